@@ -1,0 +1,53 @@
+# Two commands do everything on a bare machine with Python 3.11 or newer, pip and make:
+#   make demo   builds .venv and runs the main job on sample_logs/ into demo_results/
+#   make test   passes the tests
+PYTHON ?= python3
+VENV   ?= .venv
+BIN    := $(VENV)/bin
+RUNTIME := $(VENV)/.runtime
+DEV     := $(VENV)/.dev
+
+.PHONY: demo test check slow schemas bench clean help
+
+help: ## list the targets
+	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "groundstation needs Python 3.11 or newer: set PYTHON=/path/to/python3.11"; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "Python has no venv module: install it (Debian: apt-get install python3-venv)"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+$(RUNTIME): pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@touch $@
+
+$(DEV): pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@touch $@ $(RUNTIME)
+
+demo: $(RUNTIME) ## run the main job on sample_logs/ into demo_results/
+	$(BIN)/groundstation run sample_logs -o demo_results
+	@echo "Open demo_results/<flight>/report.html, or: $(BIN)/groundstation view demo_results/<flight>"
+
+test: $(DEV) ## tests and doctests
+	$(BIN)/python -m pytest -q -n auto
+
+check: $(DEV) ## format, lint, types, tests, doctests, architecture
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -q -n auto
+
+slow: $(DEV) ## the long Monte Carlo tests
+	$(BIN)/python -m pytest -q -n auto -m slow
+
+schemas: $(DEV) ## recompile schemas/*.proto into the package's descriptor set
+	$(BIN)/python -m grpc_tools.protoc -Ischemas --include_imports \
+		--descriptor_set_out=groundstation/store/descriptors.binpb schemas/*.proto
+
+bench: $(RUNTIME) ## benchmarks against peers, printed as ratios
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[bench]'
+	for file in benchmarks/bench_*.py; do $(BIN)/python $$file || exit 1; done
+
+clean: ## remove what the targets made
+	rm -rf $(VENV) demo_results .mypy_cache .ruff_cache .pytest_cache build dist

@@ -1,0 +1,1 @@
+"""Conventions shared by every room: units, angles, frames, time, errors, records, signals."""

@@ -1,0 +1,46 @@
+"""The one wrapper around numba: loops that must be loops are compiled here and nowhere else.
+
+The cache goes beside the code when that folder can be written, else into the user's cache folder, else there is none;
+``numba.njit(cache=True)`` alone raises at import in a read-only install without a home.
+Keep compiled functions scalar: small matrix products inside njit take 7-10 s to compile.
+"""
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def _is_writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def _choose_cache() -> bool:
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return _is_writable(Path(os.environ["NUMBA_CACHE_DIR"]))
+    if _is_writable(Path(__file__).parent / "__pycache__"):
+        return True
+    user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "groundstation" / "numba"
+    if _is_writable(user_cache):
+        os.environ["NUMBA_CACHE_DIR"] = str(user_cache)
+        return True
+    return False
+
+
+def compiled(function: Function) -> Function:
+    """Compile a scalar-loop function with numba at its first call (no Python objects, errors as in numpy).
+
+    Modules that use it are imported lazily: importing numba takes about half a second.
+    """
+    cache = _choose_cache()  # before numba is imported: it reads NUMBA_CACHE_DIR once
+    import numba
+
+    return cast(Function, numba.njit(cache=cache, nogil=True, error_model="numpy")(function))

@@ -1,0 +1,47 @@
+"""Errors that say where, what was found, what was expected and what to do next."""
+
+
+class GroundstationError(Exception):
+    """Report a failure in one line a user can act on.
+
+    Parameters
+    ----------
+    where : str
+        File, topic and time or row: ``"flight3.ulg, vehicle_gps at 12.4 s"``.
+    found : str
+        What stands there: ``"latitude 912"``.
+    expected : str, optional
+        What should stand there: ``"within [-90, 90]"``.
+    next_step : str, optional
+        What the user can do about it: ``"check the scale in the profile"``.
+
+    Examples
+    --------
+    >>> print(GroundstationError("a.csv, row 7", "latitude 912", "within [-90, 90]", "check the scale"))
+    a.csv, row 7: found latitude 912, expected within [-90, 90]: check the scale
+    """
+
+    def __init__(self, where: str, found: str, expected: str = "", next_step: str = "") -> None:
+        self.where, self.found, self.expected, self.next_step = where, found, expected, next_step
+        text = f"{where}: found {found}" if expected else f"{where}: {found}"
+        if expected:
+            text += f", expected {expected}"
+        if next_step:
+            text += f": {next_step}"
+        super().__init__(" ".join(text.split()))  # one line, whatever a log put into it
+
+
+class UnreadableLogError(GroundstationError):
+    """No reader claims the file, or nothing in it could be read (exit code 1)."""
+
+
+class UsageError(GroundstationError):
+    """The call cannot be carried out as asked (exit code 2)."""
+
+
+class NotAssessableError(GroundstationError):
+    """An analysis lacks what it needs; the reason is the message. Never fatal to a run."""
+
+
+class SettingsError(UsageError):
+    """A settings, profile, aircraft or site file has a value that cannot be used."""

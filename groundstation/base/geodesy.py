@@ -1,0 +1,78 @@
+"""WGS-84 ellipsoid: radii of curvature and small displacements.
+
+Source: NIMA TR8350.2, Department of Defense World Geodetic System 1984, third edition (2000), tables 3.1 and 3.3.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from groundstation.base.angles import FloatArray, wrap_180
+
+SEMI_MAJOR_M = 6_378_137.0
+FLATTENING = 1.0 / 298.257223563
+ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
+EARTH_RATE_RADPS = 7.292115e-5
+
+
+def curvature_radii_m(latitude_deg: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Meridian and prime-vertical radii of curvature, metres, shape as the latitude.
+
+    Examples
+    --------
+    >>> meridian, prime_vertical = curvature_radii_m(0.0)
+    >>> round(float(meridian), 3), round(float(prime_vertical), 3)
+    (6335439.327, 6378137.0)
+    """
+    sine = np.sin(np.deg2rad(np.asarray(latitude_deg, dtype=np.float64)))
+    denominator = 1.0 - ECCENTRICITY_SQUARED * sine * sine
+    prime_vertical = SEMI_MAJOR_M / np.sqrt(denominator)
+    return prime_vertical * (1.0 - ECCENTRICITY_SQUARED) / denominator, prime_vertical
+
+
+def north_east_m(
+    latitude_deg: ArrayLike,
+    longitude_deg: ArrayLike,
+    origin_latitude_deg: float,
+    origin_longitude_deg: float,
+    altitude_m: float = 0.0,
+) -> tuple[FloatArray, FloatArray]:
+    """Displacements from an origin in metres north and east, good to 0.1 % within 50 km.
+
+    The date line is crossed as if it were not there.
+
+    Examples
+    --------
+    >>> north, east = north_east_m(0.001, -179.999, 0.0, 179.999)
+    >>> round(float(north), 2), round(float(east), 2)
+    (110.57, 222.64)
+    """
+    latitude = np.asarray(latitude_deg, dtype=np.float64)
+    meridian, prime_vertical = curvature_radii_m(0.5 * (latitude + origin_latitude_deg))
+    mid_latitude_rad = np.deg2rad(0.5 * (latitude + origin_latitude_deg))
+    north = np.deg2rad(latitude - origin_latitude_deg) * (meridian + altitude_m)
+    difference = wrap_180(np.asarray(longitude_deg, dtype=np.float64) - origin_longitude_deg)
+    east = np.deg2rad(difference) * (prime_vertical + altitude_m) * np.cos(mid_latitude_rad)
+    return north, east
+
+
+def latitude_longitude_deg(
+    north_m: ArrayLike, east_m: ArrayLike, origin_latitude_deg: float, origin_longitude_deg: float
+) -> tuple[FloatArray, FloatArray]:
+    """Latitude and longitude, degrees, of displacements from an origin: the inverse of :func:`north_east_m`.
+
+    Examples
+    --------
+    >>> latitude, longitude = latitude_longitude_deg(1000.0, 2000.0, 56.0, 179.99)
+    >>> north, east = north_east_m(latitude, longitude, 56.0, 179.99)
+    >>> round(float(north), 6), round(float(east), 6)
+    (1000.0, 2000.0)
+    """
+    north = np.asarray(north_m, dtype=np.float64)
+    latitude = np.asarray(origin_latitude_deg + np.rad2deg(north / SEMI_MAJOR_M))
+    for _ in range(4):  # fixed point; contracts by the eccentricity squared (0.7 %) each time
+        meridian, _unused = curvature_radii_m(0.5 * (latitude + origin_latitude_deg))
+        latitude = origin_latitude_deg + np.rad2deg(north / meridian)
+    _unused, prime_vertical = curvature_radii_m(0.5 * (latitude + origin_latitude_deg))
+    mid_latitude_rad = np.deg2rad(0.5 * (latitude + origin_latitude_deg))
+    difference_deg = np.rad2deg(np.asarray(east_m, dtype=np.float64) / (prime_vertical * np.cos(mid_latitude_rad)))
+    return latitude, wrap_180(origin_longitude_deg + difference_deg)

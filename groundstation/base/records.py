@@ -1,0 +1,166 @@
+"""Records: what readers and the store yield, and what tables are made from.
+
+A reader is an iterator of items. Most are :class:`RecordBatch` (a bounded batch of one topic's columns); beside them
+come :class:`LogHeader` (facts about the log), :class:`Damage` (what could not be read, where and how much) and
+:class:`Remark` (what the reader derived or assumed). Missing stays missing: absent values are marked, never filled.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Int64Array = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+MAX_BATCH_ROWS = 65_536
+MAX_TEXT_CHARACTERS = 1_024
+
+
+def frozen(array: NDArray[Any]) -> NDArray[Any]:
+    """Return a read-only view of ``array``: arrays inside dataclasses never change."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+@dataclass(frozen=True)
+class Column:
+    """Values of one field and where they are present.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        float64, float32, bool, an integer type, or fixed-width text (dtype kind ``U``). Where absent the value is
+        a filler (0, NaN or empty) that nobody may read.
+    present : ndarray of bool, shape (n,), optional
+        None means: every value is present. A NaN that the device wrote is present.
+    """
+
+    values: NDArray[Any]
+    present: BoolArray | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", frozen(self.values))
+        if self.present is not None:
+            object.__setattr__(self, "present", frozen(self.present))
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def mask(self) -> BoolArray:
+        """Presence as an array, shape (n,)."""
+        return np.ones(len(self.values), dtype=bool) if self.present is None else self.present
+
+    def take(self, index: Any) -> "Column":
+        """The rows that ``index`` (slice, mask or positions) selects."""
+        return Column(self.values[index], None if self.present is None else self.present[index])
+
+
+@dataclass(frozen=True)
+class RecordBatch:
+    """A bounded batch of one topic's records, in the order of the source.
+
+    Parameters
+    ----------
+    topic : str
+        Canonical (``ins``, ``gnss.2``) or ``raw.<source topic>``.
+    record_index : ndarray of int64, shape (n,)
+        Place of each record in the source: rows of a table, messages of a log. Increasing; shared by the topics.
+    device_time_ns : Column of int64
+        Time as the recorder wrote it, nanoseconds, on the clock that the header names; absent where the log had none.
+    columns : mapping of name to Column
+    time_ns : ndarray of int64, shape (n,), optional
+        Corrected recorder time, set once the clock is known: UTC nanoseconds since 1970 when the clock is absolute,
+        else nanoseconds since the log's zero. Readers leave it out; the store yields it.
+    validity_time_ns : ndarray of int64, shape (n,), optional
+        Time at which the values were true, where it is not ``time_ns``.
+    """
+
+    topic: str
+    record_index: Int64Array
+    device_time_ns: Column
+    columns: Mapping[str, Column]
+    time_ns: Int64Array | None = None
+    validity_time_ns: Int64Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.record_index)
+
+    def take(self, index: Any) -> "RecordBatch":
+        """The rows that ``index`` (slice, mask or positions) selects."""
+        return RecordBatch(
+            self.topic,
+            self.record_index[index],
+            self.device_time_ns.take(index),
+            {name: column.take(index) for name, column in self.columns.items()},
+            None if self.time_ns is None else self.time_ns[index],
+            None if self.validity_time_ns is None else self.validity_time_ns[index],
+        )
+
+
+@dataclass(frozen=True)
+class LogHeader:
+    """Facts about a log, yielded before its first batch.
+
+    Parameters
+    ----------
+    reader : str
+        Name of the reader (and profile) that claimed the log: ``"flat-csv"``, ``"csv profile garmin-g1000"``.
+    metadata : mapping of str to str
+        ``aircraft``, ``flight``, ``start_utc``, ``reference.parking_heading_deg`` and whatever else the log says.
+    utc_of_zero_ns : int, optional
+        UTC (nanoseconds since 1970) of device time zero. 0 when device times are themselves UTC; None when the log
+        has no absolute time (NOTIME: never today's date).
+    """
+
+    reader: str
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    utc_of_zero_ns: int | None = None
+
+
+@dataclass(frozen=True)
+class Damage:
+    """Data that was lost, or rows that were dropped: kind, place and count.
+
+    Parameters
+    ----------
+    kind : str
+        ``truncated``, ``corrupt``, ``dropped_rows``, ``unreadable_cells``, ``dropped_channel``.
+    place : str
+        ``"row 1207"``, ``"byte 40960"``, ``"gnss.latitude_deg, rows 14 to 15"``.
+    count : int
+        How many (records, cells or bytes, as ``what`` says).
+    what : str
+        What is counted, and why it was lost: ``"rows with 13 cells instead of 25"``.
+    topic : str
+        Topic it belongs to; empty when it concerns the whole log.
+    loses_data : bool
+        False for what is odd but lost nothing (exit code 3 is for lost data).
+    """
+
+    kind: str
+    place: str
+    count: int
+    what: str
+    topic: str = ""
+    loses_data: bool = True
+
+
+@dataclass(frozen=True)
+class Remark:
+    """Something the reader derived, converted or assumed that a user must know of.
+
+    ``code`` is stable (``derived``, ``assumed_utc``, ``converted``), ``text`` is for people.
+    """
+
+    code: str
+    text: str
+    topic: str = ""
+
+
+Item: TypeAlias = LogHeader | RecordBatch | Damage | Remark
+Items: TypeAlias = Iterator[Item]

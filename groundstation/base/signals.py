@@ -1,0 +1,167 @@
+"""The canonical topics and fields. schemas/*.proto is the list; a test holds this module against it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+Kind = Literal["double", "bool", "text"]
+
+
+@dataclass(frozen=True)
+class Field:
+    """One field of a canonical topic.
+
+    Parameters
+    ----------
+    name : str
+        ``quantity_..._unit``; no suffix means no unit.
+    unit : str
+        As in the name: deg, m, mps, dps, mps2, nt, a, or empty.
+    kind : {'double', 'bool', 'text'}
+    low, high : float
+        Physical range; values outside are findings, not corrected.
+    is_heading : bool
+        Lives on the circle [0, 360): never averaged or interpolated as a plain number.
+    """
+
+    name: str
+    unit: str = ""
+    kind: Kind = "double"
+    low: float = float("-inf")
+    high: float = float("inf")
+    is_heading: bool = False
+
+
+def _double(name: str, unit: str, low: float = float("-inf"), high: float = float("inf")) -> Field:
+    return Field(name, unit, "double", low, high)
+
+
+def _heading(name: str) -> Field:
+    return Field(name, "deg", "double", 0.0, 360.0, is_heading=True)
+
+
+def _flag(name: str) -> Field:
+    return Field(name, "", "bool")
+
+
+def _text(name: str) -> Field:
+    return Field(name, "", "text")
+
+
+_POSITION = (
+    _double("latitude_deg", "deg", -90.0, 90.0),
+    _double("longitude_deg", "deg", -180.0, 180.0),
+    _double("altitude_ellipsoid_m", "m", -1_000.0, 100_000.0),
+    _double("altitude_msl_m", "m", -1_000.0, 100_000.0),
+)
+_VELOCITY = tuple(_double(f"velocity_{axis}_mps", "mps", -3_000.0, 3_000.0) for axis in ("north", "east", "down"))
+_INS = (
+    *_POSITION,
+    *_VELOCITY,
+    _double("roll_deg", "deg", -180.0, 180.0),
+    _double("pitch_deg", "deg", -90.0, 90.0),
+    _heading("true_heading_deg"),
+    _heading("magnetic_heading_deg"),
+    *(_double(f"rate_{axis}_dps", "dps", -4_000.0, 4_000.0) for axis in "xyz"),
+    *(_double(f"accel_{axis}_mps2", "mps2", -1_000.0, 1_000.0) for axis in "xyz"),
+    _text("mode"),
+    _flag("valid"),
+)
+
+# Topic kind -> its fields. `ins.1`, `ins.2`, `link.<peer>` are instances of a kind.
+TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
+    {
+        "ins": _INS,
+        "gnss": (
+            *_POSITION,
+            *_VELOCITY,
+            _heading("track_deg"),
+            _double("ground_speed_mps", "mps", 0.0, 3_000.0),
+            _double("gdop", "", 0.0, 100.0),
+            _double("pdop", "", 0.0, 100.0),
+            _double("hdop", "", 0.0, 100.0),
+            _double("velocity_sigma_mps", "mps", 0.0, 1_000.0),
+            _double("satellites_used", "", 0.0, 200.0),
+            _text("constellation"),
+            _flag("integrity_ok"),
+        ),
+        "onboard": (
+            _double("heading_error_deg", "deg", -180.0, 180.0),
+            _double("precision_deg", "deg", 0.0, 360.0),
+            _double("quality_deg", "deg", 0.0, 360.0),
+            _double("cycles", "", 0.0),
+            _double("correction_entered_deg", "deg", -180.0, 180.0),
+            _text("status"),
+        ),
+        "magnetometer": tuple(_double(f"field_{axis}_nt", "nt", -1e6, 1e6) for axis in ("forward", "right", "down")),
+        "electric": (_double("current_a", "a", -10_000.0, 10_000.0),),
+        "baro": (_double("pressure_altitude_m", "m", -1_000.0, 100_000.0),),
+        "air": (
+            _double("true_airspeed_mps", "mps", 0.0, 2_000.0),
+            _double("wind_north_mps", "mps", -200.0, 200.0),
+            _double("wind_east_mps", "mps", -200.0, 200.0),
+        ),
+        "radio_altimeter": (_double("height_m", "m", -50.0, 10_000.0),),
+        "discrete": (_flag("weight_on_wheels"),),
+        "event": (_text("name"),),
+        "link": (
+            _double("pseudorange_m", "m"),
+            _double("transmission_time_s", "s"),
+            _double("slot", ""),
+            *(_double(f"position_{axis}_m", "m") for axis in "xyz"),
+            *(_double(f"covariance_{pair}_m2", "m2") for pair in ("xx", "xy", "xz", "yy", "yz", "zz")),
+            _double("rank", ""),
+        ),
+        "satellite": (_double("pseudorange_m", "m"), *(_double(f"{axis}_m", "m") for axis in "xyz")),
+        "adf": (Field("relative_bearing_deg", "deg", "double", -360.0, 360.0),),
+        "truth": _INS,
+    }
+)
+INS_MODES = ("align", "nav", "attitude", "gnss_aided")
+RAW_PREFIX = "raw."
+
+
+def kind_of(topic: str) -> str:
+    """Kind of a topic: what stands before the first dot.
+
+    Examples
+    --------
+    >>> kind_of("gnss.2"), kind_of("raw.csv"), kind_of("link.tanker.2")
+    ('gnss', 'raw', 'link')
+    """
+    return topic.partition(".")[0]
+
+
+def is_canonical(topic: str) -> bool:
+    """Whether a topic is of a canonical kind (``ins``, ``gnss.1``), not ``raw.*`` or unknown.
+
+    Examples
+    --------
+    >>> is_canonical("ins.2"), is_canonical("raw.ins"), is_canonical("insx")
+    (True, False, False)
+    """
+    return kind_of(topic) in TOPICS
+
+
+def field_of(topic: str, name: str) -> Field | None:
+    """The canonical field of a topic, None when there is none of that name.
+
+    Examples
+    --------
+    >>> field_of("gnss.1", "track_deg").unit
+    'deg'
+    """
+    return next((field for field in TOPICS.get(kind_of(topic), ()) if field.name == name), None)
+
+
+def topics_of_kind(kind: str, topics: "list[str] | tuple[str, ...]") -> tuple[str, ...]:
+    """Instances of a kind among ``topics``, the plain one first, then in natural order.
+
+    Examples
+    --------
+    >>> topics_of_kind("ins", ["gnss", "ins.10", "ins.2", "ins"])
+    ('ins', 'ins.2', 'ins.10')
+    """
+    found = [topic for topic in topics if kind_of(topic) == kind]
+    return tuple(sorted(found, key=lambda topic: (len(topic), topic)))

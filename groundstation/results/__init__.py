@@ -1,0 +1,1 @@
+"""Frozen answers: findings, verdicts and the arrays behind each figure; saved and loaded."""

@@ -1,0 +1,158 @@
+"""Answer of the heading estimator (system 1): what the operator types, why, and how sure it is."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from groundstation.results.figures import FigureData
+
+GateState = Literal["passed", "failed", "not_measured"]
+Verdict = Literal["accept", "reject", "extend", "undecided"]
+
+
+@dataclass(frozen=True)
+class Gate:
+    """One acceptance gate: figure, limit, unit, state. ``value`` is None when it could not be measured.
+
+    ``limit`` is a number or a pair [low, high]; ``required`` gates decide the verdict, others inform.
+    ``reason`` says in a few words why it failed or was not measured.
+    """
+
+    name: str
+    title: str
+    value: float | None
+    limit: float | tuple[float, float]
+    unit: str
+    state: GateState
+    required: bool = True
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Standstill:
+    """GNSS velocity assessed at standstill (stage A).
+
+    Times are flight seconds. ``speed_of_mean_mps`` is the length of the mean velocity vector (gated),
+    ``mean_of_speed_mps`` the mean of the speeds: the two readings of the paper. ``speed_bound97_mps`` is the 0.97
+    bound of the former from the effective number of samples.
+    """
+
+    start_s: float
+    end_s: float
+    samples: int
+    mean_north_mps: float
+    mean_east_mps: float
+    sigma_north_mps: float
+    sigma_east_mps: float
+    mean_of_speed_mps: float
+    speed_of_mean_mps: float
+    speed_bound97_mps: float
+    share_above_limit: float
+    ground_proof: str
+    white_sigma_mps: float | None = None
+    correlated_sigma_mps: float | None = None
+    correlation_time_s: float | None = None
+
+
+@dataclass(frozen=True)
+class TaxiSegment:
+    """One straight taxi segment (stage B) and its own estimate. Times are flight seconds."""
+
+    start_s: float
+    end_s: float
+    samples: int
+    mean_track_deg: float
+    mean_speed_mps: float
+    error_deg: float
+    sigma_deg: float
+
+
+@dataclass(frozen=True)
+class RunwayCheck:
+    """Second reference: runway true bearing on line-up or take-off run against the INS heading there."""
+
+    name: str
+    true_bearing_deg: float
+    ins_heading_deg: float
+    error_deg: float
+    sigma_deg: float
+    difference_deg: float
+
+
+@dataclass(frozen=True)
+class OnboardComparison:
+    """The aircraft's own figures (topic ``onboard``) beside ours; differences are onboard minus ours."""
+
+    heading_error_deg: float | None
+    precision_deg: float | None
+    quality_deg: float | None
+    cycles: float | None
+    correction_entered_deg: float | None
+    status: str
+    difference_error_deg: float | None
+
+
+@dataclass(frozen=True)
+class HeadingResult:
+    """INS heading error found on straight taxi (error = INS heading - true heading).
+
+    Parameters
+    ----------
+    ins_topic, gnss_topic : str
+        The pair used.
+    heading_source : str
+        ``"true heading"`` or how a magnetic heading was turned to true (logged variation, magnetic model and date).
+    error_deg : float
+        The estimate reported and corrected by: robust, weighted by speed.
+    paper_error_deg : float
+        The plain running mean of the paper over the same samples.
+    standard_error_deg, confidence95_deg
+        Honest ones: they allow for errors correlated over seconds.
+    precision_deg : float
+        The paper's e: 1.96 sqrt(s^2 / (n - 1)).
+    quality_deg : float
+        Standard deviation of the running mean about its own running mean.
+    estimate_sd_deg : float
+        Standard deviation of the differences d about their mean.
+    correction_deg : float or None
+        The number to type: minus the error, rounded to the entry step; None unless there is something to type.
+    drift_deg_per_h, drift_sigma_deg_per_h : float
+    lever_arm_m, lever_arm_sigma_m, lever_arm_origin
+        Longitudinal antenna arm, its sigma, and ``"aircraft file"``, ``"estimated"`` or ``"not observable"``.
+    """
+
+    ins_topic: str
+    gnss_topic: str
+    heading_source: str
+    verdict: Verdict
+    verdict_reason: str
+    error_deg: float
+    standard_error_deg: float
+    confidence95_deg: tuple[float, float]
+    paper_error_deg: float
+    precision_deg: float
+    quality_deg: float
+    estimate_sd_deg: float
+    samples: int
+    taxi_seconds: float
+    drift_deg_per_h: float | None
+    drift_sigma_deg_per_h: float | None
+    correction_deg: float | None
+    entry_step_deg: float
+    gates: tuple[Gate, ...]
+    standstill: Standstill | None
+    segments: tuple[TaxiSegment, ...]
+    directions: tuple[TaxiSegment, ...] = ()
+    lever_arm_m: float | None = None
+    lever_arm_sigma_m: float | None = None
+    lever_arm_origin: str = "not observable"
+    time_offset_s: float | None = None
+    time_offset_sigma_s: float | None = None
+    parking_ins_heading_deg: float | None = None
+    parking_heading_deg: float | None = None
+    parking_sigma_deg: float | None = None
+    reference_parking_heading_deg: float | None = None
+    reference_residual_arcmin: float | None = None
+    runway: tuple[RunwayCheck, ...] = ()
+    onboard: OnboardComparison | None = None
+    settings: dict[str, float | str | bool] = field(default_factory=dict)
+    figures: tuple[FigureData, ...] = ()

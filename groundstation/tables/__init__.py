@@ -1,0 +1,1 @@
+"""Typed tables of one flight on one clock: validity, gaps, resampling, flight phases."""

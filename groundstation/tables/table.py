@@ -1,0 +1,157 @@
+"""A table: the samples of one topic as named numpy columns on the corrected clock."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.records import BoolArray, Column, Int64Array, frozen
+from groundstation.base.units import NS_PER_S
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Samples of one topic, in order of corrected time.
+
+    Parameters
+    ----------
+    topic : str
+    time_ns : ndarray of int64, shape (n,)
+        Corrected time of validity, never decreasing; duplicated times may occur (see :meth:`unique_times`).
+    columns : mapping of name to Column, each of length n
+    record_index, device_time_ns
+        Place in the source and time as read.
+    """
+
+    topic: str
+    time_ns: Int64Array
+    columns: Mapping[str, Column]
+    record_index: Int64Array
+    device_time_ns: Column
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "time_ns", frozen(self.time_ns))
+        object.__setattr__(self, "record_index", frozen(self.record_index))
+        object.__setattr__(self, "columns", MappingProxyType(dict(self.columns)))
+
+    def __len__(self) -> int:
+        return len(self.time_ns)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.columns
+
+    def has(self, *names: str) -> bool:
+        """Whether every named field is there with at least one present value."""
+        return all(name in self.columns and bool(self.columns[name].mask.any()) for name in names)
+
+    def values(self, name: str) -> FloatArray:
+        """Field as float64, shape (n,), NaN where absent (also where the device wrote NaN, and for no such field)."""
+        if name not in self.columns:
+            return np.full(len(self), np.nan)
+        column = self.columns[name]
+        out = np.asarray(column.values, dtype=np.float64)
+        if column.present is not None:
+            out = np.where(column.present, out, np.nan)
+        return out
+
+    def valid(self, *names: str) -> BoolArray:
+        """Where every named field is present and finite, shape (n,)."""
+        mask = np.ones(len(self), dtype=bool)
+        for name in names:
+            mask &= np.isfinite(self.values(name))
+        return mask
+
+    def text(self, name: str) -> NDArray[np.str_]:
+        """Text field, shape (n,), empty where absent."""
+        if name not in self.columns:
+            return np.full(len(self), "", dtype="U1")
+        column = self.columns[name]
+        return np.where(column.mask, column.values.astype(np.str_), "")
+
+    def take(self, index: Any) -> "Table":
+        """The rows that ``index`` (slice, mask or positions) selects."""
+        return Table(
+            self.topic,
+            self.time_ns[index],
+            {name: column.take(index) for name, column in self.columns.items()},
+            self.record_index[index],
+            self.device_time_ns.take(index),
+        )
+
+    def unique_times(self) -> "Table":
+        """The table without repeated times: of several samples of one time the first is kept."""
+        keep = np.ones(len(self), dtype=bool)
+        keep[1:] = np.diff(self.time_ns) > 0
+        return self if keep.all() else self.take(keep)
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Pandas frame of the columns, index ``time_ns`` (int64 nanoseconds), missing values as NaN / NA."""
+        import pandas as pd
+
+        data: dict[str, Any] = {}
+        for name, column in self.columns.items():
+            series = pd.Series(column.values)
+            if column.present is not None and not column.present.all():
+                series = series.where(pd.Series(column.present))
+            data[name] = series.to_numpy()
+        return pd.DataFrame(data, index=pd.Index(self.time_ns, name="time_ns"))
+
+
+@dataclass(frozen=True)
+class Flight:
+    """The tables of one flight on one clock.
+
+    Parameters
+    ----------
+    tables : mapping of topic to Table
+    metadata : mapping of str to str
+        ``aircraft``, ``flight``, ``start_utc``, ``reference.parking_heading_deg`` and what the log says.
+    start_ns : int
+        Corrected time of the first sample of any topic: flight time zero.
+    has_utc : bool
+        Whether corrected time is UTC; False means NOTIME: nanoseconds since the log's own zero.
+    source_name : str
+        Name of the log file, without folders.
+    """
+
+    tables: Mapping[str, Table]
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    start_ns: int = 0
+    has_utc: bool = False
+    source_name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tables", MappingProxyType(dict(self.tables)))
+        object.__setattr__(self, "metadata", MappingProxyType(dict(self.metadata)))
+
+    def __contains__(self, topic: str) -> bool:
+        return topic in self.tables
+
+    def __getitem__(self, topic: str) -> Table:
+        return self.tables[topic]
+
+    def topics(self) -> tuple[str, ...]:
+        """Topics in alphabetical order."""
+        return tuple(sorted(self.tables))
+
+    def seconds(self, time_ns: Int64Array) -> FloatArray:
+        """Seconds since the start of the flight, float64, shape as ``time_ns``."""
+        return (np.asarray(time_ns, dtype=np.int64) - self.start_ns) / NS_PER_S
+
+    def time_s(self, topic: str) -> FloatArray:
+        """Flight seconds of a topic's samples, shape (n,)."""
+        return self.seconds(self.tables[topic].time_ns)
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds from the first to the last sample of any topic."""
+        ends = [int(table.time_ns[-1]) for table in self.tables.values() if len(table)]
+        return (max(ends) - self.start_ns) / NS_PER_S if ends else 0.0

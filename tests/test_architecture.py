@@ -1,0 +1,80 @@
+"""Data flows one way: the rooms' import table, read off the syntax trees (imports inside functions count)."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "groundstation"
+
+MAY_IMPORT: dict[str, set[str]] = {
+    "base": set(),
+    "readers": {"base"},
+    "store": {"base"},
+    "integrity": {"base"},
+    "tables": {"base"},
+    "results": {"base"},
+    "estimators": {"base", "tables", "results"},
+    "simulation": {"base", "tables"},
+    "studies": {"base", "tables", "results", "estimators", "simulation"},
+    "viewer": {"base", "tables", "results"},
+    "reports": {"base", "tables", "results"},
+    "pipeline": {
+        *("base", "readers", "store", "integrity", "tables", "results"),
+        *("estimators", "simulation", "studies", "viewer", "reports"),
+    },
+    "cli": {"base", "results", "pipeline"},
+}
+ONLY_ROOM_OF = {"mcap": "store", "google": "store", "foxglove_schemas_protobuf": "store", "rerun": "viewer"}
+
+
+def modules() -> list[Path]:
+    return sorted(PACKAGE.rglob("*.py"))
+
+
+def room_of(path: Path) -> str:
+    parts = path.relative_to(PACKAGE).parts
+    return parts[0] if len(parts) > 1 else ""
+
+
+def imports_of(tree: ast.AST) -> list[tuple[str, int]]:
+    found: list[tuple[str, int]] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found += [(alias.name, node.lineno) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"relative import in line {node.lineno}"
+            found.append((node.module or "", node.lineno))
+            if node.module == "groundstation":
+                found += [(f"groundstation.{alias.name}", node.lineno) for alias in node.names]
+    return found
+
+
+@pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_room_imports_only_what_it_may(path: Path) -> None:
+    room = room_of(path)
+    for name, line in imports_of(ast.parse(path.read_text(encoding="utf-8"))):
+        top, _, rest = name.partition(".")
+        if top == "groundstation" and rest and room:
+            other = rest.partition(".")[0]
+            if other.startswith("__"):
+                continue
+            assert other == room or other in MAY_IMPORT[room], f"{path.name}:{line}: {room} imports {name}"
+        owner = ONLY_ROOM_OF.get(top)
+        assert owner is None or owner == room, f"{path.name}:{line}: only {owner}/ imports {top}"
+
+
+def test_every_room_is_in_the_table() -> None:
+    rooms = {path.name for path in PACKAGE.iterdir() if path.is_dir() and any(path.glob("*.py"))}
+    assert rooms <= set(MAY_IMPORT)
+
+
+def test_package_imports_nothing_at_module_level() -> None:
+    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
+    assert not [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+
+
+def test_numba_is_imported_by_its_one_wrapper_alone() -> None:
+    for path in modules():
+        names = {name.partition(".")[0] for name, _ in imports_of(ast.parse(path.read_text(encoding="utf-8")))}
+        assert "numba" not in names or path == PACKAGE / "base" / "compile.py", path
