@@ -1,0 +1,144 @@
+"""The files of one flight: summary.json, manifest.json, results.parquet/ and its readable copies tables/*.csv."""
+
+import json
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from groundstation.base.errors import UnreadableLogError
+from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults
+from groundstation.results.summary import digits_of, summary_of
+
+SUMMARY, MANIFEST, ARRAYS, TABLES = "summary.json", "manifest.json", "results.parquet", "tables"
+FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
+
+
+@dataclass(frozen=True)
+class SavedFlight:
+    """What a flight folder holds, as the report, ``compare`` and the fleet read it.
+
+    ``summary`` and ``manifest`` are the JSON documents; ``figures`` maps a name to its arrays.
+    """
+
+    folder: Path
+    summary: Mapping[str, Any]
+    manifest: Mapping[str, Any]
+    figures: Mapping[str, FigureData]
+
+    def figure(self, name: str) -> FigureData | None:
+        """The figure data of that name, None when the flight has none or it is empty."""
+        found = self.figures.get(name)
+        return found if found is not None and len(found) else None
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file under a temporary name and move it into place: a kill never leaves half a file."""
+    temporary = path.with_name(f".{path.name}.partial")
+    temporary.write_text(text, encoding="utf-8", newline="\n")
+    temporary.replace(path)
+
+
+def json_text(document: Any) -> str:
+    """Render JSON as it is written everywhere: two spaces, order kept, NaN refused."""
+    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def save(folder: Path, results: FlightResults, manifest: Mapping[str, Any]) -> None:
+    """Write a flight's answers and arrays into its folder; what an earlier run left of them is replaced.
+
+    Parameters
+    ----------
+    folder : Path
+        Created when missing.
+    results : FlightResults
+    manifest : mapping
+        Time of run, host, versions, settings: everything that may differ between two equal runs stands here alone.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in (ARRAYS, TABLES):
+        shutil.rmtree(folder / name, ignore_errors=True)
+        (folder / name).mkdir()
+    for figure in results.figures:
+        _write_parquet(folder / ARRAYS / f"{figure.name}.parquet", figure)
+        write_text(folder / TABLES / f"{figure.name}.csv", csv_text(figure))
+    write_text(folder / SUMMARY, json_text(summary_of(results)))
+    write_text(folder / MANIFEST, json_text(manifest))
+
+
+def load(folder: Path) -> SavedFlight:
+    """Read a flight folder back.
+
+    Raises
+    ------
+    UnreadableLogError
+        When the folder has no summary.json, or one that is not JSON.
+    """
+    documents = {}
+    for name in (SUMMARY, MANIFEST):
+        try:
+            documents[name] = json.loads((folder / name).read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise UnreadableLogError(
+                str(folder / name), type(error).__name__, "the JSON file a run leaves", "run the log again"
+            ) from error
+    figures = {path.stem: _read_parquet(path) for path in sorted((folder / ARRAYS).glob("*.parquet"))}
+    return SavedFlight(folder, documents[SUMMARY], documents[MANIFEST], figures)
+
+
+def _write_parquet(path: Path, figure: FigureData) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    arrays = {
+        name: pa.array(values.tolist() if values.dtype.kind == "U" else values)
+        for name, values in figure.columns.items()
+    }
+    digits = {name: str(figure.digits[name]) for name in figure.digits}
+    table = pa.table(arrays).replace_schema_metadata({"digits": json.dumps(digits, sort_keys=True)})
+    pq.write_table(table, path, compression="zstd")
+
+
+def _read_parquet(path: Path) -> FigureData:
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(path)
+    except (OSError, ValueError) as error:
+        raise UnreadableLogError(
+            str(path), type(error).__name__, "a Parquet file of a run", "run the log again"
+        ) from error
+    digits = json.loads((table.schema.metadata or {}).get(b"digits", b"{}"))
+    columns = {}
+    for name in table.column_names:
+        values = table.column(name).to_numpy()
+        columns[name] = values.astype(np.str_) if values.dtype.kind == "O" else values
+    return FigureData(path.stem, columns, {name: int(places) for name, places in digits.items()})
+
+
+def csv_text(figure: FigureData) -> str:
+    """Readable copy of a figure's arrays: rounded, NaN empty, no cell a spreadsheet would run as a formula."""
+    cells = []
+    for name, values in figure.columns.items():
+        places = figure.digits.get(name, digits_of(name))
+        if values.dtype.kind == "f":
+            rounded = np.round(values.astype(np.float64), places) + 0.0
+            cells.append([f"{value:.{places}f}" if np.isfinite(value) else "" for value in rounded.tolist()])
+        elif values.dtype.kind == "b":
+            cells.append(["1" if value else "0" for value in values.tolist()])
+        else:
+            cells.append(
+                [_text_cell(str(value)) if values.dtype.kind == "U" else str(value) for value in values.tolist()]
+            )
+    lines = [",".join(_text_cell(name) for name in figure.columns)]
+    lines += [",".join(row) for row in zip(*cells, strict=True)]
+    return "\n".join(lines) + "\n"
+
+
+def _text_cell(text: str) -> str:
+    safe = "'" + text if text.startswith(FORMULA_STARTS) else text
+    return '"' + safe.replace('"', '""') + '"' if any(mark in safe for mark in ',"\n\r') else safe

@@ -1,0 +1,72 @@
+"""Everything found out about one flight, in one frozen object: what the recording and the report are made from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from groundstation.base.findings import Finding
+from groundstation.results.figures import FigureData
+from groundstation.results.heading import HeadingResult
+
+Status = Literal["ok", "degraded", "failed"]
+
+
+@dataclass(frozen=True)
+class NotAssessable:
+    """An analysis that could not be carried out, and the reason for people."""
+
+    analysis: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Source:
+    """The log a flight came from: name without folders, SHA-256, size, reader that claimed it."""
+
+    name: str
+    sha256: str
+    size_bytes: int
+    reader: str
+
+
+@dataclass(frozen=True)
+class FlightResults:
+    """Results of one flight.
+
+    Parameters
+    ----------
+    flight_id : str
+    source : Source
+    metadata : mapping of str to str
+        ``aircraft``, ``flight`` and what the log says.
+    start_utc_ns : int, optional
+        First corrected time, UTC nanoseconds since 1970; None for a log without absolute time.
+    duration_s : float
+    status : {'ok', 'degraded', 'failed'}
+        degraded: data was lost or a finding is grave; failed: nothing could be computed.
+    completeness : mapping of topic to share of expected samples, 0 to 1
+    ledger, clock : mapping
+        As written to summary.json.
+    findings, not_assessable : tuples
+    heading : HeadingResult, optional
+    figures : tuple of FigureData
+        Arrays behind every figure, those of the heading among them.
+    """
+
+    flight_id: str
+    source: Source
+    metadata: Mapping[str, str]
+    start_utc_ns: int | None
+    duration_s: float
+    status: Status
+    completeness: Mapping[str, float] = field(default_factory=dict)
+    ledger: Mapping[str, Any] = field(default_factory=dict)
+    clock: Mapping[str, Any] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+    not_assessable: tuple[NotAssessable, ...] = ()
+    heading: HeadingResult | None = None
+    figures: tuple[FigureData, ...] = ()
+
+    def figure(self, name: str) -> FigureData | None:
+        """The figure data of that name, None when the flight has none."""
+        return next((figure for figure in self.figures if figure.name == name), None)
