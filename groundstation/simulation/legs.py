@@ -1,0 +1,234 @@
+"""Legs of a simulated flight, as a scenario lists them, and the motion pieces each of them is made of.
+
+On the ground the state is ground speed along the track; in the air it is airspeed along the direction of the air
+velocity, so that a turn at constant bank is one in the air mass and the wind adds to the ground velocity.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar, TypeAlias
+
+import numpy as np
+
+from groundstation.base.errors import SettingsError
+from groundstation.base.toml_settings import number, required_number
+from groundstation.base.units import MPS2_PER_G
+
+GROUND_ACCELERATION_MPS2 = 0.8  # peak of a change of taxi speed
+BRAKING_MPS2 = 2.0
+AIR_ACCELERATION_MPS2 = 1.0
+GROUND_TURN_RAMP_S = 2.0
+BANK_RAMP_S = 5.0
+CLIMB_RAMP_S = 8.0
+
+
+@dataclass(frozen=True)
+class Parked:
+    """Stand still, braking first if the aircraft moves: at the stand, at a stop, lined up on the runway."""
+
+    kind: ClassVar[str] = "parked"
+    duration_s: float = required_number(0.0)
+
+
+@dataclass(frozen=True)
+class Taxi:
+    """Taxi straight on for a length; the change to the leg's speed is made at its start and is part of the length."""
+
+    kind: ClassVar[str] = "taxi"
+    length_m: float = required_number(0.0)
+    speed_mps: float = required_number(0.5, 40.0)
+
+
+@dataclass(frozen=True)
+class GroundTurn:
+    """Turn on the ground (right positive) at a speed; the rate rises and falls smoothly."""
+
+    kind: ClassVar[str] = "ground_turn"
+    angle_deg: float = required_number(-720.0, 720.0)
+    speed_mps: float = number(5.0, 0.5, 40.0)
+    rate_dps: float = number(9.0, 0.01, 30.0)
+
+
+@dataclass(frozen=True)
+class TakeOff:
+    """Accelerate straight on, rotate in the last seconds and lift off at a speed, then begin to climb."""
+
+    kind: ClassVar[str] = "take_off"
+    lift_off_speed_mps: float = number(55.0, 20.0, 120.0)
+    acceleration_mps2: float = number(2.5, 0.1, 10.0)
+    climb_rate_mps: float = number(6.0, 0.5, 40.0)
+
+
+@dataclass(frozen=True)
+class Fly:
+    """Fly straight for a time; airspeed and climb rate change smoothly at the start (0 keeps level)."""
+
+    kind: ClassVar[str] = "fly"
+    duration_s: float = required_number(0.0)
+    airspeed_mps: float = required_number(20.0, 400.0)
+    climb_rate_mps: float = number(0.0, -40.0, 40.0)
+
+
+@dataclass(frozen=True)
+class ClimbTo:
+    """Climb or descend to an ellipsoid altitude and level off there, exactly."""
+
+    kind: ClassVar[str] = "climb_to"
+    altitude_m: float = required_number(-500.0, 20_000.0)
+    airspeed_mps: float = required_number(20.0, 400.0)
+    climb_rate_mps: float = number(8.0, 0.1, 40.0)
+
+
+@dataclass(frozen=True)
+class AirTurn:
+    """Coordinated turn (right positive) at constant airspeed and altitude; the bank is rolled in and out smoothly."""
+
+    kind: ClassVar[str] = "air_turn"
+    angle_deg: float = required_number(-1080.0, 1080.0)
+    bank_deg: float = number(20.0, 1.0, 60.0)
+
+
+@dataclass(frozen=True)
+class Landing:
+    """Descend to the runway, flare, touch down at a speed and brake to taxi speed."""
+
+    kind: ClassVar[str] = "landing"
+    runway_altitude_m: float = required_number(-500.0, 6_000.0)
+    airspeed_mps: float = number(50.0, 20.0, 120.0)
+    descent_rate_mps: float = number(3.0, 0.5, 10.0)
+    taxi_speed_mps: float = number(8.0, 0.5, 30.0)
+
+
+Leg: TypeAlias = Parked | Taxi | GroundTurn | TakeOff | Fly | ClimbTo | AirTurn | Landing
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A stretch of motion: speed, turn rate and climb rate go smoothly from their last values to these.
+
+    ``airborne`` is the state during the piece. Durations are rounded up to whole steps by the planner beforehand.
+    """
+
+    duration_s: float
+    speed_mps: float
+    turn_rate_dps: float = 0.0
+    climb_rate_mps: float = 0.0
+    airborne: bool = False
+
+
+@dataclass(frozen=True)
+class MotionState:
+    """Where the aircraft stands between two pieces: speed and direction over the ground, or through the air."""
+
+    step_s: float
+    speed_mps: float
+    direction_deg: float
+    altitude_m: float
+    climb_rate_mps: float = 0.0
+    airborne: bool = False
+
+    def whole_steps(self, duration_s: float) -> float:
+        """Round a duration up to whole steps."""
+        return float(np.ceil(duration_s / self.step_s - 1e-6)) * self.step_s
+
+
+def pieces_of(leg: Leg, state: MotionState, place: str) -> tuple[Piece, ...]:
+    """The pieces of one leg flown from a state (which is not changed).
+
+    Raises
+    ------
+    SettingsError
+        When the leg cannot follow: a ground leg in the air, a straight too short for its change of speed.
+    """
+    wants_air = isinstance(leg, Fly | ClimbTo | AirTurn | Landing)
+    if wants_air != state.airborne:
+        found = f"{leg.kind} {'on the ground' if wants_air else 'in the air'}"
+        raise SettingsError(place, found, "take_off before and landing after the legs flown in the air")
+    match leg:
+        case Parked():
+            return _parked(leg, state)
+        case Taxi():
+            return _taxi(leg, state, place)
+        case GroundTurn():
+            ramp = _speed_change(state, leg.speed_mps, GROUND_ACCELERATION_MPS2)
+            return ramp + _turn(leg.angle_deg, leg.rate_dps, GROUND_TURN_RAMP_S, leg.speed_mps, state)
+        case TakeOff():
+            return _take_off(leg, state)
+        case Fly():
+            ramp_s = state.whole_steps(_air_ramp_s(state, leg.airspeed_mps))
+            hold_s = state.whole_steps(max(leg.duration_s - ramp_s, 0.0))
+            return tuple(
+                Piece(duration, leg.airspeed_mps, 0.0, leg.climb_rate_mps, True) for duration in (ramp_s, hold_s)
+            )
+        case ClimbTo():
+            return _climb_to(leg.altitude_m, leg.airspeed_mps, leg.climb_rate_mps, state, place)
+        case AirTurn():
+            rate = float(np.rad2deg(MPS2_PER_G * np.tan(np.deg2rad(leg.bank_deg)) / state.speed_mps))
+            level = () if state.climb_rate_mps == 0.0 else (_level(state),)
+            return level + _turn(leg.angle_deg, rate, BANK_RAMP_S, state.speed_mps, state)
+        case Landing():
+            return _climb_to(leg.runway_altitude_m, leg.airspeed_mps, leg.descent_rate_mps, state, place)
+
+
+def _speed_change(state: MotionState, speed_mps: float, acceleration_mps2: float) -> tuple[Piece, ...]:
+    difference = abs(speed_mps - state.speed_mps)
+    if difference == 0.0:
+        return ()
+    # The smoothstep's steepest slope is 1.5 times its mean one.
+    return (Piece(state.whole_steps(1.5 * difference / acceleration_mps2), speed_mps, airborne=state.airborne),)
+
+
+def _parked(leg: Parked, state: MotionState) -> tuple[Piece, ...]:
+    return (*_speed_change(state, 0.0, GROUND_ACCELERATION_MPS2), Piece(state.whole_steps(leg.duration_s), 0.0))
+
+
+def _taxi(leg: Taxi, state: MotionState, place: str) -> tuple[Piece, ...]:
+    ramp = _speed_change(state, leg.speed_mps, GROUND_ACCELERATION_MPS2)
+    used_m = sum(piece.duration_s * 0.5 * (state.speed_mps + leg.speed_mps) for piece in ramp)
+    if used_m > leg.length_m:
+        raise SettingsError(f"{place}.length_m", f"{leg.length_m:g} m", f"{used_m:.0f} m or more for the speed change")
+    return (*ramp, Piece(state.whole_steps((leg.length_m - used_m) / leg.speed_mps), leg.speed_mps))
+
+
+def _turn(angle_deg: float, rate_dps: float, ramp_s: float, speed_mps: float, state: MotionState) -> tuple[Piece, ...]:
+    """Rate up, hold, rate down; the rate is adjusted so that whole steps give exactly the angle."""
+    hold_s = state.whole_steps(max(abs(angle_deg) / rate_dps - ramp_s, 0.0))
+    ramp_s = state.whole_steps(ramp_s)
+    rate = angle_deg / (hold_s + ramp_s)  # each ramp contributes half its length at full rate
+    rates_and_times = ((rate, ramp_s), (rate, hold_s), (0.0, ramp_s))
+    return tuple(Piece(time, speed_mps, rate, 0.0, state.airborne) for rate, time in rates_and_times)
+
+
+def _take_off(leg: TakeOff, state: MotionState) -> tuple[Piece, ...]:
+    roll_s = state.whole_steps(1.5 * (leg.lift_off_speed_mps - state.speed_mps) / leg.acceleration_mps2)
+    return (Piece(roll_s, leg.lift_off_speed_mps),)
+
+
+def pieces_after_transition(leg: Leg, state: MotionState) -> tuple[Piece, ...]:
+    """The pieces of a take-off in the air and of a landing on the ground, flown after lift-off and touchdown."""
+    if isinstance(leg, TakeOff):
+        return (Piece(state.whole_steps(CLIMB_RAMP_S), state.speed_mps, 0.0, leg.climb_rate_mps, True),)
+    if isinstance(leg, Landing):
+        return _speed_change(state, leg.taxi_speed_mps, BRAKING_MPS2)
+    return ()
+
+
+def _air_ramp_s(state: MotionState, airspeed_mps: float) -> float:
+    return max(1.5 * abs(airspeed_mps - state.speed_mps) / AIR_ACCELERATION_MPS2, CLIMB_RAMP_S)
+
+
+def _level(state: MotionState) -> Piece:
+    return Piece(state.whole_steps(CLIMB_RAMP_S), state.speed_mps, 0.0, 0.0, True)
+
+
+def _climb_to(
+    altitude_m: float, airspeed_mps: float, climb_rate_mps: float, state: MotionState, place: str
+) -> tuple[Piece, ...]:
+    """Change speed and begin to climb, climb, level off: the middle rate is solved so that the altitude is exact."""
+    ramp_s, level_s = state.whole_steps(_air_ramp_s(state, airspeed_mps)), state.whole_steps(CLIMB_RAMP_S)
+    to_gain = altitude_m - state.altitude_m - 0.5 * state.climb_rate_mps * ramp_s
+    hold_s = state.whole_steps(max(abs(to_gain) / climb_rate_mps - 0.5 * (ramp_s + level_s), 0.0))
+    rate = to_gain / (hold_s + 0.5 * (ramp_s + level_s))
+    if abs(rate) > 45.0:
+        raise SettingsError(place, f"climb rate {rate:.0f} m/s", "an altitude that can be reached")
+    times_and_rates = ((ramp_s, rate), (hold_s, rate), (level_s, 0.0))
+    return tuple(Piece(time, airspeed_mps, 0.0, rate, True) for time, rate in times_and_rates)
