@@ -42,6 +42,12 @@ class Table:
         object.__setattr__(self, "record_index", frozen(self.record_index))
         object.__setattr__(self, "columns", MappingProxyType(dict(self.columns)))
 
+    @classmethod
+    def empty(cls, topic: str) -> "Table":
+        """A table without samples: every field of it has shape (0,)."""
+        nothing = np.zeros(0, dtype=np.int64)
+        return cls(topic, nothing, {}, nothing, Column(nothing))
+
     def __len__(self) -> int:
         return len(self.time_ns)
 
@@ -93,15 +99,28 @@ class Table:
         return self if keep.all() else self.take(keep)
 
     def to_frame(self) -> "pd.DataFrame":
-        """Pandas frame of the columns, index ``time_ns`` (int64 nanoseconds), missing values as NaN / NA."""
+        """Pandas frame of the columns, index ``time_ns`` (int64 nanoseconds).
+
+        Types depend on the field alone, never on what a log lacks: floats stay floats (absent and NaN are NaN), bool
+        is ``boolean``, integers are ``Int64`` and the like, text is ``string``; there absent is ``NA``.
+        """
         import pandas as pd
 
         data: dict[str, Any] = {}
         for name, column in self.columns.items():
-            series = pd.Series(column.values)
-            if column.present is not None and not column.present.all():
-                series = series.where(pd.Series(column.present))
-            data[name] = series.to_numpy()
+            absent, kind = ~column.mask, column.values.dtype.kind
+            if kind == "f":
+                filled = column.values.copy()
+                filled[absent] = np.nan
+                data[name] = filled
+            elif kind == "b":
+                data[name] = pd.arrays.BooleanArray(column.values.copy(), absent)
+            elif kind in "iu":
+                data[name] = pd.arrays.IntegerArray(column.values.copy(), absent)
+            else:
+                text = column.values.astype(object)
+                text[absent] = pd.NA
+                data[name] = pd.array(text, dtype="string")
         return pd.DataFrame(data, index=pd.Index(self.time_ns, name="time_ns"))
 
 

@@ -1,0 +1,207 @@
+"""The motion of a flight on one coarse, even grid of times: what the ground detector and the phases look at."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import FloatArray, unwrap
+from groundstation.base.geodesy import north_east_m
+from groundstation.base.records import BoolArray
+from groundstation.base.signals import topics_of_kind
+from groundstation.tables.table import Flight, Table
+
+RATE_HZ = 5.0
+LARGEST_GAP_S = 2.5  # bridges 1 Hz logs with one lost second, nothing more
+LONGEST_GRID = 5_000_000  # 11 days: a clock that jumps by years must not fill the memory
+FEWEST_SATELLITES = 4
+FROZEN_S, FROZEN_SPEED_MPS = 60.0, 20.0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Signals on the grid ``time_s = i / RATE_HZ``, NaN where no sample is near.
+
+    Parameters
+    ----------
+    speed_mps : ndarray, shape (n,)
+        Ground speed: satellite receiver where it has one, else inertial.
+    roll_deg, pitch_deg, heading_deg : ndarray, shape (n,)
+        Inertial attitude; the heading (true, else magnetic) is continuous, without jumps at north.
+    altitude_m : ndarray, shape (k, n)
+        Altitudes of k sources (inertial, satellite), each with a datum of its own: only changes count.
+    pressure_altitude_m : ndarray, shape (n,)
+        Kept apart: on the ground full throttle moves it by 12 m (propeller wash on a light aircraft's static port).
+    climb_mps : ndarray, shape (m, n)
+        Upward speeds of m sources.
+    north_m, east_m : ndarray, shape (n,)
+        Displacement from the first known position.
+    path_m : ndarray, shape (n,)
+        Distance travelled; stands still where the speed is unknown.
+    """
+
+    speed_mps: FloatArray
+    roll_deg: FloatArray
+    pitch_deg: FloatArray
+    heading_deg: FloatArray
+    altitude_m: FloatArray
+    pressure_altitude_m: FloatArray
+    climb_mps: FloatArray
+    north_m: FloatArray
+    east_m: FloatArray
+    path_m: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.speed_mps)
+
+    @property
+    def all_altitudes_m(self) -> FloatArray:
+        """Every altitude, shape (k + 1, n), the pressure altitude last."""
+        return np.concatenate([self.altitude_m, self.pressure_altitude_m[None, :]])
+
+    def distance_m(self, origin: NDArray[np.intp], at: slice | NDArray[np.intp]) -> FloatArray:
+        """Distance between rows of the grid: straight where positions are known, else along the path."""
+        straight = np.hypot(self.north_m[at] - self.north_m[origin], self.east_m[at] - self.east_m[origin])
+        along = np.abs(self.path_m[at] - self.path_m[origin])
+        return np.asarray(np.where(np.isfinite(straight), straight, along))
+
+
+def grid_size(flight: Flight) -> int:
+    """Number of grid times from the start of the flight to its end, 0 for none or for a span of many days."""
+    size = int(flight.duration_s * RATE_HZ) + 1
+    return size if any(len(table) for table in flight.tables.values()) and size <= LONGEST_GRID else 0
+
+
+def motion_of(flight: Flight) -> Motion:
+    """Resample the flight's motion: means of the samples around each grid time, straight lines in between."""
+    size = grid_size(flight)
+    ins, gnss = first_of_kind(flight, "ins"), first_of_kind(flight, "gnss")
+    usable = _usable_fixes(gnss)
+    speed = _on_grid(flight, gnss, np.where(usable, horizontal_speed_mps(gnss), np.nan), size)
+    speed = np.where(np.isfinite(speed), speed, _on_grid(flight, ins, horizontal_speed_mps(ins), size))
+    true_heading, magnetic = ins.values("true_heading_deg"), ins.values("magnetic_heading_deg")
+    heading = true_heading if np.isfinite(true_heading).any() else magnetic
+    north, east = _positions(flight, gnss, ins, size)
+    moving = np.nan_to_num(speed, nan=0.0)
+    return Motion(
+        speed,
+        _on_grid(flight, ins, unwrap(ins.values("roll_deg")), size),
+        _on_grid(flight, ins, ins.values("pitch_deg"), size),
+        _on_grid(flight, ins, unwrap(heading), size),
+        np.array([_altitude(flight, table, speed) for table in (ins, gnss)]),
+        _altitude(flight, first_of_kind(flight, "baro"), speed),
+        np.array([_on_grid(flight, table, -table.values("velocity_down_mps"), size) for table in (ins, gnss)]).reshape(
+            2, size
+        ),
+        north,
+        east,
+        np.concatenate([[0.0], np.cumsum(0.5 * (moving[1:] + moving[:-1]))])[:size] / RATE_HZ,
+    )
+
+
+def first_of_kind(flight: Flight, kind: str) -> Table:
+    """The first instance of a topic that has samples; an empty table when there is none."""
+    topics = [topic for topic in topics_of_kind(kind, flight.topics()) if len(flight[topic])]
+    return flight[topics[0]] if topics else Table.empty(kind)
+
+
+def horizontal_speed_mps(table: Table) -> FloatArray:
+    """Ground speed of a topic, shape (n,): from the velocities, else as logged."""
+    from_velocity = np.hypot(table.values("velocity_north_mps"), table.values("velocity_east_mps"))
+    return np.where(np.isfinite(from_velocity), from_velocity, table.values("ground_speed_mps"))
+
+
+def running_mean(values: FloatArray, half_width_s: float) -> FloatArray:
+    """Mean of the known values within ``half_width_s`` on either side, along the last axis; NaN stays NaN."""
+    half = round(half_width_s * RATE_HZ)
+    known = np.isfinite(values)
+    total, count = window_sum(np.where(known, values, 0.0), half), window_sum(known.astype(np.float64), half)
+    return np.where(known, total / np.maximum(count, 1.0), np.nan)
+
+
+def known_mean(values: FloatArray) -> FloatArray:
+    """Mean of the known values along the last axis, NaN where there are none."""
+    known = np.isfinite(values)
+    count = np.count_nonzero(known, axis=-1)
+    total = np.sum(np.where(known, values, 0.0), axis=-1)
+    return np.asarray(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+
+
+def largest_over_sources(deviation_m: FloatArray) -> FloatArray:
+    """Largest deviation among all altitudes, shape (k + 1, n) -> (n,); the pressure one where no other is known."""
+    geometric = np.fmax.reduce(deviation_m[:-1], axis=0)
+    return np.asarray(np.where(np.isfinite(geometric), geometric, deviation_m[-1]))
+
+
+def window_sum(values: FloatArray, half: int) -> FloatArray:
+    """Sum over the rows i - half ... i + half along the last axis, cut at the ends."""
+    size = values.shape[-1]
+    total = np.concatenate([np.zeros((*values.shape[:-1], 1)), np.cumsum(values, axis=-1)], axis=-1)
+    row = np.arange(size)
+    return np.asarray(total[..., np.minimum(row + half + 1, size)] - total[..., np.maximum(row - half, 0)])
+
+
+def runs(mask: BoolArray) -> list[tuple[int, int]]:
+    """Runs of True as half-open pairs of rows.
+
+    Examples
+    --------
+    >>> runs(np.array([True, False, True, True]))
+    [(0, 1), (2, 4)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
+
+
+def _usable_fixes(gnss: Table) -> BoolArray:
+    """Fixes that the receiver itself trusts; one that says nothing is trusted."""
+    is_doubtful = (gnss.values("integrity_ok") == 0.0) | (gnss.values("satellites_used") < FEWEST_SATELLITES)
+    return np.asarray(~is_doubtful)
+
+
+def _positions(flight: Flight, gnss: Table, ins: Table, size: int) -> tuple[FloatArray, FloatArray]:
+    for table in (gnss, ins):
+        known = table.valid("latitude_deg", "longitude_deg")
+        if known.any():
+            latitude, longitude = table.values("latitude_deg"), table.values("longitude_deg")
+            first = int(np.argmax(known))
+            north, east = north_east_m(latitude, longitude, float(latitude[first]), float(longitude[first]))
+            return _on_grid(flight, table, north, size), _on_grid(flight, table, east, size)
+    unknown = np.full(size, np.nan)
+    return unknown, unknown
+
+
+def _altitude(flight: Flight, table: Table, speed_mps: FloatArray) -> FloatArray:
+    for name in ("altitude_msl_m", "altitude_ellipsoid_m", "pressure_altitude_m"):
+        values = table.values(name)
+        if np.isfinite(values).any():
+            on_grid = _on_grid(flight, table, values, len(speed_mps))
+            return np.where(_is_frozen(on_grid, speed_mps), np.nan, on_grid)
+    return np.full(len(speed_mps), np.nan)
+
+
+def _is_frozen(altitude_m: FloatArray, speed_mps: FloatArray) -> BoolArray:
+    """An altitude equal to the last digit for a minute at speed is a stuck sensor: it proves nothing."""
+    frozen = np.zeros(len(altitude_m), dtype=bool)
+    for start, end in runs(np.diff(altitude_m, append=np.nan) == 0.0):
+        if end - start >= FROZEN_S * RATE_HZ and np.any(speed_mps[start : end + 1] > FROZEN_SPEED_MPS):
+            frozen[start : end + 1] = True
+    return frozen
+
+
+def _on_grid(flight: Flight, table: Table, values: FloatArray, size: int) -> FloatArray:
+    """Mean of the samples nearest to each grid time, straight lines over gaps of at most LARGEST_GAP_S."""
+    known = np.isfinite(values)
+    out = np.full(size, np.nan)
+    if size == 0 or not known.any():
+        return out
+    cell = np.minimum(np.rint(flight.seconds(table.time_ns[known]) * RATE_HZ).astype(np.int64), size - 1)
+    count = np.bincount(cell, minlength=size)
+    at = np.flatnonzero(count)
+    means = np.bincount(cell, weights=values[known], minlength=size)[at] / count[at]
+    out = np.interp(np.arange(size), at, means, left=np.nan, right=np.nan)
+    wide = np.flatnonzero(np.diff(at) > LARGEST_GAP_S * RATE_HZ)
+    inside = np.zeros(size + 1, dtype=np.int64)
+    inside[at[wide] + 1] += 1
+    inside[at[wide + 1]] -= 1
+    return np.where(np.cumsum(inside[:-1]) > 0, np.nan, out)

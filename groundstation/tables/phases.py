@@ -1,0 +1,279 @@
+"""Where a flight was on the ground, proven, and the phases it went through."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import FloatArray
+from groundstation.base.records import BoolArray, Int64Array, frozen
+from groundstation.base.units import NS_PER_S
+from groundstation.tables.detector import Detection, GroundSettings, detect_ground
+from groundstation.tables.motion import (
+    RATE_HZ,
+    Motion,
+    grid_size,
+    known_mean,
+    largest_over_sources,
+    motion_of,
+    running_mean,
+    runs,
+)
+from groundstation.tables.table import Flight
+from groundstation.tables.wheels import LONGEST_HOLD_S, contact_of, disbelief, held
+
+Phase = Literal["unknown", "standstill", "taxi", "take-off run", "airborne", "landing roll"]
+PHASES: tuple[Phase, ...] = get_args(Phase)
+UNKNOWN, STANDSTILL, TAXI, TAKE_OFF_RUN, AIRBORNE, LANDING_ROLL = range(len(PHASES))
+
+STEP_NS = round(NS_PER_S / RATE_HZ)
+LEAST_COVERAGE = 0.5  # share of the flight for which a flag must speak
+RUN_SHARE = 0.25  # a run begins and a roll ends at this share of the speed at lift-off and touch-down
+SLOWEST_RUN_MPS = 3.0  # what lifts off slower made no run
+LIFTED_M = 1.5  # height at which a lift-off is seen, in smoothed altitudes
+SHORTEST_STANDSTILL_S = 3.0
+
+
+@dataclass(frozen=True)
+class GroundProof:
+    """Ground contact at given times.
+
+    Parameters
+    ----------
+    mask : ndarray of bool, shape (n,)
+        True only where contact is proven. False means airborne or not known.
+    method : str
+        ``weight on wheels``, ``landed flag``, ``detector`` with what it rests on, or ``none: `` and the reason.
+    """
+
+    mask: BoolArray
+    method: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mask", frozen(self.mask))
+
+
+@dataclass(frozen=True)
+class Interval:
+    """One phase from ``start_s`` to ``end_s``, flight seconds."""
+
+    start_s: float
+    end_s: float
+    phase: Phase
+
+
+@dataclass(frozen=True)
+class Phases:
+    """Phases of a flight: intervals without overlap from its first to its last sample, and how they were found."""
+
+    intervals: tuple[Interval, ...]
+    method: str
+
+    @property
+    def start_s(self) -> FloatArray:
+        """Starts of the intervals, shape (k,)."""
+        return np.array([interval.start_s for interval in self.intervals], dtype=np.float64)
+
+    @property
+    def end_s(self) -> FloatArray:
+        """Ends of the intervals, shape (k,)."""
+        return np.array([interval.end_s for interval in self.intervals], dtype=np.float64)
+
+    @property
+    def phase(self) -> NDArray[np.str_]:
+        """Names of the phases, shape (k,)."""
+        return np.array([interval.phase for interval in self.intervals], dtype="U16")
+
+    def at(self, time_s: FloatArray) -> NDArray[np.str_]:
+        """Phase at flight times, shape as ``time_s``; ``unknown`` outside the flight."""
+        if not self.intervals:
+            return np.full(np.shape(time_s), "unknown", dtype="U16")
+        index = np.searchsorted(self.start_s, time_s, side="right") - 1
+        is_inside = (index >= 0) & (np.asarray(time_s) <= self.end_s[-1])
+        return np.where(is_inside, self.phase[index], "unknown")
+
+    def seconds_in(self, phase: Phase) -> float:
+        """Total length of a phase, seconds."""
+        return sum(interval.end_s - interval.start_s for interval in self.intervals if interval.phase == phase)
+
+
+def ground_mask(flight: Flight, time_ns: Int64Array, *, settings: GroundSettings | None = None) -> GroundProof:
+    """Prove ground contact at given times.
+
+    Weight on wheels (or an autopilot's landed flag) decides where it is logged often enough and is plausible: a flag
+    that stays on the wheels high above the ground at speed is not believed. Else the motion has to prove it, see
+    :func:`groundstation.tables.detector.detect_ground`.
+
+    Parameters
+    ----------
+    flight : Flight
+    time_ns : ndarray of int64, shape (n,)
+        Corrected times, in any order.
+    settings : GroundSettings, optional
+
+    Returns
+    -------
+    GroundProof
+    """
+    return _Evidence(flight, settings or GroundSettings()).proof(np.asarray(time_ns, dtype=np.int64))
+
+
+def flight_phases(flight: Flight, *, settings: GroundSettings | None = None) -> Phases:
+    """Divide a flight into standstill, taxi, take-off run, airborne, landing roll and unknown.
+
+    Standstill and taxi are proven ground (:func:`ground_mask`). Airborne is weight off wheels, or, by the detector,
+    everything between lift-off and touch-down around sure flight, both read off the altitude. A take-off run is the
+    stretch before lift-off that is faster than a quarter of the speed there, a landing roll the like after touch-down:
+    these two may hold samples that are not proven ground. All else is unknown.
+    """
+    evidence = _Evidence(flight, settings or GroundSettings())
+    size = grid_size(flight)
+    if size <= 1:
+        return Phases((), evidence.method)
+    label = _labels(evidence)
+    edges = np.flatnonzero(np.diff(label)) + 1
+    bounds = [0.0, *(float(edge) / RATE_HZ for edge in edges), flight.duration_s]
+    return Phases(
+        tuple(Interval(start, end, PHASES[label[round(start * RATE_HZ)]]) for start, end in pairwise(bounds)),
+        evidence.method,
+    )
+
+
+class _Evidence:
+    """What speaks for ground and for flight: the flag if it can be believed, else the detector, computed once."""
+
+    def __init__(self, flight: Flight, settings: GroundSettings) -> None:
+        self.flight, self.settings = flight, settings
+        self.contact = contact_of(flight)
+
+    @cached_property
+    def grid_ns(self) -> Int64Array:
+        return self.flight.start_ns + np.arange(grid_size(self.flight), dtype=np.int64) * STEP_NS
+
+    @cached_property
+    def motion(self) -> Motion:
+        return motion_of(self.flight)
+
+    @cached_property
+    def detection(self) -> Detection:
+        return detect_ground(self.motion, self.settings)
+
+    @cached_property
+    def against_flag(self) -> str:
+        """Why the flag is not used; empty when it is."""
+        if self.contact is None:
+            return "no weight on wheels"
+        proves, denies = held(self.contact, self.grid_ns)
+        if np.count_nonzero(proves | denies) < LEAST_COVERAGE * len(self.grid_ns):
+            return f"{self.contact.name} logged too rarely, {len(self.contact.time_ns)} samples"
+        return disbelief(self.contact, self.motion, self.grid_ns)
+
+    @property
+    def method(self) -> str:
+        if self.contact is not None and not self.against_flag:
+            return self.contact.name
+        if not len(self.grid_ns):
+            return "none: no samples, or a span of many days"
+        if self.detection.reason:
+            return f"none: {self.detection.reason} ({self.against_flag})"
+        limit = self.detection.speed_limit_mps
+        return f"detector: standstills and rolling that adjoins them below {limit:.1f} m/s ({self.against_flag})"
+
+    def proof(self, time_ns: Int64Array) -> GroundProof:
+        if self.contact is not None and not self.against_flag:
+            return GroundProof(held(self.contact, time_ns)[0], self.method)
+        size = len(self.grid_ns)
+        if not size:
+            return GroundProof(np.zeros(len(time_ns), dtype=bool), self.method)
+        cell, rest = np.divmod(time_ns - self.flight.start_ns, STEP_NS)
+        inside = (cell >= 0) & (cell < size)
+        lower, upper = np.clip(cell, 0, size - 1), np.clip(cell + (rest > 0), 0, size - 1)
+        return GroundProof(inside & self.ground[lower] & self.ground[upper], self.method)
+
+    @property
+    def ground(self) -> BoolArray:
+        """Proven contact on the grid."""
+        if self.contact is None:
+            return self.detection.ground
+        proves, denies = held(self.contact, self.grid_ns)
+        if not self.against_flag:
+            return proves
+        rare = "too rarely" in self.against_flag  # a rare flag cannot prove, but it can deny
+        return np.asarray(self.detection.ground & ~denies) if rare else self.detection.ground
+
+    @property
+    def airborne(self) -> BoolArray:
+        """Flight on the grid, from lift-off to touch-down."""
+        if self.contact is not None and not self.against_flag:
+            return _up_to_the_ground(held(self.contact, self.grid_ns)[1], self.ground)
+        return _between_lift_off_and_touch_down(self.motion, self.ground, self.detection.airborne)
+
+
+def _labels(evidence: _Evidence) -> NDArray[np.int64]:
+    """Phase of every grid time, as its place in PHASES."""
+    ground, speed = evidence.ground, evidence.motion.speed_mps
+    label = np.where(ground, TAXI, UNKNOWN)
+    is_slow = ground & (running_mean(speed, 0.5) <= evidence.settings.standstill_speed_mps)
+    for start, end in runs(is_slow):
+        if end - start >= SHORTEST_STANDSTILL_S * RATE_HZ:
+            label[start:end] = STANDSTILL
+    label[evidence.airborne] = AIRBORNE
+    flights = runs(label == AIRBORNE)
+    gaps = zip([0, *(end for _, end in flights)], [*(start for start, _ in flights), len(label)], strict=True)
+    for start, end in gaps:  # what lies between two flights, before the first and after the last
+        if end > start and ground[start:end].any():
+            _mark_runs(label, speed, start, end)
+    return label
+
+
+def _mark_runs(label: NDArray[np.int64], speed_mps: FloatArray, start: int, end: int) -> None:
+    """Mark landing roll and take-off run in rows [start, end) between flights; the slowest row parts a touch-and-go."""
+    slowest = start + int(np.argmin(np.nan_to_num(speed_mps[start:end], nan=0.0)))
+    if start > 0 and speed_mps[start] >= SLOWEST_RUN_MPS:
+        last, least = start, RUN_SHARE * speed_mps[start]
+        while last < (slowest if end < len(label) else end) and speed_mps[last] > least:
+            last += 1
+        label[start:last] = LANDING_ROLL
+    if end < len(label) and speed_mps[end - 1] >= SLOWEST_RUN_MPS:
+        first, least = end, RUN_SHARE * speed_mps[end - 1]
+        while first > (slowest if start > 0 else 0) and speed_mps[first - 1] > least:
+            first -= 1
+        label[first:end] = TAKE_OFF_RUN
+
+
+def _up_to_the_ground(denied: BoolArray, ground: BoolArray) -> BoolArray:
+    """Flight by the flag; the instants between its last sample on the ground and its first off it belong to it."""
+    airborne = denied.copy()
+    for start, end in runs(~denied & ~ground):
+        is_between = start > 0 and ground[start - 1] and end < len(denied) and denied[end]
+        if is_between and end - start <= LONGEST_HOLD_S * RATE_HZ:
+            airborne[start:end] = True
+    return airborne
+
+
+def _between_lift_off_and_touch_down(motion: Motion, ground: BoolArray, sure: BoolArray) -> BoolArray:
+    """Widen sure flight to where the altitude leaves and meets that of the ground proven before and after."""
+    airborne = np.zeros(len(ground), dtype=bool)
+    altitude = running_mean(motion.all_altitudes_m, 1.0)
+    near = round(5.0 * RATE_HZ)
+    for start, end in runs(~ground):
+        flying = start + np.flatnonzero(sure[start:end])
+        if not flying.size:
+            continue
+        lift_off, touch_down = int(flying[0]), int(flying[-1]) + 1
+        if start > 0:
+            low = _is_low(altitude[:, start:lift_off], altitude[:, max(start - near, 0) : start])
+            lift_off = start + (int(low[-1]) + 1 if low.size else 0)
+        if end < len(ground):
+            low = _is_low(altitude[:, touch_down:end], altitude[:, end : end + near])
+            touch_down = touch_down + int(low[0]) if low.size else end
+        airborne[lift_off:touch_down] = True
+    return airborne
+
+
+def _is_low(altitude_m: FloatArray, ground_m: FloatArray) -> NDArray[np.intp]:
+    """Rows no more than LIFTED_M above the mean altitude of the ground."""
+    return np.flatnonzero(largest_over_sources(altitude_m - known_mean(ground_m)[:, None]) <= LIFTED_M)

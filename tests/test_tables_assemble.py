@@ -1,0 +1,109 @@
+"""Tables from batches and back: fields that come and go, wider types, order, and the pandas types."""
+
+import numpy as np
+import pytest
+
+from groundstation.base.errors import GroundstationError
+from groundstation.base.records import Column, RecordBatch
+from groundstation.tables.assemble import batches_from_flight, flight_from_batches
+from groundstation.tables.table import Flight, Table
+
+
+def batch(topic: str, time_ns: list[int], first: int = 0, **columns: object) -> RecordBatch:
+    index = np.arange(first, first + len(time_ns))
+    arrays = {
+        name: values if isinstance(values, Column) else Column(np.array(values)) for name, values in columns.items()
+    }
+    return RecordBatch(topic, index, Column(index * 10), arrays, np.array(time_ns, dtype=np.int64))
+
+
+def gather(*batches: RecordBatch) -> Flight:
+    return flight_from_batches(batches, metadata={"aircraft": "A"}, has_utc=True, source_name="a.csv")
+
+
+def test_fields_that_come_and_go_are_absent_where_missing() -> None:
+    flight = gather(
+        batch("ins", [10, 20], roll_deg=[1.0, np.nan], mode=["nav", "nav"]),
+        batch("gnss", [5], satellites_used=[7]),
+        batch("ins", [30], 2, pitch_deg=[3.0], mode=["attitude"]),
+    )
+    ins = flight["ins"]
+    assert ins.columns["roll_deg"].mask.tolist() == [True, True, False]  # the NaN that the device wrote is present
+    assert ins.columns["pitch_deg"].mask.tolist() == [False, False, True]
+    assert ins.columns["mode"].present is None
+    assert ins.text("mode").tolist() == ["nav", "nav", "attitude"]
+    assert ins.record_index.tolist() == [0, 1, 2]
+    assert ins.device_time_ns.values.tolist() == [0, 10, 20]
+    assert (flight.start_ns, flight.topics(), flight.metadata["aircraft"]) == (5, ("gnss", "ins"), "A")
+
+
+def test_types_widen_to_the_common_one() -> None:
+    ins = gather(
+        batch("ins", [1], a=np.float32([1.5]), b=[1]),
+        batch("ins", [2], a=[2.5], b=[0.5]),
+        batch("ins", [3], b=[True]),
+    )["ins"]
+    assert ins.columns["a"].values.dtype == np.float64
+    assert ins.values("a")[:2].tolist() == [1.5, 2.5]
+    assert ins.values("b").tolist() == [1.0, 0.5, 1.0]
+
+
+def test_order_is_by_time_of_validity_and_stable() -> None:
+    late = batch("gnss", [100, 200], a=[1.0, 2.0])
+    shifted = RecordBatch(
+        late.topic, late.record_index, late.device_time_ns, late.columns, late.time_ns, np.array([50, 150])
+    )
+    gnss = gather(shifted, batch("gnss", [150, 40], 2, a=[3.0, 4.0]))["gnss"]
+    assert gnss.time_ns.tolist() == [40, 50, 150, 150]
+    assert gnss.values("a").tolist() == [4.0, 1.0, 2.0, 3.0]
+
+
+def test_batches_without_rows_leave_no_table_and_time_is_required() -> None:
+    assert gather(batch("ins", [], roll_deg=np.zeros(0))).topics() == ()
+    assert gather().start_ns == 0
+    untimed = RecordBatch("ins", np.arange(1), Column(np.arange(1)), {})
+    with pytest.raises(GroundstationError, match=r"a.csv, ins: found records without corrected time"):
+        gather(untimed)
+
+
+def test_batches_of_a_flight_give_the_same_tables_again() -> None:
+    rng = np.random.default_rng(1)
+    time_ns = np.sort(rng.integers(0, 10**12, 1000))
+    flight = gather(
+        batch("ins", time_ns.tolist(), roll_deg=Column(rng.normal(size=1000), rng.random(1000) > 0.5)),
+        batch("event", [10**11, 10**12 + 1], name=["a", "long name"]),
+    )
+    batches = list(batches_from_flight(flight, max_rows=300))
+    assert [len(part) for part in batches] == [300, 2, 300, 300, 100]
+    assert all(part.time_ns is not None for part in batches)
+    again = gather(*batches)
+    for topic in flight.topics():
+        assert np.array_equal(flight[topic].time_ns, again[topic].time_ns)
+        for name, column in flight[topic].columns.items():
+            assert np.array_equal(column.mask, again[topic].columns[name].mask)
+            assert np.array_equal(column.values[column.mask], again[topic].columns[name].values[column.mask])
+
+
+def test_frame_types_depend_on_the_field_alone() -> None:
+    index = np.arange(2)
+    for present in (None, np.array([True, False]), np.array([False, False])):
+        columns = {
+            "number": Column(np.array([1.0, 2.0]), present),
+            "single": Column(np.array([1.0, 2.0], dtype=np.float32), present),
+            "flag": Column(np.array([True, False]), present),
+            "count": Column(np.array([1, 2]), present),
+            "text": Column(np.array(["a", "b"]), present),
+        }
+        frame = Table("x", index * 10, columns, index, Column(index)).to_frame()
+        assert [str(dtype) for dtype in frame.dtypes] == ["float64", "float32", "boolean", "Int64", "string"]
+        assert frame.index.tolist() == [0, 10]
+        assert str(frame.index.dtype) == "int64"
+        missing = 0 if present is None else int(np.count_nonzero(~present))
+        assert frame.isna().sum().tolist() == [missing] * 5
+
+
+def test_an_empty_table_answers_everything() -> None:
+    empty = Table.empty("ins")
+    assert (len(empty), empty.values("roll_deg").shape, empty.valid("roll_deg").shape) == (0, (0,), (0,))
+    assert len(empty.unique_times()) == 0
+    assert empty.to_frame().shape == (0, 0)
