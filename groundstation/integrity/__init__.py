@@ -1,0 +1,22 @@
+"""Integrity: the clock model of a log, its ledger of losses and oddities, and records in order of corrected time."""
+
+from groundstation.integrity.clock import Clock, ClockSettings, ClockStep
+from groundstation.integrity.ledger import FieldLedger, Gaps, Ledger, LedgerSettings, TopicLedger
+from groundstation.integrity.ledger_findings import ledger_findings
+from groundstation.integrity.ordering import corrected
+from groundstation.integrity.survey import Survey, survey
+
+__all__ = [
+    "Clock",
+    "ClockSettings",
+    "ClockStep",
+    "FieldLedger",
+    "Gaps",
+    "Ledger",
+    "LedgerSettings",
+    "Survey",
+    "TopicLedger",
+    "corrected",
+    "ledger_findings",
+    "survey",
+]

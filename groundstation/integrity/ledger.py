@@ -1,0 +1,227 @@
+"""The integrity ledger: what a log holds, topic by topic, and what is odd about it. Figures only, no judgement."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from groundstation.base.records import Damage, Int64Array, Remark, frozen
+from groundstation.base.signals import kind_of
+from groundstation.base.units import NS_PER_S
+from groundstation.integrity.clock import Clock
+
+GAPS_LISTED = 100
+SPORADIC_KINDS = ("event", "onboard")  # written when something happens: a pause in them is no gap
+
+
+@dataclass(frozen=True)
+class LedgerSettings:
+    """Definition of a gap: a step longer than ``gap_periods`` nominal periods and than ``gap_min_s`` seconds."""
+
+    gap_periods: float = 3.0
+    gap_min_s: float = 0.2
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """Gaps of one topic: last sample before each (corrected nanoseconds) and seconds to the next, shape (n,)."""
+
+    topic: str
+    start_ns: Int64Array
+    length_s: np.ndarray[Any, np.dtype[np.float64]]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start_ns", frozen(self.start_ns))
+        object.__setattr__(self, "length_s", frozen(self.length_s))
+
+    def __len__(self) -> int:
+        return len(self.start_ns)
+
+
+@dataclass(frozen=True)
+class FieldLedger:
+    """One field: samples present, NaN the device wrote, values outside the physical range and the first of them."""
+
+    name: str
+    present: int
+    nan: int = 0
+    out_of_range: int = 0
+    first_out_of_range: int | None = None
+    low: float = float("-inf")
+    high: float = float("inf")
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-able."""
+        return {"present": self.present, "nan": self.nan, "out_of_range": self.out_of_range}
+
+
+@dataclass(frozen=True)
+class TopicLedger:
+    """One topic on the corrected clock.
+
+    Parameters
+    ----------
+    topic : str
+    rows : int
+    first_ns, last_ns : int
+        Corrected time of the first and last record.
+    nominal_rate_hz : float or None
+        From the median step; None with fewer than two distinct times.
+    actual_rate_hz : float or None
+        Distinct times less one, over the span.
+    coverage : float or None
+        Share of the samples expected at the nominal rate over the topic's span that are there, at most 1.
+    duplicates, backward_steps, stray_rows : int
+        Records at the time of the one before (in order of time); steps back of device time; records out of order.
+    gaps : Gaps
+    fields : tuple of FieldLedger
+    """
+
+    topic: str
+    rows: int
+    first_ns: int
+    last_ns: int
+    nominal_rate_hz: float | None
+    actual_rate_hz: float | None
+    coverage: float | None
+    duplicates: int
+    backward_steps: int
+    stray_rows: int
+    gaps: Gaps
+    fields: tuple[FieldLedger, ...]
+
+    @property
+    def span_s(self) -> float:
+        """Seconds from the first to the last record."""
+        return (self.last_ns - self.first_ns) / NS_PER_S
+
+    def to_dict(self, clock: Clock) -> dict[str, Any]:
+        """JSON-able; seconds to the millisecond, rates to 4 decimals, shares to 6."""
+        listed = zip(self.gaps.start_ns[:GAPS_LISTED], self.gaps.length_s[:GAPS_LISTED], strict=True)
+        return {
+            "rows": self.rows,
+            "first": clock.text(self.first_ns),
+            "last": clock.text(self.last_ns),
+            "span_s": round(self.span_s, 3),
+            "nominal_rate_hz": _rounded(self.nominal_rate_hz, 4),
+            "actual_rate_hz": _rounded(self.actual_rate_hz, 4),
+            "coverage": _rounded(self.coverage, 6),
+            "duplicates": self.duplicates,
+            "backward_steps": self.backward_steps,
+            "stray_rows": self.stray_rows,
+            "gaps": {
+                "count": len(self.gaps),
+                "total_s": round(float(self.gaps.length_s.sum()), 3),
+                "longest_s": round(float(self.gaps.length_s.max(initial=0.0)), 3),
+                "listed": [[clock.text(int(start)), round(float(length), 3)] for start, length in listed],
+            },
+            "fields": {ledger.name: ledger.to_dict() for ledger in self.fields},
+        }
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """The ledger of a log: its topics in alphabetical order, its clock, and what the reader lost and remarked."""
+
+    topics: tuple[TopicLedger, ...] = ()
+    clock: Clock = field(default_factory=Clock)
+    damages: tuple[Damage, ...] = ()
+    remarks: tuple[Remark, ...] = ()
+    settings: LedgerSettings = field(default_factory=LedgerSettings)
+
+    def __getitem__(self, topic: str) -> TopicLedger:
+        """The ledger of one topic; KeyError when the log has none of that name."""
+        for ledger in self.topics:
+            if ledger.topic == topic:
+                return ledger
+        raise KeyError(topic)
+
+    @property
+    def gaps(self) -> tuple[Gaps, ...]:
+        """Gaps of the topics that have any."""
+        return tuple(ledger.gaps for ledger in self.topics if len(ledger.gaps))
+
+    @property
+    def loses_data(self) -> bool:
+        """Whether anything recorded could not be read (exit code 3)."""
+        return any(damage.loses_data for damage in self.damages)
+
+    @property
+    def completeness(self) -> dict[str, float]:
+        """Share of expected samples by topic, where it is known, rounded to 6 decimals."""
+        return {ledger.topic: round(ledger.coverage, 6) for ledger in self.topics if ledger.coverage is not None}
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-able, in a fixed order."""
+        return {
+            "gap_definition": {"periods": self.settings.gap_periods, "min_s": self.settings.gap_min_s},
+            "topics": {ledger.topic: ledger.to_dict(self.clock) for ledger in self.topics},
+            "damages": [
+                {
+                    "kind": damage.kind,
+                    "place": damage.place,
+                    "count": damage.count,
+                    "what": damage.what,
+                    "topic": damage.topic,
+                    "loses_data": damage.loses_data,
+                }
+                for damage in self.damages
+            ],
+            "remarks": [{"code": remark.code, "text": remark.text, "topic": remark.topic} for remark in self.remarks],
+        }
+
+
+def gaps_of(topic: str, time_ns: Int64Array, *, settings: LedgerSettings | None = None) -> Gaps:
+    """Gaps of a topic by the definition of :class:`LedgerSettings`, from its corrected times in order, shape (n,).
+
+    Topics that are written when something happens (events) have none.
+
+    Examples
+    --------
+    >>> gaps = gaps_of("ins", np.array([0, 1, 2, 9, 10]) * NS_PER_S)
+    >>> gaps.start_ns.tolist(), gaps.length_s.tolist()
+    ([2000000000], [7.0])
+    """
+    settings = settings or LedgerSettings()
+    steps = np.diff(time_ns)
+    ahead = steps[steps > 0]
+    if not len(ahead) or kind_of(topic) in SPORADIC_KINDS:
+        return Gaps(topic, np.zeros(0, dtype=np.int64), np.zeros(0))
+    longest_ns = max(settings.gap_periods * float(np.median(ahead)), settings.gap_min_s * NS_PER_S)
+    before = np.flatnonzero(steps > longest_ns)
+    return Gaps(topic, time_ns[before], steps[before] / NS_PER_S)
+
+
+def topic_ledger(
+    topic: str,
+    time_ns: Int64Array,
+    *,
+    backward_steps: int,
+    stray_rows: int,
+    fields: tuple[FieldLedger, ...],
+    settings: LedgerSettings,
+) -> TopicLedger:
+    """Ledger of one topic from its corrected times in order, shape (n,), n at least 1."""
+    steps = np.diff(time_ns)
+    ahead = steps[steps > 0]
+    span_ns = int(time_ns[-1] - time_ns[0])
+    period_ns = float(np.median(ahead)) if len(ahead) else 0.0
+    is_regular = period_ns > 0.0 and kind_of(topic) not in SPORADIC_KINDS
+    return TopicLedger(
+        topic,
+        rows=len(time_ns),
+        first_ns=int(time_ns[0]),
+        last_ns=int(time_ns[-1]),
+        nominal_rate_hz=NS_PER_S / period_ns if period_ns else None,
+        actual_rate_hz=len(ahead) * NS_PER_S / span_ns if period_ns else None,
+        coverage=min(1.0, (len(ahead) + 1) / (span_ns / period_ns + 1.0)) if is_regular else None,
+        duplicates=int((steps == 0).sum()),
+        backward_steps=backward_steps,
+        stray_rows=stray_rows,
+        gaps=gaps_of(topic, time_ns, settings=settings),
+        fields=fields,
+    )
+
+
+def _rounded(value: float | None, digits: int) -> float | None:
+    return None if value is None else round(value, digits)

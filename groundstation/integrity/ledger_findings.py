@@ -1,0 +1,114 @@
+"""What a user must know of a ledger, one line each, with figures and places."""
+
+from collections.abc import Iterator
+
+from groundstation.base.findings import Finding, Severity
+from groundstation.base.units import NS_PER_S
+from groundstation.integrity.clock import Clock, ClockStep
+from groundstation.integrity.ledger import Ledger, TopicLedger
+
+MANY_MISSING_TIMES = 0.01  # share of records without a time above which it is a warning
+_REMARKS_THAT_WARN = ("assumed_utc", "unreadable_metadata", "plug_in", "duplicate_column")
+
+
+def ledger_findings(ledger: Ledger) -> tuple[Finding, ...]:
+    """Findings of a ledger: clock first, then losses, topics and the reader's remarks.
+
+    Codes: ``clock.backward_step``, ``clock.forward_step``, ``clock.missing_times``, ``clock.implausible_times``,
+    ``clock.shifted``, ``clock.no_utc``, ``clock.no_times``, ``time.unordered``, ``time.stray_rows``,
+    ``time.duplicates``, ``data.none``, ``data.gaps``, ``data.<kind of damage>`` (``data.truncated``,
+    ``data.dropped_rows``, ``data.unreadable_cells`` ...), ``values.out_of_range``, ``values.nan``,
+    ``reader.<remark>`` (``reader.derived``, ``reader.assumed_utc`` ...).
+    """
+    findings = [*_clock(ledger), *_damages(ledger)]
+    for topic in ledger.topics:
+        findings += _topic(topic, ledger)
+    return (*findings, *_remarks(ledger))
+
+
+def _clock(ledger: Ledger) -> Iterator[Finding]:
+    clock = ledger.clock
+    if not clock.has_times:
+        if clock.missing_times:
+            text = f"none of the {clock.missing_times} records has a time: nothing can be placed in time"
+            yield Finding("fail", "clock.no_times", text, count=clock.missing_times)
+        else:
+            yield Finding("fail", "data.none", "the log holds no records")
+        return
+    for step in clock.steps:
+        yield _step(step, clock)
+    if clock.missing_times:
+        rows = sum(topic.rows for topic in ledger.topics)
+        severity: Severity = "warn" if clock.missing_times > MANY_MISSING_TIMES * rows else "info"
+        text = f"{_counted(clock.missing_times, 'record')} without a time: placed by their neighbours"
+        yield Finding(severity, "clock.missing_times", text, count=clock.missing_times)
+    if clock.implausible_times:
+        text = (
+            f"{_counted(clock.implausible_times, 'record')} with a time that cannot be true: placed by their neighbours"
+        )
+        yield Finding("warn", "clock.implausible_times", text, count=clock.implausible_times)
+    if clock.is_unordered:
+        text = f"the log is not in order of time ({clock.stray_rows} records after a later one): sorted"
+        yield Finding("warn", "time.unordered", text, count=clock.stray_rows)
+    elif clock.stray_rows:
+        place = f"record {int(clock.stray_index[0])}"
+        text = f"{_counted(clock.stray_rows, 'record')} out of order, the first at {place}: sorted"
+        yield Finding("warn", "time.stray_rows", text, place=place, count=clock.stray_rows)
+    if clock.shift_ns:
+        text = f"times were moved by {clock.shift_ns / NS_PER_S:+.3f} s so that none is negative"
+        yield Finding("info", "clock.shifted", text)
+    if not clock.is_absolute:
+        yield Finding("info", "clock.no_utc", "the log has no absolute time: times count from its own zero")
+
+
+def _step(step: ClockStep, clock: Clock) -> Finding:
+    zero_ns = int(clock.offsets_ns[-1])
+    before, after = clock.text(step.device_before_ns + zero_ns), clock.text(step.device_after_ns + zero_ns)
+    direction = "back" if step.kind == "backward" else "ahead"
+    text = (
+        f"the clock stepped {direction} by {abs(step.size_s):.3f} s at record {step.record_index} "
+        f"({before} to {after}); "
+        f"{_counted(step.records_before, 'record')} before it moved by {step.shift_s:+.3f} s to join"
+    )
+    return Finding("warn", f"clock.{step.kind}_step", text, place=f"record {step.record_index}")
+
+
+def _damages(ledger: Ledger) -> Iterator[Finding]:
+    for damage in ledger.damages:
+        severity: Severity = "warn" if damage.loses_data else "info"
+        text = f"{damage.what}: {damage.count} ({damage.place})"
+        yield Finding(severity, f"data.{damage.kind}", text, damage.topic, damage.place, damage.count)
+
+
+def _topic(topic: TopicLedger, ledger: Ledger) -> Iterator[Finding]:
+    if topic.duplicates:
+        text = f"{topic.topic}: {topic.duplicates} of {topic.rows} records repeat the time of the one before"
+        yield Finding("info", "time.duplicates", text, topic.topic, count=topic.duplicates)
+    if len(topic.gaps):
+        longest = int(topic.gaps.length_s.argmax())
+        place = ledger.clock.text(int(topic.gaps.start_ns[longest]))
+        text = (
+            f"{topic.topic}: {_counted(len(topic.gaps), 'gap')}, {topic.gaps.length_s.sum():.1f} s together, "
+            f"the longest {topic.gaps.length_s[longest]:.1f} s after {place}"
+        )
+        yield Finding("warn", "data.gaps", text, topic.topic, place, len(topic.gaps))
+    for field in topic.fields:
+        name = f"{topic.topic}.{field.name}"
+        if field.out_of_range:
+            place = f"record {field.first_out_of_range}"
+            count = _counted(field.out_of_range, "value")
+            text = f"{name}: {count} outside [{field.low:g}, {field.high:g}], first at {place}"
+            yield Finding("warn", "values.out_of_range", text, topic.topic, place, field.out_of_range)
+        if field.nan:
+            text = f"{name}: {field.nan} of {field.present} values are NaN as the device wrote them"
+            yield Finding("info", "values.nan", text, topic.topic, count=field.nan)
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def _remarks(ledger: Ledger) -> Iterator[Finding]:
+    for remark in ledger.remarks:
+        severity: Severity = "warn" if remark.code in _REMARKS_THAT_WARN else "info"
+        yield Finding(severity, f"reader.{remark.code}", remark.text, remark.topic)

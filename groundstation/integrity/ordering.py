@@ -1,0 +1,86 @@
+"""Records in order of corrected time, topic by topic, streaming."""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Item, RecordBatch
+from groundstation.integrity.clock import Clock
+
+
+def corrected(items: Iterable[Item], clock: Clock) -> Iterator[RecordBatch]:
+    """Yield the batches of a log with corrected time, each topic in non-decreasing ``time_ns``.
+
+    A record is held back until no earlier one of its topic can follow, which the lateness found by the survey tells:
+    memory is bounded by it. Records of equal time keep the order of the source. Damages and remarks are left out: the
+    survey has them.
+
+    Parameters
+    ----------
+    items : iterable of Item
+        The same log again.
+    clock : Clock
+        From the survey of that log.
+    """
+    if not clock.has_times:
+        return
+    held: dict[str, RecordBatch] = {}
+    reached: dict[str, int] = {}
+    for item in items:
+        if not isinstance(item, RecordBatch) or not len(item):
+            continue
+        batch = clock.correct(item)
+        topic, lateness = batch.topic, clock.lateness_ns.get(item.topic, 0)
+        if topic in held:
+            batch = joined([held.pop(topic), batch])
+        time = _times(batch)
+        reached[topic] = max(reached.get(topic, int(time.max())), int(time.max()))
+        if lateness:
+            batch = batch.take(np.argsort(time, kind="stable"))
+            ready = int(np.searchsorted(_times(batch), reached[topic] - lateness, side="right"))
+            if ready < len(batch):
+                held[topic] = batch.take(slice(ready, None))
+                batch = batch.take(slice(0, ready))
+        yield from _bounded(batch)
+    for topic in sorted(held):
+        yield from _bounded(held[topic])
+
+
+def _times(batch: RecordBatch) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    assert batch.time_ns is not None, "a corrected batch has times"
+    return batch.time_ns
+
+
+def _bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
+    for start in range(0, len(batch), MAX_BATCH_ROWS):
+        yield batch if len(batch) <= MAX_BATCH_ROWS else batch.take(slice(start, start + MAX_BATCH_ROWS))
+
+
+def joined(batches: Sequence[RecordBatch]) -> RecordBatch:
+    """One batch of several of one topic, in the order given; a field that one of them lacks is absent there."""
+    names = dict.fromkeys(name for batch in batches for name in batch.columns)
+    validity = [batch.validity_time_ns if batch.validity_time_ns is not None else batch.time_ns for batch in batches]
+    has_validity = any(batch.validity_time_ns is not None for batch in batches)
+    return RecordBatch(
+        batches[0].topic,
+        np.concatenate([batch.record_index for batch in batches]),
+        _joined_columns([batch.device_time_ns for batch in batches]),
+        {name: _joined_columns([_column_of(batch, name, batches) for batch in batches]) for name in names},
+        np.concatenate([_times(batch) for batch in batches]),
+        np.concatenate([time for time in validity if time is not None]) if has_validity else None,
+    )
+
+
+def _column_of(batch: RecordBatch, name: str, batches: Sequence[RecordBatch]) -> Column:
+    column = batch.columns.get(name)
+    if column is not None:
+        return column
+    kind = next(other.columns[name].values.dtype for other in batches if name in other.columns)
+    return Column(np.zeros(len(batch), dtype=kind), np.zeros(len(batch), dtype=bool))
+
+
+def _joined_columns(columns: Sequence[Column]) -> Column:
+    present: BoolArray | None = None
+    if any(column.present is not None for column in columns):
+        present = np.concatenate([column.mask for column in columns])
+    return Column(np.concatenate([column.values for column in columns]), present)

@@ -1,0 +1,211 @@
+"""Text cells to typed columns, whole columns at a time; a cell that cannot be read is marked, never guessed.
+
+Each function takes a pyarrow string array (null = empty cell) and gives values, where they are present, and where a
+cell stood that could not be read.
+"""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from groundstation.base.errors import GroundstationError
+from groundstation.base.records import MAX_TEXT_CHARACTERS, BoolArray, Column, Int64Array
+from groundstation.base.timescales import iso_to_utc_ns
+
+MAX_TIME_NS = 2**62  # UTC until 2116; sums and differences of two such times fit 64 bits
+_NUMBER = r"^[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?|(?i:nan|inf|infinity))$"
+_DECIMAL_DIGITS = 19  # before the point: what 64 bits can hold
+_DECIMAL = rf"^[+-]?\d{{1,{_DECIMAL_DIGITS}}}(?:\.\d*)?$"
+_EXPONENT = re.compile(r"[+-]?(?:\d{1,30}\.?\d{0,30}|\.\d{1,30})[eE][+-]?\d{1,2}")
+_INTEGER = r"^[+-]?\d{1,18}$"
+_NOT_TEXT = r"[\x00-\x08\x0a-\x1e\x7f\x{FFFD}]"
+
+
+@dataclass(frozen=True)
+class Cells:
+    """A column as read: values with presence, where a cell could not be read, and where a text was cut, shape (n,)."""
+
+    column: Column
+    unreadable: BoolArray
+    cut: BoolArray | None = None
+
+
+def trimmed(text: Any) -> Any:
+    """Cells without padding; cells of nothing but padding become empty (null)."""
+    stripped = pc.utf8_trim_whitespace(text)
+    return pc.if_else(pc.equal(stripped, ""), pa.scalar(None, pa.string()), stripped)
+
+
+def _mask(array: Any) -> BoolArray:
+    return np.asarray(array.to_numpy(zero_copy_only=False), dtype=bool)
+
+
+def _values(array: Any, filler: float | int) -> NDArray[Any]:
+    """Values of an array as numpy, the filler where null."""
+    return np.asarray((pc.fill_null(array, filler) if array.null_count else array).to_numpy(zero_copy_only=False))
+
+
+def _cast(text: Any, target: Any, pattern: str) -> tuple[Any, BoolArray]:
+    """Cast a column; where that fails, cast what matches ``pattern`` and say which cells did not."""
+    options = pc.CastOptions(target_type=target, allow_decimal_truncate=True)
+    none = np.zeros(len(text), dtype=bool)
+    try:
+        return pc.cast(text, options=options), none
+    except pa.ArrowException:
+        fits = pc.fill_null(pc.match_substring_regex(text, pattern), False)
+        kept = pc.if_else(fits, text, pa.scalar(None, pa.string()))
+        return pc.cast(kept, options=options), _mask(text.is_valid()) & ~_mask(fits)
+
+
+def _column(array: Any, filler: float | int) -> Column:
+    return Column(_values(array, filler), _mask(array.is_valid()) if array.null_count else None)
+
+
+def numbers(text: Any) -> Cells:
+    """Decimal numbers as float64; ``nan`` in a cell is a NaN that the device wrote.
+
+    Examples
+    --------
+    >>> read = numbers(pa.array(["1.5", None, "nan", "1.5x"]))
+    >>> read.column.values.tolist(), read.column.mask.tolist(), read.unreadable.tolist()
+    ([1.5, nan, nan, nan], [True, False, True, False], [False, False, False, True])
+    """
+    array, unreadable = _cast(text, pa.float64(), _NUMBER)
+    return Cells(_column(array, float("nan")), unreadable)
+
+
+def ready_numbers(array: Any) -> Cells:
+    """A float64 column that the CSV parser itself has converted."""
+    return Cells(_column(array, float("nan")), np.zeros(len(array), dtype=bool))
+
+
+def are_numbers(text: Any) -> bool:
+    """Whether every cell that is not empty is a number."""
+    return bool(pc.all(pc.match_substring_regex(text, _NUMBER), min_count=0).as_py())
+
+
+def flags(text: Any) -> Cells:
+    """``0``, ``1``, ``true``, ``false`` (any case) as bool.
+
+    Examples
+    --------
+    >>> read = flags(pa.array(["1", "False", None, "2"]))
+    >>> read.column.values.tolist(), read.column.mask.tolist(), read.unreadable.tolist()
+    ([True, False, False, False], [True, True, False, False], [False, False, False, True])
+    """
+    lower = pc.utf8_lower(text)
+    true, false = (_mask(pc.is_in(lower, value_set=pa.array(words))) for words in (["1", "true"], ["0", "false"]))
+    return Cells(Column(true, true | false), _mask(text.is_valid()) & ~true & ~false)
+
+
+def words(text: Any, restore: Callable[[str], str] = str) -> Cells:
+    """Text as fixed-width unicode; cells with control characters or broken encoding are unreadable.
+
+    Examples
+    --------
+    >>> read = words(pa.array(["nav", None, "n\\x1av"]))
+    >>> read.column.values.tolist(), read.unreadable.tolist()
+    (['nav', '', ''], [False, False, True])
+    """
+    strange = _mask(pc.fill_null(pc.match_substring_regex(text, _NOT_TEXT), False))
+    present = _mask(text.is_valid()) & ~strange
+    coded = pc.dictionary_encode(pc.fill_null(pc.if_else(pa.array(present), text, ""), ""))
+    distinct = [restore(word) for word in coded.dictionary.to_pylist()] or [""]
+    index = coded.indices.to_numpy()
+    long = np.array([len(word) > MAX_TEXT_CHARACTERS for word in distinct])
+    values = np.array([word[:MAX_TEXT_CHARACTERS] for word in distinct], dtype=np.str_)
+    return Cells(Column(values[index], present), strange, long[index] if long.any() else None)
+
+
+def decimal_ns(text: Any, digits: int = 9, multiple: int = 1) -> Cells:
+    """Decimal numbers of a unit of time as integer nanoseconds, exact; what is below a nanosecond is cut.
+
+    Parameters
+    ----------
+    digits, multiple : int
+        The unit is ``10**digits`` x ``multiple`` nanoseconds: 9 and 1 for seconds, 6 and 1 for milliseconds, 9 and 60
+        for minutes.
+
+    Examples
+    --------
+    >>> decimal_ns(pa.array(["1700000000.123456789", "-0.5", "x", "1.5e1"])).column.values.tolist()
+    [1700000000123456789, -500000000, 0, 15000000000]
+    >>> decimal_ns(pa.array(["1700000000123.4567899"]), 6).column.values.tolist()
+    [1700000000123456789]
+    """
+    filled, fits = _mask(text.is_valid()), pc.fill_null(pc.match_substring_regex(text, _DECIMAL), False)
+    kept = pc.if_else(fits, text, pa.scalar(None, pa.string()))
+    target = pa.decimal128(_DECIMAL_DIGITS + digits, digits)
+    decimals = pc.cast(kept, options=pc.CastOptions(target_type=target, allow_decimal_truncate=True))
+    # A decimal128 is a 128-bit integer, here of nanoseconds: its low half is the int64 wanted.
+    halves = np.frombuffer(decimals.buffers()[1], dtype=np.int64, count=2 * (len(decimals) + decimals.offset))
+    low, high = halves[2 * decimals.offset :: 2], halves[2 * decimals.offset + 1 :: 2]
+    values, readable = low.copy(), _mask(fits) & (high == low >> 63)
+    for at in np.flatnonzero(filled & ~_mask(fits)):  # 1.5e3: rare, so one by one
+        exact = _exact(text[int(at)].as_py(), digits)
+        values[at], readable[at] = exact or 0, exact is not None
+    readable &= np.abs(values) < MAX_TIME_NS // multiple
+    return _times(np.where(readable, values, 0) * multiple, filled, readable)
+
+
+def _exact(text: str, digits: int) -> int | None:
+    """A number with an exponent times ``10**digits``, cut to a whole one; None when it is none, or beyond 64 bits."""
+    if not _EXPONENT.fullmatch(text):
+        return None
+    whole = int(Decimal(text).scaleb(digits))
+    return whole if abs(whole) < MAX_TIME_NS else None
+
+
+def integers_ns(text: Any) -> Cells:
+    """Whole numbers of nanoseconds."""
+    array, unreadable = _cast(text, pa.int64(), _INTEGER)
+    filled = _mask(text.is_valid())
+    return _times(_values(array, 0), filled, filled & ~unreadable)
+
+
+def _times(values: Int64Array, filled: BoolArray, readable: BoolArray) -> Cells:
+    """Times of cells that are filled and readable; one beyond the range of :data:`MAX_TIME_NS` is not."""
+    present = readable & (np.abs(values) < MAX_TIME_NS)
+    return Cells(Column(np.where(present, values, 0), present), filled & ~present)
+
+
+def iso_ns(text: Any) -> tuple[Cells, BoolArray]:
+    """ISO 8601 times as UTC nanoseconds since 1970, and where no zone was named (read as UTC).
+
+    Examples
+    --------
+    >>> cells, zoneless = iso_ns(pa.array(["2026-05-04T06:00:00.25Z", "2026-05-04 06:00:01", "later"]))
+    >>> cells.column.values.tolist(), zoneless.tolist()
+    ([1777874400250000000, 1777874401000000000, 0], [False, True, False])
+    """
+    for target, zoneless in ((pa.timestamp("ns", tz="UTC"), False), (pa.timestamp("ns"), True)):
+        try:
+            whole = pc.cast(pc.cast(text, target), pa.int64())
+        except pa.ArrowException:
+            continue
+        filled = _mask(text.is_valid())
+        read = _times(_values(whole, 0), filled, filled)
+        return read, read.column.mask & zoneless
+    return _iso_one_by_one(text)
+
+
+def _iso_one_by_one(text: Any) -> tuple[Cells, BoolArray]:
+    values = np.zeros(len(text), dtype=np.int64)
+    readable, zoneless = np.zeros(len(text), dtype=bool), np.zeros(len(text), dtype=bool)
+    for at, cell in enumerate(text.to_pylist()):
+        if cell is None:
+            continue
+        try:
+            utc_ns, named_zone = iso_to_utc_ns(cell)
+        except GroundstationError:
+            continue
+        if abs(utc_ns) < MAX_TIME_NS:
+            values[at], readable[at], zoneless[at] = utc_ns, True, not named_zone
+    return _times(values, _mask(text.is_valid()), readable), zoneless

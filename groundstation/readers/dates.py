@@ -1,0 +1,79 @@
+"""Local date, time of day and offset from UTC, in columns of text, to UTC nanoseconds."""
+
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+import pyarrow.compute as pc
+
+from groundstation.base.records import BoolArray, Column, Int64Array
+from groundstation.base.units import NS_PER_S
+from groundstation.readers.cells import Cells
+
+_NS_PER_DAY = 86_400 * NS_PER_S
+_EPOCH_DAY = datetime(1970, 1, 1).toordinal()
+
+
+def _day_ns(text: str, formats: tuple[str, ...]) -> int | None:
+    for form in formats:
+        try:
+            return (datetime.strptime(text, form).toordinal() - _EPOCH_DAY) * _NS_PER_DAY
+        except ValueError:
+            continue
+    return None
+
+
+def _time_of_day_ns(text: str, formats: tuple[str, ...]) -> int | None:
+    whole, _, fraction = text.partition(".")
+    parts = whole.split(":")
+    if len(parts) != 3 or not all(part.isdecimal() for part in parts) or not (fraction or "0").isdecimal():
+        return None
+    hour, minute, second = (int(part) for part in parts)
+    if hour > 23 or minute > 59 or second > 60:
+        return None
+    return (hour * 3600 + minute * 60 + second) * NS_PER_S + int((fraction + "000000000")[:9])
+
+
+def _offset_ns(text: str, formats: tuple[str, ...]) -> int | None:
+    sign = -1 if text.startswith("-") else 1
+    hours, colon, minutes = text.lstrip("+-").partition(":")
+    if not hours.isdecimal() or not (minutes or "0").isdecimal() or (colon and not minutes):
+        return None
+    total_min = int(hours) * 60 + int(minutes or 0)
+    return sign * total_min * 60 * NS_PER_S if total_min < 24 * 60 else None
+
+
+def _each_distinct(text: Any, parse: Any, formats: tuple[str, ...]) -> tuple[Int64Array, BoolArray, BoolArray]:
+    """Parse every distinct text once: values, where known, where a cell could not be read."""
+    coded = pc.dictionary_encode(text, null_encoding="encode")
+    parsed = [None if word is None else parse(word, formats) for word in coded.dictionary.to_pylist()]
+    values = np.array([0 if value is None else value for value in parsed] or [0], dtype=np.int64)
+    known = np.array([value is not None for value in parsed] or [False], dtype=bool)
+    index = coded.indices.to_numpy(zero_copy_only=False)
+    filled = np.asarray(text.is_valid().to_numpy(zero_copy_only=False), dtype=bool)
+    return values[index], known[index], filled & ~known[index]
+
+
+def local_ns(date: Any, time: Any, offset: Any | None, date_formats: tuple[str, ...]) -> Cells:
+    """UTC nanoseconds since 1970 of local date and time: date + time - offset.
+
+    A row has a time when date and time are there; an empty offset is zero, an unreadable one makes the time unreadable.
+
+    Examples
+    --------
+    >>> import pyarrow as pa
+    >>> read = local_ns(pa.array(["23/06/2021", None]), pa.array(["14:13:51", "14:13:52"]), pa.array(["+01:00", ""]),
+    ...                 ("%Y-%m-%d", "%d/%m/%Y"))
+    >>> read.column.values.tolist(), read.column.mask.tolist()
+    ([1624454031000000000, 0], [True, False])
+    """
+    days, has_day, bad_day = _each_distinct(date, _day_ns, date_formats)
+    times, has_time, bad_time = _each_distinct(time, _time_of_day_ns, ())
+    unreadable = bad_day | bad_time
+    if offset is None:
+        offsets = np.zeros(len(days), dtype=np.int64)
+    else:
+        offsets, _known, bad_offset = _each_distinct(offset, _offset_ns, ())
+        unreadable = unreadable | (bad_offset & has_day & has_time)
+    present = has_day & has_time & ~unreadable
+    return Cells(Column(np.where(present, days + times - offsets, 0), present), unreadable)

@@ -1,0 +1,154 @@
+"""How a delimited text file is written: encoding, delimiter, where its rows begin."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from groundstation.base.errors import UnreadableLogError
+from groundstation.readers.source import HEAD_BYTES, Source
+
+DELIMITERS = (",", ";", "\t")
+_UTF8_BOM = b"\xef\xbb\xbf"
+_CYRILLIC_RUN = re.compile(rb"[\xc0-\xff\xa8\xb8]{2,}")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
+_DECIMAL_POINT = re.compile(r"[+-]?\d+\.\d+")
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of the head: its number (from 1), the byte where the next one starts, its text without line end."""
+
+    number: int
+    next_byte: int
+    text: str
+    ended: bool
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """What the row scanner must know.
+
+    Parameters
+    ----------
+    encoding : {'utf-8', 'cp1251'}
+    delimiter : str
+        One ASCII character.
+    cells : int
+        Number of cells of a sound row, a trailing empty one counted.
+    first_byte, first_line : int
+        Where the rows after the header begin.
+    header_lines : frozenset of str
+        Header lines as :func:`normal_form` gives them; repeats inside the file are skipped.
+    """
+
+    encoding: str
+    delimiter: str
+    cells: int
+    first_byte: int
+    first_line: int
+    header_lines: frozenset[str] = field(default_factory=frozenset)
+
+
+def detect_encoding(head: bytes, name: str) -> str:
+    """Encoding of a text: UTF-8, or cp1251 where the bytes are no UTF-8 and look like Cyrillic words.
+
+    A stray high byte in an otherwise plain file is damage of that cell, not another encoding.
+
+    Raises
+    ------
+    UnreadableLogError
+        For UTF-16, which spreadsheet programs call "Unicode text".
+    """
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise UnreadableLogError(name, "UTF-16 text", "UTF-8 or cp1251", "save it as CSV in UTF-8")
+    try:
+        head.decode("utf-8")
+    except UnicodeDecodeError as error:
+        cut_character = len(head) == HEAD_BYTES and error.start >= len(head) - 3
+        if not cut_character and _CYRILLIC_RUN.search(head[error.start - 1 if error.start else 0 :]):
+            return "cp1251"
+    return "utf-8"
+
+
+def head_lines(source: Source, encoding: str, limit: int = 1000) -> list[Line]:
+    """The first lines of a file (at most ``limit``); a last one that the head cuts off is left out."""
+    head = source.head
+    position = len(_UTF8_BOM) if head.startswith(_UTF8_BOM) else 0
+    separator = b"\n" if b"\n" in head or b"\r" not in head else b"\r"
+    lines: list[Line] = []
+    while position < len(head) and len(lines) < limit:
+        end = head.find(separator, position)
+        ended = end >= 0
+        if not ended and len(head) < source.size:
+            break
+        stop, following = (end, end + 1) if ended else (len(head), len(head))
+        text = head[position:stop].decode(encoding, errors="replace").rstrip("\r")
+        lines.append(Line(len(lines) + 1, following, text, ended))
+        position = following
+    return lines
+
+
+def detect_delimiter(header: str) -> str:
+    """The delimiter that occurs most often in a header row, ``,`` when none does.
+
+    Examples
+    --------
+    >>> detect_delimiter("time_s;ins.latitude_deg;gnss.latitude_deg")
+    ';'
+    """
+    return max(DELIMITERS, key=header.count)
+
+
+def split_cells(line: str, delimiter: str) -> list[str]:
+    """Cells of one line, trimmed, quotes removed; broken quoting falls back to a plain split.
+
+    Examples
+    --------
+    >>> split_cells('a, "b,c" ,d', ","), split_cells('1,"2,3', ",")
+    (['a', 'b,c', 'd'], ['1', '"2', '3'])
+    """
+    if '"' in line:
+        import csv
+
+        try:
+            rows = list(csv.reader([line], delimiter=delimiter, skipinitialspace=True, strict=False))
+            if len(rows) == 1 and line.count('"') % 2 == 0:
+                return [cell.strip() for cell in rows[0]]
+        except csv.Error:
+            pass
+    return [cell.strip() for cell in line.split(delimiter)]
+
+
+def normal_form(line: str, delimiter: str) -> str:
+    """A line with its cells trimmed: equal for header lines that differ in padding alone."""
+    return delimiter.join(split_cells(line, delimiter))
+
+
+def uses_decimal_comma(rows: Sequence[str], delimiter: str) -> bool:
+    """Whether numbers in the first rows are written with a decimal comma (never with ``,`` as delimiter).
+
+    Examples
+    --------
+    >>> uses_decimal_comma(["0;55", "0,02;55,75"], ";"), uses_decimal_comma(["0,02,55"], ",")
+    (True, False)
+    >>> uses_decimal_comma(["0.5;1,234"], ";")
+    False
+    """
+    if delimiter == ",":
+        return False
+    cells = [cell for row in rows for cell in split_cells(row, delimiter)]
+    if any(_DECIMAL_POINT.fullmatch(cell) for cell in cells):
+        return False  # then a comma parts thousands, or stands in a text
+    return any(_DECIMAL_COMMA.fullmatch(cell) for cell in cells)
+
+
+def trailing_cells(rows: Sequence[str], delimiter: str, names: int) -> int:
+    """1 where rows end with a delimiter that the header row does not have, else 0; the first row decides.
+
+    Examples
+    --------
+    >>> trailing_cells(["1,2,"], ",", 2), trailing_cells(["1,"], ",", 2)
+    (1, 0)
+    """
+    first = next((row.rstrip(" ") for row in rows if row.strip()), "")
+    return int(first.endswith(delimiter) and len(split_cells(first, delimiter)) == names + 1)

@@ -1,0 +1,192 @@
+"""The flat CSV that every recorder can export: one time column, columns ``<topic>.<field>``, metadata in ``#`` lines.
+
+``record_index`` is the line number in the file (from 1), so that findings name the line an editor shows. Columns
+without a canonical field go to ``raw.<topic>`` (``raw.csv`` when their name has no dot), as numbers where every cell of
+the file is one, else as text.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from groundstation.base.errors import UnreadableLogError
+from groundstation.base.records import Item, LogHeader, Remark
+from groundstation.base.signals import RAW_PREFIX, field_of
+from groundstation.readers.dialect import (
+    Dialect,
+    Line,
+    detect_delimiter,
+    detect_encoding,
+    head_lines,
+    normal_form,
+    split_cells,
+    trailing_cells,
+    uses_decimal_comma,
+)
+from groundstation.readers.layout import Derivation, Layout, Rule, TimeRule, rule_for
+from groundstation.readers.source import Claim, Source
+from groundstation.readers.start import utc_of_zero
+
+NAME = "flat-csv"
+TIME_COLUMNS = {"time_ns": "nanoseconds", "time_s": "seconds", "time_utc": "iso"}  # the recorder's own clock first
+
+
+@dataclass(frozen=True)
+class _Top:
+    """What stands above the rows."""
+
+    encoding: str
+    metadata: Mapping[str, str]
+    header: Line
+    names: tuple[str, ...]
+    delimiter: str
+    first_rows: tuple[str, ...]
+
+
+def _read_top(source: Source) -> _Top | None:
+    encoding = detect_encoding(source.head, source.name)
+    metadata: dict[str, str] = {}
+    lines = head_lines(source, encoding)
+    for at, line in enumerate(lines):
+        if line.text.startswith("#"):
+            key, colon, value = line.text.lstrip("#").partition(":")
+            if colon and key.strip():
+                metadata[key.strip()] = value.strip()
+        elif line.text.strip():
+            delimiter = detect_delimiter(line.text)
+            names = tuple(split_cells(line.text, delimiter))
+            return _Top(encoding, metadata, line, names, delimiter, tuple(after.text for after in lines[at + 1 :]))
+    return None
+
+
+def sniff(source: Source) -> Claim | None:
+    """Claim a text whose header row has a time column and at least one ``<topic>.<field>``."""
+    top = _read_top(source)
+    if top is None:
+        return None
+    canonical = [name for name in top.names if field_of(*name.rpartition(".")[::2])]
+    has_time = any(name in TIME_COLUMNS for name in top.names)
+    if canonical and not has_time:
+        raise UnreadableLogError(
+            f"{source.name}, row {top.header.number}",
+            f"columns such as {canonical[0]!r} but no time column",
+            "time_s, time_ns or time_utc",
+            "name the time column so, or describe the file by a profile",
+        )
+    dotted = [name for name in top.names if "." in name.strip(".")]
+    return Claim(NAME, "", 0.9 if canonical else 0.4) if has_time and dotted else None
+
+
+def read(source: Source) -> Iterator[Item]:
+    """Yield the header, batches, remarks and damages of a flat CSV.
+
+    Raises
+    ------
+    UnreadableLogError
+        When the header row is not that of a flat CSV.
+    """
+    from groundstation.readers.table_reader import TableReader, truncated_header
+
+    top = _read_top(source)
+    if top is None or sniff(source) is None:
+        raise UnreadableLogError(source.name, "no flat-CSV header row", "a time column and <topic>.<field> columns")
+    layout, remarks = _layout(top)
+    remarks += _mistakes(top)
+    if not top.header.ended:
+        yield LogHeader(NAME, top.metadata, None)
+        yield from remarks
+        yield truncated_header(top.header.number)
+        return
+    header_lines = frozenset({normal_form(top.header.text, top.delimiter)})
+    trailing = trailing_cells(top.first_rows, top.delimiter, len(top.names))
+    dialect = Dialect(
+        top.encoding,
+        top.delimiter,
+        len(top.names) + trailing,
+        top.header.next_byte,
+        top.header.number + 1,
+        header_lines,
+    )
+    utc_of_zero_ns, clock_remarks = _utc_of_zero(source, dialect, layout, top.metadata, top.names)
+    items = TableReader(source, dialect, layout).items(LogHeader(NAME, top.metadata, utc_of_zero_ns))
+    yield next(items)
+    yield from remarks + clock_remarks
+    yield from items
+
+
+def _utc_of_zero(
+    source: Source, dialect: Dialect, layout: Layout, metadata: Mapping[str, str], names: tuple[str, ...]
+) -> tuple[int | None, list[Remark]]:
+    """UTC of device time zero: by the kind of the time column, the metadata, or a ``time_utc`` beside it."""
+    if layout.time.kind == "iso":
+        return 0, []
+    utc_ns, remarks = utc_of_zero(metadata)
+    if utc_ns is not None or "time_utc" not in names:
+        return utc_ns, remarks
+    return _utc_from_rows(source, dialect, layout, names.index("time_utc"))
+
+
+def _utc_from_rows(source: Source, dialect: Dialect, layout: Layout, column: int) -> tuple[int | None, list[Remark]]:
+    """UTC of device time zero from the first row that has both a recorder time and a ``time_utc``."""
+    from groundstation.readers.table_reader import first_times
+
+    device, _none = first_times(source, dialect, layout)
+    utc, zoneless = first_times(source, dialect, replace(layout, time=TimeRule("iso", (column,), ("time_utc",))))
+    both = (device.mask & utc.mask).nonzero()[0]
+    if not len(both):
+        return None, []
+    remarks = [Remark("derived", "UTC taken from the first row that has both recorder time and time_utc")]
+    remarks += [Remark("assumed_utc", "time_utc names no zone: read as UTC")] if zoneless else []
+    return int(utc.values[both[0]] - device.values[both[0]]), remarks
+
+
+def _layout(top: _Top) -> tuple[Layout, list[Remark]]:
+    time_name = next(name for name in TIME_COLUMNS if name in top.names)
+    time_column = top.names.index(time_name)
+    time = TimeRule(TIME_COLUMNS[time_name], (time_column,), (time_name,))  # type: ignore[arg-type]
+    rules: dict[tuple[str, str], Rule] = {}
+    remarks: list[Remark] = []
+    for column, name in enumerate(top.names):
+        if column == time_column or not name:
+            continue
+        rule = _rule(column, name)
+        if rule.key in rules:
+            renamed = replace(
+                rule, topic=f"{RAW_PREFIX}csv", field=f"{name}_{column + 1}", kind="raw", is_heading=False
+            )
+            remarks.append(Remark("duplicate_column", f"column {name!r} occurs twice: the second is {renamed.target}"))
+            rule = renamed
+        rules[rule.key] = rule
+    layout = Layout(time, tuple(rules.values()), decimal_comma=uses_decimal_comma(top.first_rows, top.delimiter))
+    return replace(layout, derivations=_derivations(layout.rules)), remarks
+
+
+def _rule(column: int, name: str) -> Rule:
+    topic, _, field = name.rpartition(".")
+    known = field_of(topic, field)
+    if known is not None:
+        return rule_for(column, topic, known)
+    raw_topic = topic if topic.startswith(RAW_PREFIX) else f"{RAW_PREFIX}{topic or 'csv'}"
+    return Rule(column, raw_topic, field, "raw")
+
+
+def _derivations(rules: tuple[Rule, ...]) -> tuple[Derivation, ...]:
+    """Velocities from track and ground speed, for topics that have no velocities of their own."""
+    keys = {rule.key for rule in rules}
+    found = []
+    for topic in dict.fromkeys(rule.topic for rule in rules):
+        inputs = ((topic, "track_deg"), (topic, "ground_speed_mps"))
+        outputs = ("velocity_north_mps", "velocity_east_mps")
+        canonical = field_of(topic, "velocity_north_mps") is not None
+        if canonical and keys.issuperset(inputs) and not keys.intersection((topic, name) for name in outputs):
+            found.append(Derivation("velocity_from_track", topic, outputs, inputs))
+    return tuple(found)
+
+
+def _mistakes(top: _Top) -> list[Remark]:
+    """Column names that look like a slip of a canonical one: they are kept as raw, and the user is told."""
+    unknown = [name for name in top.names if "." in name and field_of(*name.rpartition(".")[::2]) is None]
+    slips = [name for name in unknown if not name.startswith(RAW_PREFIX)]
+    if not slips:
+        return []
+    shown = ", ".join(slips[:5]) + (", ..." if len(slips) > 5 else "")
+    return [Remark("unknown_columns", f"{len(slips)} columns name no canonical field and are kept as raw: {shown}")]

@@ -1,0 +1,213 @@
+"""What the columns of a delimited table mean: which canonical field each one feeds, and how the time is written."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import wrap_360
+from groundstation.base.records import Column
+from groundstation.base.signals import Field
+
+RuleKind = Literal["double", "bool", "text", "raw"]
+TimeKind = Literal["seconds", "nanoseconds", "iso", "local"]
+Key: TypeAlias = tuple[str, str]  # topic, field
+FloatArray: TypeAlias = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Where one column of the file goes: canonical value = number in the cell x ``factor`` + ``offset``.
+
+    Parameters
+    ----------
+    column : int
+        Position in the row.
+    topic, field : str
+    kind : {'double', 'bool', 'text', 'raw'}
+        ``raw`` is settled before reading: float64 where every cell of the file is a number, else text.
+    factor, offset : float
+        To the unit of the canonical field.
+    is_heading : bool
+        Values are brought into [0, 360).
+    """
+
+    column: int
+    topic: str
+    field: str
+    kind: RuleKind
+    factor: float = 1.0
+    offset: float = 0.0
+    is_heading: bool = False
+
+    @property
+    def key(self) -> Key:
+        """Topic and field."""
+        return self.topic, self.field
+
+    @property
+    def target(self) -> str:
+        """``topic.field``, for messages."""
+        return f"{self.topic}.{self.field}"
+
+
+@dataclass(frozen=True)
+class TimeRule:
+    """How the time of a row is written.
+
+    Parameters
+    ----------
+    kind : {'seconds', 'nanoseconds', 'iso', 'local'}
+        ``local`` is a date, a time of day and, as third, an offset from UTC in three columns of text.
+    columns : tuple of int
+        Positions of one column, or of date, time and (optionally) offset.
+    names : tuple of str
+        Their names, for messages.
+    digits, multiple : int
+        The unit is ``10**digits`` x ``multiple`` nanoseconds, for ``seconds``.
+    date_formats : tuple of str
+        strptime formats tried in turn, for ``local``.
+    """
+
+    kind: TimeKind
+    columns: tuple[int, ...]
+    names: tuple[str, ...]
+    digits: int = 9
+    multiple: int = 1
+    date_formats: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to derive fields from others: names and units of its inputs, what it gives, what to tell the user."""
+
+    inputs: tuple[str, ...]
+    units: tuple[str, ...]
+    function: Callable[..., tuple[FloatArray, ...]]
+    outputs: tuple[str, ...]
+    text: str
+
+
+@dataclass(frozen=True)
+class Derivation:
+    """Fields of a topic that the reader computes row by row from other fields times ``factors`` (1 where empty)."""
+
+    method: str
+    topic: str
+    outputs: tuple[str, ...]
+    inputs: tuple[Key, ...]
+    factors: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The meaning of a table: time, columns, derived fields."""
+
+    time: TimeRule
+    rules: tuple[Rule, ...]
+    derivations: tuple[Derivation, ...] = ()
+    decimal_comma: bool = False
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+
+def true_from_magnetic(magnetic_deg: FloatArray, variation_deg: FloatArray) -> tuple[FloatArray, ...]:
+    """True direction, degrees in [0, 360): magnetic + declination, east positive.
+
+    Examples
+    --------
+    >>> float(true_from_magnetic(np.array([359.0]), np.array([2.0]))[0][0])
+    1.0
+    """
+    return (np.asarray(wrap_360(magnetic_deg + variation_deg)),)
+
+
+def velocity_from_track(track_deg: FloatArray, speed_mps: FloatArray) -> tuple[FloatArray, ...]:
+    """Velocities north and east from true track and ground speed.
+
+    Examples
+    --------
+    >>> [round(float(part[0]), 9) for part in velocity_from_track(np.array([90.0]), np.array([50.0]))]
+    [0.0, 50.0]
+    """
+    track_rad = np.deg2rad(track_deg)
+    return speed_mps * np.cos(track_rad), speed_mps * np.sin(track_rad)
+
+
+def wind_from_direction(from_deg: FloatArray, speed_mps: FloatArray) -> tuple[FloatArray, ...]:
+    """Velocity of the air north and east from the true direction the wind blows from, and its speed.
+
+    Examples
+    --------
+    >>> [round(float(part[0]), 9) for part in wind_from_direction(np.array([270.0]), np.array([10.0]))]
+    [0.0, 10.0]
+    """
+    north, east = velocity_from_track(from_deg, speed_mps)
+    return -north, -east
+
+
+def pressure_altitude(indicated_m: FloatArray, setting_inhg: FloatArray) -> tuple[FloatArray, ...]:
+    """Altitude above 1013.25 hPa from the altitude indicated with another altimeter setting.
+
+    H_p = H_i + T0 / L (1 - (setting / p0)^(L R / g0)), T0 = 288.15 K, L = 6.5 K/km, p0 = 29.92126 inHg, exponent
+    0.190263. Source: ICAO Doc 7488/3, Manual of the ICAO Standard Atmosphere (1993), the lowest layer.
+
+    Examples
+    --------
+    >>> float(pressure_altitude(np.array([100.0]), np.array([29.92126]))[0][0])
+    100.0
+    >>> round(float(pressure_altitude(np.array([0.0]), np.array([28.92126]))[0][0]), 1)  # 979.39 hPa
+    285.8
+    """
+    setting_altitude_m = 288.15 / 0.0065 * (1.0 - (setting_inhg / 29.92126) ** 0.190263)
+    return (indicated_m + setting_altitude_m,)
+
+
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        "true_from_magnetic": Method(
+            ("magnetic", "variation"), ("deg", "deg"), true_from_magnetic, (), "magnetic direction plus variation"
+        ),
+        "velocity_from_track": Method(
+            ("track", "speed"),
+            ("deg", "mps"),
+            velocity_from_track,
+            ("velocity_north_mps", "velocity_east_mps"),
+            "true track and ground speed",
+        ),
+        "wind_from_direction": Method(
+            ("direction", "speed"),
+            ("deg", "mps"),
+            wind_from_direction,
+            ("wind_north_mps", "wind_east_mps"),
+            "the direction the wind blows from and its speed",
+        ),
+        "pressure_altitude": Method(
+            ("indicated", "setting"),
+            ("m", "inhg"),
+            pressure_altitude,
+            ("pressure_altitude_m",),
+            "indicated altitude and altimeter setting",
+        ),
+    }
+)
+
+
+def rule_for(column: int, topic: str, known: Field, factor: float = 1.0, offset: float = 0.0) -> Rule:
+    """Rule that feeds a canonical field from a column."""
+    return Rule(column, topic, known.name, known.kind, factor, offset, known.is_heading)
+
+
+def apply(derivation: Derivation, known: Mapping[Key, Column]) -> dict[Key, Column]:
+    """Columns that a derivation gives: present where all its inputs are."""
+    inputs = [known[key] for key in derivation.inputs]
+    present = np.logical_and.reduce([column.mask for column in inputs])
+    factors = derivation.factors or (1.0,) * len(inputs)
+    values = [np.where(present, column.values * factor, np.nan) for column, factor in zip(inputs, factors, strict=True)]
+    results = METHODS[derivation.method].function(*values)
+    return {
+        (derivation.topic, name): Column(np.asarray(result), present)
+        for name, result in zip(derivation.outputs, results, strict=True)
+    }

@@ -1,0 +1,36 @@
+"""Formats that are known by their first bytes but not read in this version."""
+
+from groundstation.readers.source import Source
+
+_AT_START: tuple[tuple[bytes, str], ...] = (
+    (b"ULog\x01\x12\x35", "PX4 ULog"),
+    (b"\xa3\x95", "ArduPilot DataFlash"),
+    (b"\x25\xeb", "IRIG 106 Chapter 10"),
+    (b"\xb5\x62", "u-blox UBX"),
+    (b"$GP", "NMEA 0183"),
+    (b"$GN", "NMEA 0183"),
+    (b"$G", "NMEA 0183"),
+    (b"#ROSBAG", "ROS 1 bag"),
+    (b"\x89MCAP0\r\n", "MCAP"),
+    (b"SQLite format 3\0", "SQLite (ROS 2 bag)"),
+    (b"\x1f\x8b", "gzip"),
+    (b"PK\x03\x04", "zip (or a spreadsheet)"),
+    (b"\x28\xb5\x2f\xfd", "zstd"),
+    (b"BZh", "bzip2"),
+    (b"\xfd7zXZ\0", "xz"),
+    (b"\x89HDF\r\n\x1a\n", "HDF5 (or MATLAB 7.3)"),
+    (b"MATLAB 5.0", "MATLAB 5"),
+    (b"PAR1", "Parquet"),
+)
+
+
+def recognise(source: Source) -> str | None:
+    """Name of the format that a file's first bytes show, None when they show none."""
+    return next((name for magic, name in _AT_START if source.head.startswith(magic)), None)
+
+
+def is_binary(source: Source) -> bool:
+    """Whether the head is no text: NUL bytes, or many control characters."""
+    sample = source.head[:4096]
+    control = sum(byte < 32 and byte not in (9, 10, 12, 13) for byte in sample)
+    return b"\0" in sample or control * 20 > len(sample)

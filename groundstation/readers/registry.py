@@ -1,0 +1,172 @@
+"""Finds the reader of a file by its content.
+
+Built-in readers are listed here; third parties add theirs through entry points of the group
+``groundstation.readers``: a module or object with ``NAME``, ``sniff(source)`` and ``read(source)``. A plug-in that
+fails never hides the others.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from groundstation.base.errors import GroundstationError, UnreadableLogError
+from groundstation.base.records import Item, Remark
+from groundstation.readers import csv_profile, flat_csv, magic
+from groundstation.readers.source import Claim, Source
+
+ENTRY_POINT_GROUP = "groundstation.readers"
+_BUILT_IN: tuple[Any, ...] = (csv_profile, flat_csv)
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format that can be read: reader's name, one line on it, and where the reader comes from."""
+
+    name: str
+    summary: str
+    origin: str
+
+
+@cache
+def _plug_ins() -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Third-party readers by name, and one line for each that could not be loaded."""
+    from importlib.metadata import entry_points
+
+    readers: dict[str, Any] = {}
+    failures: list[str] = []
+    for entry in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda entry: entry.name):
+        if entry.value.startswith("groundstation.readers."):
+            continue
+        try:
+            reader = entry.load()
+            name = str(reader.NAME)
+            if not (callable(reader.sniff) and callable(reader.read)):
+                raise TypeError("sniff and read must be functions")
+        except Exception as error:  # a stranger's code: whatever it raises must not stop a run
+            failures.append(_one_line(f"reader plug-in {entry.name!r} ({entry.value}) cannot be used: {_named(error)}"))
+            continue
+        if name in {built_in.NAME for built_in in _BUILT_IN} | readers.keys():
+            failures.append(f"reader plug-in {entry.name!r} ({entry.value}) is left out: {name!r} is taken")
+            continue
+        readers[name] = reader
+    return readers, tuple(failures)
+
+
+def _named(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}"
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _readers() -> dict[str, Any]:
+    return {reader.NAME: reader for reader in _BUILT_IN} | _plug_ins()[0]
+
+
+def plug_in_failures() -> tuple[str, ...]:
+    """One line for each third-party reader that could not be loaded."""
+    return _plug_ins()[1]
+
+
+def formats() -> tuple[Format, ...]:
+    """Formats that can be read, built-in ones first."""
+    built_in = [Format(reader.NAME, _summary(reader), "built in") for reader in _BUILT_IN]
+    added = [Format(name, _summary(reader), "plug-in") for name, reader in _plug_ins()[0].items()]
+    return (*built_in, *added)
+
+
+def _summary(reader: Any) -> str:
+    return next(iter((reader.__doc__ or "").strip().splitlines()), "")
+
+
+def identify(path: str | Path, profile: Path | None = None) -> Claim:
+    """Find out which reader claims a file.
+
+    Parameters
+    ----------
+    path : path of the log
+    profile : path of a profile (TOML), optional
+        With it, the file is a table of that layout whatever it looks like.
+
+    Raises
+    ------
+    UnreadableLogError
+        When the file is empty, of a known format that is not read in this version, or unknown.
+    SettingsError
+        When the profile cannot be used.
+    """
+    return _claim(Source(Path(path)), profile)[0]
+
+
+def read(path: str | Path, profile: Path | None = None) -> Iterator[Item]:
+    """Iterate over the items of a file, with the reader that claims it.
+
+    Raises at once as :func:`identify` does, not at the first item. Parameters as there.
+    """
+    source = Source(Path(path))
+    claim, troubles = _claim(source, profile)
+    reader = _readers()[claim.reader]
+    if reader is csv_profile:
+        items = csv_profile.read(source, profile)
+    else:
+        items = reader.read(source) if reader in _BUILT_IN else _guarded(reader, claim, source)
+    return chain(items, (Remark("plug_in", trouble) for trouble in troubles))
+
+
+def _guarded(reader: Any, claim: Claim, source: Source) -> Iterator[Item]:
+    """Items of a stranger's reader; whatever it raises becomes one line."""
+    try:
+        yield from reader.read(source)
+    except GroundstationError:
+        raise
+    except Exception as error:
+        raise UnreadableLogError(source.name, f"reader {claim.reader!r} failed ({_named(error)})") from error
+
+
+def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]]:
+    if source.size == 0:
+        raise UnreadableLogError(source.name, "an empty file", "a recorded log", "check how it was copied")
+    if profile is not None:
+        return csv_profile.claim_by(source, profile), plug_in_failures()
+    claims: list[Claim] = []
+    refusals: list[GroundstationError] = []
+    troubles = list(plug_in_failures())
+    for name, reader in _readers().items():
+        try:
+            claim = _own(reader.sniff(source), name)
+        except GroundstationError as error:
+            refusals.append(error)
+        except Exception as error:  # see _plug_ins; a built-in reader must not raise this
+            if reader in _BUILT_IN:
+                raise
+            troubles.append(_one_line(f"reader plug-in {name!r} failed to look at the file: {_named(error)}"))
+        else:
+            claims += [claim] if claim is not None else []
+    if claims:
+        return min(claims, key=lambda claim: (-claim.confidence, claim.reader)), tuple(troubles)
+    raise _unclaimed(source, refusals, troubles)
+
+
+def _own(claim: Any, name: str) -> Claim | None:
+    """A reader's answer, as its own claim."""
+    if claim is None:
+        return None
+    return Claim(name, str(claim.detail), float(claim.confidence))
+
+
+def _unclaimed(source: Source, refusals: list[GroundstationError], troubles: list[str]) -> GroundstationError:
+    known = magic.recognise(source)
+    if known is not None:
+        return UnreadableLogError(
+            source.name, f"recognised as {known}, not readable in this version", "", "convert it to the flat CSV"
+        )
+    if refusals:
+        return refusals[0]
+    found = "binary data of an unknown format" if magic.is_binary(source) else "text that no reader claims"
+    names = ", ".join(reader for reader in _readers())
+    found += f" ({'; '.join(troubles)})" if troubles else ""
+    return UnreadableLogError(source.name, found, f"one of {names}", "describe a table by a profile (--profile FILE)")

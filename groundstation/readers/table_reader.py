@@ -1,0 +1,219 @@
+"""Reads a delimited table by its dialect and layout: blocks of rows in, batches of typed columns out."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv as pa_csv
+
+from groundstation.base.angles import wrap_360
+from groundstation.base.records import (
+    MAX_BATCH_ROWS,
+    MAX_TEXT_CHARACTERS,
+    BoolArray,
+    Column,
+    Damage,
+    Int64Array,
+    Item,
+    LogHeader,
+    RecordBatch,
+    Remark,
+)
+from groundstation.readers import cells
+from groundstation.readers.cells import Cells
+from groundstation.readers.dates import local_ns
+from groundstation.readers.dialect import Dialect
+from groundstation.readers.layout import METHODS, Key, Layout, Rule, apply
+from groundstation.readers.losses import Losses
+from groundstation.readers.rows import Block, RowScanner, restore_delimiters
+from groundstation.readers.source import Source
+
+MAX_BATCH_BYTES = 32 << 20  # a text field is as wide as its longest value: a batch of long texts has fewer rows
+
+
+class TableReader:
+    """Iterator of items over one delimited file.
+
+    Parameters
+    ----------
+    source : Source
+    dialect : Dialect
+    layout : Layout
+        Rules of kind ``raw`` are settled here by a first pass over the file.
+    """
+
+    def __init__(self, source: Source, dialect: Dialect, layout: Layout) -> None:
+        self._source, self._dialect = source, dialect
+        self._losses = Losses()
+        self._wrapped: dict[str, int] = {}
+        self._zoneless = 0
+        self._layout = replace(layout, rules=self._settled(layout))
+
+    def items(self, header: LogHeader) -> Iterator[Item]:
+        """The header, batches in the order of the file, then remarks and damages."""
+        yield header
+        scanner = RowScanner(self._source, self._dialect, self._losses)
+        for block in scanner:
+            time, columns = self._typed(block)
+            yield from self._batches(block.line_numbers, time, columns)
+        yield from self._remarks(scanner)
+        yield from self._losses.damages()
+
+    def _settled(self, layout: Layout) -> tuple[Rule, ...]:
+        """Rules with ``raw`` settled: float64 where every cell of the file is a number, else text.
+
+        A column's type must not change between batches, so it takes a pass of its own; only raw columns are parsed.
+        """
+        raw = {rule.column for rule in layout.rules if rule.kind == "raw"}
+        texts: set[int] = set()
+        if raw:
+            for block in RowScanner(self._source, self._dialect, Losses()):
+                parsed = self._parse(block, dict.fromkeys(sorted(raw - texts), pa.string()))
+                for column, array in parsed.items():
+                    text = cells.trimmed(array)
+                    if not cells.are_numbers(_with_point(text) if layout.decimal_comma else text):
+                        texts.add(column)
+                if texts == raw:
+                    break
+        kinds = {column: "text" if column in texts else "double" for column in raw}
+        return tuple(replace(rule, kind=kinds.get(rule.column, rule.kind)) for rule in layout.rules)  # type: ignore[arg-type]
+
+    def _parse(self, block: Block, types: Mapping[int, Any], decimal_point: str = ".") -> dict[int, Any]:
+        """Columns of a block as arrow arrays, empty cells null; pa.ArrowInvalid where a type does not fit."""
+        names = [str(column) for column in range(self._dialect.cells)]
+        table = pa_csv.read_csv(
+            pa.BufferReader(block.text),
+            read_options=pa_csv.ReadOptions(column_names=names, use_threads=False, block_size=len(block.text) + 1),
+            parse_options=pa_csv.ParseOptions(
+                delimiter=self._dialect.delimiter, quote_char=False, escape_char=False, ignore_empty_lines=False
+            ),
+            convert_options=pa_csv.ConvertOptions(
+                column_types={str(column): kind for column, kind in types.items()},
+                include_columns=[str(column) for column in types],
+                null_values=[""],
+                strings_can_be_null=True,
+                decimal_point=decimal_point,
+            ),
+        )
+        return {column: table.column(str(column)).combine_chunks() for column in types}
+
+    def _typed(self, block: Block) -> tuple[Column, dict[Key, Column]]:
+        layout = self._layout
+        types = {rule.column: pa.float64() if rule.kind == "double" else pa.string() for rule in layout.rules}
+        types |= dict.fromkeys(layout.time.columns, pa.string())
+        try:
+            arrays = self._parse(block, types, "," if layout.decimal_comma else ".")
+        except pa.ArrowInvalid:  # some cell is no number: take all as text and find out which
+            arrays = self._parse(block, dict.fromkeys(types, pa.string()))
+        arrays = {at: cells.trimmed(array) if pa.types.is_string(array.type) else array for at, array in arrays.items()}
+        time = self._time(arrays, block.line_numbers)
+        columns = {rule.key: self._column(rule, arrays[rule.column], block.line_numbers) for rule in layout.rules}
+        for derivation in layout.derivations:
+            columns |= apply(derivation, columns)
+        return time, columns
+
+    def _time(self, arrays: Mapping[int, Any], lines: Int64Array) -> Column:
+        rule = self._layout.time
+        texts = [arrays[column] for column in rule.columns]
+        if self._layout.decimal_comma:
+            texts = [_with_point(text) for text in texts]
+        if rule.kind == "seconds":
+            read = cells.decimal_ns(texts[0], rule.digits, rule.multiple)
+        elif rule.kind == "nanoseconds":
+            read = cells.integers_ns(texts[0])
+        elif rule.kind == "iso":
+            read, zoneless = cells.iso_ns(texts[0])
+            self._zoneless += int(zoneless.sum())
+        else:
+            read = local_ns(texts[0], texts[1], texts[2] if len(texts) > 2 else None, rule.date_formats)
+        self._losses.add("unreadable_cells", "times that cannot be read", lines[read.unreadable], where=rule.names[0])
+        return read.column
+
+    def _column(self, rule: Rule, array: Any, lines: Int64Array) -> Column:
+        read, what = self._read_cells(rule, array)
+        self._losses.add("unreadable_cells", what, lines[read.unreadable], where=rule.target, topic=rule.topic)
+        if read.cut is not None:
+            what = f"texts cut to {MAX_TEXT_CHARACTERS} characters"
+            self._losses.add("cut_text", what, lines[read.cut], where=rule.target, topic=rule.topic)
+        column = read.column
+        if rule.factor != 1.0 or rule.offset != 0.0:
+            column = Column(column.values * rule.factor + rule.offset, column.present)
+        return self._on_the_circle(rule, column) if rule.is_heading else column
+
+    def _read_cells(self, rule: Rule, array: Any) -> tuple[Cells, str]:
+        if rule.kind == "bool":
+            return cells.flags(array), "cells that are not 0, 1, true or false"
+        if rule.kind == "text":
+            delimiter = self._dialect.delimiter
+            return cells.words(array, lambda word: restore_delimiters(word, delimiter)), "cells that are no text"
+        what = "cells that are not a number"
+        if not pa.types.is_string(array.type):
+            return cells.ready_numbers(array), what
+        return cells.numbers(_with_point(array) if self._layout.decimal_comma else array), what
+
+    def _on_the_circle(self, rule: Rule, column: Column) -> Column:
+        """Bring headings into [0, 360). Beyond a turn to either side it is no heading: left for the ledger to flag."""
+        values = column.values
+        astray = ((values < 0.0) | (values >= 360.0)) & (values >= -360.0) & (values <= 720.0) & column.mask
+        if not astray.any():
+            return column
+        self._wrapped[rule.target] = self._wrapped.get(rule.target, 0) + int(astray.sum())
+        return Column(np.where(astray, wrap_360(values), values), column.present)
+
+    def _batches(self, lines: Int64Array, time: Column, columns: Mapping[Key, Column]) -> Iterator[RecordBatch]:
+        topics: dict[str, dict[str, Column]] = {}
+        for (topic, name), column in columns.items():
+            topics.setdefault(topic, {})[name] = column
+        for topic, fields in topics.items():
+            batch = RecordBatch(topic, lines, time, fields)
+            rows = _occupied(fields)
+            if rows is not None:
+                batch = batch.take(rows)
+            row_bytes = sum(column.values.dtype.itemsize for column in fields.values())
+            step = max(1, min(MAX_BATCH_ROWS, MAX_BATCH_BYTES // max(1, row_bytes)))
+            for start in range(0, len(batch), step):
+                yield batch if len(batch) <= step else batch.take(slice(start, start + step))
+
+    def _remarks(self, scanner: RowScanner) -> Iterator[Remark]:
+        for derivation in self._layout.derivations:
+            outputs = ", ".join(derivation.outputs)
+            text = f"{derivation.topic}: {outputs} derived from {METHODS[derivation.method].text}"
+            yield Remark("derived", text, derivation.topic)
+        for target, count in self._wrapped.items():
+            text = f"{target}: {count} values outside [0, 360) brought into it by whole turns"
+            yield Remark("wrapped_heading", text, target.rpartition(".")[0])
+        if self._zoneless:
+            yield Remark("assumed_utc", f"{self._zoneless} times without a zone are read as UTC")
+        if self._layout.decimal_comma:
+            yield Remark("decimal_comma", "numbers are written with a decimal comma")
+        if scanner.ends_without_newline:
+            yield Remark("no_final_newline", "the last row has no line end: its last cell may be cut short")
+
+
+def _with_point(text: Any) -> Any:
+    return pc.replace_substring(text, ",", ".", max_replacements=1)
+
+
+def _occupied(fields: Mapping[str, Column]) -> BoolArray | None:
+    """Rows in which any field has a cell; None when all have."""
+    if any(column.present is None for column in fields.values()):
+        return None
+    rows: BoolArray = np.logical_or.reduce([column.mask for column in fields.values()])
+    return None if rows.all() else rows
+
+
+def first_times(source: Source, dialect: Dialect, layout: Layout) -> tuple[Column, int]:
+    """Times of the first block of rows (none when there are no rows), and how many name no zone."""
+    block = next(iter(RowScanner(source, dialect, Losses())), None)
+    if block is None:
+        return Column(np.zeros(0, dtype=np.int64)), 0
+    reader = TableReader(source, dialect, replace(layout, rules=(), derivations=()))
+    return reader._typed(block)[0], reader._zoneless
+
+
+def truncated_header(line: int) -> Damage:
+    """Damage of a file that ends inside its header row."""
+    return Damage("truncated", f"row {line}", 1, "header row cut by the end of the file: no data")

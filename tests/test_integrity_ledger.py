@@ -1,0 +1,137 @@
+"""The ledger's figures, its findings, and records in order."""
+
+import json
+
+import numpy as np
+import pytest
+
+from groundstation.base.records import Column, Damage, Item, LogHeader, RecordBatch, Remark
+from groundstation.base.units import NS_PER_S
+from groundstation.integrity import LedgerSettings, corrected, ledger_findings, survey
+from groundstation.integrity.ledger import gaps_of
+from groundstation.integrity.ordering import joined
+
+
+def batch(topic: str, times_s: list[float], first_record: int = 0, **columns: Column) -> RecordBatch:
+    times = np.round(np.array(times_s) * NS_PER_S).astype(np.int64)
+    index = np.arange(first_record, first_record + len(times), dtype=np.int64)
+    return RecordBatch(topic, index, Column(times), columns)
+
+
+def test_rates_coverage_and_gaps() -> None:
+    times = [0.0, 0.1, 0.2, 0.3, 0.4, 1.0, 1.1, 1.2, 3.2, 3.3]
+    ledger = survey([LogHeader("t"), batch("ins", times)]).ledger["ins"]
+    assert ledger.rows == 10 and ledger.span_s == 3.3
+    assert ledger.nominal_rate_hz == pytest.approx(10.0) and ledger.actual_rate_hz == pytest.approx(9 / 3.3)
+    assert ledger.coverage == pytest.approx(10 / 34)
+    assert ledger.gaps.start_ns.tolist() == [400_000_000, 1_200_000_000]
+    assert ledger.gaps.length_s.tolist() == pytest.approx([0.6, 2.0])
+
+
+def test_the_definition_of_a_gap_can_be_set() -> None:
+    items: list[Item] = [LogHeader("t"), batch("ins", [0.0, 0.1, 0.2, 0.45, 0.55, 1.55, 1.65])]
+    for settings, count in (
+        (None, 1),
+        (LedgerSettings(2.0), 2),
+        (LedgerSettings(2.0, 0.5), 1),
+        (LedgerSettings(20.0), 0),
+    ):
+        found = survey(items, ledger_settings=settings)
+        assert len(found.ledger["ins"].gaps) == count
+        assert sum(len(gaps) for gaps in found.gaps) == count
+
+
+def test_events_have_no_gaps() -> None:
+    ledger = survey([LogHeader("t"), batch("event", [0, 1, 2, 900])]).ledger["event"]
+    assert len(ledger.gaps) == 0 and ledger.coverage is None
+    assert len(gaps_of("event", np.array([0, 1, 9]) * NS_PER_S)) == 0
+
+
+def test_values_outside_the_range_and_nan_are_counted() -> None:
+    latitude = Column(np.array([10.0, 912.0, np.nan, -91.0, 912.0]), np.array([True, True, True, True, False]))
+    speed = Column(np.array([1.0, np.inf, 3.0, 4.0, 5.0]))
+    items = [LogHeader("t"), batch("gnss", [0, 1, 2, 3, 4], 7, latitude_deg=latitude, pdop=speed)]
+    found = survey(items).ledger
+    fields = {field.name: field for field in found["gnss"].fields}
+    assert (fields["latitude_deg"].present, fields["latitude_deg"].nan) == (4, 1)
+    assert (fields["latitude_deg"].out_of_range, fields["latitude_deg"].first_out_of_range) == (2, 8)
+    assert fields["pdop"].out_of_range == 1
+    texts = {finding.code: finding.text for finding in ledger_findings(found) if "latitude" in finding.text}
+    assert "2 values outside [-90, 90], first at record 8" in texts["values.out_of_range"]
+    assert "1 of 4 values are NaN" in texts["values.nan"]
+
+
+def test_damages_and_remarks_reach_the_findings() -> None:
+    items: list[Item] = [
+        LogHeader("t"),
+        batch("ins", [0, 1, 2]),
+        Damage("dropped_rows", "row 7", 1, "rows with fewer cells", "ins"),
+        Damage("repeated_header", "row 9", 1, "header lines", loses_data=False),
+        Remark("assumed_utc", "3 times without a zone"),
+        Remark("derived", "velocities", "gnss"),
+    ]
+    found = survey(items)
+    assert found.ledger.loses_data and len(found.damages) == 2 and len(found.remarks) == 2
+    codes = {finding.code: finding.severity for finding in ledger_findings(found.ledger)}
+    assert codes["data.dropped_rows"] == "warn" and codes["data.repeated_header"] == "info"
+    assert codes["reader.assumed_utc"] == "warn" and codes["reader.derived"] == "info"
+
+
+def test_dictionaries_are_json_and_repeat_exactly() -> None:
+    items = [
+        LogHeader("t"),
+        batch("ins", [0, 0.1, 0.2, 5.0], roll_deg=Column(np.zeros(4))),
+        batch("baro", [0, 1, 2, 3]),
+    ]
+    first, second = (survey(list(items)) for _ in range(2))
+    text = json.dumps(first.ledger.to_dict(), allow_nan=False)
+    assert text == json.dumps(second.ledger.to_dict(), allow_nan=False)
+    assert json.dumps(first.clock.to_dict(), allow_nan=False)
+    assert list(json.loads(text)["topics"]) == ["baro", "ins"] and first.ledger.completeness["baro"] == 1.0
+    with pytest.raises(KeyError):
+        first.ledger["gnss"]
+
+
+def test_an_empty_log() -> None:
+    found = survey([LogHeader("t")])
+    assert found.ledger.topics == () and list(corrected([LogHeader("t")], found.clock)) == []
+    assert [finding.code for finding in ledger_findings(found.ledger)] == ["data.none"]
+
+
+def test_held_back_records_come_in_order_and_in_bounded_pieces() -> None:
+    times = [0.0, 1, 2, 3, 5, 6, 4, 7, 8, 9, 10, 11]
+    pieces = [
+        batch("ins", times[start : start + 3], start, x=Column(np.array(times[start : start + 3])))
+        for start in (0, 3, 6, 9)
+    ]
+    items: list[Item] = [LogHeader("t"), *pieces]
+    clock = survey(items).clock
+    assert clock.lateness_ns == {"ins": 2 * NS_PER_S}
+    out = list(corrected(items, clock))
+    assert [value for piece in out for value in piece.columns["x"].values] == sorted(times)
+    assert out[0].record_index.tolist() == [0] and max(len(piece) for piece in out) <= 5
+    assert all(piece.time_ns is not None for piece in out)
+
+
+def test_equal_times_keep_the_order_of_the_source() -> None:
+    items: list[Item] = [LogHeader("t"), batch("ins", [0, 1, 1, 1, 3, 4, 2, 5, 6])]
+    (out,) = (piece for piece in [joined(list(corrected(items, survey(items).clock)))])
+    assert out.record_index.tolist() == [0, 1, 2, 3, 6, 4, 5, 7, 8]
+
+
+def test_joining_batches_of_different_fields_and_widths() -> None:
+    one = batch("event", [0, 1], name=Column(np.array(["a", "b"])))
+    two = batch("event", [2], 2, name=Column(np.array(["long"])), extra=Column(np.array([1.0])))
+    items: list[Item] = [LogHeader("t"), one, two]
+    whole = joined(list(corrected(items, survey(items).clock)))
+    assert whole.columns["name"].values.tolist() == ["a", "b", "long"]
+    assert whole.columns["extra"].mask.tolist() == [False, False, True]
+
+
+def test_topics_of_different_records_share_one_clock() -> None:
+    step = [*range(100, 110), *range(50, 80)]
+    ins = batch("ins", step)
+    gnss = ins.take(np.arange(20, 40))  # begins after the step; not moved
+    found = survey([LogHeader("t"), ins, RecordBatch("gnss", gnss.record_index, gnss.device_time_ns, {})])
+    assert found.ledger["ins"].first_ns == 40 * NS_PER_S and found.ledger["gnss"].first_ns == 60 * NS_PER_S
+    assert found.ledger["ins"].backward_steps == 1 and found.ledger["gnss"].backward_steps == 0

@@ -1,0 +1,200 @@
+"""Formats are found by content; what cannot be read is refused in one clear line; plug-ins cannot break a run."""
+
+from collections.abc import Iterator
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from groundstation.base.errors import UnreadableLogError
+from groundstation.base.records import Item, LogHeader, Remark
+from groundstation.readers import registry
+from groundstation.readers.source import Claim, Source
+from tests.real_logs import real_log
+
+MAGICS = [
+    (b"ULog\x01\x12\x35\x01" + bytes(20), "PX4 ULog"),
+    (b"\xa3\x95\x80\x80" + bytes(20), "ArduPilot DataFlash"),
+    (b"\x25\xeb\x00\x00" + bytes(20), "Chapter 10"),
+    (b"\xb5\x62\x01\x07" + bytes(20), "UBX"),
+    (b"$GNGGA,103607.00,5327.03942,N*2F\r\n", "NMEA"),
+    (b"#ROSBAG V2.0\n", "ROS 1 bag"),
+    (b"\x89MCAP0\r\n" + bytes(20), "MCAP"),
+    (b"SQLite format 3\0" + bytes(20), "SQLite"),
+    (b"\x1f\x8b\x08" + bytes(20), "gzip"),
+    (b"PK\x03\x04" + bytes(20), "zip"),
+    (b"\x28\xb5\x2f\xfd" + bytes(20), "zstd"),
+]
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(UnreadableLogError) as caught:
+        registry.identify(path)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(("content", "name"), MAGICS, ids=[name for _, name in MAGICS])
+def test_known_formats_are_named(tmp_path: Path, content: bytes, name: str) -> None:
+    path = tmp_path / "log.csv"  # the name means nothing
+    path.write_bytes(content)
+    text = refusal(path)
+    assert f"recognised as {name}" in text or name in text
+    assert "not readable in this version" in text and "log.csv" in text
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (b"", "empty"),
+        (bytes(range(256)) * 20, "binary data of an unknown format"),
+        (b"Dear diary,\nnothing happened.\n", "no reader claims"),
+        (b"t,x\n1,2\n", "--profile"),
+        (b"ins.roll_deg,ins.pitch_deg\n1,2\n", "no time column"),
+    ],
+)
+def test_unknown_content_is_refused_in_one_line(tmp_path: Path, content: bytes, expected: str) -> None:
+    path = tmp_path / "log.bin"
+    path.write_bytes(content)
+    assert expected in refusal(path)
+
+
+def test_absent_files_and_folders(tmp_path: Path) -> None:
+    assert "no such file" in refusal(tmp_path / "nothing.csv")
+    assert "directory" in refusal(tmp_path)
+
+
+def test_read_refuses_at_once(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(b"")
+    with pytest.raises(UnreadableLogError):
+        registry.read(tmp_path / "a")
+
+
+def test_the_flat_csv_is_claimed_whatever_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "flight.dat"
+    path.write_text("time_s,ins.roll_deg\n1,2\n")
+    assert registry.identify(path) == Claim("flat-csv", "", 0.9)
+    assert registry.identify(str(path)).title == "flat-csv"
+
+
+def test_formats_are_listed() -> None:
+    found = {entry.name: entry for entry in registry.formats()}
+    assert {"flat-csv", "csv-profile"} <= found.keys()
+    assert all(entry.summary and "\n" not in entry.summary for entry in found.values())
+
+
+class Diary:
+    """Diaries."""
+
+    NAME = "diary"
+
+    def sniff(self, source: Source) -> Claim | None:
+        return Claim("my diary") if source.head.startswith(b"Dear diary") else None
+
+    def read(self, source: Source) -> Iterator[Item]:
+        yield LogHeader("diary")
+        yield Remark("mood", "good")
+
+
+class Broken(Diary):
+    NAME = "broken"
+
+    def sniff(self, source: Source) -> Claim | None:
+        raise ValueError("oh\nno")
+
+
+class BreaksLate(Diary):
+    NAME = "late"
+
+    def read(self, source: Source) -> Iterator[Item]:
+        yield LogHeader("late")
+        raise IndexError("row 7")
+
+
+class Unloadable:
+    def load(self) -> Any:
+        raise ImportError("no module named antigravity")
+
+    name, value = "unloadable", "antigravity"
+
+
+class Loaded:
+    def __init__(self, reader: Any, name: str = "plug", value: str = "plug.reader") -> None:
+        self._reader, self.name, self.value = reader, name, value
+
+    def load(self) -> Any:
+        return self._reader
+
+
+@pytest.fixture
+def plug_ins(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
+    entries: list[Any] = []
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: entries)
+    registry._plug_ins.cache_clear()
+    yield entries
+    registry._plug_ins.cache_clear()
+
+
+@pytest.fixture
+def diary(tmp_path: Path) -> Path:
+    path = tmp_path / "diary.txt"
+    path.write_text("Dear diary,\n")
+    return path
+
+
+def test_builtins_work_without_entry_points(plug_ins: list[Any], tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("time_s,ins.roll_deg\n1,2\n")
+    assert registry.identify(path).reader == "flat-csv"
+
+
+def test_a_plug_in_reads(plug_ins: list[Any], diary: Path) -> None:
+    plug_ins.append(Loaded(Diary()))
+    assert registry.identify(diary).reader == "diary"
+    assert [type(item) for item in registry.read(diary)] == [LogHeader, Remark]
+    assert registry.formats()[-1] == registry.Format("diary", "Diaries.", "plug-in")
+
+
+@pytest.mark.parametrize("broken", [Loaded(Broken()), Unloadable(), Loaded(object()), Loaded(Diary(), "x", "y")])
+def test_a_broken_plug_in_is_one_line(plug_ins: list[Any], tmp_path: Path, broken: Any) -> None:
+    if isinstance(broken, Loaded) and broken.name == "x":
+        plug_ins.append(Loaded(Diary()))  # two of one name
+    plug_ins.append(broken)
+    path = tmp_path / "a.csv"
+    path.write_text("time_s,ins.roll_deg\n1,2\n")
+    remarks = [item for item in registry.read(path) if isinstance(item, Remark)]
+    assert [remark.code for remark in remarks] == ["plug_in"] and "\n" not in remarks[0].text
+    path.write_text("nothing known")
+    assert "plug-in" in refusal(path)
+
+
+def test_a_plug_in_that_breaks_while_reading(plug_ins: list[Any], diary: Path) -> None:
+    plug_ins.append(Loaded(BreaksLate()))
+    with pytest.raises(UnreadableLogError, match=r"reader 'late' failed \(IndexError: row 7\)"):
+        list(registry.read(diary))
+
+
+def test_our_own_entry_point_is_not_a_plug_in(plug_ins: list[Any]) -> None:
+    group = registry.ENTRY_POINT_GROUP
+    plug_ins.append(EntryPoint("flat_csv", "groundstation.readers.flat_csv", group))
+    assert registry.plug_in_failures() == () and all(entry.origin == "built in" for entry in registry.formats())
+
+
+@pytest.mark.real_log
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("ulog/pyulog_sample.ulg", "PX4 ULog"),
+        ("dataflash/erle_plane_4-12-2014_329.BIN", "ArduPilot DataFlash"),
+        ("ch10/kc135_429_1553_1MB.c10", "Chapter 10"),
+        ("gnss/ublox_ins_drive_pvat.ubx", "UBX"),
+        ("gnss/pygpsdata-NMEA.log", "NMEA"),
+        ("damaged/wrong_rmw_test_0.mcap", "MCAP"),
+        ("damaged/log_220414_065328______EMPTY.csv", "empty"),
+        ("inertial/gv_rf15_attitude_error.csv", "no reader claims"),  # PROVENANCE: not in the flat CSV
+        ("cooperative/murp/17_base-1_targ-2.csv", "no reader claims"),
+    ],
+)
+def test_recorded_logs_of_other_formats_are_named(name: str, expected: str) -> None:
+    assert expected in refusal(real_log(name))
