@@ -15,7 +15,7 @@ from groundstation.results.flight import FlightResults
 from groundstation.results.summary import digits_of, summary_of
 
 SUMMARY, MANIFEST, ARRAYS, TABLES = "summary.json", "manifest.json", "results.parquet", "tables"
-FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
+FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,16 @@ class SavedFlight:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file under a temporary name and move it into place: a kill never leaves half a file."""
+    """Write a text file under a temporary name and move it into place: a kill never leaves half a file.
+
+    A lone surrogate (a file name that is not UTF-8) is written as its escape, which JSON reads back as it was.
+    """
     temporary = path.with_name(f".{path.name}.partial")
-    temporary.write_text(text, encoding="utf-8", newline="\n")
-    temporary.replace(path)
+    try:
+        temporary.write_bytes(text.encode("utf-8", "backslashreplace"))
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def json_text(document: Any) -> str:
@@ -60,6 +66,8 @@ def save(folder: Path, results: FlightResults, manifest: Mapping[str, Any]) -> N
         Time of run, host, versions, settings: everything that may differ between two equal runs stands here alone.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    for name in (SUMMARY, MANIFEST):  # written last: a folder that was cut short has none, and does not look finished
+        (folder / name).unlink(missing_ok=True)
     for name in (ARRAYS, TABLES):
         shutil.rmtree(folder / name, ignore_errors=True)
         (folder / name).mkdir()
@@ -76,13 +84,13 @@ def load(folder: Path) -> SavedFlight:
     Raises
     ------
     UnreadableLogError
-        When the folder has no summary.json, or one that is not JSON.
+        When the folder has no summary.json, or one that is not a JSON object.
     """
-    documents = {}
+    documents: dict[str, dict[str, Any]] = {}
     for name in (SUMMARY, MANIFEST):
         try:
-            documents[name] = json.loads((folder / name).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
+            documents[name] = dict(json.loads((folder / name).read_text(encoding="utf-8")))
+        except (OSError, TypeError, ValueError) as error:
             raise UnreadableLogError(
                 str(folder / name), type(error).__name__, "the JSON file a run leaves", "run the log again"
             ) from error
@@ -95,7 +103,7 @@ def _write_parquet(path: Path, figure: FigureData) -> None:
     import pyarrow.parquet as pq
 
     arrays = {
-        name: pa.array(values.tolist() if values.dtype.kind == "U" else values)
+        name: pa.array([_utf8(text) for text in values.tolist()], pa.string()) if values.dtype.kind in "UO" else values
         for name, values in figure.columns.items()
     }
     digits = {name: str(figure.digits[name]) for name in figure.digits}
@@ -120,6 +128,10 @@ def _read_parquet(path: Path) -> FigureData:
     return FigureData(path.stem, columns, {name: int(places) for name, places in digits.items()})
 
 
+def _utf8(text: Any) -> str:
+    return str(text).encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 def csv_text(figure: FigureData) -> str:
     """Readable copy of a figure's arrays: rounded, NaN empty, no cell a spreadsheet would run as a formula."""
     cells = []
@@ -131,14 +143,20 @@ def csv_text(figure: FigureData) -> str:
         elif values.dtype.kind == "b":
             cells.append(["1" if value else "0" for value in values.tolist()])
         else:
-            cells.append(
-                [_text_cell(str(value)) if values.dtype.kind == "U" else str(value) for value in values.tolist()]
-            )
-    lines = [",".join(_text_cell(name) for name in figure.columns)]
+            is_whole = values.dtype.kind in "iu"
+            cells.append([str(value) if is_whole else text_cell(str(value)) for value in values.tolist()])
+    lines = [",".join(text_cell(name) for name in figure.columns)]
     lines += [",".join(row) for row in zip(*cells, strict=True)]
     return "\n".join(lines) + "\n"
 
 
-def _text_cell(text: str) -> str:
-    safe = "'" + text if text.startswith(FORMULA_STARTS) else text
-    return '"' + safe.replace('"', '""') + '"' if any(mark in safe for mark in ',"\n\r') else safe
+def text_cell(text: str) -> str:
+    """Write text as a CSV cell that no spreadsheet runs: quoted where needed, an apostrophe before a formula.
+
+    Examples
+    --------
+    >>> text_cell("=1+1"), text_cell("a,b"), text_cell("ab")
+    ("'=1+1", '"a,b"', 'ab')
+    """
+    safe = "'" + text if text.lstrip(" ").startswith(FORMULA_STARTS) else text
+    return '"' + safe.replace('"', '""') + '"' if any(mark in safe for mark in ',;"\n\r\t') else safe

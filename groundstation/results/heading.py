@@ -118,6 +118,11 @@ class HeadingResult:
     drift_deg_per_h, drift_sigma_deg_per_h : float
     lever_arm_m, lever_arm_sigma_m, lever_arm_origin
         Longitudinal antenna arm, its sigma, and ``"aircraft file"``, ``"estimated"`` or ``"not observable"``.
+    uncorrected_error_deg : float
+        Plain mean of the differences with the velocity of the antenna as logged: what an on-board computer without arm
+        correction would find.
+    reference_time_s : float
+        Flight time the error belongs to (weighted mean time of the samples).
     """
 
     ins_topic: str
@@ -154,5 +159,7 @@ class HeadingResult:
     reference_residual_arcmin: float | None = None
     runway: tuple[RunwayCheck, ...] = ()
     onboard: OnboardComparison | None = None
+    uncorrected_error_deg: float | None = None
+    reference_time_s: float | None = None
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()

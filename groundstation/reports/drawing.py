@@ -1,0 +1,344 @@
+"""Figures as inline SVG: one look, one palette, the same bytes for the same numbers.
+
+matplotlib is used through its object-oriented interface alone: no pyplot, no global figure, safe in worker processes.
+"""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.reports.wording import clean, clock
+
+WIDTH_MM = 178.0  # the printable width of A4
+MAX_POINTS = 5000
+MM_PER_INCH = 25.4
+
+# Okabe and Ito (2008), colour-blind safe. One meaning, one colour, in every figure.
+INS = "#0072b2"
+GNSS = "#d55e00"
+USED = "#007f5f"
+UNUSED = "#a9b1ba"
+LIMIT = "#8a2be2"
+INK = "#1c2530"
+FAINT = "#6b7683"
+FILL = "#cfe5dd"
+SERIES = (INS, GNSS, USED, "#cc79a7", "#e69f00", "#56b4e9", "#7a6a00")
+
+PHASE_COLOURS = {
+    "unknown": "#eef0f2",
+    "standstill": "#d9dee3",
+    "taxi": "#f6e3b4",
+    "take-off run": "#f2b8a0",
+    "airborne": "#d3e7f5",
+    "landing roll": "#e3cfe6",
+}
+
+STYLE: dict[str, Any] = {
+    "svg.hashsalt": "groundstation",
+    "svg.fonttype": "path",  # glyphs travel with the page: it looks the same on every machine
+    "text.parse_math": False,  # a dollar sign in a topic's name is a dollar sign
+    "font.family": "DejaVu Sans",
+    "font.size": 8.0,
+    "axes.titlesize": 8.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.titlepad": 6.0,
+    "axes.labelsize": 8.0,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": "#8d97a3",
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.unicode_minus": True,
+    "axes.formatter.useoffset": False,
+    "grid.color": "#e4e8ec",
+    "grid.linewidth": 0.5,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.major.size": 3.0,
+    "ytick.major.size": 3.0,
+    "lines.linewidth": 1.0,
+    "legend.fontsize": 7.5,
+    "legend.frameon": False,
+    "legend.handlelength": 1.6,
+    "legend.borderaxespad": 0.2,
+    "path.simplify": True,
+    "figure.facecolor": "none",
+    "savefig.facecolor": "none",
+    "axes.facecolor": "none",
+    "text.color": INK,
+}
+
+_PROLOG = re.compile(r"^.*?(?=<svg)", re.DOTALL)
+_DROPPED = re.compile(r"<!--.*?-->|<metadata>.*?</metadata>|<style[^>]*>.*?</style>", re.DOTALL)
+_SIZE = re.compile(r'<svg [^>]*?viewBox="([^"]*)"[^>]*>', re.DOTALL)
+_GEOMETRY = re.compile(r'(?<= (?:d|x|y)=")[^"]*|(?<= points=")[^"]*')
+_LONG_DECIMAL = re.compile(r"-?\d+\.\d{3,}")
+_NAME = re.compile(r'((?<= id=")|(?<=url\(#)|(?<=xlink:href="#))')
+_BETWEEN = re.compile(r">\s+<")
+
+
+def draw(key: str, height_mm: float, paint: Callable[[Any], None], width_mm: float = WIDTH_MM) -> str:
+    """Paint a figure and return it as an SVG element that can stand in a page.
+
+    Parameters
+    ----------
+    key : str
+        Unique in the page: names inside the SVG start with it.
+    height_mm, width_mm : float
+        Size on paper; on a screen it scales.
+    paint : callable
+        Receives the empty ``matplotlib.figure.Figure``.
+
+    Returns
+    -------
+    str
+        One ``<svg>`` element without comments, metadata, style sheets or anything from outside.
+    """
+    import io
+
+    import matplotlib
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()  # a user's matplotlibrc does not reach the report
+        matplotlib.rcParams.update(STYLE)  # type: ignore[arg-type]
+        figure = Figure(figsize=(width_mm / MM_PER_INCH, height_mm / MM_PER_INCH))
+        FigureCanvasSVG(figure)
+        paint(figure)
+        buffer = io.StringIO()
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    return _for_page(buffer.getvalue(), key)
+
+
+def _for_page(svg: str, key: str) -> str:
+    svg = _DROPPED.sub("", _PROLOG.sub("", svg, count=1))
+    svg = _SIZE.sub(r'<svg xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="\1" aria-hidden="true">', svg, count=1)
+    svg = _GEOMETRY.sub(lambda part: _LONG_DECIMAL.sub(_shorter, part[0].replace("\n", "")), svg)
+    svg = _NAME.sub(lambda _: f"{key}-", svg)
+    return _BETWEEN.sub("><", svg).strip()
+
+
+def _shorter(match: re.Match[str]) -> str:
+    return f"{float(match[0]):.2f}".rstrip("0").rstrip(".")
+
+
+def label(text: Any, most: int = 40) -> str:
+    """Text of a log fit for a figure: characters the font has, one line, bounded length."""
+    characters = _font_characters()
+    kept = "".join(mark if ord(mark) in characters else "\ufffd" for mark in clean(str(text)))
+    return kept if len(kept) <= most else kept[: most - 1] + "…"
+
+
+_characters: frozenset[int] = frozenset()
+
+
+def _font_characters() -> frozenset[int]:
+    global _characters
+    if not _characters:
+        from matplotlib.font_manager import FontProperties, findfont, get_font
+
+        font = get_font(findfont(FontProperties(family="DejaVu Sans")))
+        _characters = frozenset(font.get_charmap())
+    return _characters
+
+
+# ---------------------------------------------------------------------------------------------------- axes
+
+
+def place(figure: Any, left: float, bottom: float, right: float, top: float, **options: Any) -> Any:
+    """Add axes whose edges lie so many millimetres from the lower left corner of the figure."""
+    width, height = figure.get_size_inches() * MM_PER_INCH
+    return figure.add_axes((left / width, bottom / height, (right - left) / width, (top - bottom) / height), **options)
+
+
+def time_axis(axes: Any, low: float, high: float, title: bool = True) -> None:
+    """Scale the horizontal axis as flight time, written as minutes and seconds at round steps."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter
+
+    low, high = (low, high) if high > low else (low - 1.0, low + 1.0)
+    steps = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 28800, 86400)
+    step = next((step for step in steps if (high - low) / step <= 9), 604800)
+    first = int(np.ceil(low / step))
+    ticks = [step * count for count in range(first, first + 12) if step * count <= high]
+    axes.set_xlim(low, high)
+    axes.xaxis.set_major_locator(FixedLocator(ticks))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: clock(float(value))))
+    if title:
+        axes.set_xlabel("flight time, h:min:s" if high >= 3600 else "flight time, min:s")
+    else:
+        axes.tick_params(labelbottom=False)
+
+
+def legend_above(axes: Any, columns: int = 6) -> None:
+    """Put the legend on one line above the axes, where it hides nothing."""
+    handles, _ = axes.get_legend_handles_labels()
+    if handles:
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, columnspacing=1.2, borderpad=0.1)
+
+
+def limit_line(axes: Any, value: float, text: str, vertical: bool = False, colour: str = LIMIT) -> None:
+    """Draw a limit as a dashed line with its value written on it."""
+    style = {"color": colour, "linewidth": 0.9, "linestyle": (0, (4, 2)), "zorder": 3}
+    if vertical:
+        axes.axvline(value, **style)
+        beside(axes, value, 0.88, " " + text, colour, axes.get_xaxis_transform(), ha="left")
+    else:
+        axes.axhline(value, **style)
+        beside(axes, 0.995, value, text, colour, axes.get_yaxis_transform(), ha="right")
+
+
+def beside(axes: Any, x: float, y: float, text: str, colour: str, transform: Any, ha: str) -> None:
+    """Write a short label just above a place, on a ground that keeps it legible over lines."""
+    ground = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.6}
+    axes.annotate(
+        text,
+        (x, y),
+        (0, 2),
+        xycoords=transform,
+        textcoords="offset points",
+        color=colour,
+        fontsize=7,
+        va="bottom",
+        ha=ha,
+        bbox=ground,
+        zorder=6,
+    )
+
+
+def nothing(axes: Any, text: str) -> None:
+    """Say in the middle of empty axes why they are empty."""
+    axes.set_yticks([])
+    axes.text(0.5, 0.5, text, color=FAINT, ha="center", va="center", transform=axes.transAxes)
+
+
+# ---------------------------------------------------------------------------------------------------- marks
+
+
+def thin(count: int, most: int = MAX_POINTS) -> NDArray[np.int64]:
+    """Positions of at most ``most`` of ``count`` samples, evenly spread, the same every time.
+
+    Examples
+    --------
+    >>> thin(10, 4).tolist(), thin(3, 4).tolist()
+    ([0, 3, 6, 9], [0, 1, 2])
+    """
+    if count <= most:
+        return np.arange(count)
+    return np.round(np.linspace(0, count - 1, most)).astype(np.int64)
+
+
+def dots(axes: Any, x: Any, y: Any, colour: str, size: float = 1.8, most: int = MAX_POINTS, **options: Any) -> None:
+    """Draw samples as dots: strokes of no length with round ends in a single path, a tenth of the bytes of markers."""
+    known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+    shown = known[thin(len(known), most)]
+    x, y = np.asarray(x, dtype=np.float64)[shown], np.asarray(y, dtype=np.float64)[shown]
+    name = options.pop("label", None)
+    _strokes(axes, x, x, y, color=colour, linewidth=size, capstyle="round", **options)
+    if name:
+        axes.plot([], [], "o", color=colour, markersize=2.6, label=name)
+
+
+def bars(axes: Any, start: Any, end: Any, place: float, colour: str, width_pt: float) -> None:
+    """Draw intervals as thick strokes at one height, in a single path."""
+    known = np.isfinite(start) & np.isfinite(end)
+    heights = np.full(int(known.sum()), place)
+    _strokes(axes, start[known], end[known], heights, color=colour, linewidth=width_pt, capstyle="butt")
+
+
+def _strokes(axes: Any, start: Any, end: Any, height: Any, **options: Any) -> None:
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    if not len(start):
+        return
+    corners = np.column_stack([np.column_stack([start, end]).ravel(), np.repeat(height, 2)])
+    codes = np.tile([Path.MOVETO, Path.LINETO], len(start)).astype(np.uint8)
+    path = Path(corners, codes)
+    path.should_simplify = False  # simplifying drops strokes of no length
+    axes.add_patch(PathPatch(path, fill=False, **options))
+    axes.autoscale_view()
+
+
+def line(axes: Any, x: Any, y: Any, colour: str, width: float = 1.0, most: int = MAX_POINTS, **options: Any) -> None:
+    """Draw a line that breaks at NaN, thinned without losing its gaps."""
+    x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    keep = np.zeros(len(x), dtype=bool)
+    keep[thin(len(x), most)] = True
+    keep |= ~(np.isfinite(x) & np.isfinite(y))
+    y = np.where(np.isfinite(x), y, np.nan)
+    axes.plot(x[keep], y[keep], color=colour, linewidth=width, **options)
+
+
+def broken_at_wrap(angle_deg: Any) -> NDArray[np.float64]:
+    """Headings with NaN where they jump through north: the line breaks there instead of crossing the figure.
+
+    Examples
+    --------
+    >>> broken_at_wrap([358.0, 359.0, 1.0, 2.0]).tolist()
+    [358.0, 359.0, nan, 2.0]
+    """
+    angle = np.array(angle_deg, dtype=np.float64)
+    with np.errstate(invalid="ignore"):
+        jumps = np.flatnonzero(np.abs(np.diff(angle)) > 180.0)
+    angle[jumps + 1] = np.nan
+    return angle
+
+
+def broken_at_gaps(time: Any, *values: Any) -> tuple[NDArray[np.float64], ...]:
+    """Time and values with a NaN wherever time leaps: the line breaks at the gap.
+
+    Examples
+    --------
+    >>> [column.tolist() for column in broken_at_gaps([0.0, 1.0, 9.0, 10.0], [1.0, 2.0, 3.0, 4.0])]
+    [[0.0, 1.0, 9.0, 9.0, 10.0], [1.0, 2.0, nan, 3.0, 4.0]]
+    """
+    time = np.asarray(time, dtype=np.float64)
+    steps = np.diff(time)
+    known = steps[np.isfinite(steps)]
+    leaps = np.flatnonzero(steps > 5.0 * np.median(known)) + 1 if known.size else np.zeros(0, dtype=np.int64)
+    broken = [np.insert(np.asarray(column, dtype=np.float64), leaps, np.nan) for column in values]
+    return np.insert(time, leaps, time[leaps]), *broken
+
+
+def spans(axes: Any, start: Any, end: Any, name: Any, colours: dict[str, str]) -> None:
+    """Shade the background by phase, each phase named once in the legend."""
+    seen: set[str] = set()
+    for low, high, text in zip(start.tolist(), end.tolist(), name.tolist(), strict=True):
+        if np.isfinite(low) and np.isfinite(high):
+            colour = colours.get(text, "#eef0f2")
+            axes.axvspan(low, high, color=colour, linewidth=0, zorder=0, label=None if text in seen else label(text))
+            seen.add(text)
+
+
+def lanes(axes: Any, start: Any, end: Any, state: Any, states: list[str], colours: dict[str, str]) -> None:
+    """Draw one lane per state, strokes where the state holds."""
+    for place, name in enumerate(states):
+        rows = state == name
+        bars(axes, start[rows], end[rows], place, colours.get(name, "#e69f00" if " > " in name else FAINT), 7.0)
+    axes.set_yticks(range(len(states)), [label(name, 22) for name in states])
+    axes.set_ylim(len(states) - 0.4, -0.6)
+    axes.grid(axis="y", visible=False)
+    axes.tick_params(axis="y", length=0)
+
+
+def finite(*arrays: Any) -> NDArray[np.float64]:
+    """All finite values of some arrays, joined."""
+    joined = np.concatenate([np.asarray(values, dtype=np.float64).ravel() for values in arrays] or [np.zeros(0)])
+    return np.asarray(joined[np.isfinite(joined)])
+
+
+def padded(low: float, high: float, share: float = 0.06, least: float = 1e-6) -> tuple[float, float]:
+    """Axis limits around a range."""
+    margin = max(share * (high - low), least)
+    return low - margin, high + margin

@@ -1,0 +1,143 @@
+"""Chapter: the flight at a glance: track map, altitude, speed, phases and the state of GNSS."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from groundstation.base.geodesy import north_east_m
+from groundstation.reports import drawing as d
+from groundstation.reports.parts import Drawing, Section
+from groundstation.reports.sections.saved import heading_of, numbers, objects, texts
+from groundstation.reports.wording import is_number, number
+from groundstation.results.figures import FigureData
+from groundstation.results.files import SavedFlight
+
+GNSS_COLOURS = {"good": d.USED, "integrity lost": "#b3261e", "no GNSS": "#b3261e"}
+
+
+def build(saved: SavedFlight) -> Section | None:
+    """Build the chapter, None when the flight has no overview."""
+    parts = tuple(drawing for drawing in (track_map(saved), profile(saved)) if drawing is not None)
+    lead = "Where the aircraft was and what it did, from the logged navigation data."
+    return Section("overview", "Overview of the flight", lead, parts) if parts else None
+
+
+def track_map(saved: SavedFlight) -> Drawing | None:
+    """The track in local coordinates, with the taxi enlarged and the used stretches marked."""
+    data = saved.figure("overview")
+    if data is None:
+        return None
+    latitude, longitude = numbers(data, "latitude_deg"), numbers(data, "longitude_deg")
+    known = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
+    if not known.size:
+        return None
+    origin = float(latitude[known[0]]), float(longitude[known[0]])
+    north, east = north_east_m(latitude, longitude, *origin)
+    used = _used_rows(numbers(data, "time_s"), objects(heading_of(saved), "segments"))
+    taxi = _taxi_rows(numbers(data, "time_s"), objects(heading_of(saved), "segments"), saved.figure("phases"))
+    zoom = bool(np.isfinite(north[taxi]).any()) and _extent(north, east) > 2.0 * _extent(north[taxi], east[taxi])
+
+    def paint(figure: Any) -> None:
+        right = 86.0 if zoom else 174.0
+        _map(d.place(figure, 16, 12, right, 84), north, east, used, "Whole flight" if zoom else "")
+        if zoom:
+            _map(d.place(figure, 104, 12, 174, 84), north[taxi], east[taxi], used[taxi], "Taxi")
+
+    caption = (
+        f"Distances north and east of the first position (latitude {number(origin[0], 5, '°')}, longitude "
+        f"{number(origin[1], 5, '°')}), equal scales. Ring: start; green: straight stretches the heading error was "
+        "taken from."
+    )
+    alt = "Map of the track in metres north and east of the start."
+    return Drawing("Track", caption, alt, d.draw("map", 92, paint), ("overview",))
+
+
+def _used_rows(time: Any, segments: list[Mapping[str, Any]]) -> Any:
+    used = np.zeros(len(time), dtype=bool)
+    for segment in segments:
+        start, end = segment.get("start_s"), segment.get("end_s")
+        if is_number(start) and is_number(end):
+            used |= (time >= start) & (time <= end)
+    return used
+
+
+def _taxi_rows(time: Any, segments: list[Mapping[str, Any]], phases: FigureData | None) -> Any:
+    if phases is not None:
+        airborne = np.flatnonzero(np.isin(texts(phases, "phase"), ("take-off run", "airborne")))
+        if airborne.size:
+            return time < float(numbers(phases, "start_s")[airborne[0]])
+    ends = [segment["end_s"] for segment in segments if is_number(segment.get("end_s"))]
+    return time <= max(ends) if ends else np.zeros(len(time), dtype=bool)
+
+
+def _extent(north: Any, east: Any) -> float:
+    spans = [np.nanmax(values) - np.nanmin(values) for values in (north, east) if np.isfinite(values).any()]
+    return float(max(spans, default=0.0))
+
+
+def _map(axes: Any, north: Any, east: Any, used: Any, title: str) -> None:
+    kilometres = _extent(north, east) > 3000.0
+    scale, unit = (1e-3, "km") if kilometres else (1.0, "m")
+    north, east = north * scale, east * scale
+    axes.set_aspect("equal", adjustable="datalim")
+    d.line(axes, east, north, d.GNSS, 0.9)
+    d.line(axes, np.where(used, east, np.nan), np.where(used, north, np.nan), d.USED, 2.4, solid_capstyle="round")
+    first = int(np.flatnonzero(np.isfinite(north) & np.isfinite(east))[0])
+    axes.plot(
+        [east[first]], [north[first]], "o", color=d.INK, markersize=5, markerfacecolor="white", markeredgewidth=1.2
+    )
+    if _extent(north, east) == 0.0:
+        axes.set_xlim(east[first] - 1, east[first] + 1)
+        axes.set_ylim(north[first] - 1, north[first] + 1)
+    axes.set_xlabel(f"east, {unit}")
+    axes.set_ylabel(f"north, {unit}")
+    axes.set_title(title)
+
+
+def profile(saved: SavedFlight) -> Drawing | None:
+    """Altitude and ground speed over time, shaded by phase, above the state of GNSS."""
+    data = saved.figure("overview")
+    if data is None:
+        return None
+    phases, gnss = saved.figure("phases"), saved.figure("gnss_lanes")
+    time = numbers(data, "time_s")
+    times = d.finite(time)
+    low, high = (float(times.min()), float(times.max())) if times.size else (0.0, 1.0)
+    states = (
+        [] if gnss is None else sorted(set(texts(gnss, "state").tolist()), key=lambda name: (name != "good", name))[:8]
+    )
+    lane_mm = 4.6 * len(states) + (3.0 if states else 0.0)
+
+    def paint(figure: Any) -> None:
+        base = 12.0 + lane_mm
+        upper, lower = d.place(figure, 27, base + 35, 174, base + 66), d.place(figure, 27, base, 174, base + 31)
+        for axes, column, text, colour in (
+            (upper, "altitude_m", "altitude, m", d.INS),
+            (lower, "ground_speed_mps", "ground speed, m/s", d.GNSS),
+        ):
+            if phases is not None:
+                d.spans(
+                    axes, numbers(phases, "start_s"), numbers(phases, "end_s"), texts(phases, "phase"), d.PHASE_COLOURS
+                )
+            values = numbers(data, column)
+            d.line(axes, time, values, colour, 1.0)
+            axes.set_ylabel(text)
+            if not np.isfinite(values).any():
+                d.nothing(axes, f"no {text.partition(',')[0]} in the log")
+        d.time_axis(upper, low, high, title=False)
+        d.time_axis(lower, low, high, title=not states)
+        d.legend_above(upper)
+        if states and gnss is not None:
+            strip = d.place(figure, 27, 12, 174, 9 + lane_mm)
+            d.lanes(strip, numbers(gnss, "start_s"), numbers(gnss, "end_s"), texts(gnss, "state"), states, GNSS_COLOURS)
+            d.time_axis(strip, low, high)
+
+    names = tuple(name for name in ("overview", "phases", "gnss_lanes") if saved.figure(name) is not None)
+    caption = (
+        "Altitude and ground speed; the background is the phase of flight. Lanes: usability of GNSS."
+        if states
+        else ("Altitude and ground speed; the background is the phase of flight.")
+    )
+    alt = "Altitude and ground speed over flight time with phases shaded."
+    return Drawing("Altitude, speed and phases", caption, alt, d.draw("profile", 12 + lane_mm + 74, paint), names)

@@ -1,0 +1,35 @@
+"""Chapter: where the numbers come from. Time of run, host and versions stand in manifest.json alone."""
+
+from groundstation.reports.parts import Facts, Note, Part, Section
+from groundstation.reports.sections.saved import mapping
+from groundstation.reports.wording import ABSENT, clean, number
+from groundstation.results.files import SavedFlight
+
+BYTES_PER_MB = 1e6
+
+
+def build(saved: SavedFlight) -> Section:
+    """Build the chapter."""
+    flight = mapping(saved.summary, "flight")
+    source = mapping(flight, "source")
+    size = source.get("size_bytes")
+    flight_id = clean(str(flight.get("id", "")))
+    pairs = (
+        ("Log", str(source.get("name") or ABSENT), f"{number(size, 0)} bytes" if size is not None else ""),
+        ("SHA-256 of the log", str(source.get("sha256") or ABSENT), ""),
+        ("Read by", str(source.get("reader") or ABSENT), ""),
+        ("Flight id", flight_id, ""),
+        ("Recording", f"{flight_id}.rrd", "open with: groundstation view"),
+        ("Lossless store", f"{flight_id}.mcap", "every topic of the log"),
+    )
+    parts: list[Part] = [Facts("Source and files", pairs)]
+    metadata = mapping(flight, "metadata")
+    if metadata:
+        parts.append(Facts("Metadata of the log", [(str(key), str(value), "") for key, value in metadata.items()]))
+    parts.append(
+        Note(
+            "Every number on these pages stands in summary.json or in tables/*.csv beside this file. Time of run, "
+            "host, versions and configuration stand in manifest.json: equal input gives this report byte for byte."
+        )
+    )
+    return Section("provenance", "Provenance", "Where the numbers come from and how to check them.", parts)

@@ -1,0 +1,134 @@
+"""Chapter: how good the data are: rates, gaps, order, clock."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from groundstation.reports import drawing as d
+from groundstation.reports.parts import Drawing, Facts, Grid, Head, Note, Section
+from groundstation.reports.sections.saved import mapping, numbers, texts
+from groundstation.reports.wording import any_value, named_quantity, number, number_with_unit, significant
+from groundstation.results.figures import FigureData
+from groundstation.results.files import SavedFlight
+
+MOST_TOPICS = 60
+MOST_LANES = 24
+MOST_ENTRIES = 20
+
+
+def build(saved: SavedFlight) -> Section:
+    """Build the chapter."""
+    parts = (
+        _ledger(saved),
+        _gaps(saved),
+        _nested(saved, "clock", "Clock model"),
+        _nested(saved, "ledger", "Ledger of the log"),
+    )
+    shown = tuple(part for part in parts if part is not None)
+    lead = "What the recorder delivered: rates, gaps and order of every topic, and how its clock was read."
+    return Section("quality", "Data quality", lead, shown or (Note("No ledger was saved."),))
+
+
+def _ledger(saved: SavedFlight) -> Grid | None:
+    data = saved.figure("ledger")
+    if data is None:
+        return None
+    counts = ("gaps", "duplicates", "backward_steps", "stray_rows", "dropped_rows")
+    columns = {
+        name: numbers(data, name)
+        for name in ("rows", "nominal_rate_hz", "actual_rate_hz", "longest_gap_s", "coverage", *counts)
+    }
+    rows = []
+    for place, topic in enumerate(texts(data, "topic").tolist()[:MOST_TOPICS]):
+        row = {name: float(values[place]) for name, values in columns.items()}
+        rates = f"{significant(row['actual_rate_hz'])} / {significant(row['nominal_rate_hz'])}"
+        fixed = (
+            topic,
+            number(row["rows"], 0),
+            rates,
+            number(row["coverage"] * 100, 1, "%"),
+            number(row["longest_gap_s"], 2),
+        )
+        rows.append((*fixed, *(number(row[name], 0) for name in counts)))
+    heads = (
+        *(
+            Head("Topic"),
+            Head("Rows", True),
+            Head("Rate / nominal, Hz", True),
+            Head("Coverage", True),
+            Head("Longest gap, s", True),
+        ),
+        *(Head(title, True) for title in ("Gaps", "Duplicates", "Steps back", "Stray", "Dropped")),
+    )
+    more = len(data) - len(rows)
+    caption = f"{more} more topics in the table file." if more else ""
+    return Grid("Topics", heads, rows, caption, ("ledger",))
+
+
+def _gaps(saved: SavedFlight) -> Drawing | None:
+    ledger, gaps = saved.figure("ledger"), saved.figure("gaps")
+    if ledger is None:
+        return None
+    topic, first, last = texts(ledger, "topic"), numbers(ledger, "first_s"), numbers(ledger, "last_s")
+    gap_topic = np.zeros(0, dtype=np.str_) if gaps is None else texts(gaps, "topic")
+    order = sorted(range(len(topic)), key=lambda row: (topic[row] not in gap_topic, row))[:MOST_LANES]
+    order.sort()
+    times = d.finite(first, last)
+    if not times.size:
+        return None
+    low, high = d.padded(float(times.min()), float(times.max()), 0.01, 0.5)
+    height, least = 20.0 + 4.6 * len(order), (high - low) / 400.0  # narrower marks would not be seen
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 44, 12, 174, height - 6)
+        for place, row in enumerate(order):
+            here = slice(row, row + 1)
+            d.bars(axes, first[here], np.maximum(last[here], first[here] + least), place, "#b9d3e6", 6.0)
+            if gaps is not None:
+                _gap_marks(axes, gaps, gap_topic == topic[row], place, least)
+        axes.set_yticks(range(len(order)), [d.label(topic[row], 24) for row in order])
+        axes.set_ylim(len(order) - 0.4, -0.6)
+        axes.grid(axis="y", visible=False)
+        axes.tick_params(axis="y", length=0)
+        d.time_axis(axes, low, high)
+
+    count = 0 if gaps is None else len(gaps)
+    caption = f"Blue: data present; red: gaps, n = {number(count, 0)}, drawn at least wide enough to be seen."
+    caption += f" {len(order)} of {len(topic)} topics." if len(order) < len(topic) else ""
+    names = ("ledger",) if gaps is None else ("ledger", "gaps")
+    return Drawing(
+        "Gaps", caption, "Strips of data and gaps by topic over flight time.", d.draw("gaps", height, paint), names
+    )
+
+
+def _gap_marks(axes: Any, gaps: FigureData, rows: Any, place: int, least: float) -> None:
+    start, length = numbers(gaps, "start_s")[rows], numbers(gaps, "length_s")[rows]
+    largest = np.sort(np.argsort(-length, kind="stable")[:500])
+    d.bars(axes, start[largest], start[largest] + np.maximum(length[largest], least), place, "#b3261e", 6.0)
+
+
+def _nested(saved: SavedFlight, key: str, title: str) -> Facts | None:
+    told_above = {"topics"}  # the table of topics
+    document = {name: value for name, value in mapping(saved.summary, key).items() if name not in told_above}
+    pairs = [(name, value, "") for name, value in _flat(document)]
+    return Facts(title, pairs) if pairs else None
+
+
+def _flat(document: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:
+    """A JSON object as pairs of a title and a value; what is nested is told in one line each."""
+    out: list[tuple[str, str]] = []
+    for key, value in document.items():
+        name, unit = named_quantity(str(key))
+        title = f"{above} · {name}" if above else name
+        if isinstance(value, Mapping) and len(value) <= MOST_ENTRIES:
+            out += _flat(value, title)
+        elif isinstance(value, Mapping | list) and len(value) > MOST_ENTRIES:
+            out.append((title, f"{len(value)} entries in summary.json"))
+        elif isinstance(value, list) and value and all(isinstance(item, Mapping) for item in value):
+            for count, item in enumerate(value, 1):
+                told = "; ".join(f"{name} {text}" for name, text in _flat(item))
+                out.append((f"{title} {count}", told))
+        else:
+            out.append((title, number_with_unit(any_value(value), unit)))
+    return out

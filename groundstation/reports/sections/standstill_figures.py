@@ -1,0 +1,110 @@
+"""Figures of the standstill stage: errors of the velocity components, density of the mean speed."""
+
+from typing import Any
+
+import numpy as np
+
+from groundstation.reports import drawing as d
+from groundstation.reports.parts import Drawing
+from groundstation.reports.sections.saved import flags, heading_of, mapping, numbers
+from groundstation.reports.wording import is_number, number
+from groundstation.results.files import SavedFlight
+
+RAW_LIMIT_MPS = 0.2
+MEAN_LIMIT_MPS = 0.01
+
+
+def components(saved: SavedFlight) -> Drawing | None:
+    """Velocity components at standstill over time and against each other (figure 2a of the paper)."""
+    data = saved.figure("standstill_velocity")
+    if data is None:
+        return None
+    time, inside = numbers(data, "time_s"), flags(data, "in_interval")
+    north, east = numbers(data, "velocity_north_mps"), numbers(data, "velocity_east_mps")
+    still = mapping(heading_of(saved), "standstill")
+    count = int(np.count_nonzero(inside & np.isfinite(north) & np.isfinite(east)))
+    known = np.abs(d.finite(north[inside], east[inside]) if inside.any() else d.finite(north, east))
+    reach = 1.1 * max(float(known.max()) if known.size else 0.0, RAW_LIMIT_MPS)
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 16, 12, 101, 65)
+        window = d.finite(time[inside]) if inside.any() else d.finite(time)
+        moments, *lines = d.broken_at_gaps(time, north, east)
+        d.line(axes, moments, lines[0], d.INS, 0.8, 3000, label="north")
+        d.line(axes, moments, lines[1], d.GNSS, 0.8, 3000, label="east")
+        if inside.any() and window.size:
+            axes.axvspan(
+                float(window.min()), float(window.max()), color="#eef3f7", linewidth=0, zorder=0, label="interval"
+            )
+        axes.set_ylim(-reach, reach)
+        low, high = (float(window.min()), float(window.max())) if window.size else (0.0, 1.0)
+        d.time_axis(axes, *d.padded(low, high, 0.15, 2.0))
+        axes.set_ylabel("GNSS velocity, m/s")
+        d.legend_above(axes)
+        _plane(d.place(figure, 121, 12, 174, 65), north[inside], east[inside], reach, still)
+
+    caption = (
+        f"The aircraft stands: whatever velocity GNSS reports is its error. n = {number(count, 0)} in the interval. "
+        f"Right: the same samples in the plane; circle: {RAW_LIMIT_MPS} m/s (2 σ stated for GLONASS and GPS); "
+        "cross: mean."
+    )
+    alt = "North and east velocity at standstill over time, and scattered in the plane around zero."
+    return Drawing(
+        "GNSS velocity errors at standstill", caption, alt, d.draw("components", 72, paint), ("standstill_velocity",)
+    )
+
+
+def _plane(axes: Any, north: Any, east: Any, reach: float, still: Any) -> None:
+    from matplotlib.patches import Circle
+
+    axes.set_aspect("equal")
+    axes.add_patch(
+        Circle((0.0, 0.0), RAW_LIMIT_MPS, fill=False, edgecolor=d.LIMIT, linewidth=0.9, linestyle=(0, (4, 2)))
+    )
+    d.dots(axes, east, north, d.USED, 1.6, 2000, alpha=0.6)
+    mean = still.get("mean_east_mps"), still.get("mean_north_mps")
+    if all(map(is_number, mean)):
+        axes.plot([mean[0]], [mean[1]], "+", color=d.INK, markersize=9, markeredgewidth=1.2)
+    axes.set_xlim(-reach, reach)
+    axes.set_ylim(-reach, reach)
+    axes.set_xlabel("east, m/s")
+    axes.set_ylabel("north, m/s")
+
+
+def mean_speed(saved: SavedFlight) -> Drawing | None:
+    """Density of the mean speed over 10 s and 30 s with the limit (figure 2b of the paper)."""
+    data = saved.figure("standstill_mean_speed")
+    if data is None:
+        return None
+    window, speed, height = (numbers(data, name) for name in ("window_s", "speed_of_mean_mps", "density_per_mps"))
+    windows = sorted(set(d.finite(window).tolist()))
+    measured = mapping(heading_of(saved), "standstill").get("speed_of_mean_mps")
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 16, 12, 174, 60)
+        for length, colour in zip(windows, d.SERIES, strict=False):
+            rows = window == length
+            axes.fill_between(speed[rows], height[rows], step="mid", color=colour, alpha=0.12, linewidth=0)
+            name = f"intervals of {length:g} s"
+            axes.plot(speed[rows], height[rows], drawstyle="steps-mid", color=colour, linewidth=1.2, label=name)
+        d.limit_line(axes, MEAN_LIMIT_MPS, f"limit {MEAN_LIMIT_MPS} m/s", vertical=True)
+        if is_number(measured):
+            axes.axvline(measured, color=d.USED, linewidth=1.0, label=f"this interval: {number(measured, 4, 'm/s')}")
+        axes.set_xlim(left=0.0)
+        axes.set_ylim(bottom=0.0)
+        axes.set_xlabel("length of the mean velocity vector, m/s")
+        axes.set_ylabel("probability density, s/m")
+        d.legend_above(axes)
+
+    caption = (
+        "Mean speed over overlapping intervals of this flight's standstill. Longer averaging moves the density below "
+        "the limit; an interval of 10 s that fails asks for more time, not for rejection."
+    )
+    alt = "Densities of the mean speed for two interval lengths against the limit of 0.01 m/s."
+    return Drawing(
+        "Density of the mean speed at standstill",
+        caption,
+        alt,
+        d.draw("mean-speed", 68, paint),
+        ("standstill_mean_speed",),
+    )

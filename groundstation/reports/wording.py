@@ -1,0 +1,185 @@
+"""Numbers and marks as a reader meets them: true minus signs, units, an em dash for what is absent."""
+
+import math
+import re
+from typing import Any, TypeGuard
+
+ABSENT = "—"
+MINUS = "−"
+NARROW_SPACE = "\u202f"
+# Controls, and the marks that turn the direction of text: a file name may not rearrange the page around it.
+_HIDDEN = dict.fromkeys((*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A)), "\ufffd")
+_HIDDEN |= {ord("\t"): " ", ord("\n"): " ", ord("\r"): " "}
+
+
+def clean(text: str) -> str:
+    """Text of a log without control and direction characters.
+
+    Examples
+    --------
+    >>> clean("a\\u202eb\\x00\\n")
+    'a\ufffdb\ufffd '
+    """
+    return text.translate(_HIDDEN)
+
+
+def is_number(value: Any) -> TypeGuard[float]:
+    """Whether a JSON value is a finite number (a bool is none)."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def number(value: Any, places: int, unit: str = "", signed: bool = False) -> str:
+    """A number with its unit, rounded, with a true minus; an em dash when there is none.
+
+    Examples
+    --------
+    >>> number(-1.0449, 2, "°"), number(0.4, 1, "m/s", signed=True), number(None, 2, "m")
+    ('−1.04°', '+0.4\u202fm/s', '—')
+    """
+    if not is_number(value):
+        return ABSENT
+    rounded = round(float(value), places) + 0.0
+    sign = MINUS if rounded < 0 else "+" if signed and rounded > 0 else ""
+    grouped = "," if abs(rounded) >= 10_000 else ""
+    text = sign + f"{abs(rounded):{grouped}.{places}f}".replace(",", NARROW_SPACE)
+    if not unit:
+        return text
+    return text + (unit if unit in "°′%" else NARROW_SPACE + unit)
+
+
+def significant(value: Any, digits: int = 3) -> str:
+    """A number of unknown kind with so many significant digits, plain notation where that is readable.
+
+    Examples
+    --------
+    >>> significant(0.0123456), significant(12345.6), significant(20.0), significant(-3), significant(1.2e-9)
+    ('0.0123', '12\u202f346', '20', '−3', '1.2e−9')
+    """
+    if not is_number(value):
+        return ABSENT
+    if value == 0:
+        return "0"
+    exponent = math.floor(math.log10(abs(value)))
+    if not -5 <= exponent <= 14:
+        mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+        mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
+        return f"{mantissa}e{int(power)}".replace("-", MINUS)
+    places = max(digits - 1 - exponent, 0)
+    text = number(value, places)
+    return text.rstrip("0").rstrip(".") if places else text
+
+
+def interval(bounds: Any, places: int, unit: str) -> str:
+    """An interval with its unit.
+
+    Examples
+    --------
+    >>> interval([-0.1, 0.25], 2, "°"), interval(None, 2, "°")
+    ('−0.10° … +0.25°', '—')
+    """
+    if not isinstance(bounds, list | tuple) or len(bounds) != 2 or not all(map(is_number, bounds)):
+        return ABSENT
+    return f"{number(bounds[0], places, unit, signed=True)} … {number(bounds[1], places, unit, signed=True)}"
+
+
+def step_places(step: Any) -> int:
+    """Decimals needed to write multiples of an entry step.
+
+    Examples
+    --------
+    >>> step_places(0.05), step_places(0.1), step_places(1.0), step_places(None)
+    (2, 1, 0, 2)
+    """
+    if not is_number(step) or step <= 0:
+        return 2
+    return next((places for places in range(5) if abs(step * 10**places - round(step * 10**places)) < 1e-9), 4)
+
+
+def clock(seconds: Any) -> str:
+    """Flight time as minutes and seconds, hours when there are any.
+
+    Examples
+    --------
+    >>> clock(75.4), clock(3725.0), clock(-5.0), clock(float("nan"))
+    ('1:15', '1:02:05', '−0:05', '—')
+    """
+    if not is_number(seconds):
+        return ABSENT
+    whole = round(abs(seconds))
+    hours, rest = divmod(whole, 3600)
+    tail = f"{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
+    return (MINUS if seconds < 0 and whole else "") + (f"{hours}:{tail}" if hours else tail)
+
+
+def typeset(text: str) -> str:
+    """Text written for a terminal with the signs of a page: true minus, plus-minus, degree.
+
+    Examples
+    --------
+    >>> typeset("enter -1.05 deg, 0.3 +- 0.1 deg/h, a-b, 3 degrees")
+    'enter −1.05°, 0.3 ± 0.1°/h, a-b, 3 degrees'
+    """
+    text = clean(text).replace("+-", "±")
+    return re.sub(r"(?<=\d) deg\b", "°", re.sub(r"(?<![\w.])-(?=\d)", MINUS, text))
+
+
+def words(name: str) -> str:
+    """A field name as words: ``largest_gap`` becomes ``largest gap``."""
+    return clean(name).replace("_", " ").strip()
+
+
+UNIT_SIGNS = {
+    "deg": "°",
+    "arcmin": "′",
+    "mps": "m/s",
+    "deg_per_h": "°/h",
+    "deg_per_s": "°/s",
+    "dps": "°/s",
+    "hz": "Hz",
+    "ppm": "ppm",
+    "percent": "%",
+    "ms": "ms",
+    "us": "µs",
+    "ns": "ns",
+    "s": "s",
+    "m": "m",
+}
+
+
+def named_quantity(name: str) -> tuple[str, str]:
+    """Split a field name into words and the sign of its unit.
+
+    Examples
+    --------
+    >>> named_quantity("drift_deg_per_h"), named_quantity("speed_limit_mps"), named_quantity("cycles")
+    (('drift', '°/h'), ('speed limit', 'm/s'), ('cycles', ''))
+    """
+    for suffix, sign in UNIT_SIGNS.items():
+        if name.endswith("_" + suffix):
+            return words(name[: -len(suffix) - 1]), sign
+    return words(name), ""
+
+
+def unit_sign(unit: str) -> str:
+    """The sign a unit is printed with: ``deg`` becomes ``°``; what is unknown stays as it is."""
+    return UNIT_SIGNS.get(unit, unit)
+
+
+def any_value(value: Any, unit: str = "") -> str:
+    """A JSON value of unknown kind in words."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int) and not unit:
+        return number(value, 0)
+    if is_number(value):
+        return number_with_unit(significant(value, 6), unit)
+    if isinstance(value, list | tuple):
+        return ", ".join(any_value(item, unit) for item in value) or "none"
+    return ABSENT if value is None or value == "" else clean(str(value))
+
+
+def number_with_unit(text: str, unit: str) -> str:
+    """Join a written number and the sign of its unit as is usual for that unit."""
+    if not unit or text == ABSENT:
+        return text
+    return text + (unit if unit in "°′%" else NARROW_SPACE + unit)

@@ -1,0 +1,359 @@
+"""The flight report: safe with hostile logs, equal bytes for equal input, useful whatever is missing."""
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import fields, replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from groundstation.base.errors import UnreadableLogError
+from groundstation.base.findings import Finding
+from groundstation.reports import drawing
+from groundstation.reports.flight_report import REPORT, flight_report_html, write_flight_report
+from groundstation.reports.sections import CHAPTERS
+from groundstation.reports.sections.heading import limit_text
+from groundstation.results.figures import FigureData
+from groundstation.results.files import load, save
+from groundstation.results.flight import FlightResults, NotAssessable, Source
+from groundstation.results.heading import Gate
+from tests.report_example import MANIFEST, example, figure, heading_result
+
+LARGEST_REPORT_BYTES = 1_500_000  # mailed and opened on old machines
+VOID = {"meta", "col", "link", "br", "hr", "img", "input", "path", "use"}
+HOSTILE = "<script>alert(1)</script>\"'><img src=x onerror=alert(1)>=cmd|' /C calc'!A0&amp;{{7*7}}$\\frac$-->]]>"
+
+
+class Page(HTMLParser):
+    """Elements, attributes and text of a page; refuses tags that do not balance."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.tags: list[str] = []
+        self.attributes: list[tuple[str, str, str]] = []
+        self.texts: list[str] = []
+        self.feed(html)
+        self.close()
+        assert not self.open, self.open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += [(tag, name, value or "") for name, value in attrs]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += [(tag, name, value or "") for name, value in attrs]
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag not in VOID:
+            assert self.open and self.open.pop() == tag, f"</{tag}> closes nothing"
+
+    def handle_data(self, data: str) -> None:
+        self.texts.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.texts).split())
+
+
+def report(folder: Path, results: FlightResults) -> str:
+    save(folder, results, MANIFEST)
+    return write_flight_report(folder).read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def full(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return report(tmp_path_factory.mktemp("full"), example(heading_result()))
+
+
+def test_report_is_a_balanced_page_that_loads_and_runs_nothing(full: str) -> None:
+    page = Page(full)
+    assert "script" not in page.tags
+    assert not [name for _, name, _ in page.attributes if name.startswith("on")]
+    policy = next(value for tag, name, value in page.attributes if tag == "meta" and name == "content")
+    assert policy.startswith("default-src 'none'") and "script" not in policy
+    links = [value for _, name, value in page.attributes if name in ("href", "src", "xlink:href", "action")]
+    assert not [link for link in links if re.match(r"[a-z]+:|//", link)]
+    without_names = full.replace("http://www.w3.org/2000/svg", "").replace("http://www.w3.org/1999/xlink", "")
+    assert "://" not in without_names and "@import" not in full
+    assert not [url for url in re.findall(r"url\(([^)]*)\)", full) if not url.startswith("#")]
+
+
+def test_names_inside_the_page_are_unique_and_links_lead_somewhere(full: str) -> None:
+    page = Page(full)
+    names = [value for _, name, value in page.attributes if name == "id"]
+    assert len(names) == len(set(names))
+    inside = [value[1:] for _, name, value in page.attributes if name in ("href", "xlink:href") and value[:1] == "#"]
+    assert set(inside) <= set(names)
+    assert set(re.findall(r"url\(#([^)]*)\)", full)) <= set(names)
+
+
+def test_links_to_tables_exist(tmp_path: Path) -> None:
+    page = Page(report(tmp_path, example(heading_result())))
+    links = [value for tag, name, value in page.attributes if tag == "a" and name == "href" and value[:1] != "#"]
+    assert "tables/heading_samples.csv" in links and "manifest.json" in links
+    assert all((tmp_path / link).is_file() for link in links)
+
+
+def test_every_figure_has_title_caption_and_text_for_those_who_cannot_see_it(full: str) -> None:
+    page = Page(full)
+    assert page.tags.count("figure") == page.tags.count("figcaption") == 10
+    described = [value for _, name, value in page.attributes if name == "aria-label" and value]
+    assert len(described) >= 10
+    assert page.tags.count("title") == 1 and page.tags.count("h1") == 1
+
+
+def test_report_is_small_enough(full: str) -> None:
+    assert len(full.encode()) < LARGEST_REPORT_BYTES
+
+
+def test_long_flights_are_thinned(tmp_path: Path) -> None:
+    short, heading = example(heading_result()), heading_result()
+    samples = heading.figures[0]
+    many = {name: np.tile(values, 40) for name, values in samples.columns.items()}
+    many["time_s"] = np.arange(len(many["time_s"])) * 0.1
+    longer = FigureData(samples.name, many, samples.digits)
+    others = tuple(item for item in short.figures if item.name != samples.name)
+    assert len(report(tmp_path, replace(short, figures=(*others, longer))).encode()) < LARGEST_REPORT_BYTES
+
+
+def test_verdict_stands_first_with_the_number_to_type(full: str) -> None:
+    page = Page(full)
+    text = page.text
+    assert text.index("Accept") < text.index("Enter −1.05°") < text.index("reads too high by 1.04°")
+    assert text.index("Enter −1.05°") < text.index("Gates")
+    for shown in ("+1.038°", "+0.977° … +1.099°", "301.98°", "−3.6′", "2026-05-04 06:00:00 UTC", "9f" * 32):
+        assert shown in text, shown
+
+
+@pytest.mark.parametrize(
+    ("verdict", "headline"),
+    [
+        ("reject", "Enter no correction"),
+        ("extend", "No correction yet: measure longer"),
+        ("undecided", "No correction: a required gate was not measured"),
+    ],
+)
+def test_other_verdicts_give_no_number_to_type(tmp_path: Path, verdict: str, headline: str) -> None:
+    heading = heading_result(verdict=verdict, verdict_reason="a gate says so", correction_deg=None)
+    text = Page(report(tmp_path, example(heading))).text
+    front = text[: text.index("Gates")]
+    assert headline in front and "A gate says so." in front
+    assert "Enter −" not in front and "Enter +" not in front and "Signature" not in front
+    assert "an estimate, not to be entered" in front
+
+
+def test_accepted_error_below_half_a_step_needs_nothing_typed(tmp_path: Path) -> None:
+    heading = heading_result(error_deg=-0.011, correction_deg=None)
+    assert "Nothing to enter" in Page(report(tmp_path, example(heading))).text
+
+
+@pytest.mark.parametrize(("error_deg", "word"), [(1.5, "too high by 1.50°"), (-0.4, "too low by 0.40°")])
+def test_words_say_the_sense_of_the_error(tmp_path: Path, error_deg: float, word: str) -> None:
+    assert word in Page(report(tmp_path, example(heading_result(error_deg=error_deg)))).text
+
+
+def test_gates_show_state_in_words_and_symbols(full: str, tmp_path: Path) -> None:
+    text = Page(full).text.replace("\u202f", " ")
+    for shown in ("✓ passed", "▲ failed", "○ not measured", "≤ 0.01 m/s", "≥ 20 s"):
+        assert shown in text, shown
+    assert "✗ failed" not in text  # the gate that failed only informs
+    stern = tuple(replace(gate, required=True) for gate in heading_result().gates)
+    assert "✗ failed" in Page(report(tmp_path, example(heading_result(gates=stern)))).text
+
+
+def test_least_values_are_told_from_largest_ones_even_on_the_limit() -> None:
+    ground = {"name": "ground", "value": 1.0, "limit": 1.0, "unit": "", "state": "passed"}
+    assert limit_text(ground) == "≥ 1"
+    assert limit_text({**ground, "value": None, "state": "not_measured"}) == "≥ 1"
+    assert limit_text({**ground, "name": "ins_mode", "value": 0.0, "limit": 0.0}) == "≤ 0"
+
+
+def test_flight_without_heading_says_why_and_shows_the_rest(tmp_path: Path) -> None:
+    reasons = (NotAssessable("heading", "no GNSS velocity in the log"),)
+    page = Page(report(tmp_path, example(None, not_assessable=reasons)))
+    front = page.text[: page.text.index("1 Heading correction")]
+    assert "Heading correction: not assessable" in front and "No GNSS velocity in the log." in front
+    assert page.tags.count("figure") == 3
+    assert "Signature" not in page.text
+
+
+def test_log_without_absolute_time_names_no_date(tmp_path: Path) -> None:
+    results = example(None, start_utc_ns=None, metadata={}, flight_id="NOTIME_9f9f9f9f")
+    html = report(tmp_path, results)
+    text = Page(html).text
+    assert "no absolute time" in text and "not named in the log" in text
+    assert "2026-" not in text.replace("2026-05-04 A12 flight 17.csv", "")
+
+
+def test_report_holds_nothing_of_the_run_itself(full: str) -> None:
+    assert "2031-01-02" not in full and "somewhere" not in full  # time and host of the manifest
+
+
+def hostile_results() -> FlightResults:
+    ledger = next(item for item in example().figures if item.name == "ledger")
+    topics = np.array([HOSTILE, "日本語\u202eabc\x07", "a" * 300, *ledger["topic"][3:]])
+    figures = (
+        FigureData("ledger", {**ledger.columns, "topic": topics}, {}),
+        figure("phases", start_s=[0.0], end_s=[10.0], phase=[HOSTILE]),
+        figure("gnss_lanes", start_s=[0.0], end_s=[10.0], state=[HOSTILE]),
+        figure("gaps", topic=[HOSTILE], start_s=[1.0], length_s=[2.0]),
+        next(item for item in example().figures if item.name == "overview"),
+    )
+    heading = heading_result(
+        verdict_reason=HOSTILE,
+        heading_source=HOSTILE,
+        ins_topic=HOSTILE,
+        settings={HOSTILE: HOSTILE},
+        gates=(Gate(HOSTILE, HOSTILE, 1.0, 2.0, HOSTILE, "failed", True, HOSTILE),),
+    )
+    return FlightResults(
+        flight_id=HOSTILE,
+        source=Source(HOSTILE + "\udcff\u202e", HOSTILE, 1, HOSTILE),
+        metadata={"aircraft": HOSTILE, "flight": HOSTILE + "\x00", HOSTILE: HOSTILE, "-": "=1+1"},
+        start_utc_ns=None,
+        duration_s=10.0,
+        status="ok",
+        ledger={HOSTILE: {HOSTILE: [HOSTILE]}},
+        clock={HOSTILE: HOSTILE},
+        findings=(Finding("fail", HOSTILE, HOSTILE, HOSTILE, HOSTILE, 3),),
+        not_assessable=(NotAssessable(HOSTILE, HOSTILE),),
+        heading=heading,
+        figures=(*figures, *heading.figures),
+    )
+
+
+def test_nothing_from_a_log_becomes_markup(tmp_path: Path) -> None:
+    html = report(tmp_path, hostile_results())
+    page = Page(html)
+    assert "script" not in page.tags and "img" not in page.tags
+    assert not [name for _, name, _ in page.attributes if name.startswith("on")]
+    assert "<script>alert(1)</script>" in page.text  # shown as it was written
+    assert "{{7*7}}" in page.text
+    assert not [mark for mark in "\x00\x07\u202e" if mark in html]
+    style = html[html.index("<style>") : html.index("</style>")]
+    assert re.search(r'bottom-left \{ content: "[A-Za-z0-9_-]*"; \} \}\s*$', style) and "<" not in style[7:]
+
+
+def test_equal_input_gives_equal_bytes_in_any_process(tmp_path: Path) -> None:
+    save(tmp_path, example(heading_result()), MANIFEST)
+    first = write_flight_report(tmp_path).read_bytes()
+    (tmp_path / "manifest.json").write_text(
+        (tmp_path / "manifest.json").read_text().replace("2031", "2044"), encoding="utf-8"
+    )
+    code = (
+        "import sys; from pathlib import Path; from groundstation.reports.flight_report import write_flight_report;"
+        "write_flight_report(Path(sys.argv[1]))"
+    )
+    matplotlibrc = tmp_path / "matplotlibrc"
+    matplotlibrc.write_text("lines.linewidth: 7\nsvg.hashsalt: other\nfont.size: 20\n")
+    for seed in ("1", "2"):
+        environment = {**os.environ, "PYTHONHASHSEED": seed, "MATPLOTLIBRC": str(matplotlibrc), "TZ": "Asia/Tokyo"}
+        subprocess.run([sys.executable, "-c", code, str(tmp_path)], check=True, env=environment)
+        assert (tmp_path / REPORT).read_bytes() == first
+
+
+def without_figures(results: FlightResults) -> FlightResults:
+    return replace(results, figures=())
+
+
+def with_nan_everywhere(results: FlightResults) -> FlightResults:
+    figures = []
+    for item in results.figures:
+        columns = {
+            name: np.full(len(values), np.nan) if values.dtype.kind == "f" else values
+            for name, values in item.columns.items()
+        }
+        figures.append(FigureData(item.name, columns, item.digits))
+    heading = results.heading
+    assert heading is not None
+    unknown = {item.name: float("nan") for item in fields(heading) if isinstance(getattr(heading, item.name), float)}
+    unknown.pop("entry_step_deg")
+    gone = replace(heading, **unknown, confidence95_deg=(float("nan"), float("nan")))
+    return replace(results, heading=gone, duration_s=float("nan"), figures=tuple(figures))
+
+
+def with_one_sample(results: FlightResults) -> FlightResults:
+    figures = [
+        FigureData(item.name, {name: values[:1] for name, values in item.columns.items()}, item.digits)
+        for item in results.figures
+    ]
+    return replace(results, figures=tuple(figures))
+
+
+def with_empty_columns(results: FlightResults) -> FlightResults:
+    figures = [
+        FigureData(item.name, {name: values[:0] for name, values in item.columns.items()}, item.digits)
+        for item in results.figures
+    ]
+    return replace(results, figures=tuple(figures))
+
+
+def with_time_alone(results: FlightResults) -> FlightResults:
+    figures = [FigureData(item.name, dict(list(item.columns.items())[:1]), item.digits) for item in results.figures]
+    return replace(results, figures=tuple(figures))
+
+
+@pytest.mark.parametrize(
+    "change", [without_figures, with_nan_everywhere, with_one_sample, with_empty_columns, with_time_alone]
+)
+def test_report_is_written_whatever_is_missing(
+    tmp_path: Path, change: Callable[[FlightResults], FlightResults]
+) -> None:
+    page = Page(report(tmp_path, change(example(heading_result()))))
+    assert "nan" not in page.text.lower().split() and "None" not in page.text
+    assert page.tags.count("h2") >= 4
+
+
+def test_each_figure_alone_makes_a_report(tmp_path: Path) -> None:
+    results = example(heading_result())
+    for item in results.figures:
+        page = Page(report(tmp_path, replace(results, figures=(item,))))
+        assert page.tags.count("figure") <= 3, item.name
+
+
+def test_bare_results_give_a_report(tmp_path: Path) -> None:
+    bare = FlightResults("NOTIME_00000000", Source("a.csv", "00" * 32, 0, "flat-csv"), {}, None, 0.0, "failed")
+    text = Page(report(tmp_path, bare)).text
+    assert "failed: nothing could be computed" in text and "No findings." in text
+
+
+def test_folder_without_results_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UnreadableLogError, match=r"summary\.json"):
+        write_flight_report(tmp_path)
+    assert not (tmp_path / REPORT).exists()
+
+
+def test_findings_stand_gravest_first(tmp_path: Path) -> None:
+    findings = tuple(Finding(severity, f"a.{severity}", f"text of {severity}") for severity in ("info", "fail", "warn"))
+    text = Page(report(tmp_path, example(None, findings=findings))).text
+    assert text.index("text of fail") < text.index("text of warn") < text.index("text of info")
+    assert "1 fail · 1 warn · 1 info" in text
+
+
+def test_every_chapter_has_its_own_anchor(tmp_path: Path) -> None:
+    save(tmp_path, example(heading_result()), MANIFEST)
+    saved = load(tmp_path)
+    sections = [build(saved) for build in CHAPTERS]
+    assert len({section.key for section in sections if section}) == len(CHAPTERS)
+    assert "Contents" in flight_report_html(saved)
+
+
+def test_gaps_break_lines_even_when_thinned() -> None:
+    class Axes:
+        def plot(self, x: np.ndarray, y: np.ndarray, **_: object) -> None:
+            self.x, self.y = x, y
+
+    y = np.arange(20_000.0)
+    y[7_001] = np.nan
+    axes = Axes()
+    drawing.line(axes, np.arange(20_000.0), y, "black", most=100)
+    assert len(axes.x) <= 102 and np.isnan(axes.y).sum() == 1

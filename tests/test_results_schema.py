@@ -1,0 +1,115 @@
+"""schemas/summary.schema.json lists what the dataclasses hold, and summaries obey it."""
+
+import json
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from groundstation.base.findings import Finding
+from groundstation.results import heading as answers
+from groundstation.results.files import json_text
+from groundstation.results.flight import FlightResults, NotAssessable, Source
+from groundstation.results.summary import SCHEMA_VERSION, summary_of
+from tests.report_example import example, heading_result
+
+SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
+VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
+
+
+def written(results: FlightResults) -> dict[str, Any]:
+    document: dict[str, Any] = json.loads(json_text(summary_of(results)))
+    return document
+
+
+def bare() -> FlightResults:
+    return FlightResults("NOTIME_00000000", Source("a.csv", "00" * 32, 0, "flat-csv"), {}, None, 0.0, "failed")
+
+
+def least_heading() -> answers.HeadingResult:
+    """A heading result with everything optional absent and every estimate unknown."""
+    unknown = float("nan")
+    return answers.HeadingResult(
+        *("ins", "gnss", "true heading", "reject", "no sample"),
+        *(unknown, unknown, (unknown, unknown), unknown, unknown, unknown, unknown, 0, 0.0),
+        *(None, None, None, 0.1, (answers.Gate("taxi", "Taxi", None, 20.0, "s", "not_measured"),), None, ()),
+    )
+
+
+def test_schema_is_a_schema() -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    assert SCHEMA["properties"]["schema_version"]["const"] == SCHEMA_VERSION
+
+
+@pytest.mark.parametrize(
+    "results",
+    [example(heading_result()), example(least_heading()), example(None), bare(), example(None, start_utc_ns=None)],
+    ids=["full", "least heading", "no heading", "bare", "no time"],
+)
+def test_summaries_obey_the_schema(results: FlightResults) -> None:
+    VALIDATOR.validate(written(results))
+
+
+@pytest.mark.parametrize(
+    ("definition", "dataclass"),
+    [
+        ("heading", answers.HeadingResult),
+        ("gate", answers.Gate),
+        ("standstill", answers.Standstill),
+        ("segment", answers.TaxiSegment),
+        ("runway", answers.RunwayCheck),
+        ("onboard", answers.OnboardComparison),
+        ("finding", Finding),
+        ("not_assessable", NotAssessable),
+        ("source", Source),
+    ],
+)
+def test_schema_and_dataclasses_list_the_same_keys(definition: str, dataclass: type) -> None:
+    listed = SCHEMA["$defs"][definition]
+    names = [field.name for field in fields(dataclass) if field.name != "figures"]
+    assert list(listed["properties"]) == names
+    assert sorted(listed["required"]) == sorted(names) and listed["additionalProperties"] is False
+
+
+def test_top_level_keys_stand_in_the_order_of_the_contract() -> None:
+    assert list(written(bare())) == list(SCHEMA["properties"]) == SCHEMA["required"]
+    assert list(written(bare())["flight"]) == list(SCHEMA["$defs"]["flight"]["properties"])
+
+
+def test_contract_keys_are_required() -> None:
+    promised = {
+        *("error_deg", "standard_error_deg", "confidence95_deg", "precision_deg", "estimate_sd_deg", "samples"),
+        *("taxi_seconds", "drift_deg_per_h", "segments", "standstill", "gates", "verdict", "correction_deg"),
+        *("parking_heading_deg", "reference_residual_arcmin", "onboard"),
+    }
+    assert promised <= set(SCHEMA["$defs"]["heading"]["required"])
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("status",), "fine"),
+        (("flight", "start_utc"), "yesterday"),
+        (("flight", "id"), "a/b"),
+        (("results", "heading", "verdict"), "maybe"),
+        (("results", "heading", "error_deg"), "1.0"),
+        (("results", "heading", "extra"), 1),
+        (("results", "heading", "confidence95_deg"), [1.0]),
+        (("results", "unheard_of"), {}),
+    ],
+)
+def test_schema_refuses_what_is_wrong(path: tuple[str, ...], value: object) -> None:
+    document = written(example(heading_result()))
+    place: Any = document
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    assert not VALIDATOR.is_valid(document)
+
+
+def test_missing_key_is_refused() -> None:
+    document = written(replace(example(heading_result())))
+    del document["results"]["heading"]["verdict"]
+    assert not VALIDATOR.is_valid(document)
