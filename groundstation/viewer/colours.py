@@ -1,0 +1,90 @@
+"""One colour per meaning, everywhere: Okabe and Ito's palette, told apart by colour-blind readers on either theme.
+
+Source: M. Okabe, K. Ito, Color Universal Design, 2008 (https://jfly.uni-koeln.de/color/).
+"""
+
+import itertools
+from collections.abc import Iterable, Mapping
+from typing import Final, TypeAlias
+
+Colour: TypeAlias = tuple[int, int, int, int]
+
+
+def _rgb(code: int, alpha: int = 255) -> Colour:
+    return (code >> 16 & 255, code >> 8 & 255, code & 255, alpha)
+
+
+SKY: Final = _rgb(0x56B4E9)
+ORANGE: Final = _rgb(0xE69F00)
+GREEN: Final = _rgb(0x1FB58A)
+YELLOW: Final = _rgb(0xE3CF2E)
+BLUE: Final = _rgb(0x3A86C8)
+VERMILION: Final = _rgb(0xE0661A)
+PINK: Final = _rgb(0xCC79A7)
+GREY: Final = _rgb(0x8C8C8C)
+DIM: Final = _rgb(0x5A5A5A)
+
+# Meanings. A quantity keeps its colour on every tab.
+INS, GNSS, ANSWER, LIMIT, HONEST, PAPER = SKY, ORANGE, GREEN, VERMILION, PINK, YELLOW
+SAMPLES, NORMAL, OVER_LIMIT = GREY, VERMILION, ORANGE
+SERIES: Final = (SKY, ORANGE, GREEN, PINK, YELLOW, BLUE, VERMILION, GREY)
+
+PHASES: Final[dict[str, Colour]] = {
+    "unknown": DIM,
+    "standstill": BLUE,
+    "taxi": GREEN,
+    "take-off run": ORANGE,
+    "airborne": SKY,
+    "landing roll": PINK,
+}
+GNSS_STATES: Final[dict[str, Colour]] = {
+    "good": GREEN,
+    "no geometry factor": GREY,
+    "integrity lost": VERMILION,
+    "no GNSS": DIM,
+}
+GATES: Final[dict[str, Colour]] = {
+    "used": GREEN,
+    "too slow": BLUE,
+    "turning": YELLOW,
+    "take-off run": ORANGE,
+    "airborne": SKY,
+    "not proven ground": GREY,
+    "GNSS gap": DIM,
+    "no heading": DIM,
+    "geometry": ORANGE,
+    "integrity": VERMILION,
+    "excluded": PINK,
+    "outlier": VERMILION,
+}
+DATA_STATES: Final[dict[str, Colour]] = {"data": GREEN, "gap": VERMILION}
+LIGHT: Final = _rgb(0xB0B0B0)
+FLAGS: Final[dict[str, Colour]] = {"yes": GREEN, "no": GREY}
+SEVERITIES: Final[dict[str, Colour]] = {"info": LIGHT, "warn": ORANGE, "fail": VERMILION}
+
+
+def for_states(states: Iterable[str], known: Mapping[str, Colour]) -> dict[str, Colour]:
+    """A colour for every state: the known ones keep theirs, the others take those left, in order of appearance.
+
+    Examples
+    --------
+    >>> shades = for_states(["good", "odd"], GNSS_STATES)
+    >>> shades["good"] == GREEN, shades["odd"] == SKY
+    (True, True)
+    """
+    names = list(dict.fromkeys(states))
+    taken = {known[name] for name in names if name in known}
+    left = [colour for colour in SERIES if colour not in taken] or list(SERIES)
+    spare = itertools.cycle(left)
+    return {name: known[name] if name in known else next(spare) for name in names}
+
+
+def for_series(count: int) -> tuple[Colour, ...]:
+    """Colours of ``count`` series without a meaning of their own, repeating after eight.
+
+    Examples
+    --------
+    >>> len(for_series(9)), for_series(9)[8] == for_series(1)[0]
+    (9, True)
+    """
+    return tuple(SERIES[number % len(SERIES)] for number in range(count))

@@ -1,0 +1,99 @@
+"""Open a recording in the viewer that the rerun-sdk wheel ships, native or in a browser."""
+
+import importlib.util
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+from groundstation.base.errors import GroundstationError
+
+LOCAL = "127.0.0.1"
+WEB_PORT = 9090
+
+
+def viewer_executable() -> Path:
+    """Path of the viewer shipped in the wheel: Rerun looks on PATH, where an unactivated environment has nothing.
+
+    Raises
+    ------
+    GroundstationError
+        When the installation lacks it.
+    """
+    package = importlib.util.find_spec("rerun_cli")
+    folder = Path(package.origin).parent if package is not None and package.origin is not None else Path()
+    name = "rerun.exe" if sys.platform == "win32" else "rerun"
+    for place in (folder / "Rerun.app" / "Contents" / "MacOS" / "Rerun", folder / name):
+        if place.is_file():
+            return place
+    raise GroundstationError(
+        "the Rerun viewer", f"nothing in {folder}", "the executable of rerun-sdk", "install it anew"
+    )
+
+
+def viewer_command(
+    path: Path, *, web: bool = False, host: str = LOCAL, port: int | None = None, headless: bool = False
+) -> list[str]:
+    """Command line that opens a recording.
+
+    Examples
+    --------
+    >>> viewer_command(Path("a.rrd"), web=True, port=9091)[1:]
+    ['a.rrd', '--bind', '127.0.0.1', '--port', 'auto', '--web-viewer', '--web-viewer-port', '9091']
+    """
+    command = [str(viewer_executable()), str(path), "--bind", host]
+    if web:
+        # headless: serve the pages, let the user open the address in a browser of his own
+        command += ["--port", "auto", "--serve-web" if headless else "--web-viewer"]
+        return [*command, "--web-viewer-port", str(_web_port(host) if port is None else port)]
+    command += ["--port", "auto" if port is None else str(port)]
+    return [*command, "--headless"] if headless else command
+
+
+def _web_port(host: str) -> int:
+    """Rerun's usual port for the page, or any free one when another viewer has it."""
+    try:
+        with socket.socket() as listener:
+            listener.bind((host, WEB_PORT))
+            return WEB_PORT
+    except OSError:
+        return 0
+
+
+def open_viewer(
+    path: Path, *, web: bool = False, host: str = LOCAL, port: int | None = None, headless: bool = False
+) -> int:
+    """Open a recording and wait until the viewer is closed; Ctrl-C closes it.
+
+    Parameters
+    ----------
+    path : Path
+        An .rrd file (or an .mcap, which Rerun decodes).
+    web : bool
+        Serve the web viewer and open it in a browser instead of a window.
+    host : str
+        Address to listen on; only this machine unless said otherwise.
+    port : int, optional
+        Port of the web page, or of the native viewer's listener; left out, the page has 9090 where that is free and
+        everything else any free one.
+    headless : bool
+        No window; with ``web``: no browser is opened.
+
+    Returns
+    -------
+    int
+        Exit code of the viewer.
+
+    Raises
+    ------
+    GroundstationError
+        When there is no such file, or no viewer.
+    """
+    if not path.is_file():
+        raise GroundstationError(str(path), "no such file", next_step="run the log first")
+    try:
+        return subprocess.run(
+            viewer_command(path, web=web, host=host, port=port, headless=headless), check=False
+        ).returncode
+    except KeyboardInterrupt:
+        return 0

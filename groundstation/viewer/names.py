@@ -1,0 +1,121 @@
+"""Names an operator reads, and entity paths no log can break: whatever a file calls its columns, both stay legible."""
+
+import unicodedata
+from collections.abc import Iterable
+
+MAX_LABEL_CHARACTERS = 80
+
+# Unit suffix of a field -> how people write it; two-part suffixes stand first.
+UNITS: dict[str, str] = {
+    "deg_per_h": "deg/h",
+    "per_deg": "1/deg",
+    "mps2": "m/s²",
+    "mps": "m/s",
+    "dps": "deg/s",
+    "deg": "deg",
+    "arcmin": "arcmin",
+    "nt": "nT",
+    "m2": "m²",
+    "m": "m",
+    "s": "s",
+    "a": "A",
+    "hz": "Hz",
+}
+# Words not written as they stand.
+WORDS: dict[str, str] = {
+    "ins": "INS",
+    "gnss": "GNSS",
+    "gdop": "GDOP",
+    "pdop": "PDOP",
+    "hdop": "HDOP",
+    "msl": "MSL",
+    "adf": "ADF",
+    "ok": "OK",
+    "accel": "acceleration",
+    "rate": "angular rate",
+}
+
+
+def clean_text(text: str, limit: int = MAX_LABEL_CHARACTERS) -> str:
+    """One printable line of a text from a log: control and direction marks become spaces, the rest is cut at ``limit``.
+
+    Examples
+    --------
+    >>> clean_text("roll\\x00\\n\\u202eangle")
+    'roll angle'
+    """
+    printable = "".join(" " if unicodedata.category(mark)[0] in "CZ" else mark for mark in text)
+    line = " ".join(printable.split())
+    return line if len(line) <= limit else line[: limit - 1] + "…"
+
+
+def path_parts(names: Iterable[str]) -> list[str]:
+    """Entity path parts of names, in their order and each unique: letters, digits, ``_``, ``-`` and ``.`` alone.
+
+    Separators, control characters and markup become ``_``; names that would then clash are numbered.
+
+    Examples
+    --------
+    >>> path_parts(["ins.1", "a/b", "a:b", "", "__properties"])
+    ['ins.1', 'a_b', 'a_b-2', 'unnamed', 'properties']
+    """
+    parts: list[str] = []
+    used: set[str] = set()
+    for name in names:
+        kept = "".join(mark if mark.isalnum() or mark in "_-." else "_" for mark in name)
+        base = kept.strip("_.")[:MAX_LABEL_CHARACTERS] or "unnamed"
+        part, number = base, 1
+        while part.casefold() in used:
+            number += 1
+            part = f"{base}-{number}"
+        used.add(part.casefold())
+        parts.append(part)
+    return parts
+
+
+def split_unit(field: str) -> tuple[str, str]:
+    """Name of a field without its unit, and the unit as people write it.
+
+    Examples
+    --------
+    >>> split_unit("velocity_north_mps"), split_unit("gdop"), split_unit("current_a")
+    (('velocity_north', 'm/s'), ('gdop', ''), ('current', 'A'))
+    """
+    for suffix, unit in UNITS.items():
+        if field.endswith("_" + suffix):
+            return field[: -len(suffix) - 1], unit
+    return field, ""
+
+
+def words(name: str) -> str:
+    """Words of a name in readable spelling.
+
+    Examples
+    --------
+    >>> words("altitude_msl"), words("weight_on_wheels")
+    ('altitude MSL', 'weight on wheels')
+    """
+    return clean_text(" ".join(WORDS.get(word, word) for word in name.split("_")))
+
+
+def label(field: str) -> str:
+    """Series name of a field, unit last: ``true heading, deg``.
+
+    Examples
+    --------
+    >>> label("velocity_north_mps"), label("satellites_used")
+    ('velocity north, m/s', 'satellites used')
+    """
+    name, unit = split_unit(field)
+    return f"{words(name)}, {unit}" if unit else words(name)
+
+
+def topic_label(topic: str) -> str:
+    """Name of a topic for tab and view titles.
+
+    Examples
+    --------
+    >>> topic_label("ins.2"), topic_label("radio_altimeter")
+    ('INS 2', 'radio altimeter')
+    """
+    return clean_text(" ".join(words(part) for part in topic.split(".")))

@@ -1,0 +1,150 @@
+"""Send columns of one flight to Rerun, always on both timelines: what every tab logs with."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import ArrayLike, NDArray
+from rerun.components import AggregationPolicy
+
+from groundstation.base.records import BoolArray, Int64Array
+from groundstation.base.units import NS_PER_S
+from groundstation.viewer.colours import SEVERITIES, Colour, for_states
+from groundstation.viewer.names import clean_text
+from groundstation.viewer.series import FloatArray, break_line, thin
+
+UTC, FLIGHT_TIME = "utc", "flight_time"
+ROWS_PER_CALL = 65_536  # larger chunks only cost the viewer memory
+MAX_LOG_TEXT = 600
+LEVELS = {"info": "INFO", "warn": "WARN", "fail": "ERROR"}
+
+
+@dataclass(frozen=True)
+class Line:
+    """How one series looks: its name with unit, colour and width in points."""
+
+    name: str
+    colour: Colour
+    width: float = 1.5
+
+
+class Recorder:
+    """A Rerun stream that knows the flight's clock.
+
+    Parameters
+    ----------
+    stream : rerun.RecordingStream
+    start_ns : int
+        Corrected time of flight time zero.
+    has_utc : bool
+        Whether corrected time is UTC; without it there is no timeline ``utc``.
+    """
+
+    def __init__(self, stream: rr.RecordingStream, start_ns: int, has_utc: bool) -> None:
+        self.stream, self.start_ns, self.has_utc = stream, start_ns, has_utc
+
+    def time_ns(self, flight_seconds: ArrayLike) -> Int64Array:
+        """Corrected time of flight seconds, to the nanosecond."""
+        offsets = np.rint(np.asarray(flight_seconds, dtype=np.float64) * NS_PER_S).astype(np.int64)
+        return offsets + np.int64(self.start_ns)
+
+    def indexes(self, time_ns: Int64Array) -> list[rr.TimeColumn]:
+        """Time columns of the rows on every timeline the flight has."""
+        columns = [rr.TimeColumn(FLIGHT_TIME, duration=(time_ns - self.start_ns).astype("timedelta64[ns]"))]
+        if self.has_utc:
+            columns.append(rr.TimeColumn(UTC, timestamp=time_ns.astype("datetime64[ns]")))
+        return columns
+
+    def static(self, path: str, archetype: Any) -> None:
+        """Log what holds for the whole flight."""
+        self.stream.log(path, archetype, static=True)
+
+    def document(self, path: str, markdown: str) -> None:
+        """Log a text panel."""
+        self.static(path, rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN))
+
+    def lines(
+        self,
+        path: str,
+        time_ns: Int64Array,
+        values: FloatArray,
+        lines: Sequence[Line],
+        breaks: BoolArray | None = None,
+    ) -> None:
+        """Log series that share their rows: ``values`` of shape (n, k), NaN where a line is interrupted.
+
+        ``breaks``, shape (n - 1,), tells after which rows the lines end; a row of NaN is put there.
+        """
+        if breaks is not None:
+            time_ns, values = break_line(time_ns, values, breaks)
+        style = rr.SeriesLines(
+            names=[line.name for line in lines],
+            colors=[line.colour for line in lines],
+            widths=[line.width for line in lines],
+            aggregation_policy=AggregationPolicy.MinMax,  # averages would hide spikes until one zooms in
+        )
+        self.static(path, style)
+        self._scalars(path, time_ns, values)
+
+    def thinned(
+        self,
+        path: str,
+        time_ns: Int64Array,
+        values: FloatArray,
+        lines: Sequence[Line],
+        breaks: BoolArray,
+        limit: int,
+    ) -> int:
+        """Log series as :meth:`lines` does, of long ones some ``limit`` rows (see :func:`series.thin`); rows kept."""
+        rows = thin(values, breaks, limit)
+        self.lines(path, time_ns[rows], values[rows], lines, breaks[rows[:-1]])
+        return len(rows)
+
+    def dots(self, path: str, time_ns: Int64Array, values: FloatArray, line: Line) -> None:
+        """Log one series, shape (n,), as dots: samples that no line should join."""
+        style = rr.SeriesPoints(names=[line.name], colors=[line.colour], marker_sizes=[line.width], markers="circle")
+        self.static(path, style)
+        self._scalars(path, time_ns, values[:, None])
+
+    def _scalars(self, path: str, time_ns: Int64Array, values: FloatArray) -> None:
+        width = values.shape[1]
+        for start in range(0, len(time_ns), ROWS_PER_CALL):
+            part = slice(start, start + ROWS_PER_CALL)
+            scalars = rr.Scalars.columns(scalars=np.ascontiguousarray(values[part]).ravel())
+            rows = len(time_ns[part])
+            self.stream.send_columns(path, self.indexes(time_ns[part]), scalars.partition([width] * rows))
+
+    def lane(self, path: str, time_ns: Int64Array, states: Sequence[str], colours: Mapping[str, Colour]) -> None:
+        """Log one lane of states, each holding until the next row; an empty state ends the one before."""
+        shown = [clean_text(state) for state in states]
+        shades = for_states((state for state in shown if state), colours)
+        self.static(path, rr.StateConfiguration(values=list(shades), colors=list(shades.values())))
+        self.stream.send_columns(path, self.indexes(time_ns), rr.StateChange.columns(state=shown))
+
+    def spans(
+        self,
+        path: str,
+        start_s: FloatArray,
+        end_s: FloatArray,
+        states: NDArray[np.str_],
+        colours: Mapping[str, Colour],
+    ) -> None:
+        """Log a lane from spans in flight seconds; what no span covers stays empty."""
+        starts, ends = self.time_ns(start_s), self.time_ns(end_s)
+        closed = np.ones(len(starts), dtype=bool)
+        closed[:-1] = ends[:-1] < starts[1:]
+        times = np.concatenate([starts, ends[closed]])
+        names = [*states.tolist(), *[""] * int(closed.sum())]
+        order = np.argsort(times, kind="stable")
+        self.lane(path, times[order], [names[position] for position in order], colours)
+
+    def texts(self, path: str, time_ns: Int64Array, texts: Sequence[str], severities: Sequence[str]) -> None:
+        """Log lines of a text log; severities are ``info``, ``warn`` or ``fail``."""
+        columns = rr.TextLog.columns(
+            text=[clean_text(text, MAX_LOG_TEXT) for text in texts],
+            level=[LEVELS[severity] for severity in severities],
+            color=[SEVERITIES[severity] for severity in severities],
+        )
+        self.stream.send_columns(path, self.indexes(time_ns), columns)

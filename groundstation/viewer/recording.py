@@ -1,0 +1,149 @@
+"""The Rerun recording of one flight, into a file or into a running viewer: the same logging with another sink."""
+
+import hashlib
+import re
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from groundstation.base.errors import GroundstationError
+from groundstation.results.flight import FlightResults
+from groundstation.tables.table import Flight
+from groundstation.viewer.names import clean_text
+from groundstation.viewer.recorder import FLIGHT_TIME, Recorder
+from groundstation.viewer.tabs.heading import heading
+from groundstation.viewer.tabs.log import log
+from groundstation.viewer.tabs.overview import overview
+from groundstation.viewer.tabs.quality import quality
+from groundstation.viewer.tabs.raw import raw
+
+APPLICATION = "groundstation"
+DEFAULT_VIEWER_URL = "rerun+http://127.0.0.1:9876/proxy"
+DEFAULT_PORT = 9876
+CONNECT_SECONDS, FLUSH_SECONDS = 3.0, 60.0
+
+
+def write_recording(path: Path, flight: Flight, results: FlightResults) -> None:
+    """Write the recording of one flight, blueprint embedded.
+
+    Parameters
+    ----------
+    path : Path
+        The .rrd file. It is written under a temporary name and moved into place: a kill never leaves half a file.
+    flight : Flight
+    results : FlightResults
+
+    Raises
+    ------
+    GroundstationError
+        When Rerun refused the data or the file could not be written.
+    """
+    temporary = path.with_name(f".{path.name}.partial")
+    try:
+        with _stream(results) as stream:
+            stream.save(temporary)
+            send_flight(stream, flight, results)
+        temporary.replace(path)
+    except (OSError, RuntimeError) as error:  # Rerun's own are RuntimeErrors
+        raise GroundstationError(str(path), str(error), next_step="check the folder and the space left") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def stream_recording(flight: Flight, results: FlightResults, *, connect_url: str = DEFAULT_VIEWER_URL) -> None:
+    """Send the recording of one flight to a running viewer.
+
+    Parameters
+    ----------
+    flight, results
+        As for :func:`write_recording`.
+    connect_url : str
+        Where the viewer listens: ``rerun+http://host:port/proxy``.
+
+    Raises
+    ------
+    GroundstationError
+        When no viewer took the data.
+    """
+    _expect_viewer(connect_url)
+    with _stream(results) as stream:
+        try:
+            stream.connect_grpc(connect_url)
+            send_flight(stream, flight, results)
+        except (ValueError, RuntimeError) as error:
+            raise GroundstationError(
+                connect_url, str(error), next_step="start the viewer first, or check its port"
+            ) from error
+
+
+def _expect_viewer(url: str) -> None:
+    """Raise when nobody listens: Rerun itself would find out after a minute of waiting."""
+    parts = urlsplit(url)
+    try:
+        socket.create_connection((parts.hostname or "", parts.port or DEFAULT_PORT), timeout=CONNECT_SECONDS).close()
+    except (OSError, ValueError) as error:
+        raise GroundstationError(
+            url, f"no viewer ({error})", "rerun+http://host:port/proxy of a running one", "start the viewer first"
+        ) from error
+
+
+def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResults) -> rrb.Blueprint:
+    """Log everything to a stream that has its sink, send the layout, wait until it is out; returns the layout."""
+    recorder = Recorder(stream, flight.start_ns, flight.has_utc)
+    stream.send_recording_name(clean_text(results.flight_id))
+    if flight.has_utc:
+        stream.send_recording_start_time_nanos(flight.start_ns)
+    tabs = (
+        overview(recorder, results),
+        quality(recorder, flight, results),
+        heading(recorder, results),
+        raw(recorder, flight, results),
+        log(recorder, flight, results),
+    )
+    blueprint = rrb.Blueprint(
+        rrb.Tabs(contents=[tab for tab in tabs if tab is not None], active_tab=0),
+        rrb.TimePanel(state="collapsed", timeline=FLIGHT_TIME, play_state="paused"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        auto_layout=False,
+        auto_views=False,
+    )
+    stream.send_blueprint(blueprint, make_active=True, make_default=True)
+    stream.flush(timeout_sec=FLUSH_SECONDS)
+    return blueprint
+
+
+def application_id(flight_id: str) -> str:
+    """Application id of a flight: its own, for Rerun binds a layout to it and flights differ in their topics.
+
+    Examples
+    --------
+    >>> application_id("20260504T060000Z_A12_7"), application_id("борт 7")
+    ('groundstation 20260504T060000Z_A12_7', 'groundstation 7-1ea9aca8')
+    """
+    safe = re.sub(r"[^A-Za-z0-9_-]+", "-", flight_id).strip("-")
+    if safe != flight_id:
+        safe = f"{safe}-{hashlib.sha256(flight_id.encode()).hexdigest()[:8]}".lstrip("-")
+    return f"{APPLICATION} {safe}"
+
+
+@contextmanager
+def _stream(results: FlightResults) -> Iterator[rr.RecordingStream]:
+    """Open a stream in strict mode, without Rerun's own timelines; closed, file footer written, on leaving."""
+    strict = rr.strict_mode()
+    rr.set_strict_mode(True)  # else the SDK drops data with a mere warning
+    stream = rr.RecordingStream(
+        application_id(results.flight_id), recording_id=clean_text(results.flight_id), send_properties=False
+    )
+    try:
+        stream.set_log_time_enabled(False)
+        stream.set_log_tick_enabled(False)
+        yield stream
+    finally:
+        stream.disconnect()
+        rr.set_strict_mode(strict)

@@ -1,0 +1,115 @@
+"""Densities as bar views: the growing one of the heading error over its final state, and the mean speed at standstill.
+
+Rerun has no x-y plots: the fitted normal is drawn as hairline bars. An invisible bar as high as the highest step keeps
+the axes still while one scrubs.
+"""
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults
+from groundstation.viewer import colours
+from groundstation.viewer.colours import Colour
+from groundstation.viewer.recorder import FLIGHT_TIME, UTC, Recorder
+from groundstation.viewer.series import FloatArray
+from groundstation.viewer.views import figure_of, numbers
+
+PATH = "distribution"
+HAIRLINE = 1.0  # of the distance between two points of the fitted normal
+SLIM = 0.5  # of a bin: what grows stands before what it grows into
+NO_WIDTH = 1e-6  # of the invisible bar, deg
+CEILING = 2.0  # highest bar of the growing density, in peaks of the final one
+BEHIND, MIDDLE, FRONT = 100, 100, 255  # opacity; Rerun draws in alphabetical order of the entities
+UNSEEN: Colour = (0, 0, 0, 1)  # wholly transparent means "choose a colour" to Rerun
+
+
+def heading_error(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
+    """Log the density of the differences d: growing with time, over the final one and the fitted normal."""
+    final = figure_of(results, "heading_distribution", "bin_low_deg", "bin_high_deg", "density_per_deg")
+    if final is None:
+        return []
+    low, high = numbers(final, "bin_low_deg"), numbers(final, "bin_high_deg")
+    centre, width = 0.5 * (low + high), high - low
+    density = numbers(final, "density_per_deg")
+    peak = float(np.nanmax(density))
+    normal = figure_of(results, "heading_normal", "difference_deg", "density_per_deg")
+    if normal is not None:
+        x, y = numbers(normal, "difference_deg"), numbers(normal, "density_per_deg")
+        _hairlines(recorder, "fitted_normal", x, y)
+        peak = max(peak, float(np.nanmax(y)))
+    _bars(recorder, "samples_all", density, centre, width, (*colours.GREY[:3], MIDDLE))
+    growth = figure_of(results, "heading_growth", "step", "time_s", "bin_center_deg", "density_per_deg")
+    if growth is not None:
+        highest = _growing(recorder, growth, float(np.median(width)), CEILING * peak)
+        middle = np.array([float(np.mean(centre))])
+        _bars(recorder, "axis_top", np.array([max(highest, peak)]), middle, np.array([NO_WIDTH]), UNSEEN)
+    name = "Density of d, 1/deg (grey all, green so far, red normal)"
+    hidden = rrb.PlotLegend(visible=False)  # it would name the invisible bar
+    return [rrb.BarChartView(name=name, origin=f"/{PATH}", plot_legend=hidden)]
+
+
+def mean_speed(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
+    """Log the densities of the mean speed at standstill over windows of 10 s and 30 s."""
+    figure = figure_of(results, "standstill_mean_speed", "window_s", "speed_of_mean_mps", "density_per_mps")
+    if figure is None:
+        return []
+    windows = numbers(figure, "window_s")
+    for window, colour in zip(np.unique(windows).tolist(), (colours.INS, colours.GNSS, colours.HONEST), strict=False):
+        chosen = windows == window
+        x, y = numbers(figure, "speed_of_mean_mps")[chosen], numbers(figure, "density_per_mps")[chosen]
+        width = np.full(len(x), float(np.median(np.diff(x))) if len(x) > 1 else 1e-3)
+        bar = rr.BarChart(y, abscissa=x, widths=width, color=(*colour[:3], 140))
+        recorder.static(f"mean_speed/{window:g}s", bar)
+    name = "Density of mean speed, s/m (blue 10 s, orange 30 s)"
+    return [rrb.BarChartView(name=name, origin="/mean_speed", plot_legend=rrb.PlotLegend(visible=False))]
+
+
+def _steps(growth: FigureData) -> Iterator[tuple[float, FloatArray, FloatArray]]:
+    step = growth["step"]
+    starts = [0, *(np.flatnonzero(step[1:] != step[:-1]) + 1).tolist(), len(step)]
+    for start, end in pairwise(starts):
+        part = slice(start, end)
+        yield (
+            float(growth["time_s"][start]),
+            numbers(growth, "bin_center_deg")[part],
+            numbers(growth, "density_per_deg")[part],
+        )
+
+
+def _growing(recorder: Recorder, growth: FigureData, bin_width: float, ceiling: float) -> float:
+    """Log one bar chart a step (the SDK drops bar charts sent as columns); the highest bar logged.
+
+    The first few steps are left out while a bar of some later one rises above the ceiling: of ten samples three may
+    share a bin, and an axis that has to hold such a bar flattens the rest.
+    """
+    steps = list(_steps(growth))
+    peaks = np.array([float(np.nanmax(density, initial=0.0)) for _, _, density in steps])
+    too_high = np.flatnonzero(peaks > ceiling)
+    first = int(too_high[-1]) + 1 if too_high.size else 0
+    stream = recorder.stream
+    for time_s, centre, density in steps[first:]:
+        time_ns = int(recorder.time_ns(time_s))
+        stream.set_time(FLIGHT_TIME, duration=np.timedelta64(time_ns - recorder.start_ns, "ns"))
+        if recorder.has_utc:
+            stream.set_time(UTC, timestamp=np.datetime64(time_ns, "ns"))
+        width = np.full(len(centre), SLIM * bin_width)
+        bars = rr.BarChart(density, abscissa=centre, widths=width, color=(*colours.ANSWER[:3], FRONT))
+        stream.log(f"{PATH}/samples_so_far", bars)
+    stream.reset_time()
+    return float(peaks[first:].max(initial=0.0))
+
+
+def _bars(
+    recorder: Recorder, name: str, height: FloatArray, centre: FloatArray, width: FloatArray, colour: Colour
+) -> None:
+    recorder.static(f"{PATH}/{name}", rr.BarChart(height, abscissa=centre, widths=width, color=colour))
+
+
+def _hairlines(recorder: Recorder, name: str, x: FloatArray, y: FloatArray) -> None:
+    spacing = float(np.median(np.diff(x))) if len(x) > 1 else 0.01
+    _bars(recorder, name, y, x, np.full(len(x), HAIRLINE * spacing), (*colours.NORMAL[:3], BEHIND))

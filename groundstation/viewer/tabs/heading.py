@@ -1,0 +1,135 @@
+"""Heading: the INS heading error found on straight taxi, how it grew, and what it rests on."""
+
+import numpy as np
+import rerun.blueprint as rrb
+
+from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults
+from groundstation.viewer import colours
+from groundstation.viewer.recorder import Line, Recorder
+from groundstation.viewer.series import FloatArray, gap_after, wraps_after
+from groundstation.viewer.tabs import distribution
+from groundstation.viewer.tabs.overview import log_lane
+from groundstation.viewer.tabs.verdict import verdict_text
+from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
+
+SPEED_LIMIT_MPS = 6.0  # the paper's; the result's own settings stand above it
+THIN, BOLD, DOT = 1.0, 2.5, 1.6
+AFTER_TAXI = ("take-off run", "airborne")
+MARGIN, SMALLEST_MARGIN_DEG = 0.15, 0.05
+
+
+def heading(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
+    """Log the heading tab; None when the flight was not assessed and no reason is known."""
+    reasons = [entry.reason for entry in results.not_assessable if entry.analysis == "heading"]
+    if results.heading is None and not reasons:
+        return None
+    recorder.document("heading/verdict", verdict_text(results.heading, reasons))
+    verdict = document("Verdict and the number to type", "heading/verdict")
+    plots = [*_difference(recorder, results), *_taxi(recorder, results), *_lanes(recorder, results)]
+    pictures = [
+        *distribution.heading_error(recorder, results),
+        *_standstill(recorder, results),
+        *distribution.mean_speed(recorder, results),
+    ]
+    columns: list[rrb.View | rrb.Container] = []
+    if plots:
+        columns.append(rrb.Vertical(contents=plots, row_shares=[3.0, 2.0, 2.0, 1.0][: len(plots)]))
+    columns.append(verdict)
+    if pictures:
+        columns.append(rrb.Vertical(contents=pictures))
+    shares = {1: [1.0], 2: [3.0, 2.0], 3: [5.0, 4.0, 3.5]}[len(columns)]
+    return rrb.Horizontal(contents=columns, column_shares=shares, name="Heading")
+
+
+def _difference(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
+    """Differences d as dots, the running mean, and two bands of thin lines about it: the honest one and the paper's."""
+    path = "heading/difference"
+    samples = figure_of(results, "heading_samples", "time_s", "difference_deg", "used")
+    running = figure_of(results, "heading_running", "time_s", "mean_deg")
+    if samples is not None and samples["used"].any():
+        used = samples["used"].astype(bool)
+        recorder.dots(
+            f"{path}/samples",
+            recorder.time_ns(numbers(samples, "time_s")[used]),
+            numbers(samples, "difference_deg")[used],
+            Line("INS heading − GNSS track, deg", colours.SAMPLES, DOT),
+        )
+    if running is not None:
+        _running(recorder, f"{path}/running", running)
+    if samples is None and running is None:
+        return []
+    name = "Heading difference d = INS heading − GNSS track, deg"
+    return [plot(name, path, axis_range=None if samples is None else _range_of_used(samples))]
+
+
+def _range_of_used(samples: FigureData) -> tuple[float, float] | None:
+    """Axis on which all samples used are seen: the bands of the first few samples are far wider than anything else."""
+    values = numbers(samples, "difference_deg")[samples["used"].astype(bool)]
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return None
+    margin = max(MARGIN * float(np.ptp(values)), SMALLEST_MARGIN_DEG)
+    return float(values.min()) - margin, float(values.max()) + margin
+
+
+def _running(recorder: Recorder, path: str, running: FigureData) -> None:
+    time_ns, mean = recorder.time_ns(numbers(running, "time_s")), numbers(running, "mean_deg")
+    columns, lines = [mean], [Line("running mean, deg", colours.ANSWER, BOLD)]
+    for column, name, colour in (
+        ("honest_half_width_deg", "mean ± honest 95 % interval, deg", colours.HONEST),
+        ("precision_deg", "mean ± e (the paper's precision), deg", colours.PAPER),
+    ):
+        if column in running.columns:
+            half = numbers(running, column)
+            columns += [mean + half, mean - half]
+            lines += [Line(name, colour, THIN), Line(name, colour, THIN)]
+    recorder.lines(path, time_ns, np.column_stack(columns), lines, gap_after(time_ns))
+
+
+def _taxi(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
+    """Heading and track while the aircraft moved, and the ground speed with its threshold."""
+    samples = figure_of(results, "heading_samples", "time_s", "heading_deg", "track_deg", "ground_speed_mps")
+    if samples is None:
+        return []
+    gate = samples["gate"] if "gate" in samples.columns else np.full(len(samples), "")
+    ground = ~np.isin(gate, AFTER_TAXI)  # the axes should show the taxi, not what comes after it
+    time_ns = recorder.time_ns(numbers(samples, "time_s"))[ground]
+    speed, heading_deg = numbers(samples, "ground_speed_mps")[ground], numbers(samples, "heading_deg")[ground]
+    track_deg = np.where(gate == "too slow", np.nan, numbers(samples, "track_deg"))[ground]  # noise at standstill
+    gaps = gap_after(time_ns)
+    for name, values, line in (
+        ("heading", heading_deg, Line("INS true heading, deg", colours.INS)),
+        ("track", track_deg, Line("GNSS track above the speed threshold, deg", colours.GNSS)),
+    ):
+        recorder.lines(f"heading/taxi/{name}", time_ns, values[:, None], [line], gaps | wraps_after(values))
+    limit = _speed_limit(results)
+    limits = np.full(len(speed), limit)
+    lines = [Line("GNSS ground speed, m/s", colours.GNSS), Line(f"threshold {limit:g} m/s", colours.LIMIT, THIN)]
+    recorder.lines("heading/speed", time_ns, np.column_stack([speed, limits]), lines, gaps)
+    return [
+        plot("INS heading and GNSS track on the ground, deg", "heading/taxi"),
+        plot("Ground speed on the ground, m/s", "heading/speed"),
+    ]
+
+
+def _speed_limit(results: FlightResults) -> float:
+    settings = {} if results.heading is None else results.heading.settings
+    value = settings.get("taxi_speed_min_mps", SPEED_LIMIT_MPS)
+    return float(value) if isinstance(value, int | float) else SPEED_LIMIT_MPS
+
+
+def _lanes(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
+    paths = log_lane(recorder, results, "heading_lanes", "state", "heading/gate", colours.GATES)
+    return [lanes("Why samples were used or not", paths)] if paths else []
+
+
+def _standstill(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
+    figure = figure_of(results, "standstill_velocity", "time_s", "velocity_north_mps", "velocity_east_mps")
+    if figure is None:
+        return []
+    time_ns = recorder.time_ns(numbers(figure, "time_s"))
+    values: FloatArray = np.column_stack([numbers(figure, "velocity_north_mps"), numbers(figure, "velocity_east_mps")])
+    lines = [Line("GNSS velocity north, m/s", colours.BLUE), Line("GNSS velocity east, m/s", colours.GNSS)]
+    recorder.lines("heading/standstill", time_ns, values, lines, gap_after(time_ns))
+    return [plot("GNSS velocity at standstill, m/s", "heading/standstill")]

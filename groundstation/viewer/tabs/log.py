@@ -1,0 +1,86 @@
+"""Log: findings, what could not be assessed, events and gaps, as lines in time."""
+
+import re
+
+import numpy as np
+import rerun.blueprint as rrb
+
+from groundstation.base.findings import Finding
+from groundstation.base.signals import topics_of_kind
+from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.base.units import NS_PER_S
+from groundstation.results.flight import FlightResults
+from groundstation.tables.table import Flight
+from groundstation.viewer.names import topic_label
+from groundstation.viewer.recorder import Recorder
+from groundstation.viewer.views import figure_of, numbers
+
+MAX_GAPS = 2_000  # of all topics; the lanes of the data quality tab show every one
+_AT_UTC = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z")
+_AT_SECONDS = re.compile(r"(?:^|\bat )\+?(\d+(?:\.\d+)?) s\b")
+
+
+def log(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Container:
+    """Log the text log; lines without a time of their own stand at flight time zero."""
+    _findings(recorder, flight, results)
+    _events(recorder, flight)
+    _gaps(recorder, results)
+    columns = rrb.TextLogColumns(text_log_columns=["loglevel", "body"])  # and the time on the timeline chosen
+    view = rrb.TextLogView(name="Findings, events and gaps", origin="/log", columns=columns)
+    return rrb.Vertical(contents=[view], name="Log")
+
+
+def _findings(recorder: Recorder, flight: Flight, results: FlightResults) -> None:
+    entries = [
+        (place_s(finding.place, flight), f"{finding.text}{_tail(finding)} [{finding.code}]", finding.severity)
+        for finding in results.findings
+    ]
+    entries += [(0.0, f"not assessed: {entry.analysis}: {entry.reason}", "info") for entry in results.not_assessable]
+    if not entries:
+        entries = [(0.0, "no findings", "info")]
+    entries.sort(key=lambda entry: entry[0])
+    times, texts, severities = zip(*entries, strict=True)
+    recorder.texts("log/findings", recorder.time_ns(np.array(times)), texts, severities)
+
+
+def place_s(place: str, flight: Flight) -> float:
+    """Flight seconds a finding's place names; 0 when it names a row, a byte, nothing, or a time outside the flight.
+
+    Examples
+    --------
+    >>> place_s("at 12.4 s", Flight({})), place_s("row 7", Flight({}))
+    (0.0, 0.0)
+    """
+    seconds, utc = _AT_SECONDS.search(place), _AT_UTC.search(place)
+    found = float(seconds.group(1)) if seconds else 0.0
+    if utc and flight.has_utc:
+        found = (iso_to_utc_ns(utc.group(0))[0] - flight.start_ns) / NS_PER_S
+    return found if 0.0 <= found <= flight.duration_s else 0.0
+
+
+def _tail(finding: Finding) -> str:
+    """Topic and place, where the text does not name them itself."""
+    parts = [part for part in (finding.topic, finding.place) if part and part not in finding.text]
+    return f" ({', '.join(parts)})" if parts else ""
+
+
+def _events(recorder: Recorder, flight: Flight) -> None:
+    for topic in topics_of_kind("event", flight.topics()):
+        events = flight[topic]
+        names = events.text("name")
+        said = np.flatnonzero(names != "")
+        if said.size:
+            texts = [f"{topic_label(topic)}: {name}" for name in names[said].tolist()]
+            recorder.texts("log/events", events.time_ns[said], texts, ["info"] * len(texts))
+
+
+def _gaps(recorder: Recorder, results: FlightResults) -> None:
+    gaps = figure_of(results, "gaps", "topic", "start_s", "length_s")
+    if gaps is None:
+        return
+    start, length = numbers(gaps, "start_s"), numbers(gaps, "length_s")
+    rows = np.sort(np.argsort(-length, kind="stable")[:MAX_GAPS])
+    texts = [f"gap of {length[row]:.3f} s in {gaps['topic'][row]}" for row in rows]
+    if len(rows) < len(gaps):
+        texts[0] += f" (the longest {MAX_GAPS} of {len(gaps)} gaps are listed)"
+    recorder.texts("log/gaps", recorder.time_ns(start[rows]), texts, ["info"] * len(texts))

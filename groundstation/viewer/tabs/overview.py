@@ -1,0 +1,98 @@
+"""Overview: where the aircraft went, how high, how fast, where it pointed, and in what state it was."""
+
+from collections import Counter
+
+import numpy as np
+import rerun.blueprint as rrb
+
+from groundstation.base.timescales import duration_text, utc_ns_to_iso
+from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults
+from groundstation.viewer import colours
+from groundstation.viewer.colours import Colour
+from groundstation.viewer.markdown import markdown_text, table
+from groundstation.viewer.recorder import Line, Recorder
+from groundstation.viewer.series import gap_after, wraps_after
+from groundstation.viewer.tabs.track import track
+from groundstation.viewer.tabs.verdict import to_type
+from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
+
+
+def overview(recorder: Recorder, results: FlightResults) -> rrb.Container:
+    """Log the overview: whatever there is of track, plots and lanes, and always the summary."""
+    recorder.document("summary", _summary(results))
+    summary = document("Flight", "summary")
+    figure = figure_of(results, "overview", "time_s")
+    ground = None if figure is None else track(recorder, results, figure)
+    left = summary if ground is None else rrb.Vertical(contents=[ground, summary], row_shares=[2.0, 1.0])
+    right = [] if figure is None else _plots(recorder, figure)
+    lane_paths = [
+        *log_lane(recorder, results, "phases", "phase", "flight/phase", colours.PHASES),
+        *log_lane(recorder, results, "gnss_lanes", "state", "flight/GNSS", colours.GNSS_STATES),
+    ]
+    if lane_paths:
+        right.append(lanes("Flight phase and GNSS", lane_paths))
+    columns = [left, *([rrb.Vertical(contents=right)] if right else [])]
+    return rrb.Horizontal(contents=columns, name="Overview")
+
+
+def log_lane(
+    recorder: Recorder, results: FlightResults, name: str, column: str, path: str, palette: dict[str, Colour]
+) -> list[str]:
+    """Log the spans of a figure as one lane; the path logged, or nothing when the flight has no such figure."""
+    figure = figure_of(results, name, "start_s", "end_s", column)
+    if figure is None:
+        return []
+    states = figure[column].astype(np.str_)
+    over_limit = {state: colours.OVER_LIMIT for state in states.tolist() if ">" in state}  # "gdop > 2"
+    recorder.spans(path, numbers(figure, "start_s"), numbers(figure, "end_s"), states, palette | over_limit)
+    return [path]
+
+
+def _plots(recorder: Recorder, figure: FigureData) -> list[rrb.View]:
+    views: list[rrb.View] = []
+    for column, name, line in (
+        ("altitude_m", "Altitude, m", Line("altitude, m", colours.INS)),
+        ("ground_speed_mps", "Ground speed, m/s", Line("ground speed, m/s", colours.GNSS)),
+    ):
+        if column in figure.columns and np.isfinite(numbers(figure, column)).any():
+            path = f"overview/{column.rpartition('_')[0]}"
+            time_ns = recorder.time_ns(numbers(figure, "time_s"))
+            recorder.lines(path, time_ns, numbers(figure, column)[:, None], [line], gap_after(time_ns))
+            views.append(plot(name, path, legend=False))
+    directions = [
+        ("heading_deg", "overview/directions/heading", Line("INS true heading, deg", colours.INS)),
+        ("track_deg", "overview/directions/track", Line("GNSS track, deg", colours.GNSS)),
+    ]
+    paths = [path for column, path, line in directions if _direction(recorder, figure, column, path, line)]
+    if paths:
+        views.append(plot("INS heading and GNSS track, deg", paths, axis_range=(0.0, 360.0)))
+    return views
+
+
+def _direction(recorder: Recorder, figure: FigureData, column: str, path: str, line: Line) -> bool:
+    """Log a heading or a track, interrupted where it crosses north; False when it has no value."""
+    if column not in figure.columns or not np.isfinite(numbers(figure, column)).any():
+        return False
+    time_ns, values = recorder.time_ns(numbers(figure, "time_s")), numbers(figure, column)
+    recorder.lines(path, time_ns, values[:, None], [line], gap_after(time_ns) | wraps_after(values))
+    return True
+
+
+def _summary(results: FlightResults) -> str:
+    start = "unknown" if results.start_utc_ns is None else utc_ns_to_iso(results.start_utc_ns, 0)
+    severities = Counter(finding.severity for finding in results.findings)
+    found = ", ".join(f"{severities[name]} {name}" for name in ("fail", "warn", "info") if severities[name]) or "none"
+    rows = [
+        ["aircraft, flight", markdown_text(" ".join(results.metadata.get(key, "") for key in ("aircraft", "flight")))],
+        ["start, UTC", markdown_text(start)],
+        ["duration", markdown_text(duration_text(results.duration_s))],
+        ["source", markdown_text(f"{results.source.name}, read by {results.source.reader}")],
+        ["status", results.status],
+        ["findings", found],
+    ]
+    heading = results.heading
+    if heading is not None:
+        rows.append(["heading", f"**{heading.verdict}**: {to_type(heading)}"])
+    rows += [[markdown_text(entry.analysis), markdown_text(entry.reason)] for entry in results.not_assessable]
+    return table(["flight", markdown_text(results.flight_id)], [row for row in rows if row[1]])

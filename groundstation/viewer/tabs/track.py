@@ -1,0 +1,167 @@
+"""The track from above: a plan in kilometres that asks nobody for anything, and a map for who wants one.
+
+Rerun's map fetches tiles over the network for the very place flown over, whatever the provider. The plan is therefore
+what opens; the map is behind its own tab, and a hidden tab fetches nothing.
+"""
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from groundstation.base.geodesy import north_east_m
+from groundstation.base.records import BoolArray
+from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults
+from groundstation.viewer import colours
+from groundstation.viewer.colours import Colour
+from groundstation.viewer.recorder import Recorder
+from groundstation.viewer.series import FloatArray
+from groundstation.viewer.views import figure_of, numbers
+
+LINE, MARK, GRID_LINE = 1.6, 5.0, 0.5  # widths and radii in points of the screen
+TILE_PIXELS, MAP_PIXELS, MAX_ZOOM = 256.0, 500.0, 18.0
+GRID_LINES = 6  # about so many across the longer side
+MARGIN = 0.08  # of the longer side, around the track
+SMALLEST_M = 20.0  # side of the plan of an aircraft that never moved
+
+
+def track(recorder: Recorder, results: FlightResults, figure: FigureData) -> rrb.Container | None:
+    """Log the track by flight phase with a marker at the cursor; None without positions."""
+    if not {"latitude_deg", "longitude_deg"} <= set(figure.columns):
+        return None
+    time_s = numbers(figure, "time_s")
+    positions = np.column_stack([numbers(figure, "latitude_deg"), numbers(figure, "longitude_deg")])
+    known = np.isfinite(positions).all(axis=1)
+    if not known.any():
+        return None
+    pieces, shades = _pieces(results, time_s, known)
+    plan = _plan(recorder, time_s, positions, known, pieces, shades)
+    return rrb.Tabs(contents=[plan, _map(recorder, time_s, positions, known, pieces, shades)], active_tab=0)
+
+
+def _plan(
+    recorder: Recorder,
+    time_s: FloatArray,
+    positions: FloatArray,
+    known: BoolArray,
+    pieces: list[slice],
+    shades: list[Colour],
+) -> rrb.Spatial2DView:
+    origin = positions[known][0]
+    north, east = north_east_m(positions[:, 0], positions[:, 1], float(origin[0]), float(origin[1]))
+    points = np.column_stack([east, -north])  # the axes of a Rerun picture run right and down
+    low, high = _bounds(points[known])
+    recorder.static("plan/grid", _grid(low, high))
+    recorder.static(
+        "plan/track",
+        rr.LineStrips2D(
+            [points[piece] for piece in pieces], colors=shades, radii=rr.Radius.ui_points(LINE), draw_order=1.0
+        ),
+    )
+    recorder.static(
+        "plan/ends",
+        rr.Points2D(
+            points[known][[0, -1]],
+            colors=[colours.ANSWER, colours.LIMIT],
+            labels=["start", "end"],
+            radii=rr.Radius.ui_points(MARK),
+            draw_order=2.0,
+        ),
+    )
+    style = rr.Points2D.from_fields(colors=[colours.PAPER], radii=rr.Radius.ui_points(MARK), draw_order=3.0)
+    recorder.static("plan/now", style)
+    rows = recorder.time_ns(time_s[known])
+    recorder.stream.send_columns(
+        "plan/now", recorder.indexes(rows), rr.Points2D.columns(positions=points[known].astype(np.float32))
+    )
+    bounds = rrb.VisualBounds2D(x_range=[low[0], high[0]], y_range=[low[1], high[1]])
+    name = "Track by flight phase, km east and north of the first position"
+    return rrb.Spatial2DView(name=name, origin="/plan", visual_bounds=bounds)
+
+
+def _bounds(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    low, high = points.min(axis=0), points.max(axis=0)
+    side = max(float((high - low).max()), SMALLEST_M)
+    return low - MARGIN * side, high + MARGIN * side
+
+
+def grid_step_m(side_m: float) -> float:
+    """Distance of grid lines, 1, 2 or 5 times a power of ten, for a plan that is ``side_m`` across.
+
+    Examples
+    --------
+    >>> grid_step_m(12_000.0), grid_step_m(150.0)
+    (2000.0, 20.0)
+    """
+    decade = 10.0 ** np.floor(np.log10(side_m / GRID_LINES))
+    return float(decade * min((1.0, 2.0, 5.0, 10.0), key=lambda factor: abs(factor * decade - side_m / GRID_LINES)))
+
+
+def _grid(low: FloatArray, high: FloatArray) -> rr.LineStrips2D:
+    """Lines of equal distance east and north; the label of each stands in its middle."""
+    step = grid_step_m(float((high - low).max()))
+    strips, labels = [], []
+    for axis, names in ((0, ("E", "W")), (1, ("S", "N"))):
+        for place in np.arange(np.ceil(low[axis] / step), np.floor(high[axis] / step) + 1) * step:
+            line = np.array([low, high])
+            line[:, axis] = place
+            strips.append(line)
+            labels.append(f"{abs(place) / 1000.0:g} km {names[int(place < 0)] if place else ''}".strip())
+    return rr.LineStrips2D(
+        strips,
+        colors=[colours.DIM] * len(strips),
+        labels=labels,
+        show_labels=True,
+        radii=rr.Radius.ui_points(GRID_LINE),
+        draw_order=0.0,
+    )
+
+
+def _map(
+    recorder: Recorder,
+    time_s: FloatArray,
+    positions: FloatArray,
+    known: BoolArray,
+    pieces: list[slice],
+    shades: list[Colour],
+) -> rrb.MapView:
+    strips = rr.GeoLineStrings(
+        lat_lon=[positions[piece] for piece in pieces], colors=shades, radii=rr.Radius.ui_points(LINE)
+    )
+    recorder.static("map/track", strips)
+    recorder.static("map/now", rr.GeoPoints.from_fields(colors=[colours.PAPER], radii=rr.Radius.ui_points(MARK)))
+    rows = recorder.time_ns(time_s[known])
+    recorder.stream.send_columns("map/now", recorder.indexes(rows), rr.GeoPoints.columns(positions=positions[known]))
+    name = "Map (asks openstreetmap.org for this area)"
+    return rrb.MapView(name=name, origin="/map", zoom=zoom_of(positions[known]))
+
+
+def zoom_of(positions_deg: FloatArray, pixels: float = MAP_PIXELS) -> float:
+    """Zoom of the map, in powers of two, at which positions (latitude, longitude), shape (n, 2), fill ``pixels``.
+
+    Examples
+    --------
+    >>> zoom_of(np.array([[0.0, 0.0], [0.0, 360.0]]), 256.0), zoom_of(np.array([[56.0, 38.0]]))
+    (0.0, 18.0)
+    """
+    low, high = positions_deg.min(axis=0), positions_deg.max(axis=0)
+    stretch = np.cos(np.deg2rad(np.clip(0.5 * (low[0] + high[0]), -85.0, 85.0)))  # of the Mercator projection
+    span_deg = max(float(high[0] - low[0]) / float(stretch), float(high[1] - low[1]), 1e-9)
+    return float(np.clip(np.log2(360.0 / span_deg * pixels / TILE_PIXELS), 0.0, MAX_ZOOM))
+
+
+def _pieces(results: FlightResults, time_s: FloatArray, known: BoolArray) -> tuple[list[slice], list[Colour]]:
+    """Cut the track at gaps and where the phase changes; neighbouring pieces share their joint."""
+    phase = np.full(len(time_s), "unknown", dtype="U32")
+    spans = figure_of(results, "phases", "start_s", "end_s", "phase")
+    if spans is not None:
+        for start, end, name in zip(spans["start_s"], spans["end_s"], spans["phase"].tolist(), strict=True):
+            phase[(time_s >= start) & (time_s <= end)] = name
+    cuts = (np.flatnonzero((phase[1:] != phase[:-1]) | ~known[1:] | ~known[:-1]) + 1).tolist()
+    pieces, shades = [], []
+    for start, end in zip([0, *cuts], [*cuts, len(time_s)], strict=True):
+        joint = end < len(time_s) and bool(known[end])
+        if known[start] and end + joint - start > 1:
+            pieces.append(slice(start, end + joint))
+            shades.append(colours.PHASES.get(str(phase[start]), colours.GREY))
+    return pieces, shades

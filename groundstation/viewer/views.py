@@ -1,0 +1,57 @@
+"""Views as this room uses them: every time axis open on the whole flight, names instead of axis titles."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults
+
+
+def whole_flight() -> rrb.TimeAxis:
+    """Time axis open on everything: the one range that holds on ``utc`` and on ``flight_time``."""
+    everything = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
+    return rrb.TimeAxis(view_range=everything)
+
+
+def plot(
+    name: str, contents: str | Sequence[str], *, axis_range: tuple[float, float] | None = None, legend: bool = True
+) -> rrb.TimeSeriesView:
+    """Time series of the entities named; ``axis_range`` fixes the vertical axis, else it fits the data."""
+    entities = [contents] if isinstance(contents, str) else list(contents)
+    return rrb.TimeSeriesView(
+        name=name,
+        origin="/",
+        contents=[f"+ /{entity}/**" for entity in entities],
+        axis_x=whole_flight(),
+        axis_y=None if axis_range is None else rrb.ScalarAxis(range=axis_range),
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=legend),
+    )
+
+
+def lanes(name: str, contents: str | Sequence[str]) -> rrb.StateTimelineView:
+    """State lanes of the entities named."""
+    entities = [contents] if isinstance(contents, str) else list(contents)
+    return rrb.StateTimelineView(
+        name=name, origin="/", contents=[f"+ /{entity}/**" for entity in entities], time_view=whole_flight()
+    )
+
+
+def document(name: str, path: str) -> rrb.TextDocumentView:
+    """Text panel."""
+    return rrb.TextDocumentView(name=name, origin=f"/{path}")
+
+
+def figure_of(results: FlightResults, name: str, *columns: str) -> FigureData | None:
+    """Figure data that has rows and every column named, None otherwise: the view is then left out."""
+    own = () if results.heading is None else results.heading.figures
+    found = results.figure(name) or next((figure for figure in own if figure.name == name), None)
+    usable = found is not None and len(found) > 0 and all(column in found.columns for column in columns)
+    return found if usable else None
+
+
+def numbers(figure: FigureData, column: str) -> np.ndarray:
+    """A figure's column as float64."""
+    return np.asarray(figure[column], dtype=np.float64)

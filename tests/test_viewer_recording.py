@@ -1,0 +1,276 @@
+"""The recording as a file: read back with Rerun's own reader and held against tables and results."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from groundstation.base.errors import GroundstationError
+from groundstation.base.records import Column
+from groundstation.results.flight import FlightResults, Source
+from groundstation.tables.table import Flight
+from groundstation.viewer import recording
+from groundstation.viewer.recording import stream_recording, write_recording
+from groundstation.viewer.tabs import raw
+from groundstation.viewer.tabs.log import place_s
+from tests.viewer_example import GNSS_GAP_S, START_NS, make_flight, make_results, table
+from tests.viewer_shots import free_port
+
+HOSTILE = [
+    "raw.../../etc/passwd",
+    "raw.a b\x00\n\u202ec",
+    "raw.<script>alert(1)</script>",
+    "raw.![x](http://127.0.0.1/x)",
+    "raw.**|`$origin/**`",
+    "raw." + "long" * 400,
+    "raw.a:b",
+    "raw.a/b",
+]
+
+
+class Contents:
+    """What a recording holds: rows by entity, timelines, static text."""
+
+    def __init__(self, path: Path) -> None:
+        reader = RrdReader(path)
+        self.store, self.blueprints = reader.recordings()[0], reader.blueprints()
+        self.timelines: set[str] = set()
+        self.batches: dict[str, list[pa.RecordBatch]] = {}
+        self.fixed: dict[str, list[pa.RecordBatch]] = {}
+        for chunk in reader.stream():
+            self.timelines |= set(chunk.timeline_names)
+            place = self.fixed if chunk.is_static else self.batches
+            place.setdefault(chunk.entity_path, []).append(chunk.to_record_batch())
+
+    def scalars(self, entity: str) -> tuple[np.ndarray, np.ndarray]:
+        """Flight time in nanoseconds and values, shapes (n,) and (n, k), in order of time."""
+        times, values = [], []
+        for batch in self.batches[entity]:
+            rows = batch.num_rows
+            times.append(np.asarray(batch.column("flight_time").cast(pa.int64())))
+            flat = batch.column("Scalars:scalars").flatten().to_numpy(zero_copy_only=False)
+            values.append(flat.reshape(rows, -1))
+        order = np.argsort(np.concatenate(times), kind="stable")
+        return np.concatenate(times)[order], np.concatenate(values)[order]
+
+    def text(self, entity: str) -> str:
+        """Text of a document."""
+        return next(
+            str(batch.column("TextDocument:text")[0].as_py()[0])
+            for batch in self.fixed[entity]
+            if "TextDocument:text" in batch.schema.names
+        )
+
+
+@pytest.fixture(scope="module")
+def flight() -> Flight:
+    return make_flight(240.0, 50.0)
+
+
+@pytest.fixture(scope="module")
+def results(flight: Flight) -> FlightResults:
+    return make_results(flight)
+
+
+@pytest.fixture(scope="module")
+def contents(flight: Flight, results: FlightResults, tmp_path_factory: pytest.TempPathFactory) -> Contents:
+    path = tmp_path_factory.mktemp("recording") / "flight.rrd"
+    write_recording(path, flight, results)
+    assert [entry.name for entry in path.parent.iterdir()] == ["flight.rrd"], "a temporary file stayed behind"
+    return Contents(path)
+
+
+def test_exactly_the_two_timelines_on_every_row(contents: Contents) -> None:
+    assert contents.timelines == {"utc", "flight_time"}
+    for entity, batches in contents.batches.items():
+        for batch in batches:
+            flight_ns = np.asarray(batch.column("flight_time").cast(pa.int64()))
+            utc_ns = np.asarray(batch.column("utc").cast(pa.int64()))
+            assert (utc_ns - flight_ns == START_NS).all(), entity
+
+
+def test_a_flight_without_utc_has_flight_time_alone(tmp_path: Path) -> None:
+    flight = make_flight(200.0, 10.0, has_utc=False)
+    write_recording(tmp_path / "a.rrd", flight, make_results(flight, flight_id="NOTIME_01234567"))
+    assert Contents(tmp_path / "a.rrd").timelines == {"flight_time"}
+
+
+def test_identity_and_embedded_layout(contents: Contents, results: FlightResults) -> None:
+    assert contents.store.recording_id == results.flight_id
+    assert re.fullmatch(r"[A-Za-z0-9_ -]+", contents.store.application_id)
+    assert len(contents.blueprints) == 1
+    assert contents.blueprints[0].application_id == contents.store.application_id
+
+
+def test_nothing_is_dropped_and_values_are_those_of_the_tables(contents: Contents, flight: Flight) -> None:
+    names = ("velocity_north_mps", "velocity_east_mps", "velocity_down_mps")
+    time_ns, values = contents.scalars("/raw/ins/velocity")
+    assert (time_ns == flight["ins"].time_ns - START_NS).all()
+    assert (values == np.column_stack([flight["ins"].values(name) for name in names])).all()
+    numeric = {
+        (topic, name)
+        for topic in flight.topics()
+        for name, column in flight[topic].columns.items()
+        if column.values.dtype.kind == "f"
+    }
+    shown = 0
+    for entity in contents.batches:
+        if entity.startswith("/raw/") and "states" not in entity:
+            shown += contents.scalars(entity)[1].shape[1]
+    assert shown == len(numeric)
+
+
+def test_a_gap_is_a_row_of_nan(contents: Contents, flight: Flight) -> None:
+    time_ns, values = contents.scalars("/raw/gnss/velocity")
+    gap_ns = round(GNSS_GAP_S[0] * 1e9) + 1
+    assert len(time_ns) == len(flight["gnss"]) + 1
+    assert np.isnan(values[time_ns == gap_ns]).all() and np.isfinite(values[time_ns != gap_ns]).all()
+
+
+def test_lines_break_where_a_heading_crosses_north(contents: Contents) -> None:
+    values = contents.scalars("/overview/directions/heading")[1][:, 0]
+    steps = np.abs(np.diff(values))
+    assert np.nanmax(steps) < 180.0
+
+
+def test_absent_is_no_gap_and_nan_of_the_device_is_one(tmp_path: Path) -> None:
+    time_s = np.arange(0.0, 100.0, 0.1)
+    slow = np.arange(len(time_s)) % 10 == 0
+    reading = np.where((time_s > 40.0) & (time_s < 45.0), np.nan, time_s)
+    one = table("gnss", time_s, gdop=Column(time_s, slow), velocity_north_mps=reading)
+    flight = Flight({"gnss": one}, {}, START_NS, True, "a.csv")
+    write_recording(tmp_path / "a.rrd", flight, _bare_results(flight))
+    contents = Contents(tmp_path / "a.rrd")
+    sparse = contents.scalars("/raw/gnss/gdop")[1]
+    assert len(sparse) == slow.sum() and np.isfinite(sparse).all()
+    assert np.isnan(contents.scalars("/raw/gnss/velocity_north")[1]).sum() == np.isnan(reading).sum()
+
+
+def test_long_topics_are_thinned_without_losing_an_extreme_and_say_so(
+    tmp_path: Path, flight: Flight, results: FlightResults, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(raw, "SCALARS", 30_000)
+    write_recording(tmp_path / "a.rrd", flight, results)
+    contents = Contents(tmp_path / "a.rrd")
+    time_ns, values = contents.scalars("/raw/ins/rate")
+    every = np.column_stack([flight["ins"].values(f"rate_{axis}_dps") for axis in "xyz"])
+    assert len(time_ns) < len(every) / 3
+    assert (values.min(axis=0) == every.min(axis=0)).all() and (values.max(axis=0) == every.max(axis=0)).all()
+    rows = np.searchsorted(flight["ins"].time_ns - START_NS, time_ns)
+    assert (every[rows] == values).all(), "a value was altered"
+    assert f"of {len(every)} rows" in contents.text("/raw/about")
+
+
+@pytest.mark.parametrize(
+    ("place", "seconds"),
+    [("at 61.3 s", 61.3), ("2026-05-04T06:01:40.500Z", 100.5), ("row 12", 0.0), ("2031-01-01T00:00:00Z", 0.0)],
+)
+def test_a_finding_stands_where_its_place_says(flight: Flight, place: str, seconds: float) -> None:
+    assert place_s(place, flight) == seconds
+
+
+def test_a_text_too_busy_for_a_lane_is_named(tmp_path: Path) -> None:
+    time_s = np.arange(0.0, 600.0, 0.1)
+    one = table("event", time_s, name=np.array([f"step {row}" for row in range(len(time_s))]))
+    flight = Flight({"event": one}, {}, START_NS, True, "a.csv")
+    write_recording(tmp_path / "a.rrd", flight, _bare_results(flight))
+    assert "not shown: event\\.name" in Contents(tmp_path / "a.rrd").text("/raw/about")
+
+
+def test_growing_density_stands_below_an_axis_that_stands_still(contents: Contents) -> None:
+    def heights(batch: pa.RecordBatch) -> float:
+        return max(max(row[0]["buffer"]) for row in batch.column("BarChart:values").to_pylist())
+
+    top = heights(contents.fixed["/distribution/axis_top"][0])
+    grown = contents.batches["/distribution/samples_so_far"]
+    assert sum(batch.num_rows for batch in grown) > 10
+    assert max(heights(batch) for batch in grown) <= top
+    assert heights(contents.fixed["/distribution/samples_all"][0]) <= top
+
+
+def test_findings_and_events_stand_in_the_log_with_severity_and_time(contents: Contents) -> None:
+    batch = contents.batches["/log/findings"][0]
+    at = {row: level[0] for row, level in enumerate(batch.column("TextLog:level").to_pylist())}
+    times = np.asarray(batch.column("flight_time").cast(pa.int64()))
+    assert [at[row] for row in np.argsort(times)] == ["INFO", "WARN"]
+    assert times.max() == 61_300_000_000
+    assert sum(batch.num_rows for batch in contents.batches["/log/events"]) == 2
+
+
+def test_without_a_heading_the_tab_says_why(tmp_path: Path, flight: Flight) -> None:
+    write_recording(tmp_path / "a.rrd", flight, make_results(flight, with_heading=False))
+    contents = Contents(tmp_path / "a.rrd")
+    assert "no GNSS velocity in the log" in contents.text("/heading/verdict")
+    assert not [entity for entity in contents.batches if entity.startswith("/distribution")]
+
+
+def test_number_to_type_and_gates_stand_in_the_panel(contents: Contents) -> None:
+    text = contents.text("/heading/verdict")
+    assert "# ACCEPT" in text and "Type -1.2 deg" in text
+    assert "no GDOP in the log" in text and "*not measured*" in text
+
+
+def test_hostile_names_reach_neither_paths_nor_markup(tmp_path: Path, flight: Flight) -> None:
+    seconds = np.arange(0.0, 100.0, 1.0)
+    tables = {
+        name: table(name, seconds, **{"x/../y\n`|": seconds, "state\x1b[0m": np.full(100, "a\x00|b")})
+        for name in HOSTILE
+    }
+    hostile = Flight({**flight.tables, **tables}, {}, START_NS, True, "|.csv")
+    results = replace(make_results(hostile), metadata={"aircraft": "<img src=x>", "flight": "![x](http://y)"})
+    write_recording(tmp_path / "a.rrd", hostile, results)
+    contents = Contents(tmp_path / "a.rrd")
+    paths = [entity for entity in contents.batches if entity.startswith("/raw/raw.")]
+    assert len(paths) == 2 * (len(HOSTILE) + 1), "one path for each topic and kind of field, the example's own too"
+    assert all(re.fullmatch(r"/raw/raw\.[\w.-]+(/states)?/[\w.-]+", path) for path in paths), paths
+    for entity in ("/quality/ledger", "/raw/about", "/summary"):
+        text = contents.text(entity)
+        assert "<" not in text.replace("\\<", "") and "](" not in text and "\x00" not in text
+
+
+@pytest.mark.parametrize("nothing", [{}, {"ins": table("ins", np.zeros(0))}])
+def test_a_flight_without_data_still_gives_a_recording(tmp_path: Path, nothing: dict) -> None:
+    flight = Flight(nothing, {}, START_NS, True, "a.csv")
+    write_recording(tmp_path / "a.rrd", flight, _bare_results(flight))
+    assert "/quality/ledger" in Contents(tmp_path / "a.rrd").fixed
+
+
+def test_an_hour_at_100_hz_stays_small(tmp_path: Path) -> None:
+    flight = make_flight(3600.0, 100.0)
+    write_recording(tmp_path / "a.rrd", flight, make_results(flight))
+    assert (tmp_path / "a.rrd").stat().st_size < 30e6
+
+
+def test_a_failure_leaves_no_file_and_the_strictness_as_it_was(
+    tmp_path: Path, flight: Flight, results: FlightResults, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise ValueError("broken")
+
+    before = rr.strict_mode()
+    monkeypatch.setattr(recording, "log", fail)
+    with pytest.raises(ValueError, match="broken"):
+        write_recording(tmp_path / "a.rrd", flight, results)
+    assert not list(tmp_path.iterdir())
+    assert rr.strict_mode() == before
+
+
+def test_a_folder_that_is_not_there_is_one_line(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
+    with pytest.raises(GroundstationError, match="check the folder"):
+        write_recording(tmp_path / "missing" / "a.rrd", flight, results)
+
+
+def test_streaming_to_nobody_is_said_at_once(flight: Flight, results: FlightResults) -> None:
+    with pytest.raises(GroundstationError, match="start the viewer first"):
+        stream_recording(flight, results, connect_url=f"rerun+http://127.0.0.1:{free_port()}/proxy")
+
+
+def _bare_results(flight: Flight) -> FlightResults:
+    """Results without a single figure."""
+    source = Source("a.csv", "0" * 64, 0, "flat-csv")
+    return FlightResults("20260504T060000Z", source, {}, START_NS, flight.duration_s, "failed")
