@@ -154,12 +154,14 @@ class Damage:
 class Remark:
     """Something the reader derived, converted or assumed that a user must know of.
 
-    ``code`` is stable (``derived``, ``assumed_utc``, ``converted``), ``text`` is for people.
+    ``code`` is stable (``derived``, ``assumed_utc``, ``converted``), ``text`` is for people. ``fields`` are those of
+    ``topic`` that the remark is about: what a derived field was derived from is kept with the flight.
     """
 
     code: str
     text: str
     topic: str = ""
+    fields: tuple[str, ...] = ()
 
 
 Item: TypeAlias = LogHeader | RecordBatch | Damage | Remark

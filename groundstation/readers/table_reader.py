@@ -181,7 +181,7 @@ class TableReader:
         for derivation in self._layout.derivations:
             outputs = ", ".join(derivation.outputs)
             text = f"{derivation.topic}: {outputs} derived from {METHODS[derivation.method].text}"
-            yield Remark("derived", text, derivation.topic)
+            yield Remark("derived", text, derivation.topic, derivation.outputs)
         for target, count in self._wrapped.items():
             text = f"{target}: {count} values outside [0, 360) brought into it by whole turns"
             yield Remark("wrapped_heading", text, target.rpartition(".")[0])

@@ -1,0 +1,5 @@
+"""``python -m groundstation``."""
+
+from groundstation.cli.main import main
+
+main()

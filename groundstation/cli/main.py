@@ -1,0 +1,305 @@
+"""The command ``groundstation``: its verbs, options and exit codes. Heavy imports happen inside the verbs."""
+
+import sys
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import Annotated, Any, Literal, ParamSpec, TypeVar
+
+import typer
+
+from groundstation import __version__
+from groundstation.base.errors import GroundstationError, UsageError
+
+DONE, FAILED, USAGE, DATA_LOST, LIMIT_REACHED = 0, 1, 2, 3, 4
+INTERRUPTED = 130
+EXIT_CODES = (
+    "Exit codes: 0 done; 1 could not read or compute; 2 usage; 3 done, with data lost (truncated, corrupt spans, "
+    "channels dropped); 4 done, and --fail-on reached. For several logs the worst wins (1, 4, 3, 0)."
+)
+
+app = typer.Typer(
+    name="groundstation",
+    help="Ground station for post-flight navigation analysis: recorded logs become MCAP, a heading correction, a "
+    "Rerun recording and a report.",
+    epilog=EXIT_CODES,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Parameters = ParamSpec("Parameters")
+Answer = TypeVar("Answer")
+
+ProgressMode = Literal["auto", "none", "json"]
+FailOn = Literal["none", "warn", "fail"]
+
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing but errors on the terminal.")]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more; show where an internal error came from.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
+Force = Annotated[bool, typer.Option("-f", "--force", help="Overwrite what is there.")]
+Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
+Profile = Annotated[
+    Path | None, typer.Option("--profile", help="Profile (TOML) that describes the columns of a CSV.", metavar="FILE")
+]
+ConfigFile = Annotated[Path | None, typer.Option("--config", help="Settings (TOML).", metavar="FILE")]
+AircraftFile = Annotated[
+    Path | None, typer.Option("--aircraft", help="Aircraft file (TOML): antenna arm, entry step.", metavar="FILE")
+]
+SiteFile = Annotated[
+    Path | None, typer.Option("--site", help="Site file (TOML): stands, runways and their bearings.", metavar="FILE")
+]
+IntervalsFile = Annotated[
+    Path | None, typer.Option("--intervals", help="Intervals to exclude or force (TOML).", metavar="FILE")
+]
+
+
+def say(text: str) -> None:
+    """Print a line on stderr."""
+    typer.echo(text, err=True)
+
+
+def answers_with_exit_code(verb: Callable[Parameters, int | None]) -> Callable[Parameters, None]:
+    """Turn a verb's answer into the exit code, and its errors into one clear line."""
+
+    @wraps(verb)
+    def run(*args: Parameters.args, **options: Parameters.kwargs) -> None:
+        try:
+            code = verb(*args, **options) or DONE
+        except UsageError as error:
+            say(f"error: {error}")
+            code = USAGE
+        except GroundstationError as error:
+            say(f"error: {error}")
+            code = FAILED
+        except KeyboardInterrupt:
+            say("interrupted")
+            code = INTERRUPTED
+        except BrokenPipeError:  # the reader of our output went away: `groundstation list | head -1`
+            sys.stderr.close()
+            code = DONE
+        except OSError as error:
+            say(f"error: {error.filename or 'file system'}: {error.strerror or error}")
+            code = FAILED
+        except Exception as error:  # a defect of ours: one line for the user, the rest on request
+            if options.get("verbose"):
+                raise
+            say(f"error: internal error ({type(error).__name__}: {error}); please report it; -v shows where")
+            code = FAILED
+        raise typer.Exit(code)
+
+    return run
+
+
+def _version(is_asked: bool) -> None:
+    if is_asked:
+        typer.echo(f"groundstation {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and exit.", callback=_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Options before the verb."""
+
+
+@app.command()
+@answers_with_exit_code
+def info(
+    log: Annotated[Path, typer.Argument(help="A recorded log or an MCAP.", metavar="LOG")],
+    profile: Profile = None,
+    json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> int | None:
+    """Tell what a log is: format, clock, span, topics with rows, rates and fields."""
+    from groundstation.cli import printing
+    from groundstation.pipeline.describe import describe
+
+    description = describe(log, profile)
+    typer.echo(printing.as_json(description.to_dict()) if json else printing.description(description))
+    return DATA_LOST if description.has_lost_data else DONE
+
+
+@app.command()
+@answers_with_exit_code
+def convert(
+    logs: Annotated[list[Path], typer.Argument(help="Recorded logs.", metavar="LOG...")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="MCAP to write; a folder for several logs.")],
+    profile: Profile = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+    progress: Progress = "auto",
+) -> int | None:
+    """Convert recorded logs to MCAP (protobuf channels, zstd, indexed); the clock is repaired, both times are kept."""
+    from groundstation.cli import printing
+    from groundstation.cli.progress import listener
+    from groundstation.pipeline.batch import convert_many
+
+    with listener("none" if quiet else progress) as listen:
+        outcomes = convert_many(logs, output, profile=profile, force=force, listen=listen)
+    printing.outcomes(outcomes, as_json_text=json, quiet=quiet)
+    return printing.worst_code(outcomes)
+
+
+@app.command()
+@answers_with_exit_code
+def run(
+    paths: Annotated[list[Path], typer.Argument(help="Logs or folders of logs.", metavar="PATH...")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.", metavar="OUT")],
+    config: ConfigFile = None,
+    aircraft: AircraftFile = None,
+    site: SiteFile = None,
+    intervals: IntervalsFile = None,
+    profile: Profile = None,
+    jobs: Annotated[int, typer.Option("-j", "--jobs", help="Processes; 0: one per core.", min=0)] = 0,
+    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is this grave.")] = "none",
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+    progress: Progress = "auto",
+) -> int | None:
+    """Run everything the data allows: MCAP, heading correction, recording and report of each flight."""
+    from groundstation.cli import printing
+    from groundstation.cli.progress import listener
+    from groundstation.pipeline.batch import run_many
+    from groundstation.pipeline.configuration import load_configuration
+
+    configuration = load_configuration(config, aircraft, site, intervals, profile)
+    with listener("none" if quiet else progress) as listen:
+        outcomes = run_many(paths, output, configuration, jobs=jobs, force=force, fail_on=fail_on, listen=listen)
+    printing.outcomes(outcomes, as_json_text=json, quiet=quiet, with_times=verbose)
+    return printing.worst_code(outcomes)
+
+
+@app.command()
+@answers_with_exit_code
+def report(
+    out: Annotated[Path, typer.Argument(help="A folder that `run` made, or one flight folder in it.", metavar="OUT")],
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+) -> int | None:
+    """Make the reports and the index again from the saved results, without the logs."""
+    from groundstation.cli import printing
+    from groundstation.pipeline.batch import report_again
+
+    written = [str(path) for path in report_again(out)]
+    if not quiet:
+        typer.echo(printing.as_json({"written": written}) if json else "\n".join(written))
+    return DONE
+
+
+@app.command()
+@answers_with_exit_code
+def view(
+    flight: Annotated[Path, typer.Argument(help="Flight folder, recording, MCAP or log.", metavar="FLIGHT")],
+    web: Annotated[bool, typer.Option("--web", help="Serve the viewer to a browser.")] = False,
+    host: Annotated[str, typer.Option("--host", help="Address that --web listens on.")] = "127.0.0.1",
+    port: Annotated[int | None, typer.Option("--port", help="Port for --web.", min=1, max=65535)] = None,
+    profile: Profile = None,
+    verbose: Verbose = False,
+) -> int | None:
+    """Look at a flight in the Rerun viewer, native or in the browser."""
+    from groundstation.pipeline.look import look_at
+
+    look_at(flight, web=web, host=host, port=port, profile=profile, say=say)
+    return DONE
+
+
+@app.command()
+@answers_with_exit_code
+def simulate(
+    scenario: Annotated[str, typer.Argument(help="Name of a shipped scenario, or a TOML file.", metavar="SCENARIO")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the log.", metavar="DIR")],
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed in place of the scenario's own.")] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+) -> int | None:
+    """Simulate a flight as a flat CSV, with the truth beside it. `groundstation list` names the scenarios."""
+    from groundstation.cli import printing
+    from groundstation.pipeline.synthesis import simulate_to
+
+    written = [str(path) for path in simulate_to(scenario, output, seed=seed, force=force)]
+    if not quiet:
+        typer.echo(printing.as_json({"written": written}) if json else "\n".join(written))
+    return DONE
+
+
+@app.command()
+@answers_with_exit_code
+def study(
+    name: Annotated[Literal["heading"], typer.Argument(help="Which study.", metavar="NAME")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the tables.", metavar="DIR")],
+    runs: Annotated[int, typer.Option("--runs", help="Simulated runs.", min=10)] = 1000,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the random numbers.")] = 20150601,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    progress: Progress = "auto",
+) -> int | None:
+    """Monte Carlo behind the published figures, with ours beside them."""
+    from groundstation.cli.progress import listener
+    from groundstation.pipeline.synthesis import study_to
+
+    with listener("none" if quiet else progress) as listen:
+        text = study_to(name, output, runs=runs, seed=seed, force=force, listen=listen)
+    if not quiet:
+        typer.echo(text)
+    return DONE
+
+
+@app.command(name="list")
+@answers_with_exit_code
+def list_(
+    log: Annotated[Path | None, typer.Argument(help="A log: would each analysis run on it?", metavar="[LOG]")] = None,
+    profile: Profile = None,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> int | None:
+    """List the analyses and what each needs; with a LOG, whether each would run and why not."""
+    from groundstation.cli import printing
+    from groundstation.pipeline.catalogue import catalogue
+
+    entries = catalogue(log, profile)
+    typer.echo(printing.as_json(entries) if json else printing.catalogue(entries, log is not None))
+    return DONE
+
+
+LATER_VERBS = {
+    "check": "Print the integrity ledger of a log.",
+    "compare": "Compare two flights or two configurations.",
+    "clip": "Cut a part of a flight.",
+    "cooperative": "Navigation between aircraft.",
+    "plan": "Plan a session or a landing.",
+    "serve": "Offer recordings through Rerun's catalog server.",
+}
+
+
+def _add_later_verb(name: str) -> None:
+    @app.command(
+        name=name,
+        hidden=True,
+        add_help_option=False,
+        context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+    )
+    def not_in_this_version(context: typer.Context) -> None:
+        say(f"error: {name}: not in this version")
+        raise typer.Exit(USAGE)
+
+
+for _name in LATER_VERBS:
+    _add_later_verb(_name)
+
+
+def main(arguments: Any = None) -> None:
+    """Run the command line; the exit code is raised as SystemExit."""
+    app(arguments)

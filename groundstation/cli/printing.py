@@ -1,0 +1,134 @@
+"""How results look on stdout: lines for people, JSON for programs."""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import typer
+
+from groundstation.base.timescales import duration_text
+from groundstation.pipeline.describe import Description
+from groundstation.pipeline.outcome import Outcome, worst_code
+
+__all__ = ["as_json", "catalogue", "description", "outcomes", "worst_code"]
+
+
+def as_json(document: Any) -> str:
+    """Render a document as JSON text."""
+    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def printable(text: str) -> str:
+    """Text of a log without control characters: a log must not drive the terminal.
+
+    Examples
+    --------
+    >>> printable("L-39\\x1b[2J")
+    'L-39?[2J'
+    """
+    return "".join(character if character.isprintable() else "?" for character in text)
+
+
+def columns(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
+    """Lay rows out in aligned columns; those numbered in ``right`` are aligned to the right."""
+    widths = [max(len(row[place]) for row in rows) for place in range(len(rows[0]))]
+    lines = []
+    for row in rows:
+        cells = [
+            cell.rjust(width) if place in right else cell.ljust(width)
+            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append("  ".join(cells).rstrip())
+    return "\n".join(lines)
+
+
+def description(what: Description) -> str:
+    """Text of ``info``."""
+    head = [[f"{key}:", printable(value)] for key, value in what.facts.items()]
+    parts = [columns(head)]
+    if what.topics:
+        rows = [["topic", "rows", "rate Hz", "span s", "fields"]]
+        for topic in what.topics:
+            rate = "" if topic.rate_hz is None else f"{topic.rate_hz:.6g}"
+            span = "" if topic.span_s is None else f"{topic.span_s:.1f}"
+            rows.append(
+                [
+                    printable(topic.name),
+                    "" if topic.rows is None else str(topic.rows),
+                    rate,
+                    span,
+                    printable(", ".join(topic.fields)),
+                ]
+            )
+        parts.append(columns(rows, right=(1, 2, 3)))
+    if what.findings:
+        rows = [[finding.severity, printable(finding.text)] for finding in what.findings]
+        parts.append("findings\n" + columns(rows))
+    return "\n\n".join(parts)
+
+
+def outcomes(
+    done: Sequence[Outcome], *, as_json_text: bool = False, quiet: bool = False, with_times: bool = False
+) -> None:
+    """Print what became of each log: one line each on stdout, failures last with their reasons, then totals."""
+    if as_json_text:
+        typer.echo(as_json([_plain(outcome) for outcome in done]))
+        return
+    for outcome in sorted(done, key=lambda one: one.state == "failed"):
+        if outcome.state == "failed":
+            typer.echo(f"error: {printable(outcome.text)}", err=True)
+        elif not quiet:
+            typer.echo(f"{printable(outcome.flight_id or outcome.source)}  {printable(outcome.text)}")
+        if with_times and outcome.times_s:
+            spent = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in outcome.times_s.items())
+            typer.echo(f"  {spent}", err=True)
+    if len(done) > 1 and not quiet:
+        typer.echo(totals(done), err=True)
+
+
+def totals(done: Sequence[Outcome]) -> str:
+    """Totals line: how many logs ended in which state.
+
+    Examples
+    --------
+    >>> totals([Outcome("a", "done", ""), Outcome("b", "failed", "x")])
+    '2 logs: 1 done, 0 with data lost, 0 at the limit, 1 failed, 0 skipped'
+    """
+    count = {state: sum(one.state == state for one in done) for state in _STATE_WORDS}
+    return f"{len(done)} logs: " + ", ".join(f"{count[state]} {word}" for state, word in _STATE_WORDS.items())
+
+
+_STATE_WORDS = {
+    "done": "done",
+    "data_lost": "with data lost",
+    "limit_reached": "at the limit",
+    "failed": "failed",
+    "skipped": "skipped",
+}
+
+
+def _plain(outcome: Outcome) -> dict[str, Any]:
+    return {
+        "source": outcome.source,
+        "state": outcome.state,
+        "exit_code": outcome.code,
+        "flight_id": outcome.flight_id,
+        "folder": outcome.folder,
+        "text": outcome.text,
+    }
+
+
+def catalogue(entries: Sequence[Mapping[str, Any]], is_about_a_log: bool) -> str:
+    """Text of ``list``."""
+    lines = []
+    for entry in entries:
+        lines.append(f"{entry['name']}  {entry['title']}")
+        lines.append(f"    needs: {entry['needs']}")
+        if is_about_a_log and "would_run" in entry:
+            lines.append("    would run" if entry["would_run"] else f"    would not run: {printable(entry['reason'])}")
+    return "\n".join(lines)
+
+
+def span(seconds: float) -> str:
+    """Length of time for people."""
+    return duration_text(seconds)

@@ -1,0 +1,49 @@
+"""Progress on stderr: a bar on a terminal, JSON lines for programs, or nothing."""
+
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Literal
+
+from groundstation.pipeline.progress import Event, Listener, silent
+
+
+@contextmanager
+def listener(mode: Literal["auto", "none", "json"]) -> Iterator[Listener]:
+    """Give a listener for progress events; ``auto`` draws a bar only where stderr is a terminal."""
+    if mode == "json":
+        yield _as_json
+    elif mode == "auto" and sys.stderr.isatty():
+        with _bar() as listen:
+            yield listen
+    else:
+        yield silent
+
+
+def _as_json(event: Event) -> None:
+    document = {"event": event.kind, "name": event.name, "text": event.text}
+    if event.kind == "begin":
+        document["total"] = str(event.total)
+    print(json.dumps(document, ensure_ascii=False), file=sys.stderr, flush=True)
+
+
+@contextmanager
+def _bar() -> Iterator[Listener]:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting", total=None)
+
+        def listen(event: Event) -> None:
+            if event.kind == "begin":
+                bar.update(task, total=event.total)
+            elif event.kind == "stage":
+                bar.update(task, description=escape(f"{event.name}: {event.text}"))
+            else:
+                bar.advance(task)
+
+        yield listen

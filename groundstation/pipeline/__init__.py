@@ -1,0 +1,1 @@
+"""One flight, a folder of flights: from log to MCAP, results, recording and report."""

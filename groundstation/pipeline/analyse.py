@@ -1,0 +1,181 @@
+"""Tables of one flight in, all its answers out: everything the data allows, and the reason for what it does not."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.findings import Finding
+from groundstation.base.toml_settings import settings_from
+from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings, Interval, SiteData
+from groundstation.pipeline import configuration as configured
+from groundstation.pipeline import overview
+from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.intervals import seconds_of
+from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
+from groundstation.results.heading import HeadingResult
+from groundstation.tables.phases import Phases, flight_phases, ground_mask
+from groundstation.tables.table import Flight
+
+
+@dataclass(frozen=True)
+class Given:
+    """What is known of a flight before anything is estimated."""
+
+    flight_id: str
+    source: Source
+    ledger: Mapping[str, Any]
+    clock: Mapping[str, Any]
+    findings: tuple[Finding, ...]
+    has_lost_data: bool
+
+
+@dataclass(frozen=True)
+class UserSettings:
+    """The user's tables as the dataclasses the estimators take."""
+
+    heading: HeadingSettings
+    aircraft: AircraftData
+    site: SiteData
+
+
+def user_settings(configuration: Configuration) -> UserSettings:
+    """Turn the user's tables into settings.
+
+    Raises
+    ------
+    SettingsError
+        For an unknown key or a value of the wrong kind.
+    """
+    return UserSettings(
+        settings_from(HeadingSettings, configuration.heading, "[heading]"),
+        settings_from(AircraftData, configuration.aircraft, "aircraft file"),
+        settings_from(SiteData, configuration.site, "site file"),
+    )
+
+
+def analyse(flight: Flight, given: Given, configuration: Configuration) -> FlightResults:
+    """Compute everything the data of a flight allows.
+
+    Returns
+    -------
+    FlightResults
+        Analyses that could not run stand in ``not_assessable`` with their reasons.
+    """
+    settings = user_settings(configuration)
+    findings = list(given.findings)
+    not_assessable: list[NotAssessable] = []
+    phases = flight_phases(flight)
+    heading = _heading_or_reason(flight, configuration, settings, findings, not_assessable)
+    figures = _figures(flight, given, settings, phases, heading)
+    if heading is not None:
+        findings += heading_findings(heading)
+    return FlightResults(
+        flight_id=given.flight_id,
+        source=given.source,
+        metadata=flight.metadata,
+        start_utc_ns=flight.start_ns if flight.has_utc else None,
+        duration_s=flight.duration_s,
+        status=_status(given, findings),
+        completeness=_completeness(given.ledger),
+        ledger={key: value for key, value in given.ledger.items() if key != "findings"},
+        clock=given.clock,
+        findings=tuple(findings),
+        not_assessable=tuple(not_assessable),
+        heading=heading,
+        figures=figures,
+    )
+
+
+def estimate_heading(flight: Flight, configuration: Configuration, settings: UserSettings) -> HeadingResult:
+    """Run system 1 on a flight, with the user's intervals and the proof of ground contact.
+
+    Raises
+    ------
+    NotAssessableError
+        When the data does not allow it; the reason is the message.
+    """
+    from groundstation.estimators.heading.estimate import estimate_heading_error
+    from groundstation.tables.headings import true_heading
+
+    uses: tuple[tuple[Literal["exclude", "force"], tuple[configured.Interval, ...]], ...] = (
+        ("exclude", configuration.exclude),
+        ("force", configuration.force),
+    )
+    intervals = tuple(
+        Interval(start_s, end_s, use) for use, listed in uses for start_s, end_s in seconds_of(flight, listed)
+    )
+    return estimate_heading_error(
+        flight,
+        on_ground=lambda time_ns: ground_mask(flight, time_ns),
+        heading=lambda topic: true_heading(flight, topic),
+        settings=settings.heading,
+        aircraft=settings.aircraft,
+        site=settings.site,
+        request=HeadingRequest(intervals=intervals),
+    )
+
+
+def _heading_or_reason(
+    flight: Flight,
+    configuration: Configuration,
+    settings: UserSettings,
+    findings: list[Finding],
+    not_assessable: list[NotAssessable],
+) -> HeadingResult | None:
+    try:
+        return estimate_heading(flight, configuration, settings)
+    except NotAssessableError as error:
+        not_assessable.append(NotAssessable("heading", str(error)))
+        findings.append(Finding("info", "heading.not_assessable", f"heading correction not assessable: {error}"))
+        return None
+
+
+def heading_findings(result: HeadingResult) -> tuple[Finding, ...]:
+    """Findings that follow from the heading result: a rejected verdict is a warning."""
+    grave = result.verdict == "reject"
+    text = f"heading correction: {result.verdict}: {result.verdict_reason}"
+    return (Finding("warn" if grave else "info", f"heading.{result.verdict}", text),)
+
+
+def _status(given: Given, findings: list[Finding]) -> Status:
+    if any(finding.severity == "fail" for finding in findings):
+        return "failed"
+    return "degraded" if given.has_lost_data else "ok"
+
+
+def _completeness(ledger: Mapping[str, Any]) -> dict[str, float]:
+    topics = ledger.get("topics", {})
+    return {name: float(entry["coverage"]) for name, entry in topics.items() if entry.get("coverage") is not None}
+
+
+def _figures(
+    flight: Flight, given: Given, settings: UserSettings, phases: Phases, heading: HeadingResult | None
+) -> tuple[FigureData, ...]:
+    true_heading_deg, ins_topic = _heading_for_overview(flight, heading)
+    general = (
+        overview.overview(flight, true_heading_deg, ins_topic),
+        overview.phase_figure(phases),
+        overview.gnss_lanes(flight, settings.heading.geometry_max),
+        *overview.ledger_figures(flight, given.ledger),
+    )
+    return (*(figure for figure in general if figure is not None), *(heading.figures if heading else ()))
+
+
+def _heading_for_overview(
+    flight: Flight, heading: HeadingResult | None
+) -> tuple[NDArray[np.float64] | None, str | None]:
+    from groundstation.tables.headings import true_heading
+
+    topic = heading.ins_topic if heading else overview.first_of_kind(flight, "ins", "true_heading_deg")
+    topic = topic or overview.first_of_kind(flight, "ins", "magnetic_heading_deg")
+    if topic is None:
+        return None, None
+    try:
+        return true_heading(flight, topic).values_deg, topic
+    except NotAssessableError:
+        return None, None

@@ -1,0 +1,116 @@
+"""What the user sets: estimator settings, aircraft and site files, intervals left out or forced. Strictly checked."""
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from groundstation.base.errors import SettingsError
+
+SECTIONS = ("heading", "aircraft", "site", "exclude", "force")
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Part of a flight that the user excludes or forces; ends as written: flight seconds, +mm:ss or ISO UTC."""
+
+    start: str
+    end: str
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Everything a user may set for a run, as read from TOML; plain values, so that it travels to worker processes.
+
+    ``heading``, ``aircraft`` and ``site`` are the tables as written; they become dataclasses where they are used.
+    """
+
+    heading: Mapping[str, Any] = field(default_factory=dict)
+    aircraft: Mapping[str, Any] = field(default_factory=dict)
+    site: Mapping[str, Any] = field(default_factory=dict)
+    exclude: tuple[Interval, ...] = ()
+    force: tuple[Interval, ...] = ()
+    profile: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for the manifest and the MCAP; only what the user set."""
+        document: dict[str, Any] = {
+            name: dict(getattr(self, name)) for name in ("heading", "aircraft", "site") if getattr(self, name)
+        }
+        for name in ("exclude", "force"):
+            intervals = [{"from": part.start, "to": part.end, "reason": part.reason} for part in getattr(self, name)]
+            if intervals:
+                document[name] = intervals
+        if self.profile:
+            document["profile"] = Path(self.profile).name
+        return document
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Raises
+    ------
+    SettingsError
+        When the file cannot be read or is not TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise SettingsError(str(path), error.strerror or "cannot be opened", "a readable TOML file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise SettingsError(str(path), f"not TOML ({error})", "a TOML file", "see docs/configuration.md") from error
+
+
+def load_configuration(
+    config: Path | None = None,
+    aircraft: Path | None = None,
+    site: Path | None = None,
+    intervals: Path | None = None,
+    profile: Path | None = None,
+) -> Configuration:
+    """Read the user's files into one configuration; a file named for a section wins over that section of ``config``.
+
+    Raises
+    ------
+    SettingsError
+        For an unreadable file, an unknown section, or a value of the wrong kind, naming file and key.
+    """
+    document = read_toml(config) if config else {}
+    _refuse_unknown(document, SECTIONS, str(config))
+    for name, path in (("aircraft", aircraft), ("site", site)):
+        if path:
+            document[name] = read_toml(path)
+    if intervals:
+        listed = read_toml(intervals)
+        _refuse_unknown(listed, ("exclude", "force"), str(intervals))
+        document.update(listed)
+    for name in ("heading", "aircraft", "site"):
+        if not isinstance(document.get(name, {}), dict):
+            raise SettingsError(f"{config}, {name}", repr(document[name]), f"a table [{name}]")
+    return Configuration(
+        heading=document.get("heading", {}),
+        aircraft=document.get("aircraft", {}),
+        site=document.get("site", {}),
+        exclude=_intervals(document.get("exclude", []), f"{intervals or config}, exclude"),
+        force=_intervals(document.get("force", []), f"{intervals or config}, force"),
+        profile=str(profile) if profile else None,
+    )
+
+
+def _refuse_unknown(document: Mapping[str, Any], known: Iterable[str], where: str) -> None:
+    unknown = sorted(set(document) - set(known))
+    if unknown:
+        raise SettingsError(where, f"unknown key {unknown[0]!r}", "one of " + ", ".join(sorted(known)))
+
+
+def _intervals(listed: Any, where: str) -> tuple[Interval, ...]:
+    if not isinstance(listed, list) or not all(isinstance(part, dict) for part in listed):
+        raise SettingsError(where, repr(listed), "tables such as [[exclude]] with from and to")
+    for part in listed:
+        _refuse_unknown(part, ("from", "to", "reason"), where)
+        if not {"from", "to"} <= set(part):
+            raise SettingsError(where, repr(part), "from and to: flight seconds, +mm:ss or ISO UTC")
+    return tuple(Interval(str(part["from"]), str(part["to"]), str(part.get("reason", ""))) for part in listed)

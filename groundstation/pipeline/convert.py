@@ -1,0 +1,115 @@
+"""A log becomes an MCAP: its clock is repaired, its ledger is kept beside the data."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from importlib import metadata as installed
+from pathlib import Path
+from typing import Any
+
+from groundstation import __version__
+from groundstation.base.errors import UnreadableLogError
+from groundstation.base.findings import Finding, Severity
+from groundstation.base.records import Damage, LogHeader, RecordBatch, Remark
+from groundstation.pipeline.log import Log, Replay
+from groundstation.store.info import StoreInfo
+
+
+@dataclass(frozen=True)
+class Converted:
+    """What an MCAP holds and what was found while it was made.
+
+    ``has_lost_data``: something of the log could not be kept (exit code 3).
+    """
+
+    info: StoreInfo
+    findings: tuple[Finding, ...]
+    has_lost_data: bool
+
+
+def convert_log(log: Log, target: Path) -> Converted:
+    """Write a log's MCAP, under a temporary name until it is whole.
+
+    Raises
+    ------
+    UnreadableLogError
+        When the log holds no record at all.
+    """
+    return _copy_store(log, target) if log.is_store else _convert_recorded(log, target)
+
+
+def _convert_recorded(log: Log, target: Path) -> Converted:
+    from groundstation.integrity.ledger_findings import ledger_findings
+    from groundstation.integrity.ordering import corrected
+    from groundstation.integrity.survey import survey
+    from groundstation.store.writer import StoreWriter
+
+    items = Replay(log.items)
+    found = survey(items)
+    if not found.ledger.topics:
+        raise UnreadableLogError(log.path.name, "no record that could be read", "", "`info` tells what the file is")
+    findings = ledger_findings(found.ledger)
+    info = StoreInfo(
+        source_name=log.source.name,
+        source_sha256=log.source.sha256,
+        reader=found.header.reader,
+        versions={"groundstation": __version__, "mcap": installed.version("mcap")},
+        metadata={**found.header.metadata, **_derivations(found.remarks)},
+        has_utc=found.clock.is_absolute,
+        start_ns=min(topic.first_ns for topic in found.ledger.topics),
+        clock=found.clock.to_dict(),
+        ledger={**found.ledger.to_dict(), "findings": [asdict(finding) for finding in findings]},
+        remarks=[asdict(remark) for remark in found.remarks],
+        damages=[asdict(damage) for damage in found.damages],
+    )
+    with StoreWriter(target, info) as writer:
+        for batch in corrected(items, found.clock):
+            writer.write(batch)
+    return Converted(info, findings, any(damage.loses_data for damage in found.damages))
+
+
+def _derivations(remarks: tuple[Remark, ...]) -> dict[str, str]:
+    """What each derived field was derived from, ``derived.<topic>.<field>``: it stays with the flight."""
+    derived = (remark for remark in remarks if remark.code == "derived")
+    return {f"derived.{remark.topic}.{field}": remark.text for remark in derived for field in remark.fields}
+
+
+def _copy_store(log: Log, target: Path) -> Converted:
+    """Write the intact content of a groundstation MCAP again; an undamaged one comes out equal in content."""
+    from groundstation.store.reader import read_info
+    from groundstation.store.writer import StoreWriter
+
+    info = read_info(log.path)
+    damages: list[Damage] = []
+    rows = 0
+    with StoreWriter(target, info) as writer:
+        for item in log.items():
+            if isinstance(item, RecordBatch):
+                writer.write(item)
+                rows += len(item)
+            elif isinstance(item, Damage):
+                damages.append(item)
+            elif isinstance(item, LogHeader):
+                continue
+        if not rows:
+            raise UnreadableLogError(log.path.name, "no intact record", "", "the file is damaged beyond its index")
+    findings = (*stored_findings(info), *(damage_finding(damage) for damage in damages))
+    lost_before = any(entry.get("loses_data") for entry in info.damages)
+    return Converted(info, findings, lost_before or any(damage.loses_data for damage in damages))
+
+
+def stored_findings(info: StoreInfo) -> tuple[Finding, ...]:
+    """Findings kept in an MCAP when the log was converted."""
+    return tuple(finding_from(entry) for entry in info.ledger.get("findings", ()))
+
+
+def finding_from(entry: Mapping[str, Any]) -> Finding:
+    """A finding from its plain form."""
+    known = ("severity", "code", "text", "topic", "place", "count")
+    return Finding(**{name: entry[name] for name in known if name in entry})
+
+
+def damage_finding(damage: Damage) -> Finding:
+    """A finding that tells of damage in an MCAP."""
+    text = f"{damage.what}: {damage.count} at {damage.place}"
+    severity: Severity = "warn" if damage.loses_data else "info"
+    return Finding(severity, f"store.{damage.kind}", text, damage.topic, damage.place, damage.count)

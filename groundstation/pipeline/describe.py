@@ -1,0 +1,132 @@
+"""What a log is: format, clock, span and topics, for the verb ``info``."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from groundstation.base.findings import Finding
+from groundstation.base.records import Damage, RecordBatch
+from groundstation.pipeline.log import Log, open_log
+
+MCAP_MAGIC = b"\x89MCAP0\r\n"
+
+
+@dataclass(frozen=True)
+class TopicDescription:
+    """A topic of a log: rows, median rate, span in seconds, fields."""
+
+    name: str
+    rows: int | None
+    rate_hz: float | None
+    span_s: float | None
+    fields: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Description:
+    """A log described: facts for people (name to text), topics, findings."""
+
+    facts: dict[str, str]
+    topics: tuple[TopicDescription, ...]
+    findings: tuple[Finding, ...]
+    has_lost_data: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return asdict(self)
+
+
+def describe(path: Path, profile: Path | None = None) -> Description:
+    """Describe a recorded log, a groundstation MCAP, or an MCAP of another program.
+
+    Raises
+    ------
+    UsageError, UnreadableLogError
+        When the file is missing, or nothing can be said about it.
+    """
+    from groundstation.base.errors import UsageError
+    from groundstation.store.reader import is_groundstation_mcap
+
+    if not path.exists():
+        raise UsageError(str(path), "no such file")
+    if path.is_dir():
+        raise UsageError(str(path), "a folder", "a log", "`run` takes folders")
+    if _is_mcap(path) and not is_groundstation_mcap(path):
+        return _foreign(path)
+    log = open_log(path, profile)
+    return _stored(log) if log.is_store else _recorded(log)
+
+
+def _is_mcap(path: Path) -> bool:
+    with path.open("rb") as stream:
+        return stream.read(len(MCAP_MAGIC)) == MCAP_MAGIC
+
+
+def _recorded(log: Log) -> Description:
+    from groundstation.integrity.ledger_findings import ledger_findings
+    from groundstation.integrity.survey import survey
+    from groundstation.pipeline.log import Replay
+
+    items = Replay(log.items)
+    found = survey(items)
+    fields: dict[str, dict[str, None]] = {}
+    for item in items:
+        if isinstance(item, RecordBatch):
+            fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
+    ledger = found.ledger.to_dict()
+    facts = _facts(log, dict(found.header.metadata), ledger)
+    lost = any(damage.loses_data for damage in found.damages)
+    return Description(facts, _topics(ledger, fields), ledger_findings(found.ledger), lost)
+
+
+def _stored(log: Log) -> Description:
+    from groundstation.pipeline.convert import damage_finding, stored_findings
+    from groundstation.store.reader import read_info
+
+    info = read_info(log.path)
+    fields: dict[str, dict[str, None]] = {}
+    damages = []
+    for item in log.items():
+        if isinstance(item, RecordBatch):
+            fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
+        elif isinstance(item, Damage):
+            damages.append(item)
+    facts = _facts(log, dict(info.metadata), dict(info.ledger))
+    facts["log"] = f"{info.source_name}, read as {info.reader}"
+    findings = (*stored_findings(info), *(damage_finding(damage) for damage in damages))
+    return Description(facts, _topics(dict(info.ledger), fields), findings, any(d.loses_data for d in damages))
+
+
+def _facts(log: Log, metadata: dict[str, str], ledger: dict[str, Any]) -> dict[str, str]:
+    facts = {
+        "file": log.source.name,
+        "size": f"{log.source.size_bytes} bytes",
+        "sha256": log.source.sha256,
+        "format": log.source.reader,
+    }
+    topics = ledger.get("topics", {}).values()
+    if topics:
+        # Texts of one clock sort as their times do: ISO UTC, or +mm:ss padded by what has the most digits.
+        facts["first sample"] = min((topic["first"] for topic in topics), key=lambda text: (len(text), text))
+        facts["last sample"] = max((topic["last"] for topic in topics), key=lambda text: (len(text), text))
+    return {**facts, **{key: metadata[key] for key in sorted(metadata)}}
+
+
+def _topics(ledger: dict[str, Any], fields: dict[str, dict[str, None]]) -> tuple[TopicDescription, ...]:
+    described = []
+    for name, entry in sorted(ledger.get("topics", {}).items()):
+        known = tuple(fields.get(name, ()))
+        rate_hz, span_s = entry.get("nominal_rate_hz"), entry.get("span_s")
+        described.append(TopicDescription(name, entry["rows"], rate_hz, span_s, known))
+    return tuple(described)
+
+
+def _foreign(path: Path) -> Description:
+    from groundstation.store.foreign import describe_foreign
+
+    found = describe_foreign(path)
+    facts = {"file": path.name, "format": "MCAP of another program (no reader for it in this version)", **found.facts}
+    topics = tuple(
+        TopicDescription(channel.topic, channel.messages, None, None, (channel.schema,)) for channel in found.channels
+    )
+    return Description(facts, topics, (), found.is_damaged)

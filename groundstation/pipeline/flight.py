@@ -1,0 +1,169 @@
+"""One log from beginning to end: MCAP, answers, recording and report in a folder of its own."""
+
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from groundstation.base.errors import GroundstationError, UnreadableLogError
+from groundstation.base.findings import SEVERITIES, worst
+from groundstation.base.records import RecordBatch
+from groundstation.pipeline.analyse import Given, analyse
+from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.convert import Converted, convert_log
+from groundstation.pipeline.identity import flight_id
+from groundstation.pipeline.log import Log, open_log
+from groundstation.pipeline.manifest import manifest_of
+from groundstation.pipeline.outcome import Outcome, State
+from groundstation.pipeline.progress import Event, Listener, silent
+from groundstation.results.flight import FlightResults
+from groundstation.tables.table import Flight
+
+PARTIAL_PREFIX = ".partial-"
+
+
+@dataclass
+class Stopwatch:
+    """Seconds spent by stage."""
+
+    listen: Listener = silent
+    name: str = ""
+    times_s: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, text: str) -> Iterator[None]:
+        """Time a stage and tell the listener that it began."""
+        self.listen(Event("stage", self.name, text))
+        started = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.times_s[text] = self.times_s.get(text, 0.0) + time.perf_counter() - started
+
+
+@dataclass(frozen=True)
+class Job:
+    """One log to run; plain values, so that it travels to a worker process.
+
+    ``suffix`` is added to the flight id (two flights of one id get ``_<sha8>``).
+    """
+
+    path: Path
+    out: Path
+    configuration: Configuration
+    fail_on: str = "none"
+    is_named: bool = True
+    add_suffix: bool = False
+
+
+def run_flight(job: Job, listen: Listener = silent) -> Outcome:
+    """Run one log into ``out/.partial-<sha8>``; the caller moves it into place (see :func:`place`).
+
+    A log that cannot be read or computed gives an outcome with the reason, never an exception: one bad log never
+    stops the others.
+    """
+    watch = Stopwatch(listen, job.path.name)
+    try:
+        log = open_log(job.path, Path(job.configuration.profile) if job.configuration.profile else None)
+    except UnreadableLogError as error:
+        return Outcome(str(job.path), "failed" if job.is_named else "skipped", str(error))
+    partial = job.out / f"{PARTIAL_PREFIX}{log.source.sha256[:16]}"
+    try:
+        return _run(log, job, partial, watch)
+    except GroundstationError as error:
+        reason = str(error)
+    except OSError as error:
+        reason = f"{error.filename or job.path}: {error.strerror or error}"
+    except MemoryError:
+        reason = f"{job.path.name}: not enough memory"
+    except Exception as error:
+        # One bad log never stops the others; what is wrong is ours to mend, and the line says so.
+        reason = f"{job.path.name}: internal error ({type(error).__name__}: {error}); please report it"
+    shutil.rmtree(partial, ignore_errors=True)
+    return Outcome(str(job.path), "failed", reason, sha256=log.source.sha256, times_s=watch.times_s)
+
+
+def _run(log: Log, job: Job, partial: Path, watch: Stopwatch) -> Outcome:
+    from groundstation.reports.flight_report import write_flight_report
+    from groundstation.reports.index import index_row
+    from groundstation.results.files import load, save
+    from groundstation.viewer.recording import write_recording
+
+    shutil.rmtree(partial, ignore_errors=True)
+    partial.mkdir(parents=True)
+    mcap = partial / "flight.mcap"
+    with watch.stage("converting"):
+        converted = convert_log(log, mcap)
+    with watch.stage("reading the MCAP"):
+        flight = read_flight(mcap, converted)
+    start_utc_ns = flight.start_ns if flight.has_utc else None
+    identity = flight_id(start_utc_ns, flight.metadata, log.source.sha256)
+    if job.add_suffix and start_utc_ns is not None:
+        identity += f"_{log.source.sha256[:8]}"
+    with watch.stage("estimating"):
+        results = analyse(flight, given_of(log, converted, identity), job.configuration)
+    with watch.stage("saving"):
+        mcap.rename(partial / f"{identity}.mcap")
+        save(partial, results, manifest_of(log, results, job.configuration))
+    with watch.stage("recording"):
+        write_recording(partial / f"{identity}.rrd", flight, results)
+    with watch.stage("reporting"):
+        write_flight_report(partial)
+    state = _state(results, converted, job.fail_on)
+    return Outcome(
+        str(job.path),
+        state,
+        sentence(results),
+        flight_id=identity,
+        folder=str(partial),
+        sha256=log.source.sha256,
+        row=index_row(load(partial)),
+        times_s=watch.times_s,
+    )
+
+
+def given_of(log: Log, converted: Converted, identity: str) -> Given:
+    """What is known of a converted log before anything is estimated."""
+    info = converted.info
+    return Given(identity, log.source, info.ledger, info.clock, converted.findings, converted.has_lost_data)
+
+
+def read_flight(mcap: Path, converted: Converted) -> Flight:
+    """Tables of an MCAP that was just written."""
+    from groundstation.store.reader import read
+    from groundstation.tables.assemble import flight_from_batches
+
+    info = converted.info
+    batches = (item for item in read(mcap) if isinstance(item, RecordBatch))
+    return flight_from_batches(batches, metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name)
+
+
+def _state(results: FlightResults, converted: Converted, fail_on: str) -> State:
+    gravest = worst(results.findings)
+    if fail_on in SEVERITIES and gravest and SEVERITIES.index(gravest) >= SEVERITIES.index(fail_on):
+        return "limit_reached"
+    return "data_lost" if converted.has_lost_data else "done"
+
+
+def sentence(results: FlightResults) -> str:
+    """What was found, in one line."""
+    heading = results.heading
+    if heading is None:
+        reasons = "; ".join(entry.reason for entry in results.not_assessable) or "no analysis applies"
+        return f"not assessable: {reasons}"
+    low, high = heading.confidence95_deg
+    text = f"{heading.verdict}: heading error {heading.error_deg:+.3f} deg, 95 % {low:+.3f} to {high:+.3f}"
+    if heading.correction_deg is not None:
+        text += f", enter {heading.correction_deg:+g} deg"
+    else:
+        text += f" ({heading.verdict_reason})"
+    return text
+
+
+def place(partial: Path, target: Path) -> None:
+    """Move a finished flight folder into place; one that was there is replaced."""
+    if target.exists():
+        shutil.rmtree(target)
+    partial.rename(target)

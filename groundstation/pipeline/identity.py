@@ -1,0 +1,45 @@
+"""Names of flights: the folder and file name a flight gets, from what the log itself says."""
+
+import hashlib
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from groundstation.base.timescales import utc_ns_to_stamp
+
+_NOT_ALLOWED = re.compile(r"[^A-Za-z0-9_-]+")
+MAX_PART_CHARACTERS = 60
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file, hexadecimal."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def safe_part(text: str) -> str:
+    """Text made fit for a file name: other characters than A-Z a-z 0-9 _ - become ``-``, runs are joined.
+
+    Examples
+    --------
+    >>> safe_part("L-39 #07/../x"), safe_part("Як-130")
+    ('L-39-07-x', '130')
+    """
+    joined = re.sub(r"-{2,}", "-", _NOT_ALLOWED.sub("-", text))
+    return joined.strip("-")[:MAX_PART_CHARACTERS].strip("-")
+
+
+def flight_id(start_utc_ns: int | None, metadata: Mapping[str, str], sha256: str) -> str:
+    """Name of a flight: ``20260504T060000Z_<aircraft>_<flight>``, or ``NOTIME_<sha8>`` without absolute time.
+
+    Examples
+    --------
+    >>> flight_id(1777874400000000000, {"aircraft": "L-39 07", "flight": ""}, "ab" * 32)
+    '20260504T060000Z_L-39-07'
+    >>> flight_id(None, {"aircraft": "x"}, "ab" * 32)
+    'NOTIME_abababab'
+    """
+    if start_utc_ns is None:
+        return f"NOTIME_{sha256[:8]}"
+    parts = [utc_ns_to_stamp(start_utc_ns), *(safe_part(metadata.get(key, "")) for key in ("aircraft", "flight"))]
+    return "_".join(part for part in parts if part)

@@ -1,0 +1,60 @@
+"""Which files a run takes: named files, and logs found in folders; nothing that groundstation itself made."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from groundstation.base.errors import UsageError
+
+FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK = "manifest.json", "index.json"
+
+
+@dataclass(frozen=True)
+class Input:
+    """A file to process. ``is_named``: the user named it, so that failing to recognise it is an error."""
+
+    path: Path
+    is_named: bool
+
+
+def collect(paths: Sequence[Path], out: Path | None = None) -> tuple[Input, ...]:
+    """List the files that ``paths`` (files or folders, recursive) stand for, in a stable order, each once.
+
+    OUT and folders that groundstation made (they hold its manifest or index) are never inputs of a folder walk; nor
+    are hidden files.
+
+    Raises
+    ------
+    UsageError
+        When a path does not exist.
+    """
+    found: dict[Path, Input] = {}
+    for path in paths:
+        if not path.exists():
+            raise UsageError(str(path), "no such file or folder")
+        if path.is_dir():
+            for file in _walk(path, out.resolve() if out else None):
+                found.setdefault(file.resolve(), Input(file, is_named=False))
+        else:
+            found[path.resolve()] = Input(path, is_named=True)
+    return tuple(sorted(found.values(), key=lambda item: str(item.path)))
+
+
+def is_ours(folder: Path) -> bool:
+    """Whether groundstation made the folder: a flight folder or an OUT."""
+    names = {FLIGHT_FOLDER_MARK, "summary.json"}, {OUT_FOLDER_MARK, "index.csv"}
+    return any(all((folder / name).is_file() for name in marks) for marks in names)
+
+
+def _walk(folder: Path, out: Path | None) -> list[Path]:
+    if folder.resolve() == out or is_ours(folder):
+        return []
+    files: list[Path] = []
+    for entry in sorted(folder.iterdir()):
+        if entry.name.startswith("."):
+            continue
+        if entry.is_dir() and not entry.is_symlink():
+            files += _walk(entry, out)
+        elif entry.is_file():
+            files.append(entry)
+    return files

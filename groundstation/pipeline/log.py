@@ -1,0 +1,91 @@
+"""One way to open whatever a user names: a recorded log, or an MCAP that groundstation wrote."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from groundstation.base.errors import UnreadableLogError
+from groundstation.base.records import Item, RecordBatch
+from groundstation.pipeline.identity import sha256_of
+from groundstation.results.flight import Source
+
+REPLAY_LIMIT_BYTES = 256 * 1024 * 1024
+
+
+@dataclass(frozen=True)
+class Log:
+    """A log that a reader (or the store) claims.
+
+    ``is_store``: an MCAP that groundstation wrote; its records carry corrected time already.
+    """
+
+    path: Path
+    source: Source
+    is_store: bool
+    profile: Path | None = None
+
+    def items(self) -> Iterator[Item]:
+        """Read the log from its beginning, in bounded batches."""
+        if self.is_store:
+            from groundstation.store.reader import read
+
+            return read(self.path)
+        from groundstation.readers.registry import read as read_log
+
+        return read_log(self.path, self.profile)
+
+
+def open_log(path: Path, profile: Path | None = None) -> Log:
+    """Find out who can read a file.
+
+    Raises
+    ------
+    UnreadableLogError
+        When no reader claims it, or it is an MCAP of another program.
+    """
+    from groundstation.readers.registry import identify
+    from groundstation.store.reader import is_groundstation_mcap
+
+    is_store = is_groundstation_mcap(path)
+    claimed_by = "groundstation-mcap" if is_store else identify(path, profile).title
+    return Log(path, Source(path.name, sha256_of(path), path.stat().st_size, claimed_by), is_store, profile)
+
+
+class Replay:
+    """Items of a log that are wanted twice: kept while they are small, read again when they are not.
+
+    Examples
+    --------
+    >>> from groundstation.base.records import Remark
+    >>> replay = Replay(lambda: iter([Remark("a", "b")]))
+    >>> [item.code for item in replay], [item.code for item in replay]
+    (['a'], ['a'])
+    """
+
+    def __init__(self, read: Callable[[], Iterator[Item]], limit_bytes: int = REPLAY_LIMIT_BYTES) -> None:
+        self._read = read
+        self._limit_bytes = limit_bytes
+        self._kept: list[Item] | None = None
+
+    def __iter__(self) -> Iterator[Item]:
+        if self._kept is not None:
+            yield from self._kept
+            return
+        kept: list[Item] | None = []
+        size = 0
+        for item in self._read():
+            size += _size_bytes(item)
+            if size > self._limit_bytes:
+                kept = None
+            if kept is not None:
+                kept.append(item)
+            yield item
+        self._kept = kept
+
+
+def _size_bytes(item: Item) -> int:
+    if not isinstance(item, RecordBatch):
+        return 200
+    columns = (item.device_time_ns, *item.columns.values())
+    present = sum(len(item) for column in columns if column.present is not None)
+    return item.record_index.nbytes + present + sum(column.values.nbytes for column in columns)

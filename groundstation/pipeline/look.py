@@ -1,0 +1,59 @@
+"""``view``: whatever stands for a flight - folder, recording, MCAP or log - opens in the Rerun viewer."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from groundstation.base.errors import UnreadableLogError, UsageError
+from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.flight import Job, run_flight
+
+
+def look_at(
+    path: Path,
+    *,
+    web: bool,
+    host: str,
+    port: int | None,
+    profile: Path | None,
+    say: Callable[[str], None],
+) -> None:
+    """Open a flight in the Rerun viewer; an MCAP or log is run into a temporary folder first.
+
+    Raises
+    ------
+    UsageError
+        When the path is missing or a folder without a recording.
+    UnreadableLogError
+        When the log cannot be run.
+    """
+    from groundstation.viewer.launch import open_viewer
+
+    if not path.exists():
+        raise UsageError(str(path), "no such file or folder")
+    if path.is_dir():
+        open_viewer(recording_in(path), web=web, host=host, port=port)
+    elif path.suffix == ".rrd":
+        open_viewer(path, web=web, host=host, port=port)
+    else:
+        with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
+            say(f"computing {path.name} ...")
+            configuration = Configuration(profile=str(profile) if profile else None)
+            outcome = run_flight(Job(path, Path(folder), configuration))
+            if outcome.state == "failed":
+                raise UnreadableLogError(path.name, outcome.text)
+            open_viewer(recording_in(Path(outcome.folder)), web=web, host=host, port=port)
+
+
+def recording_in(folder: Path) -> Path:
+    """The recording of a flight folder.
+
+    Raises
+    ------
+    UsageError
+        When there is none, or more than one.
+    """
+    found = sorted(folder.glob("*.rrd"))
+    if len(found) != 1:
+        raise UsageError(str(folder), f"{len(found)} recordings", "a flight folder that `run` made", "name the .rrd")
+    return found[0]

@@ -1,0 +1,55 @@
+"""What became of one log of a run, for the totals line, the index and the exit code."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+State = Literal["done", "data_lost", "limit_reached", "failed", "skipped"]
+EXIT_CODE: Mapping[State, int] = {"done": 0, "skipped": 0, "data_lost": 3, "limit_reached": 4, "failed": 1}
+WORST_FIRST = (1, 4, 3, 0)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one log.
+
+    Parameters
+    ----------
+    source : str
+        Path of the log as the user would type it.
+    state : {'done', 'data_lost', 'limit_reached', 'failed', 'skipped'}
+    text : str
+        One line for people: the verdict, or the reason of a failure.
+    flight_id, folder : str
+        Empty when there is none.
+    row : mapping
+        Row of the index; empty for a log that was skipped or failed before it had one.
+    times_s : mapping
+        Seconds spent, by stage.
+    """
+
+    source: str
+    state: State
+    text: str
+    flight_id: str = ""
+    folder: str = ""
+    sha256: str = ""
+    row: Mapping[str, Any] = field(default_factory=dict)
+    times_s: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def code(self) -> int:
+        """Exit code of this log alone."""
+        return EXIT_CODE[self.state]
+
+
+def worst_code(outcomes: "tuple[Outcome, ...]") -> int:
+    """Exit code of several logs: the worst wins, in the order 1, 4, 3, 0.
+
+    Examples
+    --------
+    >>> worst_code((Outcome("a", "data_lost", ""), Outcome("b", "limit_reached", ""), Outcome("c", "done", "")))
+    4
+    """
+    codes = {outcome.code for outcome in outcomes}
+    return next((code for code in WORST_FIRST if code in codes), 0)

@@ -1,0 +1,185 @@
+"""Arrays of the overview and data-quality figures: the flight thinned, its phases, the state of GNSS, the ledger."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.signals import topics_of_kind
+from groundstation.results.figures import FigureData
+from groundstation.tables.phases import Phases
+from groundstation.tables.table import Flight, Table
+
+MAX_OVERVIEW_ROWS = 4000
+GAP_PERIODS = 5.0
+LARGEST_QUIET_GAP_S = 3.0
+
+
+def first_of_kind(flight: Flight, kind: str, *fields: str) -> str | None:
+    """First topic of a kind that has all the fields, None when there is none."""
+    found = topics_of_kind(kind, flight.topics())
+    return next((topic for topic in found if flight[topic].has(*fields)), None)
+
+
+def runs_of(states: NDArray[np.str_], time_s: NDArray[np.float64], end_s: float) -> FigureData:
+    """Run-length form of a state per sample: ``start_s``, ``end_s``, ``state``; each run lasts until the next one."""
+    change = np.flatnonzero(np.r_[True, states[1:] != states[:-1]]) if len(states) else np.array([], dtype=int)
+    starts = time_s[change]
+    return FigureData(
+        "gnss_lanes",
+        {"start_s": starts, "end_s": np.r_[starts[1:], end_s] if len(starts) else starts, "state": states[change]},
+        {"start_s": 2, "end_s": 2},
+    )
+
+
+def gnss_lanes(flight: Flight, geometry_limit: float) -> FigureData | None:
+    """State of GNSS over the flight: good, geometry above the limit, integrity lost, no geometry factor, no GNSS."""
+    topic = first_of_kind(flight, "gnss", "velocity_north_mps") or first_of_kind(flight, "gnss", "latitude_deg")
+    if topic is None:
+        return None
+    table = flight[topic]
+    time_s = flight.time_s(topic)
+    name = next((factor for factor in ("gdop", "pdop", "hdop") if table.has(factor)), None)
+    states = np.full(len(table), "good" if name else "no geometry factor", dtype="U24")
+    if name:
+        factor = table.values(name)
+        states[~np.isfinite(factor)] = "no geometry factor"
+        states[factor > geometry_limit] = f"{name} > {geometry_limit:g}"
+    if table.has("integrity_ok"):
+        states[table.values("integrity_ok") == 0.0] = "integrity lost"
+    step_s = np.diff(time_s)
+    if len(step_s):
+        limit_s = max(GAP_PERIODS * float(np.median(step_s)), LARGEST_QUIET_GAP_S)
+        after = np.flatnonzero(step_s > limit_s)
+        at = after + 1
+        states, time_s = np.insert(states, at, "no GNSS"), np.insert(time_s, at, time_s[after])
+    lanes = runs_of(states, time_s, flight.duration_s)
+    if time_s.size and time_s[-1] < flight.duration_s - LARGEST_QUIET_GAP_S:
+        start, end, state = (np.asarray(lanes[key]) for key in ("start_s", "end_s", "state"))
+        end = np.r_[end[:-1], time_s[-1], flight.duration_s]
+        start, state = np.r_[start, time_s[-1]], np.r_[state, np.array(["no GNSS"])]
+        lanes = FigureData(lanes.name, {"start_s": start, "end_s": end, "state": state}, lanes.digits)
+    return lanes
+
+
+def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_topic: str | None) -> FigureData | None:
+    """Thinned flight for the map and profiles, on the times of GNSS (of INS where there is no GNSS), NaN at gaps."""
+    gnss = first_of_kind(flight, "gnss", "latitude_deg", "longitude_deg")
+    base = gnss or first_of_kind(flight, "ins", "latitude_deg", "longitude_deg") or ins_topic
+    if base is None or not len(flight[base]):
+        return None
+    table = flight[base]
+    keep = np.unique(np.linspace(0, len(table) - 1, min(len(table), MAX_OVERVIEW_ROWS)).round().astype(int))
+    table = table.take(keep)
+    columns = {
+        "time_s": flight.seconds(table.time_ns),
+        "latitude_deg": table.values("latitude_deg"),
+        "longitude_deg": table.values("longitude_deg"),
+        "altitude_m": _altitude(table),
+        "ground_speed_mps": ground_speed(table),
+        "heading_deg": _nearest_heading(flight, table, true_heading_deg, ins_topic),
+        "track_deg": _track(table),
+    }
+    columns = _break_at_gaps(columns, flight.duration_s / MAX_OVERVIEW_ROWS)
+    digits = {"time_s": 2, "latitude_deg": 7, "longitude_deg": 7, "altitude_m": 1, "ground_speed_mps": 2}
+    return FigureData("overview", columns, {**digits, "heading_deg": 2, "track_deg": 2})
+
+
+def ground_speed(table: Table) -> NDArray[np.float64]:
+    """Ground speed, metres per second, shape (n,): from the velocities, else as logged."""
+    if table.has("velocity_north_mps", "velocity_east_mps"):
+        return np.asarray(np.hypot(table.values("velocity_north_mps"), table.values("velocity_east_mps")))
+    return table.values("ground_speed_mps")
+
+
+def _altitude(table: Table) -> NDArray[np.float64]:
+    name = "altitude_msl_m" if table.has("altitude_msl_m") else "altitude_ellipsoid_m"
+    return table.values(name)
+
+
+def _track(table: Table) -> NDArray[np.float64]:
+    from groundstation.base.angles import direction_of
+
+    if not table.has("velocity_north_mps", "velocity_east_mps"):
+        return table.values("track_deg")
+    north, east = table.values("velocity_north_mps"), table.values("velocity_east_mps")
+    return np.where(np.hypot(north, east) > 1.0, direction_of(north, east), np.nan)
+
+
+def _nearest_heading(
+    flight: Flight, table: Table, true_heading_deg: NDArray[np.float64] | None, ins_topic: str | None
+) -> NDArray[np.float64]:
+    if true_heading_deg is None or ins_topic is None or not len(true_heading_deg):
+        return np.full(len(table), np.nan)
+    times = flight[ins_topic].time_ns
+    right = np.clip(np.searchsorted(times, table.time_ns), 1, max(len(times) - 1, 1)) if len(times) > 1 else None
+    if right is None:
+        return np.full(len(table), np.nan)
+    left = right - 1
+    nearest = np.where(table.time_ns - times[left] <= times[right] - table.time_ns, left, right)
+    is_near = np.abs(times[nearest] - table.time_ns) <= 1_000_000_000
+    return np.where(is_near, true_heading_deg[nearest], np.nan)
+
+
+def _break_at_gaps(columns: dict[str, NDArray[np.float64]], thinned_step_s: float) -> dict[str, NDArray[np.float64]]:
+    """Insert a row of NaN wherever time stands still for longer than thinning explains."""
+    step_s = np.diff(columns["time_s"])
+    if not len(step_s):
+        return columns
+    limit_s = max(GAP_PERIODS * float(np.median(step_s)), 2.0 * thinned_step_s, LARGEST_QUIET_GAP_S)
+    after = np.flatnonzero(step_s > limit_s)
+    broken = {name: np.insert(values, after + 1, np.nan) for name, values in columns.items() if name != "time_s"}
+    middle = columns["time_s"][after] + 0.5 * step_s[after]
+    return {"time_s": np.insert(columns["time_s"], after + 1, middle), **broken}
+
+
+def phase_figure(phases: Phases) -> FigureData:
+    """Phases of the flight as figure data."""
+    intervals = phases.intervals
+    columns: dict[str, NDArray[Any]] = {
+        "start_s": np.array([interval.start_s for interval in intervals], dtype=float),
+        "end_s": np.array([interval.end_s for interval in intervals], dtype=float),
+        "phase": np.array([interval.phase for interval in intervals], dtype=np.str_),
+    }
+    return FigureData("phases", columns, {"start_s": 1, "end_s": 1})
+
+
+def ledger_figures(flight: Flight, ledger: Mapping[str, Any]) -> tuple[FigureData, ...]:
+    """The ledger's topics and gaps as figure data, times in flight seconds."""
+    counts = ledger.get("topics", {})
+    names = [topic for topic in flight.topics() if topic in counts]
+    rates = ("nominal_rate_hz", "actual_rate_hz", "coverage")
+    columns: dict[str, NDArray[Any]] = {"topic": np.array(names, dtype=np.str_)}
+    for key in ("rows", "duplicates", "backward_steps", "stray_rows"):
+        columns[key] = np.array([counts[name][key] for name in names], dtype=np.int64)
+    for key in rates:
+        columns[key] = np.array([_number(counts[name][key]) for name in names])
+    columns["gaps"] = np.array([counts[name]["gaps"]["count"] for name in names], dtype=np.int64)
+    columns["longest_gap_s"] = np.array([counts[name]["gaps"]["longest_s"] for name in names], dtype=float)
+    columns["dropped_rows"] = np.array([_dropped(ledger, name) for name in names], dtype=np.int64)
+    columns["first_s"] = np.array([flight.time_s(name)[0] for name in names])
+    columns["last_s"] = np.array([flight.time_s(name)[-1] for name in names])
+    digits = {"coverage": 4, "nominal_rate_hz": 3, "actual_rate_hz": 3, "longest_gap_s": 2, "first_s": 2, "last_s": 2}
+    return FigureData("ledger", columns, digits), _gap_figure(flight, names)
+
+
+def _gap_figure(flight: Flight, names: list[str]) -> FigureData:
+    from groundstation.integrity.ledger import gaps_of
+
+    found = [gaps_of(name, flight[name].time_ns) for name in names]
+    columns: dict[str, NDArray[Any]] = {
+        "topic": np.array([gaps.topic for gaps in found for _ in range(len(gaps))], dtype=np.str_),
+        "start_s": np.concatenate([np.zeros(0), *(flight.seconds(gaps.start_ns) for gaps in found)]),
+        "length_s": np.concatenate([np.zeros(0), *(gaps.length_s for gaps in found)]),
+    }
+    return FigureData("gaps", columns, {"start_s": 2, "length_s": 2})
+
+
+def _dropped(ledger: Mapping[str, Any], topic: str) -> int:
+    damages = ledger.get("damages", ())
+    return sum(entry["count"] for entry in damages if entry["topic"] == topic and entry["kind"] == "dropped_rows")
+
+
+def _number(value: Any) -> float:
+    return float("nan") if value is None else float(value)

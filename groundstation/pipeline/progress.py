@@ -1,0 +1,35 @@
+"""Progress of a run, told as events: the pipeline says what happens, the command line decides how to show it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+EventKind = Literal["begin", "stage", "end"]
+
+
+@dataclass(frozen=True)
+class Event:
+    """One step of a run.
+
+    Parameters
+    ----------
+    kind : {'begin', 'stage', 'end'}
+        ``begin`` of everything (``total`` items), a ``stage`` of one item, ``end`` of one item.
+    name : str
+        The item: a log's name.
+    text : str
+        The stage (``"reading"``) or the result in a few words.
+    total : int
+    """
+
+    kind: EventKind
+    name: str = ""
+    text: str = ""
+    total: int = 0
+
+
+Listener: TypeAlias = Callable[[Event], None]
+
+
+def silent(event: Event) -> None:
+    """Ignore an event."""

@@ -1,0 +1,46 @@
+"""Simulated logs and Monte Carlo studies as files."""
+
+from pathlib import Path
+
+from groundstation.base.errors import UsageError
+from groundstation.pipeline.progress import Event, Listener
+
+
+def simulate_to(scenario: str, folder: Path, *, seed: int | None = None, force: bool = False) -> list[Path]:
+    """Simulate a scenario (a shipped name or a TOML file) into ``<folder>/<scenario>.csv``.
+
+    Raises
+    ------
+    UsageError
+        When the log is there already and ``force`` is not given, or there is no such scenario.
+    """
+    from groundstation.simulation.samples import write_scenario
+    from groundstation.simulation.scenario import load_scenario
+
+    target = folder / f"{load_scenario(scenario).name}.csv"
+    if target.exists() and not force:
+        raise UsageError(str(target), "a file that exists", "a new folder", "-f overwrites it")
+    return [write_scenario(scenario, folder, seed)]
+
+
+def study_to(name: str, folder: Path, *, runs: int, seed: int, force: bool, listen: Listener) -> str:
+    """Run a study into a folder: ``<name>.md`` and tables/*.csv; returns the page's text.
+
+    Raises
+    ------
+    UsageError
+        When the page is there already and ``force`` is not given.
+    """
+    from groundstation.results.files import csv_text, write_text
+    from groundstation.studies.heading import study_heading
+
+    page = folder / f"{name}.md"
+    if page.exists() and not force:
+        raise UsageError(str(page), "a file that exists", "a new folder", "-f overwrites it")
+    (folder / "tables").mkdir(parents=True, exist_ok=True)
+    listen(Event("begin", total=runs))
+    result = study_heading(runs=runs, seed=seed, progress=lambda text: listen(Event("end", name, text)))
+    for table in result.tables:
+        write_text(folder / "tables" / f"{table.name}.csv", csv_text(table))
+    write_text(page, result.markdown)
+    return result.markdown

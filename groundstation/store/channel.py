@@ -1,0 +1,254 @@
+"""One topic on its way into the file: batches become message records, gathered until they fill a chunk."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from foxglove_schemas_protobuf import LocationFix_pb2
+from google.protobuf.descriptor import FileDescriptor
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from mcap.records import Channel, Schema
+from numpy.typing import NDArray
+
+from groundstation.base.errors import GroundstationError
+from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
+from groundstation.base.units import NS_PER_S
+from groundstation.store.schema import GrowingType, WireField, columns_text
+from groundstation.store.wire import ByteArray, Slot, encode, slot_of
+
+CHUNK_BYTES = 1 << 20  # a chunk is closed when it has so many bytes: a flipped bit loses no more
+CHUNK_SPAN_NS = 300 * NS_PER_S  # or at each such boundary of time, which bounds the loss of slow topics
+SHORT_SPAN_NS = 60 * NS_PER_S  # or at such a boundary when it has enough bytes to be worth a chunk
+SHORT_SPAN_BYTES = 32 << 10
+COLUMNS_KEY, DERIVED_KEY = "columns", "derived_from"
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Message records of one channel, ready to be compressed: bytes, times and places of its messages."""
+
+    channel_id: int
+    topic: str
+    buffer: ByteArray
+    log_time: Int64Array
+    starts: Int64Array
+
+
+class ChannelWriter:
+    """Turn batches of one topic into chunks.
+
+    Parameters
+    ----------
+    channel_id : int
+    topic : str
+    emit : callable
+        Takes each full :class:`Chunk`.
+    """
+
+    def __init__(self, channel_id: int, topic: str, emit: Callable[[Chunk], None]) -> None:
+        self.id = channel_id
+        self.topic = topic
+        self.count = 0
+        self._emit = emit
+        self._buffers: list[ByteArray] = []
+        self._times: list[Int64Array] = []
+        self._starts: list[Int64Array] = []
+        self._bytes = 0
+        self._piece_ns = 0
+        self._last_ns = 0
+
+    def slots(self, batch: RecordBatch) -> list[Slot]:
+        """Values of a batch as they are written, in order of their field numbers."""
+        raise NotImplementedError
+
+    def definition(self) -> tuple[Schema, Channel]:
+        """Schema and channel records, for all that was written."""
+        raise NotImplementedError
+
+    def write(self, batch: RecordBatch) -> None:
+        """Take in a batch; full chunks are emitted."""
+        time_ns = self._checked_times(batch)
+        row_bytes = 64 + sum(2 + _width(column.values.dtype) for column in batch.columns.values())
+        for rows in _pieces(time_ns, row_bytes):
+            self._close_at_boundary(int(time_ns[rows.start]))
+            self._append(batch.take(rows), time_ns[rows])
+            if self._bytes >= CHUNK_BYTES * 7 // 8:
+                self.flush()
+
+    def _close_at_boundary(self, time_ns: int) -> None:
+        before, self._piece_ns = self._piece_ns, time_ns
+        span = SHORT_SPAN_NS if self._bytes >= SHORT_SPAN_BYTES else CHUNK_SPAN_NS
+        if before // span != time_ns // span:
+            self.flush()
+
+    def _append(self, piece: RecordBatch, time_ns: Int64Array) -> None:
+        publish = time_ns if piece.validity_time_ns is None else piece.validity_time_ns
+        buffer, starts = encode(self.id, self.count, time_ns, publish, self.slots(piece))
+        self._buffers.append(buffer)
+        self._times.append(time_ns)
+        self._starts.append(starts + self._bytes)
+        self._bytes += len(buffer)
+        self.count += len(time_ns)
+
+    def flush(self) -> None:
+        """Emit what is gathered as a chunk."""
+        if not self._bytes:
+            return
+        buffer, times, starts = _joined(self._buffers), _joined(self._times), _joined(self._starts)
+        self._buffers, self._times, self._starts, self._bytes = [], [], [], 0
+        self._emit(Chunk(self.id, self.topic, buffer, times, starts))
+
+    def _checked_times(self, batch: RecordBatch) -> Int64Array:
+        where = f"topic {batch.topic}, record {int(batch.record_index[0])}"
+        if batch.time_ns is None:
+            raise GroundstationError(where, "no corrected time", "time_ns set", "apply the clock model first")
+        time_ns = np.asarray(batch.time_ns, dtype=np.int64)
+        falls = np.flatnonzero(np.diff(time_ns, prepend=self._last_ns) < 0)
+        if len(falls):
+            place = f"topic {batch.topic}, record {int(batch.record_index[falls[0]])}"
+            time = int(time_ns[falls[0]])
+            expected = "not negative" if time < 0 else "no less than the time before"
+            raise GroundstationError(place, f"time {time} ns", expected, "sort the rows by corrected time")
+        self._last_ns = int(time_ns[-1])
+        return time_ns
+
+
+class TopicWriter(ChannelWriter):
+    """Channel of a topic: the compiled type of a canonical one, else a type made of its columns."""
+
+    def __init__(self, channel_id: int, topic: str, name: str, emit: Callable[[Chunk], None]) -> None:
+        super().__init__(channel_id, topic, emit)
+        self._type = GrowingType(topic, name)
+        self._device_time, self._record_index = self._type.common_fields
+
+    def slots(self, batch: RecordBatch) -> list[Slot]:
+        """Common fields, then the batch's columns in order of their numbers."""
+        device_time = batch.device_time_ns
+        fields = {name: self._type.field_for(name, column.values.dtype) for name, column in batch.columns.items()}
+        common = [
+            slot_of(self._device_time, device_time.values.astype("<i8", copy=False), device_time.present),
+            slot_of(self._record_index, batch.record_index.astype("<u8"), None),
+        ]
+        ordered = sorted(fields.items(), key=lambda item: item[1].number)
+        return common + [self._slot(field, batch.columns[name]) for name, field in ordered]
+
+    def _slot(self, field: WireField, column: Column) -> Slot:
+        values = column.values
+        if values.dtype != field.dtype and not (field.dtype.kind == values.dtype.kind == "U"):
+            values = self._converted(field, values, column.present)
+        if field.wire_dtype is not None:
+            values = values.astype(field.wire_dtype, copy=False)
+        return slot_of(field, values, column.present)
+
+    def _converted(self, field: WireField, values: NDArray[Any], present: BoolArray | None) -> NDArray[Any]:
+        """Values in the dtype that the channel has from its first batch, where nothing is lost by it."""
+        numbers = "biuf"
+        if values.dtype.kind in numbers and field.dtype.kind in numbers:
+            with np.errstate(invalid="ignore"):
+                converted = values.astype(field.dtype)
+                back = converted.astype(values.dtype)
+                same = (back == values) | (back != back) & (values != values)
+            if bool(same.all() if present is None else same[present].all()):
+                return converted
+        where = f"topic {self.topic}, column {field.column}"
+        raise GroundstationError(where, f"values of {values.dtype}", f"{field.dtype} as in the batches before")
+
+    def definition(self) -> tuple[Schema, Channel]:
+        """Schema and channel records, with every column that was written."""
+        message = self._type.message_type()
+        metadata = {COLUMNS_KEY: columns_text(self._type.own_fields)}
+        schema = Schema(id=self.id, name=message.name, encoding="protobuf", data=message.descriptor_set)
+        return schema, _channel(self.id, self.topic, metadata)
+
+
+class LocationFixWriter(ChannelWriter):
+    """Positions of a GNSS topic once more as ``foxglove.LocationFix``, which gives them a map in any viewer."""
+
+    LATITUDE, LONGITUDE, ALTITUDE, TIMESTAMP = b"\x09", b"\x11", b"\x19", b"\x32\x0c"
+
+    def __init__(self, channel_id: int, source_topic: str, emit: Callable[[Chunk], None], has_utc: bool) -> None:
+        super().__init__(channel_id, f"location_fix.{source_topic}", emit)
+        self._source_topic = source_topic
+        self._has_utc = has_utc
+
+    def write(self, batch: RecordBatch) -> None:
+        """Take in the rows that have a position."""
+        position = [batch.columns.get(name) for name in ("latitude_deg", "longitude_deg")]
+        if any(column is None for column in position):
+            return
+        known = np.logical_and.reduce([column.mask & np.isfinite(column.values) for column in position if column])
+        if known.any():
+            super().write(batch if known.all() else batch.take(known))
+
+    def slots(self, batch: RecordBatch) -> list[Slot]:
+        """Latitude, longitude, altitude and, on an absolute clock, the timestamp."""
+        tags = {"latitude_deg": self.LATITUDE, "longitude_deg": self.LONGITUDE}
+        altitude = next((name for name in ("altitude_ellipsoid_m", "altitude_msl_m") if name in batch.columns), None)
+        if altitude:
+            tags[altitude] = self.ALTITUDE
+        columns = ((tag, batch.columns[name]) for name, tag in tags.items())
+        slots = [Slot(tag, column.values.astype("<f8", copy=False), column.present) for tag, column in columns]
+        if self._has_utc and batch.time_ns is not None:
+            slots.append(Slot(self.TIMESTAMP, _timestamps(batch.time_ns)))
+        return slots
+
+    def definition(self) -> tuple[Schema, Channel]:
+        """Foxglove's schema; the channel's metadata says that reading skips it."""
+        files = FileDescriptorSet()
+        for descriptor in _with_imports(LocationFix_pb2.DESCRIPTOR, {}).values():
+            descriptor.CopyToProto(files.file.add())
+        name = LocationFix_pb2.LocationFix.DESCRIPTOR.full_name
+        schema = Schema(id=self.id, name=name, encoding="protobuf", data=files.SerializeToString(deterministic=True))
+        return schema, _channel(self.id, self.topic, {DERIVED_KEY: self._source_topic})
+
+
+def _channel(channel_id: int, topic: str, metadata: Mapping[str, str]) -> Channel:
+    return Channel(
+        id=channel_id, topic=topic, message_encoding="protobuf", metadata=dict(metadata), schema_id=channel_id
+    )
+
+
+def _with_imports(file: FileDescriptor, found: dict[str, FileDescriptor]) -> dict[str, FileDescriptor]:
+    """A file's descriptor and all that it imports, imported ones first."""
+    for imported in file.dependencies:
+        _with_imports(imported, found)
+    found[file.name] = file
+    return found
+
+
+def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+def _timestamps(time_ns: Int64Array) -> NDArray[np.void]:
+    """google.protobuf.Timestamp of each time: varints padded to five bytes, so that all are equally long."""
+    seconds, nanos = np.divmod(time_ns, NS_PER_S)
+    out = np.empty((len(time_ns), 12), np.uint8)
+    for at, tag, value in ((0, 0x08, seconds), (6, 0x10, nanos)):
+        out[:, at] = tag
+        for k in range(5):
+            out[:, at + 1 + k] = (value >> (7 * k)) & 0x7F | (0x80 if k < 4 else 0)
+    return out.view("V12")[:, 0]
+
+
+def _width(dtype: np.dtype[Any]) -> int:
+    """About as many bytes as a value takes in a message."""
+    return dtype.itemsize // 4 if dtype.kind == "U" else dtype.itemsize
+
+
+def _pieces(time_ns: Int64Array, row_bytes: int) -> Iterator[slice]:
+    """Rows in pieces of no more than a chunk's bytes that cross no boundary at which a chunk ends."""
+    at, count = 0, len(time_ns)
+    most_rows = max(1, CHUNK_BYTES // row_bytes)
+    while at < count:
+        ahead = time_ns[at : at + most_rows]
+        rows = _rows_before_boundary(ahead, SHORT_SPAN_NS)
+        if rows * row_bytes < SHORT_SPAN_BYTES:
+            rows = _rows_before_boundary(ahead, CHUNK_SPAN_NS)
+        yield slice(at, at + rows)
+        at += rows
+
+
+def _rows_before_boundary(time_ns: Int64Array, span_ns: int) -> int:
+    return int(np.searchsorted(time_ns, (int(time_ns[0]) // span_ns + 1) * span_ns))

@@ -1,0 +1,294 @@
+"""MCAP at the level of records: chunks, their messages, the summary. Nothing here trusts a length that a file states.
+
+Source: MCAP format specification, https://mcap.dev/spec.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from io import BytesIO
+from typing import Any, BinaryIO, TypeAlias, cast
+
+import lz4.frame
+import numpy as np
+import zstandard
+from mcap.data_stream import ReadDataStream, RecordBuilder
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import (
+    Channel,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+
+from groundstation.base.records import Int64Array
+from groundstation.store.wire import HEAD, MESSAGE_OPCODE, RECORD_PREFIX, ByteArray, Messages
+
+MAGIC = b"\x89MCAP0\r\n"
+MAX_CHUNK_BYTES = 64 << 20  # of a decompressed chunk; the writer's have about one megabyte
+MAX_RECORD_BYTES = 64 << 20  # of any record that is read whole
+FOOTER_BYTES = RECORD_PREFIX + 20
+_PREFIX = struct.Struct("<BQ")
+_CHUNK_HEAD = struct.Struct("<BQQQQII")  # opcode, length, start, end, uncompressed size, crc, length of compression
+_INDEX_HEAD = struct.Struct("<BQHI")  # opcode, length, channel, bytes of entries
+INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
+
+_READABLE: Mapping[int, Any] = {
+    Opcode.HEADER: Header,
+    Opcode.FOOTER: Footer,
+    Opcode.SCHEMA: Schema,
+    Opcode.CHANNEL: Channel,
+    Opcode.CHUNK_INDEX: ChunkIndex,
+    Opcode.STATISTICS: Statistics,
+    Opcode.METADATA: Metadata,
+    Opcode.METADATA_INDEX: MetadataIndex,
+    Opcode.SUMMARY_OFFSET: SummaryOffset,
+    Opcode.DATA_END: DataEnd,
+}
+Buffer: TypeAlias = bytes | memoryview
+
+
+class ChunkError(Exception):
+    """A chunk that cannot be used; the text says why."""
+
+
+def to_bytes(*records: McapRecord) -> bytes:
+    """MCAP records as bytes, one after the other."""
+    builder = RecordBuilder()
+    for record in records:
+        record.write(builder)
+    return cast(bytes, builder.end())
+
+
+def parse_record(opcode: int, payload: bytes) -> McapRecord | None:
+    """The record in a payload; None when the payload is not exactly one record of that kind."""
+    kind = _READABLE.get(opcode)
+    if kind is None:
+        return None
+    stream = ReadDataStream(BytesIO(payload))
+    try:
+        record = kind.read(stream)
+    except (McapError, ValueError, struct.error, EOFError, OverflowError, MemoryError):
+        return None
+    return cast(McapRecord, record) if stream.count == len(payload) else None
+
+
+def parse_records(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Records that stand one after the other: opcode and whole bytes; ends where a length leads outside."""
+    at = 0
+    while at + RECORD_PREFIX <= len(data):
+        opcode, length = _PREFIX.unpack_from(data, at)
+        end = at + RECORD_PREFIX + length
+        if end > len(data):
+            return
+        yield opcode, data[at:end]
+        at = end
+
+
+def message_index(channel_id: int, log_time: Int64Array, starts: Int64Array) -> bytes:
+    """MessageIndex record of a chunk: time and place of each message (mcap.records would take a list of pairs)."""
+    entries = np.empty(len(log_time), INDEX_ENTRY)
+    entries["time"] = log_time
+    entries["offset"] = starts
+    return _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + entries.nbytes, channel_id, entries.nbytes) + entries.tobytes()
+
+
+def read_message_index(data: bytes) -> tuple[int, int, int, int] | None:
+    """Channel, number of messages, first and last time of a MessageIndex record at the start of ``data``, if it is one.
+
+    ``data`` needs the whole record: entries must be in order of time and of place to be believed.
+    """
+    if len(data) < _INDEX_HEAD.size:
+        return None
+    opcode, length, channel_id, nbytes = _INDEX_HEAD.unpack_from(data)
+    whole = length == nbytes + 6 and nbytes % INDEX_ENTRY.itemsize == 0 and nbytes <= len(data) - _INDEX_HEAD.size
+    if opcode != Opcode.MESSAGE_INDEX or not whole or not nbytes:
+        return None
+    entries = np.frombuffer(data, INDEX_ENTRY, nbytes // INDEX_ENTRY.itemsize, _INDEX_HEAD.size)
+    times, offsets = entries["time"], entries["offset"]
+    if (times[1:] < times[:-1]).any() or (offsets[1:] <= offsets[:-1]).any():
+        return None
+    return channel_id, len(entries), int(times[0]), int(times[-1])
+
+
+@dataclass(frozen=True)
+class ChunkHead:
+    """What stands before a chunk's compressed data.
+
+    ``length`` is that of the whole record, ``data_at`` the place of the data in it.
+    """
+
+    length: int
+    start_time: int
+    end_time: int
+    uncompressed_size: int
+    crc: int
+    compression: str
+    data_at: int
+
+
+def read_chunk_head(data: bytes, *, need_lengths: bool = True) -> ChunkHead | None:
+    """Head of the chunk record at the start of ``data``; None when it contradicts itself.
+
+    Without ``need_lengths`` only the places are used: for a chunk whose extent an index tells.
+    """
+    if len(data) < _CHUNK_HEAD.size + 12:
+        return None
+    opcode, length, start, end, size, crc, text_length = _CHUNK_HEAD.unpack_from(data)
+    if not need_lengths:
+        return ChunkHead(len(data), start, end, size, crc, "", 0)
+    data_at = _CHUNK_HEAD.size + text_length + 8
+    if opcode != Opcode.CHUNK or text_length > 4 or length + RECORD_PREFIX < data_at:
+        return None
+    compression = data[_CHUNK_HEAD.size : data_at - 8]
+    (data_length,) = struct.unpack_from("<Q", data, data_at - 8)
+    if data_length != length + RECORD_PREFIX - data_at or compression not in (b"zstd", b"lz4", b""):
+        return None
+    return ChunkHead(length + RECORD_PREFIX, start, end, size, crc, compression.decode(), data_at)
+
+
+def decompress(compression: str, data: Buffer, size: int, crc: int | None) -> ByteArray:
+    """Records of a chunk, checksum checked.
+
+    Parameters
+    ----------
+    compression : {'zstd', 'lz4', ''}
+    data : bytes-like
+    size : int
+        Bytes that must come out; no more is ever allocated than this and ``MAX_CHUNK_BYTES``.
+    crc : int, optional
+        CRC-32 of what comes out; None when there is none to compare.
+
+    Raises
+    ------
+    ChunkError
+        When the data is not what was written.
+    """
+    if size > MAX_CHUNK_BYTES:
+        raise ChunkError(f"claims {size} bytes, more than {MAX_CHUNK_BYTES}")
+    try:
+        if compression == "zstd":
+            raw = _zstd(data, size)
+        elif compression == "lz4":
+            raw = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
+        else:
+            raw = bytes(data)
+    except (zstandard.ZstdError, RuntimeError, ValueError, EOFError, MemoryError):
+        raise ChunkError("cannot be decompressed") from None
+    if len(raw) != size:
+        raise ChunkError("has another size than it claims")
+    if crc is not None and zlib.crc32(raw) != crc:
+        raise ChunkError("checksum differs")
+    return np.frombuffer(raw, np.uint8)
+
+
+def _zstd(data: Buffer, size: int) -> bytes:
+    """One zstd frame; its own claim of a size is compared first, since the library allocates by it."""
+    claimed = zstandard.get_frame_parameters(data).content_size
+    if claimed not in (size, zstandard.CONTENTSIZE_UNKNOWN):
+        raise ChunkError("has another size than it claims")
+    if size == 0:
+        return b""
+    return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
+
+
+def split_messages(buffer: ByteArray) -> list[Messages] | None:
+    """Messages of a chunk by channel; None when the chunk is not a row of whole records."""
+    if not len(buffer):
+        return []
+    even = _evenly_spaced(buffer)
+    if even is not None:
+        return [even]
+    from groundstation.store.walk import find_messages
+
+    found = find_messages(buffer)
+    if found is None:
+        return None
+    starts, sizes = found
+    ids = Messages(buffer, 0, starts, sizes, 0).head("channel_id")
+    order = np.argsort(ids, kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(ids[order])) + 1) if len(ids) else []
+    return [Messages(buffer, int(ids[rows[0]]), starts[rows], sizes[rows], 0) for rows in groups]
+
+
+def _evenly_spaced(buffer: ByteArray) -> Messages | None:
+    """The messages of a chunk in which all have one length and one channel."""
+    if len(buffer) < HEAD.itemsize or buffer[0] != MESSAGE_OPCODE:
+        return None
+    head = np.frombuffer(buffer, HEAD, 1)[0]
+    stride = int(head["length"]) + RECORD_PREFIX
+    if stride < HEAD.itemsize or stride > len(buffer) or len(buffer) % stride:
+        return None
+    matrix = buffer.reshape(-1, stride)
+    for words in (matrix[:, 0:8].view("<u8"), matrix[:, 3:11].view("<u8")):  # together: opcode, length and channel
+        if (words != words[0]).any():
+            return None
+    count = len(matrix)
+    starts = np.arange(count, dtype=np.int64) * stride
+    return Messages(buffer, int(head["channel_id"]), starts, np.full(count, stride, np.int64), stride)
+
+
+@dataclass
+class Summary:
+    """The summary section: definitions and indexes; ``is_intact`` when its checksum was right."""
+
+    start: int = 0
+    is_intact: bool = False
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    definitions: dict[str, bytes] = field(default_factory=dict)
+    chunks: list[ChunkIndex] = field(default_factory=list)
+    statistics: Statistics | None = None
+    metadata: list[MetadataIndex] = field(default_factory=list)
+
+    def add(self, record: McapRecord, raw: bytes) -> None:
+        """Take in one record."""
+        if isinstance(record, Schema):
+            self.schemas[record.id] = record
+            self.definitions[f"schema {record.id}"] = raw
+        elif isinstance(record, Channel):
+            self.channels[record.id] = record
+            self.definitions[f"channel {record.id}"] = raw
+        elif isinstance(record, ChunkIndex):
+            self.chunks.append(record)
+        elif isinstance(record, Statistics):
+            self.statistics = record
+        elif isinstance(record, MetadataIndex):
+            self.metadata.append(record)
+
+
+def read_summary(file: BinaryIO, size: int) -> Summary | None:
+    """Summary of a file of ``size`` bytes; None when it has no footer at its end or no summary.
+
+    A summary with a wrong checksum is read as far as it goes, ``is_intact`` False.
+    """
+    tail = FOOTER_BYTES + len(MAGIC)
+    if size < len(MAGIC) + tail:
+        return None
+    file.seek(size - tail)
+    end = file.read(tail)
+    opcode, length = _PREFIX.unpack_from(end)
+    footer = parse_record(opcode, end[RECORD_PREFIX:FOOTER_BYTES])
+    if not isinstance(footer, Footer) or length != 20 or end[FOOTER_BYTES:] != MAGIC:
+        return None
+    start, stop = footer.summary_start, size - tail
+    if not len(MAGIC) <= start <= stop or stop - start > MAX_RECORD_BYTES:
+        return None
+    file.seek(start)
+    data = file.read(stop - start)
+    crc = zlib.crc32(end[: FOOTER_BYTES - 4], zlib.crc32(data))
+    summary = Summary(start, footer.summary_crc in (0, crc))
+    for opcode, raw in parse_records(data):
+        record = parse_record(opcode, raw[RECORD_PREFIX:])
+        if record is not None:
+            summary.add(record, raw)
+    return summary

@@ -1,0 +1,159 @@
+"""What a store file is of: its source, how it was read, its clock and its integrity ledger."""
+
+import json
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+from typing import Any
+
+METADATA_NAME = "groundstation"
+COPY_NAME = "groundstation_copy"  # the same record before the end of data: one flip cannot take both
+FORMAT_VERSION = "1"
+_TEXTS = {"versions", "metadata"}  # mappings whose values are text
+_CHECKSUM, _FORMAT, _DEFINITIONS = "crc32", "format", "definitions_crc32"
+
+
+def _plain(value: Any) -> Any:
+    """Numpy scalars and mappings as plain Python, for JSON."""
+    if isinstance(value, Mapping):
+        return {str(key): entry for key, entry in value.items()}
+    if hasattr(value, "item"):
+        return value.item()
+    if isinstance(value, Sequence):
+        return list(value)
+    raise TypeError(f"{type(value).__name__} cannot be kept in the store's metadata")
+
+
+def _json(value: Any) -> str:
+    text = json.dumps(value, default=_plain, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
+    return text.encode("utf-8", "replace").decode()  # a lone surrogate from a badly coded log cannot be written
+
+
+@dataclass(frozen=True)
+class StoreInfo:
+    """Facts about a store file.
+
+    Mappings and lists are normalised through JSON (tuples become lists, numpy scalars plain numbers), so what is read
+    equals what was written.
+
+    Parameters
+    ----------
+    source_name : str
+        Name of the log, without folders.
+    source_sha256 : str
+        Hexadecimal digest of the log's bytes.
+    reader : str
+        Reader (and profile) that read the log.
+    versions : mapping of str to str
+        Program and libraries that wrote the file.
+    configuration : mapping, json-able
+        Settings in force.
+    metadata : mapping of str to str
+        ``aircraft``, ``flight``, ``start_utc`` and what else the log or the user said.
+    has_utc : bool
+        Whether times are UTC nanoseconds since 1970; False: nanoseconds since the log's own zero (NOTIME).
+    start_ns : int, optional
+        Corrected time of the first sample: flight time zero.
+    clock : mapping, json-able
+        The clock model that made corrected time from device time.
+    ledger : mapping, json-able
+        The integrity ledger.
+    remarks, damages : sequence, json-able
+        What the reader derived or assumed, and what of the log was lost.
+
+    Examples
+    --------
+    >>> StoreInfo(source_name="a.csv", metadata={"aircraft": "X1"}).metadata["aircraft"]
+    'X1'
+    """
+
+    source_name: str = ""
+    source_sha256: str = ""
+    reader: str = ""
+    versions: Mapping[str, str] = field(default_factory=dict)
+    configuration: Mapping[str, Any] = field(default_factory=dict)
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    has_utc: bool = False
+    start_ns: int | None = None
+    clock: Mapping[str, Any] = field(default_factory=dict)
+    ledger: Mapping[str, Any] = field(default_factory=dict)
+    remarks: Sequence[Any] = ()
+    damages: Sequence[Any] = ()
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            value = json.loads(_json(getattr(self, entry.name)))
+            if isinstance(value, dict):
+                value = MappingProxyType(value)
+            elif isinstance(value, list):
+                value = tuple(value)
+            object.__setattr__(self, entry.name, value)
+
+    def to_strings(self, definitions_crc32: Mapping[str, int]) -> dict[str, str]:
+        """The record's strings for an MCAP Metadata record: plain text as it is, all else as JSON, keys sorted.
+
+        Parameters
+        ----------
+        definitions_crc32 : mapping of str to int
+            Checksums of the file's schema and channel records, which have none of their own.
+        """
+        out = {_FORMAT: FORMAT_VERSION, _DEFINITIONS: _json(definitions_crc32)}
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            out[entry.name] = value if isinstance(value, str) else _json(value)
+        out = dict(sorted(out.items()))
+        return {**out, _CHECKSUM: checksum(out)}
+
+
+def checksum(strings: Mapping[str, str]) -> str:
+    """CRC-32 of a metadata record's strings but itself, eight hexadecimal digits: MCAP has none for these records."""
+    kept = {key: value for key, value in strings.items() if key != _CHECKSUM}
+    return f"{zlib.crc32(_json(kept).encode()):08x}"
+
+
+def is_intact(strings: Mapping[str, str]) -> bool:
+    """Whether a metadata record's strings are as they were written."""
+    return strings.get(_CHECKSUM) == checksum(strings)
+
+
+def from_strings(strings: Mapping[str, str]) -> StoreInfo:
+    """The facts in a metadata record; entries that cannot be read are left at their defaults."""
+    values: dict[str, Any] = {}
+    defaults = StoreInfo()
+    for entry in fields(StoreInfo):
+        default = getattr(defaults, entry.name)
+        text = strings.get(entry.name, "")
+        try:
+            value = text if isinstance(default, str) else json.loads(text)
+        except (ValueError, RecursionError):
+            continue
+        if _fits(value, default):
+            values[entry.name] = value
+    for name in _TEXTS & values.keys():
+        values[name] = {key: value if isinstance(value, str) else str(value) for key, value in values[name].items()}
+    try:
+        return StoreInfo(**values)
+    except RecursionError:
+        return defaults
+
+
+def _fits(value: Any, default: Any) -> bool:
+    if isinstance(default, Mapping):
+        return isinstance(value, dict)
+    if isinstance(default, tuple):
+        return isinstance(value, list)
+    if default is None:
+        return value is None or type(value) is int
+    return type(value) is type(default)
+
+
+def definition_checksums(strings: Mapping[str, str]) -> dict[str, int]:
+    """Checksums of schema and channel records (``"schema 1"``, ``"channel 1"``); empty when not known."""
+    try:
+        found = json.loads(strings.get(_DEFINITIONS, "{}"))
+    except (ValueError, RecursionError):
+        return {}
+    if not isinstance(found, dict):
+        return {}
+    return {str(key): value for key, value in found.items() if isinstance(value, int)}

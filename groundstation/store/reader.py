@@ -1,0 +1,263 @@
+"""Read a store file: facts, then batches chunk by chunk, and an account of what is damaged."""
+
+import os
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from mcap.records import Channel, Schema
+
+from groundstation.base.errors import GroundstationError, UnreadableLogError
+from groundstation.base.records import MAX_BATCH_ROWS, Damage, Item, LogHeader, RecordBatch
+from groundstation.base.timescales import utc_ns_to_iso
+from groundstation.base.units import NS_PER_S
+from groundstation.store.channel import COLUMNS_KEY, DERIVED_KEY
+from groundstation.store.framing import MAGIC, Summary, read_summary
+from groundstation.store.info import METADATA_NAME, StoreInfo, definition_checksums, from_strings
+from groundstation.store.recovery import (
+    Intact,
+    Lost,
+    chunks_by_index,
+    chunks_by_walk,
+    find_facts,
+    read_definitions,
+)
+from groundstation.store.schema import WireField, message_type, own_columns
+from groundstation.store.wire import Decoded, Messages, decode
+
+READER = "groundstation-mcap"
+HEAD_BYTES = 4096  # of a file are enough to recognise it
+PLACES_BYTES = 64 << 20  # bound of the working arrays for one piece of a chunk
+
+
+def is_groundstation_mcap(source: str | os.PathLike[str] | bytes) -> bool:
+    """Whether a file, or the first 4096 bytes of one, was written by the store.
+
+    Three marks tell: MCAP's magic number, the library in the header, the name of the metadata record. Two are enough,
+    so that no single flipped bit disowns a file.
+    """
+    head = _head(source)
+    marks = (head.startswith(MAGIC), head[25:39] == b"groundstation ", b"\r\0\0\0" + METADATA_NAME.encode() in head)
+    return sum(marks) >= 2
+
+
+def is_mcap(source: str | os.PathLike[str] | bytes) -> bool:
+    """Whether a file, or the first bytes of one, is an MCAP of any program."""
+    return _head(source).startswith(MAGIC) or is_groundstation_mcap(source)
+
+
+def _head(source: str | os.PathLike[str] | bytes) -> bytes:
+    if isinstance(source, bytes):
+        return source[:HEAD_BYTES]
+    try:
+        with Path(source).open("rb") as file:
+            return file.read(HEAD_BYTES)
+    except OSError:
+        return b""
+
+
+def read_info(path: str | os.PathLike[str]) -> StoreInfo:
+    """Facts about a store file; blank where the file lost them.
+
+    Raises
+    ------
+    UnreadableLogError
+        When the file cannot be opened or is not of the store.
+    """
+    with _opened(path) as (file, _):
+        return from_strings(find_facts(file)[0])
+
+
+def read(path: str | os.PathLike[str]) -> Iterator[Item]:
+    """Items of a store file: one LogHeader, then batches and damages in the order of the file.
+
+    Batches have ``time_ns`` and, where it differs, ``validity_time_ns``; their columns are those that the topic had,
+    in the source's names and types. The header's ``utc_of_zero_ns`` is 0 when times are UTC, None for NOTIME.
+    One chunk is held at a time.
+
+    Raises
+    ------
+    UnreadableLogError
+        When the file cannot be opened or is not of the store. All that is wrong inside is a Damage.
+    """
+    with _opened(path) as (file, size):
+        facts, is_intact = find_facts(file)
+        info = from_strings(facts)
+        yield LogHeader(READER, dict(info.metadata), 0 if info.has_utc else None)
+        if not is_intact:
+            yield Damage("corrupt", "metadata", 1, "metadata record and its copy: what the file is of is uncertain")
+        summary = read_summary(file, size)
+        by_index = summary is not None and summary.is_intact
+        definitions = _definitions(file, size, summary, definition_checksums(facts) if is_intact else {})
+        reading = _Reading(definitions, info.has_utc)
+        found = chunks_by_index(file, summary) if summary is not None and by_index else chunks_by_walk(file, size)
+        is_cut = False
+        for chunk in found:
+            if isinstance(chunk, Lost):
+                is_cut |= chunk.is_cut
+                yield reading.damage(chunk)
+            else:
+                yield from reading.batches(chunk)
+        if not by_index and not is_cut:
+            what = "summary at the end of the file; the chunks were found by walking the file"
+            yield Damage("corrupt", "summary", 1, what, loses_data=False)
+
+
+@contextmanager
+def _opened(path: str | os.PathLike[str]) -> Iterator[tuple[BinaryIO, int]]:
+    """The file and its size, when it is one of the store; errors of reading in one line."""
+    try:
+        with Path(path).open("rb") as file:
+            if not is_groundstation_mcap(file.read(HEAD_BYTES)):
+                raise UnreadableLogError(str(path), "a file of another program", "an MCAP that groundstation wrote")
+            yield file, os.fstat(file.fileno()).st_size
+    except OSError as error:
+        raise UnreadableLogError(str(path), f"cannot be read ({error.strerror})") from error
+
+
+@dataclass(frozen=True)
+class _Definition:
+    """How to decode a channel: its topic and the fields its columns come from; ``fields`` None: do not."""
+
+    topic: str
+    fields: tuple[WireField, ...] | None
+    is_derived: bool = False
+
+
+def _definitions(
+    file: BinaryIO, size: int, summary: Summary | None, checksums: dict[str, int]
+) -> dict[int, _Definition]:
+    """Definitions by channel id: from an intact summary, else those of the file's start, else a damaged summary's.
+
+    Where the metadata has their checksums, only definitions that agree with them count.
+    """
+    sources = [summary] if summary and summary.is_intact else [read_definitions(file, size), summary]
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Channel] = {}
+    for source in reversed([source for source in sources if source]):
+        for key, raw in source.definitions.items():
+            kind, number = key.split()
+            if checksums and checksums.get(key) != zlib.crc32(raw):
+                continue
+            if kind == "schema":
+                schemas[int(number)] = source.schemas[int(number)]
+            else:
+                channels[int(number)] = source.channels[int(number)]
+    return {number: _definition(channel, schemas.get(channel.schema_id)) for number, channel in channels.items()}
+
+
+def _definition(channel: Channel, schema: Schema | None) -> _Definition:
+    if DERIVED_KEY in channel.metadata:
+        return _Definition(channel.topic, None, is_derived=True)
+    if schema is None:
+        return _Definition(channel.topic, None)
+    columns = channel.metadata.get(COLUMNS_KEY, "")
+    try:
+        message = message_type(schema.data, schema.name, columns)
+    except GroundstationError:
+        return _Definition(channel.topic, None)
+    names = own_columns(columns)
+    own = message.own_fields if names is None else tuple(field for field in message.own_fields if field.name in names)
+    return _Definition(channel.topic, (*message.fields[:2], *own))
+
+
+class _Reading:
+    """Chunks to items, by the definitions of one file."""
+
+    def __init__(self, definitions: dict[int, _Definition], has_utc: bool) -> None:
+        self._definitions = definitions
+        self._has_utc = has_utc
+        self._last_ns: dict[int, int] = {}  # channel -> time of its last message
+        self._seen: set[tuple[int, int]] = set()  # channel and sequence number of the first message of each chunk
+
+    def batches(self, chunk: Intact) -> Iterator[Item]:
+        """Batches of a chunk's messages."""
+        for messages in chunk.messages:
+            definition = self._definitions.get(messages.channel_id)
+            if definition is not None and definition.is_derived:
+                continue
+            place = f"chunk at byte {chunk.start}"
+            if not self._is_next(messages):
+                topic, repeated = definition.topic if definition else "", self._is_repeated(messages)
+                what = "messages that stand in the file twice" if repeated else "messages that are not in order of time"
+                yield Damage("corrupt", place, len(messages), what, topic, loses_data=not repeated)
+                continue
+            if definition is None or definition.fields is None:
+                topic = definition.topic if definition else ""
+                yield Damage("dropped_channel", place, len(messages), "messages whose definition is lost", topic)
+                continue
+            unreadable = 0
+            for part in _parts(messages, len(definition.fields)):
+                for decoded in decode(part, definition.fields):
+                    batch = _batch(part, decoded, definition)
+                    unreadable += decoded.taken - len(batch)
+                    if len(batch):
+                        yield batch
+            if unreadable:
+                yield Damage("corrupt", place, unreadable, "messages that are not of their schema", definition.topic)
+
+    def _is_next(self, messages: Messages) -> bool:
+        """Whether a chunk is in order of time and follows those before; a damaged disk may repeat or move one."""
+        time_ns = messages.log_time
+        if (time_ns[1:] < time_ns[:-1]).any() or int(time_ns[0]) < self._last_ns.get(messages.channel_id, 0):
+            return False
+        if self._is_repeated(messages):
+            return False
+        self._seen.add((messages.channel_id, messages.first_sequence))
+        self._last_ns[messages.channel_id] = int(time_ns[-1])
+        return True
+
+    def _is_repeated(self, messages: Messages) -> bool:
+        return (messages.channel_id, messages.first_sequence) in self._seen
+
+    def damage(self, lost: Lost) -> Damage:
+        """What a stretch of lost bytes means."""
+        known = [self._definitions[number] for number in lost.channels if number in self._definitions]
+        topic = ", ".join(definition.topic for definition in known)
+        loses = not known or not all(definition.is_derived for definition in known)
+        place = f"byte {lost.start} to {lost.end}"
+        if lost.is_cut:
+            what = f"bytes of an unfinished record: {lost.reason}; what followed is not known"
+            return Damage("truncated", f"byte {lost.start}", lost.end - lost.start, what)
+        span = "" if lost.span is None else f", {self._time(lost.span[0])} to {self._time(lost.span[1])}"
+        if lost.count is None:
+            return Damage("corrupt", place, lost.end - lost.start, f"bytes{span}: {lost.reason}", topic, loses)
+        return Damage("corrupt", place, lost.count, f"messages{span}: chunk: {lost.reason}", topic, loses)
+
+    def _time(self, time_ns: int) -> str:
+        try:
+            return utc_ns_to_iso(time_ns) if self._has_utc else f"{time_ns / NS_PER_S:.3f} s"
+        except (ValueError, OverflowError, GroundstationError):
+            return f"{time_ns} ns"
+
+
+def _parts(messages: Messages, field_count: int) -> Iterator[Messages]:
+    """Messages in parts that a batch may have and whose working arrays stay bounded."""
+    most = max(1, min(MAX_BATCH_ROWS, PLACES_BYTES // (16 * field_count)))
+    if len(messages) <= most:
+        yield messages
+        return
+    for start in range(0, len(messages), most):
+        yield messages.take(slice(start, start + most))
+
+
+def _batch(messages: Messages, decoded: Decoded, definition: _Definition) -> RecordBatch:
+    """Batch of decoded messages; those without a record index are not the store's and left out."""
+    assert definition.fields is not None
+    if decoded.rows is not None:
+        messages = messages.take(decoded.rows)
+    time_ns, validity_ns = messages.log_time, messages.head("publish_time")
+    device_time, record_index, *columns = decoded.columns
+    batch = RecordBatch(
+        definition.topic,
+        record_index.values.astype(np.int64),
+        device_time,
+        {field.column: column for field, column in zip(definition.fields[2:], columns, strict=True)},
+        time_ns,
+        None if np.array_equal(time_ns, validity_ns) else validity_ns,
+    )
+    return batch if record_index.present is None else batch.take(record_index.present)

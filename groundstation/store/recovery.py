@@ -1,0 +1,255 @@
+"""Find the intact chunks of a file, whatever happened to the rest of it.
+
+With an intact summary its chunk indexes say where each chunk is and what it holds, so that only the chunk's own data
+and checksum matter. Without one the file is walked record by record; where no record can be recognised the next chunk
+is searched for by its signature. A chunk counts only when its checksum is right.
+"""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import BinaryIO, TypeAlias
+
+from mcap.opcode import Opcode
+from mcap.records import Channel, ChunkIndex, Metadata, Schema
+
+from groundstation.store.framing import (
+    INDEX_ENTRY,
+    MAGIC,
+    MAX_CHUNK_BYTES,
+    MAX_RECORD_BYTES,
+    ChunkError,
+    ChunkHead,
+    Summary,
+    decompress,
+    parse_record,
+    read_chunk_head,
+    read_message_index,
+    split_messages,
+)
+from groundstation.store.info import COPY_NAME, METADATA_NAME, is_intact
+from groundstation.store.wire import RECORD_PREFIX, Messages
+
+# A chunk record of the writer: this text stands 37 bytes from its start, zstd's magic number 8 bytes after it.
+SIGNATURE = struct.pack("<I4s", 4, b"zstd")
+SIGNATURE_AT = 37
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+SEARCH_BYTES = 1 << 20
+PEEK_BYTES = 64
+_INDEX_BYTES = RECORD_PREFIX + 6  # of a MessageIndex without its entries
+
+
+@dataclass(frozen=True)
+class Intact:
+    """A chunk with the right checksum: its messages by channel."""
+
+    start: int
+    messages: list[Messages]
+
+
+@dataclass(frozen=True)
+class Lost:
+    """Bytes ``start`` to ``end`` of the file that could not be used, and what is known of them.
+
+    ``channels`` are the ids, ``count`` the messages and ``span`` their first and last log time, where known;
+    ``is_cut`` when the file ends there without its summary.
+    """
+
+    start: int
+    end: int
+    reason: str
+    channels: tuple[int, ...] = ()
+    count: int | None = None
+    span: tuple[int, int] | None = None
+    is_cut: bool = False
+
+
+Found: TypeAlias = Intact | Lost
+
+
+def _read(file: BinaryIO, at: int, length: int) -> bytes:
+    file.seek(at)
+    return file.read(length)
+
+
+def _opened(data: memoryview, compression: str, size: int, crc: int) -> list[Messages]:
+    """Messages of a chunk's compressed data; ChunkError when it is not intact."""
+    messages = split_messages(decompress(compression, data, size, crc))
+    if messages is None:
+        raise ChunkError("its records do not fit together")
+    return messages
+
+
+def chunks_by_index(file: BinaryIO, summary: Summary) -> Iterator[Found]:
+    """Chunks of a file with an intact summary, in the order of the file."""
+    free_from = len(MAGIC)
+    for index in sorted(summary.chunks, key=lambda index: index.chunk_start_offset):
+        start, length = index.chunk_start_offset, index.chunk_length
+        inside = free_from <= start and start + length <= summary.start and index.compressed_size <= length
+        if not inside or length > MAX_CHUNK_BYTES:
+            yield _lost(index, None, "its index leads outside the file")
+            continue
+        free_from = start + length
+        data = _read(file, start, length)
+        head = read_chunk_head(data, need_lengths=False)
+        try:
+            if head is None:
+                raise ChunkError("is too short")
+            content = memoryview(data)[length - index.compressed_size :]
+            messages = _opened(content, index.compression, index.uncompressed_size, head.crc)
+        except ChunkError as error:
+            known = read_message_index(_read(file, free_from, min(index.message_index_length, MAX_RECORD_BYTES)))
+            yield _lost(index, known[1] if known else None, str(error))
+        else:
+            yield Intact(start, messages)
+
+
+def _lost(index: ChunkIndex, count: int | None, reason: str) -> Lost:
+    start = index.chunk_start_offset
+    span = (index.message_start_time, index.message_end_time)
+    return Lost(start, start + index.chunk_length, reason, tuple(index.message_index_offsets), count, span)
+
+
+def chunks_by_walk(file: BinaryIO, size: int) -> Iterator[Found]:
+    """Chunks of a file without a usable summary, in the order of the file.
+
+    The last item is a :class:`Lost` of ``is_cut`` when the file ends before its data does.
+    """
+    at = len(MAGIC)
+    while at < size:
+        peek = _read(file, at, PEEK_BYTES)
+        head = _chunk_at(peek, at, size)
+        if head is not None:
+            found, at = _try_chunk(file, at, size, head)
+            yield found
+            continue
+        end = _record_end(file, at, size, peek)
+        if end is None:
+            end = find_chunk(file, at + 1, size)
+            yield Lost(at, end, "no record can be recognised", is_cut=end == size)
+            if end == size:
+                return
+        elif peek[0] == Opcode.DATA_END:
+            return
+        at = end
+    yield Lost(size, size, "the file ends without its summary", is_cut=True)
+
+
+def _try_chunk(file: BinaryIO, at: int, size: int, head: ChunkHead) -> tuple[Found, int]:
+    """The chunk at ``at`` and the place to go on from."""
+    data = _read(file, at, head.length)
+    end = at + head.length
+    try:
+        content = memoryview(data)[head.data_at :]
+        messages = _opened(content, head.compression, head.uncompressed_size, head.crc)
+    except ChunkError as error:
+        if not _is_plausible(file, end, size):  # then its length is not to be trusted
+            end = find_chunk(file, at + 1, size)
+            return Lost(at, end, str(error)), end
+        known = read_message_index(_index_record(file, end))
+        if known is None:
+            return Lost(at, end, str(error), span=(head.start_time, head.end_time)), end
+        channel, count, first, last = known
+        return Lost(at, end, str(error), (channel,), count, (first, last)), end
+    # The indexes have no checksum and are not needed: pass over as many bytes as they must have.
+    after = end + sum(_INDEX_BYTES + INDEX_ENTRY.itemsize * len(one) for one in messages)
+    return Intact(at, messages), after if after <= size and _is_plausible(file, after, size) else end
+
+
+def _index_record(file: BinaryIO, at: int) -> bytes:
+    prefix = _read(file, at, RECORD_PREFIX)
+    length = int.from_bytes(prefix[1:], "little")
+    return _read(file, at, min(RECORD_PREFIX + length, MAX_RECORD_BYTES))
+
+
+def _chunk_at(peek: bytes, at: int, size: int) -> ChunkHead | None:
+    """Head of a chunk that lies wholly inside the file."""
+    head = read_chunk_head(peek)
+    return head if head is not None and head.length <= min(size - at, MAX_CHUNK_BYTES) else None
+
+
+def _record_end(file: BinaryIO, at: int, size: int, peek: bytes) -> int | None:
+    """Where the record at ``at`` ends; None when there is no whole record other than a chunk."""
+    if len(peek) < RECORD_PREFIX:
+        return None
+    length = int.from_bytes(peek[1:RECORD_PREFIX], "little")
+    end = at + RECORD_PREFIX + length
+    if end > size or length > MAX_RECORD_BYTES:
+        return None
+    if peek[0] == Opcode.MESSAGE_INDEX:
+        return end if read_message_index(_read(file, at, RECORD_PREFIX + length)) is not None else None
+    return end if parse_record(peek[0], _read(file, at + RECORD_PREFIX, length)) is not None else None
+
+
+def _is_plausible(file: BinaryIO, at: int, size: int) -> bool:
+    """Whether a record starts at ``at``, or the file ends there."""
+    if at == size:
+        return True
+    peek = _read(file, at, PEEK_BYTES)
+    return _chunk_at(peek, at, size) is not None or _record_end(file, at, size, peek) is not None
+
+
+def find_chunk(file: BinaryIO, start: int, size: int) -> int:
+    """Place of the next chunk from ``start`` on, ``size`` when there is none."""
+    at = start + SIGNATURE_AT
+    while (hit := find_bytes(file, SIGNATURE, at)) is not None:
+        peek = _read(file, hit - SIGNATURE_AT, PEEK_BYTES)
+        head = _chunk_at(peek, hit - SIGNATURE_AT, size)
+        if head is not None and peek[head.data_at : head.data_at + 4] == ZSTD_MAGIC:
+            return hit - SIGNATURE_AT
+        at = hit + 1
+    return size
+
+
+def find_bytes(file: BinaryIO, needle: bytes, start: int) -> int | None:
+    """Place of the first ``needle`` from ``start`` on; the file is searched in blocks."""
+    at = start
+    while True:
+        block = _read(file, at, SEARCH_BYTES)
+        hit = block.find(needle)
+        if hit >= 0:
+            return at + hit
+        if len(block) < SEARCH_BYTES:
+            return None
+        at += len(block) - len(needle) + 1
+
+
+def find_facts(file: BinaryIO) -> tuple[dict[str, str], bool]:
+    """Strings of the file's metadata record or of its copy, and whether they are as they were written."""
+    fallback: dict[str, str] = {}
+    for name in (METADATA_NAME, COPY_NAME):
+        needle = struct.pack("<I", len(name)) + name.encode()
+        place = find_bytes(file, needle, len(MAGIC) + RECORD_PREFIX)
+        if place is None:
+            continue
+        strings = _facts_at(file, place, len(needle))
+        if is_intact(strings):
+            return strings, True
+        fallback = fallback or strings
+    return fallback, False
+
+
+def _facts_at(file: BinaryIO, place: int, name_bytes: int) -> dict[str, str]:
+    """Strings of a Metadata record whose name stands at ``place``; by the length of its map, not of the record."""
+    (length,) = struct.unpack("<I", _read(file, place + name_bytes, 4).ljust(4, b"\0"))
+    if length > MAX_RECORD_BYTES:
+        return {}
+    record = parse_record(Opcode.METADATA, _read(file, place, name_bytes + 4 + length))
+    return record.metadata if isinstance(record, Metadata) else {}
+
+
+def read_definitions(file: BinaryIO, size: int) -> Summary:
+    """Schemas and channels that stand at the start of the file, before its first chunk."""
+    found = Summary()
+    at = len(MAGIC)
+    while at + RECORD_PREFIX <= size:
+        peek = _read(file, at, PEEK_BYTES)
+        end = None if peek[0] == Opcode.CHUNK else _record_end(file, at, size, peek)
+        if end is None:
+            return found
+        raw = _read(file, at, end - at)
+        record = parse_record(raw[0], raw[RECORD_PREFIX:])
+        if isinstance(record, Schema | Channel):
+            found.add(record, raw)
+        at = end
+    return found

@@ -1,0 +1,93 @@
+"""The command line: what it imports, what it prints where, and its exit codes."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from groundstation.cli.main import LATER_VERBS, app
+
+HEAVY = (
+    *("numpy", "pandas", "pyarrow", "numba", "scipy", "rerun", "matplotlib", "mcap", "google.protobuf", "jinja2"),
+    *("groundstation.pipeline.batch", "groundstation.readers", "groundstation.viewer"),
+)
+
+
+def groundstation(*arguments: str) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr of a call in this process."""
+    result = CliRunner().invoke(app, list(arguments))
+    return result.exit_code, result.stdout, result.stderr
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["--version"]])
+def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
+    code = (
+        "import sys\n"
+        "from groundstation.cli.main import main\n"
+        f"try: main({arguments!r})\n"
+        "except SystemExit as stop: assert not stop.code\n"
+        f"print('HEAVY', [name for name in {HEAVY!r} if name in sys.modules])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "HEAVY []"
+
+
+@pytest.mark.parametrize("verb", sorted(LATER_VERBS))
+def test_a_verb_of_a_later_version_says_so(verb: str) -> None:
+    code, out, err = groundstation(verb, "x.csv", "--whatever")
+    assert (code, out) == (2, "")
+    assert "not in this version" in err
+
+
+def test_every_verb_has_help() -> None:
+    _, text, _ = groundstation("--help")
+    for verb in ("info", "convert", "run", "report", "view", "simulate", "study", "list"):
+        assert verb in text
+        code, verb_text, _ = groundstation(verb, "--help")
+        assert code == 0 and "Usage" in verb_text
+
+
+def test_wrong_usage_is_exit_2() -> None:
+    assert groundstation("run")[0] == 2
+    assert groundstation("run", "x.csv", "-o", "out", "--fail-on", "sometimes")[0] == 2
+    assert groundstation("nonsense")[0] == 2
+
+
+def test_a_missing_file_is_one_line_on_stderr(tmp_path: Path) -> None:
+    for verb in ("info", "list"):
+        code, out, err = groundstation(verb, str(tmp_path / "none.csv"))
+        assert (code, out) == (2, "")
+        assert err.count("\n") == 1 and "none.csv" in err
+
+
+@pytest.mark.parametrize("content", [b"", b"\x00" * 100, b"hello world\n", bytes(range(256)) * 8, b"\xa3\x95\x80" * 50])
+def test_what_no_reader_claims_is_exit_1_in_one_line(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "odd.bin"
+    path.write_bytes(content)
+    for arguments in (["info", str(path)], ["run", str(path), "-o", str(tmp_path / "out")]):
+        code, _, err = groundstation(*arguments)
+        assert code == 1, err
+        assert len(err.strip().splitlines()) == 1 and "odd.bin" in err and "Traceback" not in err
+
+
+def test_a_foreign_file_in_a_folder_is_skipped_and_listed(tmp_path: Path) -> None:
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs/readme.txt").write_text("notes", encoding="utf-8")
+    code, out, _ = groundstation("run", str(tmp_path / "logs"), "-o", str(tmp_path / "out"))
+    assert code == 0
+    assert "readme.txt" in out
+    assert "readme.txt" in (tmp_path / "out/index.csv").read_text(encoding="utf-8")
+
+
+def test_an_output_that_is_not_ours_needs_force(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("time_s,baro.pressure_altitude_m\n0,1\n1,1\n2,1\n", encoding="utf-8")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/precious.txt").write_text("mine", encoding="utf-8")
+    arguments = ["run", str(tmp_path / "log.csv"), "-o", str(tmp_path / "out")]
+    code, _, err = groundstation(*arguments)
+    assert code == 2 and "-f" in err
+    assert groundstation(*arguments, "-f")[0] == 0
+    assert (tmp_path / "out/precious.txt").read_text(encoding="utf-8") == "mine"
+    assert groundstation(*arguments)[0] == 0, "an own OUT is continued"

@@ -1,0 +1,68 @@
+"""Users' settings files: every mistake is told in one line that names file and key."""
+
+from pathlib import Path
+
+import pytest
+
+from groundstation.base.errors import SettingsError
+from groundstation.pipeline.analyse import user_settings
+from groundstation.pipeline.configuration import Configuration, Interval, load_configuration
+
+
+def written(folder: Path, name: str, text: str) -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_no_files_give_the_defaults() -> None:
+    assert load_configuration() == Configuration()
+
+
+def test_a_file_for_a_section_wins_over_the_section(tmp_path: Path) -> None:
+    config = written(tmp_path, "c.toml", "[heading]\ntaxi_speed_min_mps = 5\n[aircraft]\nentry_step_deg = 1.0\n")
+    aircraft = written(tmp_path, "l39.toml", "antenna_arm_m = 4.2\n")
+    settings = user_settings(load_configuration(config, aircraft))
+    assert settings.heading.taxi_speed_min_mps == 5.0
+    assert settings.aircraft.antenna_arm_m == 4.2
+    assert settings.aircraft.entry_step_deg == user_settings(Configuration()).aircraft.entry_step_deg
+
+
+def test_intervals_are_read_with_their_reasons(tmp_path: Path) -> None:
+    path = written(tmp_path, "i.toml", '[[exclude]]\nfrom = "+01:00"\nto = "+01:30"\nreason = "towed"\n')
+    assert load_configuration(intervals=path).exclude == (Interval("+01:00", "+01:30", "towed"),)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[heding]\nx = 1\n", "heding"),
+        ("heading = 3\n", "heading"),
+        ("exclude = 3\n", "exclude"),
+        ("[[exclude]]\nfrom = 3\n", "from and to"),
+        ("[[exclude]]\nfrom = 3\nto = 4\nbecause = 1\n", "because"),
+        ("not toml at all", "not TOML"),
+    ],
+)
+def test_a_mistake_is_named(tmp_path: Path, text: str, says: str) -> None:
+    with pytest.raises(SettingsError, match=says):
+        load_configuration(written(tmp_path, "c.toml", text))
+
+
+@pytest.mark.parametrize(
+    ("section", "values", "says"),
+    [
+        ("heading", {"no_such_gate": 1.0}, "no_such_gate"),
+        ("heading", {"taxi_speed_min_mps": "fast"}, "taxi_speed_min_mps"),
+        ("aircraft", {"entry_step_deg": True}, "entry_step_deg"),
+        ("site", {"stands": [{"name": "4A"}]}, "heading_deg"),
+    ],
+)
+def test_a_wrong_value_is_named(section: str, values: dict[str, object], says: str) -> None:
+    with pytest.raises(SettingsError, match=says):
+        user_settings(Configuration(**{section: values}))
+
+
+def test_a_missing_file_is_told() -> None:
+    with pytest.raises(SettingsError, match="nowhere.toml"):
+        load_configuration(Path("nowhere.toml"))

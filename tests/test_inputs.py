@@ -1,0 +1,50 @@
+"""Which files a run takes."""
+
+from pathlib import Path
+
+import pytest
+
+from groundstation.base.errors import UsageError
+from groundstation.pipeline.inputs import collect
+
+
+def touched(path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("x", encoding="utf-8")
+    return path
+
+
+def test_a_folder_is_walked_in_a_stable_order(tmp_path: Path) -> None:
+    expected = [touched(tmp_path / name) for name in ("a/1.csv", "a/2.csv", "b.csv")]
+    touched(tmp_path / ".hidden/x.csv")
+    touched(tmp_path / ".x.csv")
+    assert [item.path for item in collect([tmp_path])] == expected
+    assert not any(item.is_named for item in collect([tmp_path]))
+
+
+def test_what_groundstation_made_is_never_an_input(tmp_path: Path) -> None:
+    log = touched(tmp_path / "log.csv")
+    touched(tmp_path / "results/index.json")
+    touched(tmp_path / "results/index.csv")
+    touched(tmp_path / "results/flight/tables/ledger.csv")
+    touched(tmp_path / "copied_flight/manifest.json")
+    touched(tmp_path / "copied_flight/summary.json")
+    touched(tmp_path / "out/x.csv")
+    assert [item.path for item in collect([tmp_path], out=tmp_path / "out")] == [log]
+
+
+def test_a_file_named_and_found_counts_once_as_named(tmp_path: Path) -> None:
+    log = touched(tmp_path / "log.csv")
+    found = collect([tmp_path, log])
+    assert len(found) == 1 and found[0].is_named
+
+
+def test_links_in_a_circle_are_not_followed(tmp_path: Path) -> None:
+    log = touched(tmp_path / "logs/log.csv")
+    (tmp_path / "logs/again").symlink_to(tmp_path / "logs")
+    assert [item.path for item in collect([tmp_path])] == [log]
+
+
+def test_a_missing_path_is_a_usage_error(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="no such file"):
+        collect([tmp_path / "none"])

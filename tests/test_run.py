@@ -1,0 +1,201 @@
+"""The main job from end to end: logs in, folders of results out."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from groundstation.pipeline.batch import convert_many, report_again, run_many
+from groundstation.pipeline.configuration import Configuration, Interval
+from groundstation.pipeline.flight import Job, run_flight
+from groundstation.pipeline.outcome import Outcome, worst_code
+from groundstation.results.files import load
+from tests.real_logs import real_log
+
+SAMPLES = Path(__file__).parents[1] / "sample_logs"
+BYTE_IDENTICAL = ("summary.json", "report.html", "tables")
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+    """The accepted sample log, run once."""
+    out = tmp_path_factory.mktemp("good") / "out"
+    (outcome,) = run_many([SAMPLES / "taxi-good.csv"], out, Configuration())
+    return outcome
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """The files of a flight that are promised byte for byte."""
+    files = [folder / name for name in BYTE_IDENTICAL]
+    listed = [path for path in files if path.is_file()] + sorted((folder / "tables").iterdir())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in listed}
+
+
+def test_the_good_sample_is_accepted_with_all_its_files(good: Outcome) -> None:
+    folder = Path(good.folder)
+    assert good.state == "done" and good.code == 0
+    names = {path.name for path in folder.iterdir()}
+    identity = good.flight_id
+    assert names == {
+        *("summary.json", "manifest.json", "report.html", "results.parquet", "tables"),
+        *(f"{identity}.mcap", f"{identity}.rrd"),
+    }
+    summary = load(folder).summary
+    assert summary["results"]["heading"]["verdict"] == "accept"
+    assert summary["status"] == "ok"
+    assert summary["flight"]["id"] == identity
+
+
+def test_the_index_lists_the_flight(good: Outcome) -> None:
+    index = json.loads((Path(good.folder).parent / "index.json").read_text(encoding="utf-8"))
+    (row,) = index["rows"]
+    assert row["flight_id"] == good.flight_id and row["verdict"] == "accept"
+    assert (Path(good.folder).parent / row["report"]).is_file()
+
+
+def test_the_mcap_gives_what_the_log_gave(good: Outcome, tmp_path: Path) -> None:
+    (again,) = run_many([Path(good.folder) / f"{good.flight_id}.mcap"], tmp_path / "out", Configuration())
+    assert again.flight_id == good.flight_id
+    first, second = (load(Path(outcome.folder)).summary for outcome in (good, again))
+    for key in ("results", "ledger", "clock", "completeness", "findings", "status"):
+        assert second[key] == first[key], key
+
+
+def test_a_second_run_is_byte_identical(good: Outcome, tmp_path: Path) -> None:
+    environment = {**os.environ, "PYTHONHASHSEED": "7"}
+    command = [
+        sys.executable,
+        "-m",
+        "groundstation",
+        "run",
+        str(SAMPLES / "taxi-good.csv"),
+        "-o",
+        str(tmp_path / "out"),
+    ]
+    subprocess.run(command, check=True, capture_output=True, env=environment)
+    assert contents(tmp_path / "out" / good.flight_id) == contents(Path(good.folder))
+
+
+def test_the_report_is_made_again_from_the_saved_results_alone(good: Outcome) -> None:
+    folder = Path(good.folder)
+    before = (folder / "report.html").read_bytes()
+    (folder / "report.html").unlink()
+    assert list(report_again(folder.parent)) == [folder / "report.html"]
+    assert (folder / "report.html").read_bytes() == before
+
+
+def test_excluding_an_interval_changes_the_answer_and_is_kept(good: Outcome, tmp_path: Path) -> None:
+    segment = load(Path(good.folder)).summary["results"]["heading"]["segments"][0]
+    excluded = Interval(str(segment["start_s"]), str(segment["end_s"]), "for the test")
+    job = Job(SAMPLES / "taxi-good.csv", tmp_path, Configuration(exclude=(excluded,)))
+    outcome = run_flight(job)
+    heading = load(Path(outcome.folder)).summary["results"]["heading"]
+    before = load(Path(good.folder)).summary["results"]["heading"]
+    assert heading["samples"] < before["samples"]
+    assert json.loads((Path(outcome.folder) / "manifest.json").read_text(encoding="utf-8"))["configuration"]["exclude"]
+
+
+def test_a_folder_with_all_samples_gives_each_its_truth(tmp_path: Path) -> None:
+    outcomes = run_many([SAMPLES], tmp_path / "out", Configuration(), jobs=2)
+    by_name = {Path(outcome.source).stem: outcome for outcome in outcomes}
+    verdict = {
+        name: load(Path(outcome.folder)).summary["results"].get("heading", {}).get("verdict")
+        for name, outcome in by_name.items()
+        if outcome.flight_id
+    }
+    assert verdict["taxi-good"] == "accept"
+    assert verdict["taxi-drift"] == "reject"
+    assert verdict["taxi-short"] == "extend"
+    assert verdict["taxi-notime"] == "undecided"
+    assert by_name["taxi-notime"].flight_id.startswith("NOTIME_")
+    assert by_name["taxi-damaged"].state == "data_lost"
+    assert worst_code(outcomes) == 3
+    assert not list((tmp_path / "out").glob(".partial*"))
+
+
+def test_two_logs_of_one_flight_get_their_digests_and_twins_are_told(tmp_path: Path) -> None:
+    text = "# start_utc: 2026-05-04T06:00:00Z\ntime_s,baro.pressure_altitude_m\n"
+    rows = "".join(f"{second},100.0\n" for second in range(30))
+    for name, content in (("a", text + rows), ("b", text + rows + "30,101.0\n"), ("c", text + rows)):
+        (tmp_path / f"{name}.csv").write_text(content, encoding="utf-8")
+    outcomes = run_many([tmp_path / f"{name}.csv" for name in "abc"], tmp_path / "out", Configuration())
+    assert [outcome.state for outcome in outcomes] == ["done", "done", "skipped"]
+    assert [outcome.flight_id for outcome in outcomes[:2]] == [
+        f"20260504T060000Z_{outcome.sha256[:8]}" for outcome in outcomes[:2]
+    ]
+    assert "same content as" in outcomes[2].text
+
+
+def test_a_bad_log_never_stops_the_others(tmp_path: Path) -> None:
+    (tmp_path / "bad.csv").write_bytes(b"time_s,ins.true_heading_deg\n")
+    (tmp_path / "odd.csv").write_bytes(b"\xff\xfe\x00")
+    good = tmp_path / "good.csv"
+    good.write_text("time_s,ins.true_heading_deg\n0,1\n1,2\n", encoding="utf-8")
+    outcomes = run_many([tmp_path / "bad.csv", tmp_path / "odd.csv", good], tmp_path / "out", Configuration())
+    assert {Path(outcome.source).name: outcome.code for outcome in outcomes} == {
+        "bad.csv": 1,
+        "odd.csv": 1,
+        "good.csv": 0,
+    }
+    assert all("\n" not in outcome.text and "internal error" not in outcome.text for outcome in outcomes)
+
+
+def mutated(data: bytes, rng: np.random.Generator) -> bytes:
+    """A log cut somewhere or with some bytes changed."""
+    if rng.random() < 0.3:
+        return data[: int(rng.integers(0, len(data)))]
+    changed = bytearray(data)
+    for place in rng.integers(0, len(data), int(rng.integers(1, 40))):
+        changed[place] = int(rng.integers(0, 256))
+    return bytes(changed)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_damaged_log_ends_in_one_line_or_in_results(tmp_path: Path, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    log = tmp_path / "log.csv"
+    log.write_bytes(mutated((SAMPLES / "taxi-short.csv").read_bytes(), rng))
+    outcome = run_flight(Job(log, tmp_path / "out", Configuration()))
+    assert outcome.code in (0, 1, 3)
+    assert "internal error" not in outcome.text and "\n" not in outcome.text
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_damaged_mcap_ends_in_one_line_or_in_results(good: Outcome, tmp_path: Path, seed: int) -> None:
+    rng = np.random.default_rng(100 + seed)
+    path = tmp_path / "flight.mcap"
+    path.write_bytes(mutated((Path(good.folder) / f"{good.flight_id}.mcap").read_bytes(), rng))
+    outcome = run_flight(Job(path, tmp_path / "out", Configuration()))
+    assert outcome.code in (1, 3) or outcome.state == "done"
+    assert "internal error" not in outcome.text and "\n" not in outcome.text
+
+
+def test_convert_writes_one_file_or_a_folder(tmp_path: Path) -> None:
+    one = convert_many([SAMPLES / "taxi-good.csv"], tmp_path / "one.mcap")
+    several = convert_many([SAMPLES / "taxi-good.csv", SAMPLES / "taxi-short.csv"], tmp_path / "many")
+    assert [outcome.state for outcome in (*one, *several)] == ["done"] * 3
+    assert (tmp_path / "one.mcap").read_bytes() == (tmp_path / "many/taxi-good.mcap").read_bytes()
+
+
+@pytest.mark.real_log
+@pytest.mark.parametrize(
+    "name",
+    ["g1000/log_220416_161856_LFQA.csv", "g1000/log_220502_135932_EGPN.csv"],
+)
+def test_a_taxi_that_never_reaches_the_speed_gate_is_not_assessable(tmp_path: Path, name: str) -> None:
+    outcome = run_flight(Job(real_log(name), tmp_path, Configuration()))
+    (entry,) = load(Path(outcome.folder)).summary["not_assessable"]
+    assert entry["analysis"] == "heading" and "6" in entry["reason"] and "m/s" in entry["reason"]
+
+
+@pytest.mark.real_log
+@pytest.mark.parametrize("name", ["g1000/log_210623_141501_TEST1.csv", "g1000/log_220417_125002_LFQA.csv"])
+def test_a_real_light_aircraft_is_not_accepted(tmp_path: Path, name: str) -> None:
+    outcome = run_flight(Job(real_log(name), tmp_path, Configuration()))
+    heading = load(Path(outcome.folder)).summary["results"]["heading"]
+    assert heading["verdict"] in ("reject", "undecided")
+    assert heading["precision_deg"] > 0.05
