@@ -30,9 +30,8 @@ def main() -> None:
         subprocess.run([*COMMAND, "simulate", "hour-100hz", "-o", str(root / "log")], check=True, capture_output=True)
         log = next((root / "log").glob("*.csv"))
         rows = sum(block.count(b"\n") for block in iter_blocks(log))
-        print(
-            f"log     {log.stat().st_size / 1e6:.1f} MB, {rows} rows, simulated in {time.perf_counter() - started:.1f} s"
-        )
+        simulated_s = time.perf_counter() - started
+        print(f"log     {log.stat().st_size / 1e6:.1f} MB, {rows} rows, simulated in {simulated_s:.1f} s")
         cold, _ = run_once(log, root / "cold", root / "cache")
         warm, stages = run_once(log, root / "warm", root / "cache")
         peak_mb = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024

@@ -64,5 +64,5 @@ def test_a_wrong_value_is_named(section: str, values: dict[str, object], says: s
 
 
 def test_a_missing_file_is_told() -> None:
-    with pytest.raises(SettingsError, match="nowhere.toml"):
+    with pytest.raises(SettingsError, match=r"nowhere\.toml"):
         load_configuration(Path("nowhere.toml"))
