@@ -70,7 +70,7 @@ def _step(step: ClockStep, clock: Clock) -> Finding:
         f"({before} to {after}); "
         f"{_counted(step.records_before, 'record')} before it moved by {step.shift_s:+.3f} s to join"
     )
-    return Finding("warn", f"clock.{step.kind}_step", text, place=f"record {step.record_index}")
+    return Finding("warn", f"clock.{step.kind}_step", text, place=f"{after}, record {step.record_index}")
 
 
 def _damages(ledger: Ledger) -> Iterator[Finding]:
