@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Item, RecordBatch
 from groundstation.pipeline.identity import sha256_of
 from groundstation.results.flight import Source

@@ -1,0 +1,208 @@
+"""The answer: gates, verdict and references around a solution, as the frozen result."""
+
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from groundstation.base.angles import wrap_180
+from groundstation.estimators.heading import figures as drawn
+from groundstation.estimators.heading.checks import normality, variance_ratio
+from groundstation.estimators.heading.interval import ErrorPosterior
+from groundstation.estimators.heading.references import (
+    mode_changes,
+    onboard_comparison,
+    parking_heading,
+    runway_checks,
+)
+from groundstation.estimators.heading.settings import AircraftData, HeadingSettings, SiteData
+from groundstation.estimators.heading.solution import Solution
+from groundstation.estimators.heading.standstill import StandstillData
+from groundstation.estimators.heading.verdict import Figures, build_gates, decide, explain, round_to_step
+from groundstation.results.figures import FigureData
+from groundstation.results.heading import HeadingResult, Standstill, TaxiSegment
+from groundstation.tables.table import Flight
+
+
+@dataclass(frozen=True)
+class _Error:
+    """The error with the sigma of what all samples share (mounting, declination) in it, wrapped."""
+
+    error_deg: float
+    sigma_deg: float
+    low_deg: float
+    high_deg: float
+
+
+def build_answer(
+    flight: Flight,
+    topics: tuple[str, str],
+    solution: Solution,
+    standstill: StandstillData,
+    settings: HeadingSettings,
+    aircraft: AircraftData,
+    site: SiteData,
+) -> HeadingResult:
+    """Judge a solution and set it beside its references. ``topics`` are those of INS and GNSS."""
+    error = _error_of(solution, aircraft)
+    assessed = _assessed(standstill, solution.posterior)
+    figures = _judged_figures(flight, topics[0], solution, assessed, settings, error)
+    gates = build_gates(solution.samples, assessed, figures, settings)
+    verdict, deciding = decide(gates, assessed, settings)
+    step_deg = aircraft.entry_step_deg
+    plain = HeadingResult(
+        ins_topic=topics[0],
+        gnss_topic=topics[1],
+        heading_source=solution.samples.heading_source,
+        verdict=verdict,
+        verdict_reason=explain(verdict, deciding, error.error_deg, step_deg),
+        error_deg=error.error_deg,
+        standard_error_deg=error.sigma_deg,
+        confidence95_deg=(error.low_deg, error.high_deg),
+        paper_error_deg=float(wrap_180(solution.running.mean_deg[-1])),
+        precision_deg=figures.precision_deg,
+        quality_deg=figures.quality_deg,
+        estimate_sd_deg=float(solution.running.sigma_deg[-1]),
+        samples=len(solution.used),
+        taxi_seconds=figures.taxi_seconds,
+        drift_deg_per_h=solution.drift_deg_per_h,
+        drift_sigma_deg_per_h=solution.drift_sigma_deg_per_h,
+        correction_deg=round_to_step(-error.error_deg, step_deg) if verdict == "accept" else None,
+        entry_step_deg=step_deg,
+        gates=gates,
+        standstill=assessed,
+        segments=solution.segments,
+        directions=solution.directions,
+        uncorrected_error_deg=solution.uncorrected_deg,
+        reference_time_s=solution.reference_time_s,
+        settings=_settings_of(settings, aircraft),
+        figures=_figures_of(solution, standstill, settings),
+    )
+    return _with_references(_with_arm(plain, solution), flight, solution, standstill, settings, site)
+
+
+def _error_of(solution: Solution, aircraft: AircraftData) -> _Error:
+    posterior = solution.posterior
+    common_sigma = float(np.hypot(aircraft.mounting_sigma_deg, solution.samples.heading_sigma_deg))
+    low, high = posterior.interval_deg(extra_sigma_deg=common_sigma)
+    wrapped = float(wrap_180(posterior.error_deg))
+    shift = wrapped - posterior.error_deg  # differences near +-180 deg were kept together
+    sigma = float(np.hypot(posterior.standard_error_deg, common_sigma))
+    return _Error(wrapped, sigma, low + shift, high + shift)
+
+
+def _assessed(standstill: StandstillData, posterior: ErrorPosterior) -> Standstill | None:
+    if standstill.answer is None or not standstill.is_informative:
+        return standstill.answer
+    return replace(
+        standstill.answer,
+        white_sigma_mps=posterior.parameter("white_mps"),
+        correlated_sigma_mps=posterior.parameter("correlated_mps"),
+        correlation_time_s=posterior.parameter("correlation_s"),
+    )
+
+
+def _judged_figures(
+    flight: Flight,
+    ins_topic: str,
+    solution: Solution,
+    assessed: Standstill | None,
+    settings: HeadingSettings,
+    error: _Error,
+) -> Figures:
+    used, running = solution.used, solution.running
+    begin_s = assessed.end_s if assessed else float(used.time_s[0])  # alignment may end while the aircraft stands
+    interval_s = solution.samples.interval_s
+    return Figures(
+        precision_deg=float(running.precision_deg[-1]),
+        quality_deg=float(running.quality_deg[-1]),
+        half_width_deg=0.5 * (error.high_deg - error.low_deg),
+        taxi_seconds=float(sum(part.end_s - part.start_s + interval_s for part in solution.segments)),
+        normality=normality(solution.difference_deg),
+        variance=variance_ratio(used, assessed, settings.sway_line_s),
+        drift_deg_per_h=solution.drift_deg_per_h,
+        drift_sigma_deg_per_h=solution.drift_sigma_deg_per_h,
+        mode_changes=mode_changes(flight, ins_topic, begin_s, float(used.time_s[-1])),
+        segments_chi2=_segments_chi2(solution.segments),
+    )
+
+
+def _segments_chi2(segments: tuple[TaxiSegment, ...]) -> float | None:
+    if len(segments) < 2:
+        return None
+    errors = np.array([segment.error_deg for segment in segments])
+    weights = 1.0 / np.maximum(np.array([segment.sigma_deg for segment in segments]), 1e-9) ** 2
+    mean = float(np.sum(weights * errors) / np.sum(weights))
+    return float(np.sum(weights * (errors - mean) ** 2) / (len(errors) - 1))
+
+
+def _with_arm(result: HeadingResult, solution: Solution) -> HeadingResult:
+    knowledge = solution.knowledge
+    rest_m, sigma_m = solution.posterior.coefficient(1)  # what the straight samples add to the applied arm
+    result = replace(
+        result,
+        lever_arm_m=knowledge.applied_arm_m + rest_m,
+        lever_arm_sigma_m=sigma_m,
+        lever_arm_origin=knowledge.origin,
+    )
+    if not knowledge.is_offset_observable:
+        return result
+    return replace(result, time_offset_s=knowledge.offset_s, time_offset_sigma_s=knowledge.offset_sigma_s)
+
+
+def _with_references(
+    result: HeadingResult,
+    flight: Flight,
+    solution: Solution,
+    standstill: StandstillData,
+    settings: HeadingSettings,
+    site: SiteData,
+) -> HeadingResult:
+    error, sigma = result.error_deg, result.standard_error_deg
+    parking = parking_heading(
+        solution.samples,
+        standstill.in_interval,
+        flight,
+        site,
+        (error, sigma, solution.reference_time_s),
+        (solution.drift_deg_per_h, solution.drift_sigma_deg_per_h),
+    )
+    return replace(
+        result,
+        parking_ins_heading_deg=parking.ins_heading_deg,
+        parking_heading_deg=parking.heading_deg,
+        parking_sigma_deg=parking.sigma_deg,
+        reference_parking_heading_deg=parking.reference_deg,
+        reference_residual_arcmin=parking.residual_arcmin,
+        runway=runway_checks(solution.samples, site, error, sigma, settings),
+        onboard=onboard_comparison(flight, float(solution.used.time_s[-1]), error),
+    )
+
+
+def _settings_of(settings: HeadingSettings, aircraft: AircraftData) -> dict[str, float | str | bool]:
+    out: dict[str, float | str | bool] = {}
+    for name, value in (
+        asdict(settings) | {f"aircraft.{key}": value for key, value in asdict(aircraft).items()}
+    ).items():
+        if isinstance(value, tuple):
+            out[f"{name}.low"], out[f"{name}.high"] = value
+        elif value is not None:
+            out[name] = value
+    return out
+
+
+def _figures_of(solution: Solution, standstill: StandstillData, settings: HeadingSettings) -> tuple[FigureData, ...]:
+    used, differences, posterior = solution.used, solution.differences, solution.posterior
+    spectrum = drawn.spectrum_figure(
+        differences.time_s,
+        differences.difference_deg - posterior.error_deg,
+        differences.speed_mps,
+        posterior.typical(),
+    )
+    return (
+        drawn.samples_figure(solution.samples, posterior.error_deg, solution.weight),
+        drawn.lanes_figure(solution.samples),
+        drawn.running_figure(used.time_s, solution.running, solution.growth_samples, posterior.growth_half_width_deg()),
+        *drawn.distribution_figures(used.time_s, differences.difference_deg, settings.growth_steps),
+        *drawn.standstill_figures(solution.samples, standstill),
+        *(() if spectrum is None else (spectrum,)),
+    )

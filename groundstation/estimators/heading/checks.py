@@ -1,0 +1,133 @@
+"""Checks of the differences: how normal, how large beside what GNSS and sway explain, how steady."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import unwrap
+from groundstation.base.units import DEG_PER_RAD
+from groundstation.estimators.heading.lines import fitted_lines, window_bounds
+from groundstation.estimators.heading.samples import Samples
+from groundstation.estimators.heading.standstill import effective_samples
+from groundstation.results.heading import Standstill
+
+FloatArray = NDArray[np.float64]
+LEAST_NORMALITY = 20  # samples
+LEAST_IN_LINE = 4
+LEAST_SPREAD_DEG = 1e-6  # below it there is nothing to fit a normal to
+
+
+@dataclass(frozen=True)
+class Normality:
+    """Sizes of the deviation from a normal distribution, and p-values that take the samples as independent.
+
+    The p-values are shown and not gated: with hundreds of samples they reject good runs.
+    """
+
+    skewness: float
+    excess_kurtosis: float
+    distance: float
+    skewness_p: float
+    kurtosis_p: float
+    distance_p: float
+
+
+@dataclass(frozen=True)
+class VarianceRatio:
+    """Variance of the differences over what is expected of it, with a 95 % interval.
+
+    expected = standstill velocity variance / V^2 over the used samples (track) + variance of the INS heading about its
+    running line (sway).
+    """
+
+    ratio: float
+    low: float
+    high: float
+    track_sigma_deg: float
+    sway_sigma_deg: float
+
+
+def normality(difference_deg: FloatArray) -> Normality | None:
+    """Skewness, excess kurtosis and largest distance between the sample and fitted normal distribution functions.
+
+    None for fewer than 20 samples or differences without spread.
+
+    Source: moments as in Pearson; distance as in Lilliefors, On the Kolmogorov-Smirnov test for normality with mean and
+    variance unknown, 1967 (the p-value shown is that of a known normal: too large, and said so).
+    """
+    from scipy import stats
+
+    spread = float(np.std(difference_deg)) if len(difference_deg) else 0.0
+    if len(difference_deg) < LEAST_NORMALITY or spread < LEAST_SPREAD_DEG:
+        return None
+    standard = (difference_deg - np.mean(difference_deg)) / spread
+    distance = stats.kstest(standard, "norm")
+    return Normality(
+        skewness=float(np.mean(standard**3)),
+        excess_kurtosis=float(np.mean(standard**4) - 3.0),
+        distance=float(distance.statistic),
+        skewness_p=float(stats.skewtest(standard).pvalue),
+        kurtosis_p=float(stats.kurtosistest(standard).pvalue),
+        distance_p=float(distance.pvalue),
+    )
+
+
+def about_running_line(
+    time_s: FloatArray, heading_deg: FloatArray, segment: NDArray[np.int64], line_s: float
+) -> FloatArray:
+    """INS heading less a straight line fitted over ``line_s`` centred at each sample, degrees, shape (n,).
+
+    Windows stay inside the segment. NaN where a window has fewer than four samples.
+    """
+    residual = np.full(len(time_s), np.nan)
+    for number in np.unique(segment[segment > 0]):
+        index = np.flatnonzero(segment == number)
+        t, y = time_s[index], unwrap(heading_deg[index])
+        low, high = window_bounds(t, t, line_s)
+        _slope, line = fitted_lines(t, t, y, low, high)
+        residual[index] = np.where(high - low >= LEAST_IN_LINE, y - line, np.nan)
+    return residual
+
+
+def _variance_log_sigma(values: FloatArray) -> float:
+    """Standard deviation of the logarithm of the sample variance, from the effective number of squares."""
+    squares = (values - np.mean(values)) ** 2
+    mean = float(np.mean(squares))
+    if mean <= 0.0:
+        return 0.0
+    return float(np.std(squares)) / mean / float(np.sqrt(effective_samples(squares)))
+
+
+def variance_ratio(used: Samples, standstill: Standstill | None, line_s: float) -> VarianceRatio | None:
+    """Compare the variance of the differences with that of the track plus that of the heading about its line.
+
+    Parameters
+    ----------
+    used : Samples
+        The used samples alone, arm taken out.
+    standstill : Standstill or None
+        Without it the track's part is not known and neither is the ratio.
+
+    Returns
+    -------
+    VarianceRatio or None
+        The interval takes both variances as independent, which they are not quite (both contain the sway): it is wide.
+    """
+    if standstill is None or len(used) < LEAST_NORMALITY:
+        return None
+    residual = about_running_line(used.time_s, used.heading_deg, used.segment, line_s)
+    residual = residual[np.isfinite(residual)]
+    if len(residual) < LEAST_NORMALITY:
+        return None
+    velocity2 = 0.5 * (standstill.sigma_north_mps**2 + standstill.sigma_east_mps**2)
+    track2 = velocity2 * float(np.mean(1.0 / used.speed_mps**2)) * DEG_PER_RAD**2
+    sway2 = float(np.mean(residual**2))
+    difference = unwrap(used.difference_deg)
+    expected = track2 + sway2
+    if expected <= LEAST_SPREAD_DEG**2:
+        return None
+    ratio = float(np.var(difference)) / expected
+    spread = np.hypot(_variance_log_sigma(difference), sway2 / expected * _variance_log_sigma(residual))
+    low, high = ratio * np.exp(-1.96 * spread), ratio * np.exp(1.96 * spread)
+    return VarianceRatio(ratio, float(low), float(high), float(np.sqrt(track2)), float(np.sqrt(sway2)))

@@ -1,0 +1,85 @@
+"""The heading estimator: from the tables of a flight to a verdict and a number to type."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from groundstation.base.angles import wrap_360
+from groundstation.base.errors import NotAssessableError
+from groundstation.estimators.heading.answer import build_answer
+from groundstation.estimators.heading.gating import gate_samples
+from groundstation.estimators.heading.samples import HeadingOf, OnGround, Samples, choose_topics, pair_samples
+from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings, SiteData
+from groundstation.estimators.heading.solution import solve
+from groundstation.estimators.heading.standstill import find_standstill
+from groundstation.results.heading import HeadingResult
+from groundstation.tables.table import Flight
+
+
+def estimate_heading_error(
+    flight: Flight,
+    *,
+    on_ground: OnGround | None = None,
+    heading: HeadingOf | None = None,
+    settings: HeadingSettings | None = None,
+    aircraft: AircraftData | None = None,
+    site: SiteData | None = None,
+    request: HeadingRequest | None = None,
+) -> HeadingResult:
+    """Estimate the INS heading error from straight taxi before take-off.
+
+    Parameters
+    ----------
+    flight : Flight
+        Topics ``ins`` (true heading) and ``gnss`` (velocities); ``discrete``, ``onboard`` where there are any.
+    on_ground : callable, optional
+        Ground contact at corrected times, e.g. ``lambda t: ground_mask(flight, t)``; default: logged weight on wheels.
+    heading : callable, optional
+        True heading of an INS topic, e.g. ``lambda topic: true_heading(flight, topic)``; default: as logged.
+    settings, aircraft, site, request : optional
+
+    Returns
+    -------
+    HeadingResult
+        error = INS heading - true heading at ``reference_time_s``; ``correction_deg`` only with the verdict accept.
+
+    Raises
+    ------
+    NotAssessableError
+        With the reason: no heading, no velocity, never fast enough, never straight.
+
+    Notes
+    -----
+    On straight taxi the track equals the true heading, so the mean of d = INS heading - track is the error. The
+    running mean, its precision e and the quality are the paper's; the estimate and its interval come from a noise model
+    (``interval.py``) in which errors are correlated over seconds. What neither sees: steady sideslip and mounting,
+    which an aircraft file may state.
+
+    Source: Markelov, Kostishin, Shukalov, Heading correction of an INS before take-off by satellite navigation,
+    Information and Control Systems 2015 No 6.
+    """
+    settings, aircraft = settings or HeadingSettings(), aircraft or AircraftData()
+    site, request = site or SiteData(), request or HeadingRequest()
+    ins_topic, gnss_topic = choose_topics(flight, request)
+    paired = pair_samples(flight, ins_topic, gnss_topic, settings=settings, on_ground=on_ground, heading=heading)
+    if aircraft.mounting_deg:
+        paired = replace(paired, heading_deg=wrap_360(paired.heading_deg - aircraft.mounting_deg))
+    antenna = gate_samples(paired, settings, request)
+    if antenna.is_used.sum() < 2:
+        raise NotAssessableError("heading", _why_nothing_is_used(antenna, settings))
+    standstill = find_standstill(antenna, settings)
+    solution = solve(antenna, standstill, aircraft, settings)
+    return build_answer(flight, (ins_topic, gnss_topic), solution, standstill, settings, aircraft, site)
+
+
+def _why_nothing_is_used(samples: Samples, settings: HeadingSettings) -> str:
+    limit = settings.taxi_speed_min_mps
+    highest = float(np.max(samples.speed_mps)) if len(samples) else 0.0
+    if not np.isfinite(samples.heading_deg).any():
+        return "no INS heading at the times of the GNSS velocities on the ground"
+    if highest <= limit:
+        return f"ground speed never above {limit:g} m/s before lift-off: highest {highest:.1f} m/s"
+    fast = samples.gate[samples.speed_mps > limit]
+    names, counts = np.unique(fast, return_counts=True)
+    shares = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
+    return f"no straight taxi: of {len(fast)} epochs above {limit:g} m/s before lift-off: {shares}"

@@ -1,0 +1,93 @@
+"""Why a sample is used or not, and the straight segments."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import wrap_180
+from groundstation.base.records import BoolArray
+from groundstation.estimators.heading.samples import GATE_TEXT, USED, Samples
+from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+
+
+def gate_samples(samples: Samples, settings: HeadingSettings, request: HeadingRequest) -> Samples:
+    """Say of every epoch why it is used or not, and number the straight segments.
+
+    Later reasons give way to earlier ones: excluded, no heading, ground, geometry, integrity, too slow, turning,
+    outlier, GNSS gap. A forced interval overrides ``too slow``, ``turning`` and ``outlier``.
+    """
+    speed = samples.speed_mps
+    gate = np.full(len(samples), USED, dtype=GATE_TEXT)
+    gate[_outliers(samples, settings)] = "outlier"
+    with np.errstate(invalid="ignore"):
+        gate[~(np.abs(samples.rate_dps) <= settings.turn_rate_max_dps)] = "turning"
+    gate[~(speed > settings.taxi_speed_min_mps)] = "too slow"
+    gate[speed > settings.taxi_speed_max_mps] = "take-off run"
+    for interval in request.intervals:
+        inside = (samples.time_s >= interval.start_s) & (samples.time_s <= interval.end_s)
+        if interval.use == "force":
+            gate[inside] = USED
+    gate[samples.integrity == 0.0] = "integrity"
+    gate[samples.geometry > settings.geometry_max] = "geometry"
+    if samples.ground_method:
+        gate[~samples.on_ground] = "not proven ground"
+        gate[~samples.on_ground & (speed > settings.taxi_speed_max_mps)] = "airborne"
+    gate[~np.isfinite(samples.heading_deg)] = "no heading"
+    for interval in request.intervals:
+        inside = (samples.time_s >= interval.start_s) & (samples.time_s <= interval.end_s)
+        if interval.use == "exclude":
+            gate[inside] = "excluded"
+    segment = _segments(samples, gate == USED, settings)
+    gate[(gate == USED) & (segment == 0)] = "GNSS gap"  # a single epoch between two gaps
+    return replace(samples, gate=gate, segment=segment)
+
+
+def is_straight_and_fast(samples: Samples, settings: HeadingSettings) -> BoolArray:
+    """Epochs of straight taxi by speed and rate of heading alone, shape (n,)."""
+    speed = samples.speed_mps
+    is_straight = np.abs(np.nan_to_num(samples.rate_dps, nan=np.inf)) <= settings.turn_rate_max_dps
+    return is_straight & (speed > settings.taxi_speed_min_mps) & (speed <= settings.taxi_speed_max_mps)
+
+
+def _outliers(samples: Samples, settings: HeadingSettings) -> BoolArray:
+    """Differences far from the running median of 5 s, in robust sigmas of the straight and fast samples.
+
+    Six robust sigmas and at least a floor: no sample of a normal process is ever touched, so coverage is not.
+    """
+    candidate = is_straight_and_fast(samples, settings) & np.isfinite(samples.heading_deg)
+    out = np.zeros(len(samples), dtype=bool)
+    index = np.flatnonzero(candidate)
+    if len(index) < 5:
+        return out
+    difference = samples.difference_deg[index]
+    centred = wrap_180(difference - np.median(difference))
+    half = max(round(2.5 / max(samples.interval_s, 0.01)), 2)
+    padded = np.pad(centred, half, mode="reflect" if len(centred) > half else "edge")
+    median = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1), axis=1)
+    residual = wrap_180(centred - median)
+    scale = 1.4826 * float(np.median(np.abs(residual)))
+    out[index] = np.abs(residual) > max(settings.outlier_sigmas * scale, settings.outlier_floor_deg)
+    return out
+
+
+def _segments(samples: Samples, used: BoolArray, settings: HeadingSettings) -> NDArray[np.int64]:
+    """Number the straight segments: a GNSS gap, a turn or a long unused stretch ends one."""
+    segment = np.zeros(len(samples), dtype=np.int64)
+    index = np.flatnonzero(used)
+    if not len(index):
+        return segment
+    epoch_gap = np.diff(samples.time_s) > max(settings.gnss_gap_max_s, 2.5 * samples.interval_s)
+    gaps_before = np.concatenate([[0], np.cumsum(epoch_gap)])
+    heading = samples.heading_deg[index]
+    breaks = (
+        (np.diff(gaps_before[index]) > 0)
+        | (np.diff(samples.time_s[index]) > max(settings.segment_break_s, 2.5 * samples.interval_s))
+        | ((np.diff(index) > 1) & (np.abs(wrap_180(np.diff(heading))) > settings.segment_turn_deg))
+    )
+    number = np.concatenate([[1], 1 + np.cumsum(breaks)])
+    sizes = np.bincount(number)
+    kept = sizes[number] > 1
+    _unused, renumbered = np.unique(number[kept], return_inverse=True)
+    segment[index[kept]] = renumbered + 1
+    return segment

@@ -1,0 +1,331 @@
+"""The honest interval: the heading error averaged over what the noise may be, given standstill and taxi data.
+
+The width of an interval hangs on the spectral density at zero frequency, which one run shows only dimly. So the
+eight parameters of the noise model (``noise.py``) are not fixed at a best fit: they have broad priors, their
+posterior is sampled, and the answer is the mixture of the normal distributions that belong to the draws. Short runs
+and short standstills get heavier tails by themselves.
+
+The sampling itself is in ``sampling.py``.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.units import DEG_PER_RAD
+from groundstation.estimators.heading import noise
+from groundstation.estimators.heading.sampling import find_mode, sample
+
+FloatArray = NDArray[np.float64]
+
+# Priors: each parameter is log-normal. (median, sigma of the natural logarithm): two sigma either side reach over
+# 0.007-0.37 m/s, 0.007-0.12 m/s, 0.4-45 s, 0.05-3 deg, 0.1-1.3 Hz, 0.012-0.99, 0.003-0.2 deg.
+PRIOR: dict[str, tuple[float, float]] = {
+    "white_mps": (0.05, 1.0),
+    "correlated_mps": (0.03, 0.7),
+    "correlation_s": (4.0, 1.2),
+    "sway_deg": (0.4, 1.0),
+    "sway_hz": (0.36, 0.65),
+    "sway_damping": (0.15, 1.25),
+    "heading_white_deg": (0.025, 1.05),
+    "motion_factor": (1.0, 0.25),
+}
+PRIOR_MEAN = np.log([PRIOR[name][0] for name in noise.PARAMETER_NAMES])
+PRIOR_SIGMA = np.array([PRIOR[name][1] for name in noise.PARAMETER_NAMES])
+
+
+@dataclass(frozen=True)
+class StandstillVelocities:
+    """GNSS velocity at standstill, m/s, shapes (n,); ``gap_s`` from its end to the first taxi sample, None: unlinked.
+
+    ``restart`` is the index at which the stretch that is linked to taxi begins, the others standing before it.
+    """
+
+    time_s: FloatArray
+    north_mps: FloatArray
+    east_mps: FloatArray
+    restart: int = 0
+    gap_s: float | None = None
+
+
+NO_STANDSTILL = StandstillVelocities(np.zeros(0), np.zeros(0), np.zeros(0))
+
+
+@dataclass(frozen=True)
+class Regressor:
+    """A known shape times an unknown factor with a normal prior, beside the constant error."""
+
+    values: FloatArray
+    prior_mean: float
+    prior_sigma: float
+
+
+@dataclass(frozen=True)
+class Differences:
+    """Heading differences to be averaged, shapes (n,).
+
+    Parameters
+    ----------
+    time_s, difference_deg, speed_mps : ndarray, shape (n,)
+    direction_deg : ndarray, shape (n,)
+        Direction of motion free of GNSS noise: the INS heading less the median difference. With the measured track
+        in its place a large velocity error along the track would "explain" the noise of the track by itself.
+    regressors : tuple of Regressor
+        Known shapes with unknown factors, beside the constant error.
+    error_prior_deg : (mean, sigma), optional
+        Prior of the error; flat without one.
+    """
+
+    time_s: FloatArray
+    difference_deg: FloatArray
+    direction_deg: FloatArray
+    speed_mps: FloatArray
+    regressors: tuple[Regressor, ...] = ()
+    error_prior_deg: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class ErrorPosterior:
+    """Posterior of the heading error: a mixture of normals, one for each draw of the noise parameters.
+
+    Parameters
+    ----------
+    mean_deg, sigma_deg, weight : ndarray, shape (k,)
+    coefficients, coefficient_sigma : ndarray, shape (k, c)
+        Regression coefficients of each draw, the heading error first.
+    growth_sigma_deg : ndarray, shape (k, m)
+        Sigma after the samples counted in ``growth_samples``.
+    parameters : ndarray, shape (k, 8)
+        Draws, natural logarithms, in the order of ``noise.PARAMETER_NAMES``.
+    effective_draws : float
+        1 / sum of squared weights: a small figure means a badly sampled posterior.
+    has_converged : bool
+        Whether the search for the maximum ended at one.
+    """
+
+    mean_deg: FloatArray
+    sigma_deg: FloatArray
+    weight: FloatArray
+    coefficients: FloatArray
+    coefficient_sigma: FloatArray
+    growth_samples: NDArray[np.int64]
+    growth_sigma_deg: FloatArray
+    parameters: FloatArray
+    effective_draws: float
+    has_converged: bool
+
+    @property
+    def error_deg(self) -> float:
+        """Posterior mean."""
+        return float(self.weight @ self.mean_deg)
+
+    @property
+    def standard_error_deg(self) -> float:
+        """Posterior standard deviation."""
+        return float(np.sqrt(self.weight @ (self.sigma_deg**2 + (self.mean_deg - self.error_deg) ** 2)))
+
+    def typical(self) -> FloatArray:
+        """Posterior mean of the parameters (natural logarithms), shape (8,)."""
+        return np.asarray(self.weight @ self.parameters)
+
+    def parameter(self, name: str) -> float:
+        """Posterior median of one parameter, in its unit."""
+        values = self.parameters[:, noise.PARAMETER_NAMES.index(name)]
+        order = np.argsort(values)
+        return float(np.exp(values[order][np.searchsorted(np.cumsum(self.weight[order]), 0.5)]))
+
+    def coefficient(self, index: int) -> tuple[float, float]:
+        """Posterior mean and standard deviation of a regression coefficient."""
+        mean = float(self.weight @ self.coefficients[:, index])
+        spread = self.coefficient_sigma[:, index] ** 2 + (self.coefficients[:, index] - mean) ** 2
+        return mean, float(np.sqrt(self.weight @ spread))
+
+    def interval_deg(self, probability: float = 0.95, extra_sigma_deg: float = 0.0) -> tuple[float, float]:
+        """Equal-tailed interval of the mixture, widened by a further independent sigma."""
+        sigma = np.hypot(self.sigma_deg, extra_sigma_deg)
+        tail = 0.5 * (1.0 - probability)
+        return (
+            mixture_quantile(tail, self.mean_deg, sigma, self.weight),
+            mixture_quantile(1.0 - tail, self.mean_deg, sigma, self.weight),
+        )
+
+    def growth_half_width_deg(self, probability: float = 0.95) -> FloatArray:
+        """Half width of the interval after ``growth_samples``, noise as known at the end, shape (m,)."""
+        upper = 0.5 * (1.0 + probability)
+        zeros = np.zeros(len(self.weight))
+        columns = self.growth_sigma_deg.T
+        return np.array([mixture_quantile(upper, zeros, sigma, self.weight) for sigma in columns])
+
+    def even_draws(self, count: int = 40) -> FloatArray:
+        """Draws of the parameters with equal weights, shape (count, 8): systematic resampling."""
+        places = (np.arange(count) + 0.5) / count
+        index = np.minimum(np.searchsorted(np.cumsum(self.weight), places), len(self.weight) - 1)
+        return np.asarray(self.parameters[index])
+
+
+def mixture_quantile(probability: float, mean: FloatArray, sigma: FloatArray, weight: FloatArray) -> float:
+    """Quantile of a mixture of normal distributions, by bisection.
+
+    Examples
+    --------
+    >>> round(mixture_quantile(0.975, np.zeros(2), np.array([1.0, 1.0]), np.array([0.3, 0.7])), 3)
+    1.96
+    """
+    from scipy.special import ndtr
+
+    low, high = float(np.min(mean - 12.0 * sigma)), float(np.max(mean + 12.0 * sigma))
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if float(weight @ ndtr((middle - mean) / sigma)) < probability:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+@dataclass
+class _Target:
+    """Log posterior density of the noise parameters, with the error and the coefficients integrated out."""
+
+    standstill: StandstillVelocities
+    differences: Differences
+    checkpoints: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        data, still = self.differences, self.standstill
+        self.reference_deg = float(np.median(data.difference_deg))
+        columns = [data.difference_deg - self.reference_deg, np.ones(len(data.time_s))]
+        columns += [regressor.values for regressor in data.regressors]
+        direction_rad = np.deg2rad(data.direction_deg)
+        scale = DEG_PER_RAD / data.speed_mps
+        self.taxi = (
+            np.ascontiguousarray(data.time_s, dtype=np.float64),
+            np.ascontiguousarray(np.column_stack(columns)),
+            np.sin(direction_rad) * scale,
+            -np.cos(direction_rad) * scale,
+        )
+        gap_s = -1.0 if still.gap_s is None else float(still.gap_s)
+        self.still = (
+            np.ascontiguousarray(still.time_s, dtype=np.float64),
+            np.ascontiguousarray(still.north_mps, dtype=np.float64),
+            np.ascontiguousarray(still.east_mps, dtype=np.float64),
+            int(still.restart),
+            gap_s,
+        )
+        mean, sigma = data.error_prior_deg or (self.reference_deg, np.inf)
+        sigmas = np.array([sigma, *(regressor.prior_sigma for regressor in data.regressors)])
+        means = [mean - self.reference_deg, *(regressor.prior_mean for regressor in data.regressors)]
+        self.prior = (np.array(means), 1.0 / np.maximum(sigmas, 1e-6) ** 2)
+        self.last = np.array([len(data.time_s)], dtype=np.int64)
+
+    def evaluate(self, thetas: FloatArray, checkpoints: NDArray[np.int64]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Log posterior (k,), coefficients (k, c), variances (k, m, c)."""
+        count, width = len(thetas), self.taxi[1].shape[1] - 1
+        log_likelihood, estimate = np.empty(count), np.empty((count, width))
+        variance = np.empty((count, len(checkpoints), width))
+        bounded = np.clip(thetas, PRIOR_MEAN - 6.0 * PRIOR_SIGMA, PRIOR_MEAN + 6.0 * PRIOR_SIGMA)
+        noise.evaluate(bounded, self.still, self.taxi, self.prior, checkpoints, log_likelihood, estimate, variance)
+        log_prior = -0.5 * np.sum(((thetas - PRIOR_MEAN) / PRIOR_SIGMA) ** 2, axis=1)
+        return log_likelihood + log_prior, estimate, variance
+
+    def log_density(self, thetas: FloatArray) -> FloatArray:
+        return self.evaluate(thetas, self.last)[0]
+
+
+def _start(differences: Differences, standstill: StandstillVelocities) -> FloatArray:
+    """A first guess of the parameters from plain standard deviations."""
+    theta = PRIOR_MEAN.copy()
+    if len(standstill.time_s) > 20:
+        steps = np.concatenate([np.diff(standstill.north_mps), np.diff(standstill.east_mps)])
+        theta[noise.WHITE] = np.log(max(float(np.std(steps)) / np.sqrt(2.0), 1e-3))
+    spread = float(np.std(differences.difference_deg))
+    theta[noise.SWAY] = np.log(min(max(spread, 0.02), 3.0))
+    return theta
+
+
+def error_posterior(
+    differences: Differences,
+    standstill: StandstillVelocities = NO_STANDSTILL,
+    *,
+    draws: int = 400,
+    seed: int = 2015,
+    growth: int = 30,
+) -> ErrorPosterior:
+    """Sample the posterior of the heading error.
+
+    Parameters
+    ----------
+    differences : Differences
+    standstill : StandstillVelocities
+        Empty where there is none: the priors then stand alone.
+    draws : int
+        Draws of the noise parameters (up to three times as many where the posterior is awkward).
+    seed : int
+        Of the draws: the same data always give the same interval.
+    growth : int
+        Steps at which the growing precision is reported.
+    """
+    count = len(differences.time_s)
+    checkpoints = np.unique(np.linspace(min(2, count), count, growth).astype(np.int64))
+    target = _Target(standstill, differences, checkpoints)
+    mode, has_converged = find_mode(target.log_density, _start(differences, standstill), PRIOR_SIGMA)
+    points, weight = sample(target.log_density, mode, PRIOR_SIGMA, draws, np.random.default_rng(seed))
+    kept = weight > 1e-5 / len(weight)
+    points, weight = points[kept], weight[kept] / weight[kept].sum()
+    _log_density, coefficients, variance = target.evaluate(points, checkpoints)
+    coefficients[:, 0] += target.reference_deg
+    sigma = np.sqrt(np.maximum(variance, 1e-18))
+    return ErrorPosterior(
+        mean_deg=coefficients[:, 0],
+        sigma_deg=sigma[:, -1, 0],
+        weight=weight,
+        coefficients=coefficients,
+        coefficient_sigma=sigma[:, -1, :],
+        growth_samples=checkpoints,
+        growth_sigma_deg=sigma[:, :, 0],
+        parameters=points,
+        effective_draws=float(1.0 / np.sum(weight**2)),
+        has_converged=has_converged,
+    )
+
+
+def fixed_noise_estimate(
+    differences: Differences, parameters: FloatArray, standstill: StandstillVelocities = NO_STANDSTILL
+) -> tuple[FloatArray, FloatArray]:
+    """Coefficients and their standard deviations, shapes (c,), averaged over given draws of the noise parameters.
+
+    The error comes first, then the factors of the regressors. For parts of a run (segments, directions) and further
+    regressors (drift), with the noise as found from the whole of it.
+    """
+    target = _Target(standstill, differences, np.array([len(differences.time_s)], dtype=np.int64))
+    _log_density, coefficients, variance = target.evaluate(parameters, target.last)
+    coefficients[:, 0] += target.reference_deg
+    mean = coefficients.mean(axis=0)
+    spread = variance[:, -1, :].mean(axis=0) + coefficients.var(axis=0)
+    return mean, np.sqrt(np.maximum(spread, 0.0))
+
+
+def misfit(differences: Differences, parameters: FloatArray) -> float:
+    """Mean square of the whitened residuals: 1 where the differences are as noisy as the parameters say, shape ()."""
+    target = _Target(NO_STANDSTILL, differences, np.array([len(differences.time_s)], dtype=np.int64))
+    width = int(target.taxi[1].shape[1])
+    information = np.zeros((1, width, width))
+    noise.taxi_filter(*target.taxi, -1.0, parameters, np.zeros(3), target.last, information, np.zeros((0, 5)))
+    mean, inverse = np.zeros(width - 1), np.zeros((width - 1, width - 1))
+    noise.solve_normal_equations(information[0], target.prior[0], target.prior[1], mean, inverse)
+    full = np.concatenate([[1.0], -mean])
+    squares = float(np.sum(np.outer(full, full) * information[0]))
+    return squares / max(len(differences.time_s) - width + 1, 1)
+
+
+def sample_weights(differences: Differences, parameters: FloatArray) -> FloatArray:
+    """Weight of every sample in the estimate of the error, shape (n,), sum 1, for given noise parameters."""
+    target = _Target(NO_STANDSTILL, differences, np.array([len(differences.time_s)], dtype=np.int64))
+    time_s, columns, from_north, from_east = target.taxi
+    history = np.zeros((len(time_s), 5))
+    information = np.zeros((1, columns.shape[1], columns.shape[1]))
+    noise.taxi_filter(
+        time_s, columns, from_north, from_east, -1.0, parameters, np.zeros(3), target.last, information, history
+    )
+    return np.asarray(noise.generalised_weights(time_s, from_north, from_east, parameters, history))

@@ -1,0 +1,144 @@
+"""What the estimate is compared with: parking heading, runway bearing, the aircraft's own figures."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import mean_heading, wrap_180, wrap_360
+from groundstation.base.signals import topics_of_kind
+from groundstation.base.units import ARCMIN_PER_DEG
+from groundstation.estimators.heading.samples import Samples
+from groundstation.estimators.heading.settings import HeadingSettings, SiteData
+from groundstation.estimators.heading.standstill import effective_samples
+from groundstation.results.heading import OnboardComparison, RunwayCheck
+from groundstation.tables.table import Flight
+
+FloatArray = NDArray[np.float64]
+DRIFT_PRIOR_DEG_PER_H = 0.1  # sigma of the azimuth drift of an INS in order: all that taxi can add to it is noise
+RUNWAY_ALONG_DEG = 10.0
+REFERENCE_KEY = "reference.parking_heading_deg"
+
+
+@dataclass(frozen=True)
+class Parking:
+    """Heading at the last standstill, as shown and corrected, and its reference; None where not known."""
+
+    ins_heading_deg: float | None = None
+    heading_deg: float | None = None
+    sigma_deg: float | None = None
+    reference_deg: float | None = None
+    residual_arcmin: float | None = None
+
+
+def shrunk_drift(drift_deg_per_h: float | None, sigma_deg_per_h: float | None) -> tuple[float, float]:
+    """Drift and sigma, deg/h, after the prior of an INS in order (0 +- 0.1 deg/h) has had its say.
+
+    Examples
+    --------
+    >>> drift, sigma = shrunk_drift(20.0, 10.0)
+    >>> round(drift, 4), round(sigma, 4)
+    (0.002, 0.1)
+    """
+    if drift_deg_per_h is None or not sigma_deg_per_h:
+        return 0.0, DRIFT_PRIOR_DEG_PER_H
+    weight = DRIFT_PRIOR_DEG_PER_H**2 / (DRIFT_PRIOR_DEG_PER_H**2 + sigma_deg_per_h**2)
+    return weight * drift_deg_per_h, float(np.sqrt(weight)) * sigma_deg_per_h
+
+
+def parking_heading(
+    samples: Samples,
+    in_interval: NDArray[np.bool_],
+    flight: Flight,
+    site: SiteData,
+    error: tuple[float, float, float],
+    drift: tuple[float | None, float | None],
+) -> Parking:
+    """Heading of the aircraft at the last standstill, corrected.
+
+    heading = INS heading there - (error - drift x (t_taxi - t_parking)), because the error at parking was smaller than
+    the error on taxi by what it drifted in between. The drift is that of :func:`shrunk_drift`.
+
+    Parameters
+    ----------
+    error : (error_deg, sigma_deg, t_taxi_s)
+    drift : (drift, sigma), deg/h
+    """
+    stand = site.parked_on()
+    text = flight.metadata.get(REFERENCE_KEY, "")
+    reference = stand.heading_deg if stand else None
+    with suppress(ValueError):  # the flight's own reference stands above the stand's
+        reference = float(text) if text else reference
+    if not in_interval.any() or not np.isfinite(samples.heading_deg[in_interval]).any():
+        return Parking(reference_deg=reference)
+    shown = mean_heading(samples.heading_deg[in_interval])
+    rate, rate_sigma = shrunk_drift(*drift)
+    hours = (error[2] - float(np.mean(samples.time_s[in_interval]))) / 3600.0
+    corrected = float(wrap_360(shown - (error[0] - rate * hours)))
+    residual = None if reference is None else float(wrap_180(corrected - reference)) * ARCMIN_PER_DEG
+    return Parking(shown, corrected, float(np.hypot(error[1], rate_sigma * hours)), reference, residual)
+
+
+def runway_checks(
+    samples: Samples, site: SiteData, error_deg: float, sigma_deg: float, settings: HeadingSettings
+) -> tuple[RunwayCheck, ...]:
+    """INS heading on the take-off run against the true bearing of the runway: a second, independent reference.
+
+    The run is the part of the ground samples faster than taxi with the heading steady. The runway is the one whose
+    bearing is nearest the corrected heading, within 10 deg. Crosswind and the pilot's feet enter its sigma only as
+    far as they show in the heading.
+    """
+    with np.errstate(invalid="ignore"):
+        run = (samples.speed_mps > settings.taxi_speed_max_mps) & (
+            np.abs(samples.rate_dps) <= settings.turn_rate_max_dps
+        )
+    run &= np.isfinite(samples.heading_deg) & ~np.isin(samples.gate, ["airborne", "not proven ground"])
+    if run.sum() < 3 or not site.runways:
+        return ()
+    heading = mean_heading(samples.heading_deg[run])
+    away = [abs(float(wrap_180(heading - error_deg - runway.true_bearing_deg))) for runway in site.runways]
+    if min(away) > RUNWAY_ALONG_DEG:
+        return ()
+    runway = site.runways[int(np.argmin(away))]
+    spread = wrap_180(samples.heading_deg[run] - heading)
+    own = float(np.std(spread)) / np.sqrt(effective_samples(spread))
+    error = float(wrap_180(heading - runway.true_bearing_deg))
+    sigma = float(np.hypot(own, runway.sigma_deg))
+    return (
+        RunwayCheck(runway.name, runway.true_bearing_deg, heading, error, sigma, float(wrap_180(error - error_deg))),
+    )
+
+
+def onboard_comparison(flight: Flight, end_s: float, error_deg: float) -> OnboardComparison | None:
+    """The last figures the aircraft computed itself before lift-off, beside ours."""
+    for topic in topics_of_kind("onboard", flight.topics()):
+        table = flight[topic]
+        before = flight.seconds(table.time_ns) <= end_s + 60.0
+
+        def last(name: str) -> float | None:
+            known = table.values(name)[before]  # noqa: B023 - called in this turn of the loop only
+            known = known[np.isfinite(known)]
+            return float(known[-1]) if len(known) else None
+
+        status = [text for text in table.text("status")[before] if text]
+        error = last("heading_error_deg")
+        return OnboardComparison(
+            heading_error_deg=error,
+            precision_deg=last("precision_deg"),
+            quality_deg=last("quality_deg"),
+            cycles=last("cycles"),
+            correction_entered_deg=last("correction_entered_deg"),
+            status=str(status[-1]) if status else "",
+            difference_error_deg=None if error is None else float(wrap_180(error - error_deg)),
+        )
+    return None
+
+
+def mode_changes(flight: Flight, ins_topic: str, start_s: float, end_s: float) -> int | None:
+    """Changes of the INS mode between two flight times; None where the mode is not logged."""
+    table = flight[ins_topic]
+    mode = table.text("mode")
+    inside = (flight.seconds(table.time_ns) >= start_s) & (flight.seconds(table.time_ns) <= end_s) & (mode != "")
+    known = mode[inside]
+    return int(np.sum(known[1:] != known[:-1])) if len(known) else None

@@ -1,0 +1,316 @@
+"""Pairs of INS heading and GNSS velocity at the GNSS times of validity, and why each is used or not."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import direction_of, interpolate_heading, unwrap, wrap_180
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.records import BoolArray, Int64Array
+from groundstation.base.signals import topics_of_kind
+from groundstation.base.units import NS_PER_S
+from groundstation.estimators.heading.lines import fitted_lines, window_bounds
+from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.tables.table import Flight, Table
+
+FloatArray = NDArray[np.float64]
+TextArray = NDArray[np.str_]
+
+USED = "used"
+GATE_TEXT = "U20"
+MOVING_MPS = 1.0
+GEOMETRY_FIELDS = ("gdop", "pdop", "hdop")
+GEOMETRY_NAMES = {"gdop": "GDOP", "pdop": "PDOP", "hdop": "HDOP"}
+
+
+class GroundContact(Protocol):
+    """Ground contact at given times: where it is proven, and by what (empty or ``none...``: by nothing)."""
+
+    @property
+    def mask(self) -> BoolArray: ...
+    @property
+    def method(self) -> str: ...
+
+
+class TrueHeading(Protocol):
+    """True heading of every row of an INS topic, degrees, NaN where unknown, and what it was made from.
+
+    ``declination_sigma_deg`` is that of an error common to all rows; None for a heading logged as true.
+    """
+
+    @property
+    def values_deg(self) -> FloatArray: ...
+    @property
+    def description(self) -> str: ...
+    @property
+    def declination_sigma_deg(self) -> float | None: ...
+
+
+OnGround = Callable[[Int64Array], GroundContact]
+HeadingOf = Callable[[str], TrueHeading]
+
+
+@dataclass(frozen=True)
+class Proof:
+    """Ground contact as found by this module where the caller gives none."""
+
+    mask: BoolArray
+    method: str
+
+
+@dataclass(frozen=True)
+class HeadingValues:
+    """True heading as logged."""
+
+    values_deg: FloatArray
+    description: str
+    declination_sigma_deg: float | None = None
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Distinct GNSS epochs of the ground part of a flight, shapes (n,).
+
+    Parameters
+    ----------
+    time_s : flight seconds of validity
+    time_ns : corrected time
+    heading_deg : INS true heading at those times, NaN where the log has none near
+    north_mps, east_mps : velocity of the main-gear axle (of the antenna until an arm is taken out)
+    rate_dps, arm_rate_dps : slope of the INS heading over the long (gate) and the short window (lever arm)
+    difference_deg : INS heading minus track
+    geometry, integrity : NaN where not logged; integrity 1 good, 0 bad
+    on_ground : proven
+    gate : why a sample is used or not
+    segment : number of the straight segment, from 1; 0 for none
+    """
+
+    time_s: FloatArray
+    time_ns: Int64Array
+    heading_deg: FloatArray
+    north_mps: FloatArray
+    east_mps: FloatArray
+    rate_dps: FloatArray
+    arm_rate_dps: FloatArray
+    geometry: FloatArray
+    integrity: FloatArray
+    on_ground: BoolArray
+    gate: TextArray
+    segment: NDArray[np.int64]
+    geometry_name: str = ""
+    ground_method: str = ""
+    heading_source: str = ""
+    heading_sigma_deg: float = 0.0
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def speed_mps(self) -> FloatArray:
+        return np.hypot(self.north_mps, self.east_mps)
+
+    @property
+    def track_deg(self) -> FloatArray:
+        return direction_of(self.north_mps, self.east_mps)
+
+    @property
+    def difference_deg(self) -> FloatArray:
+        return wrap_180(self.heading_deg - self.track_deg)
+
+    @property
+    def is_used(self) -> BoolArray:
+        return np.asarray(self.gate == USED)
+
+    @property
+    def interval_s(self) -> float:
+        """Usual interval between epochs."""
+        return float(np.median(np.diff(self.time_s))) if len(self) > 1 else 0.0
+
+
+def choose_topics(flight: Flight, request: HeadingRequest) -> tuple[str, str]:
+    """The INS and GNSS topics to use: the ones asked for, else the first that have what is needed.
+
+    Raises
+    ------
+    NotAssessableError
+        When there is no pair.
+    """
+    ins = request.ins_topic or next(
+        (
+            topic
+            for field in ("true_heading_deg", "magnetic_heading_deg")
+            for topic in topics_of_kind("ins", flight.topics())
+            if flight[topic].has(field)
+        ),
+        "",
+    )
+    velocities = ("velocity_north_mps", "velocity_east_mps")
+    gnss = request.gnss_topic or next(
+        (topic for topic in topics_of_kind("gnss", flight.topics()) if flight[topic].has(*velocities)), ""
+    )
+    if ins not in flight:
+        raise NotAssessableError("heading", f"no topic {ins}" if ins else "no INS heading in the log")
+    if gnss not in flight:
+        raise NotAssessableError("heading", f"no topic {gnss}" if gnss else "no GNSS velocity in the log")
+    return ins, gnss
+
+
+def logged_heading(flight: Flight, ins_topic: str) -> HeadingValues:
+    """True heading as the INS wrote it."""
+    table = flight[ins_topic]
+    if not table.has("true_heading_deg"):
+        raise NotAssessableError(f"heading, {ins_topic}", "no true heading in the log")
+    return HeadingValues(table.values("true_heading_deg"), "true heading")
+
+
+def logged_ground(flight: Flight, time_ns: Int64Array) -> Proof:
+    """Ground contact by logged weight on wheels: the last value before each time; without it nothing is proven."""
+    for topic in topics_of_kind("discrete", flight.topics()):
+        table = flight[topic]
+        known = table.valid("weight_on_wheels")
+        if known.any():
+            index = np.searchsorted(table.time_ns[known], time_ns, side="right") - 1
+            wheels = table.values("weight_on_wheels")[known] > 0.5
+            return Proof(wheels[np.maximum(index, 0)] & (index >= 0), "weight on wheels")
+    return Proof(np.zeros(len(time_ns), dtype=bool), "")
+
+
+def distinct_epochs(table: Table) -> Table:
+    """GNSS rows with a velocity, each receiver epoch once.
+
+    Rows of one time are one epoch. A recorder that runs faster than the receiver writes each epoch several times:
+    a row that repeats the velocity (and position) before it is dropped while moving; and everywhere where more than
+    a fifth of the moving rows are such repetitions. A receiver that holds its velocity at standstill is left alone.
+    """
+    table = table.take(table.valid("velocity_north_mps", "velocity_east_mps")).unique_times()
+    if len(table) < 2:
+        return table
+    fields = [
+        name for name in ("velocity_north_mps", "velocity_east_mps", "latitude_deg", "longitude_deg") if table.has(name)
+    ]
+    repeated = np.zeros(len(table), dtype=bool)
+    repeated[1:] = np.all([np.diff(table.values(name)) == 0.0 for name in fields], axis=0)
+    moving = np.hypot(table.values("velocity_north_mps"), table.values("velocity_east_mps")) > MOVING_MPS
+    is_recorder_faster = moving.any() and float(np.mean(repeated[moving])) > 0.2
+    return table.take(~(repeated & (moving | is_recorder_faster)))
+
+
+def window_slope(at: FloatArray, time_s: FloatArray, values: FloatArray, window_s: float) -> FloatArray:
+    """Least-squares slope of ``values`` over a window centred at each time, per second, shape as ``at``.
+
+    A window with fewer than three samples is widened to the three nearest (raw data: ``window_s`` = 0). NaN where there
+    are fewer than two samples.
+    """
+    if len(time_s) < 2:
+        return np.full(len(at), np.nan)
+    low, high = window_bounds(at, time_s, window_s)
+    few = high - low < 3
+    slope, _value = fitted_lines(at, time_s, values, np.maximum(low - few, 0), np.minimum(high + few, len(time_s)))
+    return slope
+
+
+def pair_samples(
+    flight: Flight,
+    ins_topic: str,
+    gnss_topic: str,
+    *,
+    settings: HeadingSettings,
+    on_ground: OnGround | None = None,
+    heading: HeadingOf | None = None,
+) -> Samples:
+    """Pair each distinct GNSS epoch before lift-off with the INS heading interpolated to its time.
+
+    The heading is interpolated along the shorter arc between INS samples no farther apart than
+    ``heading_gap_max_s``; elsewhere it is NaN. The part before lift-off ends where ground contact, once proven, is
+    lost for more than 5 s at speed; where nothing is proven, at ``lift_off_speed_mps``.
+    """
+    gnss = distinct_epochs(flight[gnss_topic])
+    given = heading(ins_topic) if heading else logged_heading(flight, ins_topic)
+    ground: GroundContact = on_ground(gnss.time_ns) if on_ground else logged_ground(flight, gnss.time_ns)
+    method = "" if ground.method.startswith("none") else ground.method
+    if not len(gnss):
+        raise NotAssessableError(f"heading, {gnss_topic}", "no GNSS velocity in the log")
+    part = _before_lift_off(gnss, np.asarray(ground.mask), bool(method), settings)
+    gnss, mask = gnss.take(part), np.asarray(ground.mask)[part]
+    time_s = flight.seconds(gnss.time_ns)
+    ins_time, ins_heading = _ins_heading(flight, ins_topic, given.values_deg, time_s)
+    geometry_field = next((name for name in GEOMETRY_FIELDS if gnss.has(name)), "")
+    raw = settings.turn_rate_kind == "raw"
+    return Samples(
+        time_s=time_s,
+        time_ns=gnss.time_ns,
+        heading_deg=_interpolated(time_s, ins_time, ins_heading, settings.heading_gap_max_s),
+        north_mps=gnss.values("velocity_north_mps"),
+        east_mps=gnss.values("velocity_east_mps"),
+        rate_dps=window_slope(time_s, ins_time, ins_heading, 0.0 if raw else settings.turn_rate_window_s),
+        arm_rate_dps=window_slope(time_s, ins_time, ins_heading, settings.arm_rate_window_s),
+        geometry=gnss.values(geometry_field) if geometry_field else np.full(len(gnss), np.nan),
+        integrity=gnss.values("integrity_ok"),
+        on_ground=mask,
+        gate=np.full(len(gnss), "", dtype=GATE_TEXT),
+        segment=np.zeros(len(gnss), dtype=np.int64),
+        geometry_name=GEOMETRY_NAMES.get(geometry_field, ""),
+        ground_method=method,
+        heading_source=given.description,
+        heading_sigma_deg=given.declination_sigma_deg or 0.0,
+    )
+
+
+def _before_lift_off(gnss: Table, on_ground: BoolArray, is_proven: bool, settings: HeadingSettings) -> slice:
+    speed = np.hypot(gnss.values("velocity_north_mps"), gnss.values("velocity_east_mps"))
+    fast = np.flatnonzero(speed > settings.lift_off_speed_mps)
+    if not is_proven:
+        return slice(0, int(fast[0]) if len(fast) else len(gnss))
+    contact = np.flatnonzero(on_ground)
+    if not len(contact):
+        raise NotAssessableError("heading", "no GNSS epoch with ground contact proven")
+    time_s = (gnss.time_ns - gnss.time_ns[0]) / NS_PER_S
+    off = (~on_ground) & (np.arange(len(gnss)) > contact[0]) & (speed > MOVING_MPS)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], off, [False]]).astype(np.int8)))
+    for start, end in zip(edges[::2], edges[1::2], strict=True):
+        is_fast = float(speed[start:end].max()) > settings.taxi_speed_max_mps
+        if is_fast and time_s[min(end, len(gnss) - 1)] - time_s[start] > 5.0:
+            return slice(int(contact[0]), int(start))
+    return slice(int(contact[0]), len(gnss))
+
+
+def _ins_heading(
+    flight: Flight, ins_topic: str, heading_deg: FloatArray, time_s: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Times and continuous headings of the valid INS rows around the epochs; one row for each time."""
+    table = flight[ins_topic]
+    known = np.isfinite(heading_deg)
+    if "valid" in table:
+        known &= table.values("valid") != 0.0
+    ins_time = flight.seconds(table.time_ns)
+    known &= (ins_time > time_s[0] - 10.0) & (ins_time < time_s[-1] + 10.0)
+    known[1:] &= np.diff(table.time_ns) > 0
+    if known.sum() < 2:
+        raise NotAssessableError(f"heading, {ins_topic}", "no INS heading while the aircraft was on the ground")
+    return ins_time[known], unwrap(np.asarray(heading_deg)[known])
+
+
+def _interpolated(at: FloatArray, time_s: FloatArray, heading_deg: FloatArray, gap_max_s: float) -> FloatArray:
+    after = np.clip(np.searchsorted(time_s, at), 1, len(time_s) - 1)
+    is_near = time_s[after] - time_s[after - 1] <= gap_max_s
+    return np.where(is_near, interpolate_heading(at, time_s, heading_deg), np.nan)
+
+
+def without_arm(samples: Samples, arm_m: float, error_deg: float = 0.0) -> Samples:
+    """Velocities of the main-gear axle from those of the antenna ``arm_m`` ahead of it.
+
+    v_axle = v_antenna - omega x arm: a turn to the right moves the antenna to the right of the heading.
+    ``error_deg`` is the rough INS heading error: the arm points along the true heading.
+    """
+    if arm_m == 0.0:
+        return samples
+    sideways = np.deg2rad(np.nan_to_num(samples.arm_rate_dps)) * arm_m
+    heading_rad = np.deg2rad(np.nan_to_num(samples.heading_deg - error_deg))
+    return replace(
+        samples,
+        north_mps=samples.north_mps + sideways * np.sin(heading_rad),
+        east_mps=samples.east_mps - sideways * np.cos(heading_rad),
+    )

@@ -1,0 +1,204 @@
+"""The estimate itself: from gated samples to the error, its posterior, drift, segments and directions."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import mean_heading, wrap_180, wrap_360
+from groundstation.base.records import BoolArray
+from groundstation.estimators.heading.arms import ArmKnowledge, know_arm, straight_regressors
+from groundstation.estimators.heading.interval import (
+    Differences,
+    ErrorPosterior,
+    Regressor,
+    StandstillVelocities,
+    error_posterior,
+    fixed_noise_estimate,
+    sample_weights,
+)
+from groundstation.estimators.heading.recursion import Running, run_recursion
+from groundstation.estimators.heading.samples import Samples, without_arm
+from groundstation.estimators.heading.settings import AircraftData, HeadingSettings
+from groundstation.estimators.heading.standstill import StandstillData
+from groundstation.results.heading import TaxiSegment
+
+FloatArray = NDArray[np.float64]
+DRAWS_FOR_PARTS = 24
+MOST_SAMPLES = 3000  # of the honest interval; a longer taxi at a high rate is thinned
+LEAST_DRIFT_S = 5.0
+LEAST_IN_DIRECTION = 20  # samples
+FLAT_DEG_PER_S = 1e3
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Everything found from the used samples.
+
+    Parameters
+    ----------
+    samples, used : Samples
+        All and the used ones, the applied arm taken out.
+    differences : Differences
+        Of the used samples, without a jump at +-180 deg.
+    posterior : ErrorPosterior
+    growth_samples : ndarray of int64
+        Numbers of used samples at which the posterior's growth was taken.
+    running : Running
+        The paper's recursion over the same differences.
+    knowledge : ArmKnowledge
+    uncorrected_deg : float
+        Plain mean of the differences with the velocity of the antenna.
+    weight : ndarray, shape of samples
+        Weight in the estimate, mean 1 over the used samples, 0 elsewhere.
+    reference_time_s : float
+        Weighted mean time: the error belongs to it.
+    drift_deg_per_h, drift_sigma_deg_per_h : float or None
+    segments, directions : tuple of TaxiSegment
+    """
+
+    samples: Samples
+    used: Samples
+    differences: Differences
+    posterior: ErrorPosterior
+    growth_samples: NDArray[np.int64]
+    running: Running
+    knowledge: ArmKnowledge
+    uncorrected_deg: float
+    weight: FloatArray
+    reference_time_s: float
+    drift_deg_per_h: float | None
+    drift_sigma_deg_per_h: float | None
+    segments: tuple[TaxiSegment, ...]
+    directions: tuple[TaxiSegment, ...]
+
+    @property
+    def difference_deg(self) -> FloatArray:
+        return self.differences.difference_deg
+
+
+def _centred(difference_deg: FloatArray) -> FloatArray:
+    """Differences without a jump at +-180 deg: wrapped about their own direction."""
+    centre = float(wrap_180(mean_heading(difference_deg)))
+    return np.asarray(centre + wrap_180(difference_deg - centre))
+
+
+def _take(samples: Samples, mask: BoolArray) -> Samples:
+    arrays: dict[str, Any] = {
+        name: value[mask] for name, value in vars(samples).items() if isinstance(value, np.ndarray)
+    }
+    return replace(samples, **arrays)
+
+
+def _differences(used: Samples, knowledge: ArmKnowledge) -> Differences:
+    difference = _centred(used.difference_deg)
+    return Differences(
+        time_s=used.time_s,
+        difference_deg=difference,
+        direction_deg=wrap_360(used.heading_deg - np.median(difference)),
+        speed_mps=used.speed_mps,
+        regressors=straight_regressors(used, knowledge),
+    )
+
+
+def solve(antenna: Samples, standstill: StandstillData, aircraft: AircraftData, settings: HeadingSettings) -> Solution:
+    """Find the error from gated samples with the velocities of the antenna."""
+    knowledge = know_arm(antenna, aircraft, settings)
+    uncorrected = _centred(antenna.difference_deg[antenna.is_used])
+    samples = without_arm(antenna, knowledge.applied_arm_m, float(np.median(uncorrected)))
+    used = _take(samples, samples.is_used)
+    differences = _differences(used, knowledge)
+    thinning = -(-len(used) // MOST_SAMPLES)
+    thinned = _part(differences, slice(None, None, thinning))
+    velocities = _velocities(antenna, standstill, float(used.time_s[0]), settings)
+    posterior = error_posterior(thinned, velocities, draws=settings.posterior_draws, seed=settings.posterior_seed)
+    weight = sample_weights(differences, posterior.typical())
+    reference_time_s = float(np.sum(weight * used.time_s))
+    draws = posterior.even_draws(DRAWS_FOR_PARTS)
+    drift, drift_sigma = _drift(thinned, reference_time_s, draws)
+    segments = tuple(_segment(differences, used, used.segment == number, draws) for number in np.unique(used.segment))
+    full_weight = np.zeros(len(samples))
+    full_weight[samples.is_used] = weight * len(used)
+    return Solution(
+        samples=samples,
+        used=used,
+        differences=differences,
+        posterior=posterior,
+        growth_samples=posterior.growth_samples * thinning,
+        running=run_recursion(differences.difference_deg),
+        knowledge=knowledge,
+        uncorrected_deg=float(wrap_180(np.mean(uncorrected))),
+        weight=full_weight,
+        reference_time_s=reference_time_s,
+        drift_deg_per_h=drift,
+        drift_sigma_deg_per_h=drift_sigma,
+        segments=segments,
+        directions=_directions(differences, used, segments, draws),
+    )
+
+
+def _part(differences: Differences, index: slice | BoolArray) -> Differences:
+    return replace(
+        differences,
+        time_s=differences.time_s[index],
+        difference_deg=differences.difference_deg[index],
+        direction_deg=differences.direction_deg[index],
+        speed_mps=differences.speed_mps[index],
+        regressors=tuple(replace(item, values=item.values[index]) for item in differences.regressors),
+    )
+
+
+def _velocities(
+    antenna: Samples, standstill: StandstillData, taxi_start_s: float, settings: HeadingSettings
+) -> StandstillVelocities:
+    """Standstill velocities for the noise model: at most ``spectrum_max_s`` of them, those before taxi at the end.
+
+    Stretches during or after taxi stand first, not linked to it.
+    """
+    if not standstill.is_informative:
+        return StandstillVelocities(np.zeros(0), np.zeros(0), np.zeros(0))
+    index = np.flatnonzero(standstill.is_still)
+    before = index[antenna.time_s[index] < taxi_start_s]
+    later = index[antenna.time_s[index] >= taxi_start_s]
+    most = max(int(settings.spectrum_max_s / max(antenna.interval_s, 0.01)), 10)
+    before = before[-most:]
+    later = later[: max(most - len(before), 0)]
+    order = np.concatenate([later, before])
+    gap = taxi_start_s - float(antenna.time_s[before[-1]]) if len(before) else None
+    return StandstillVelocities(
+        antenna.time_s[order], antenna.north_mps[order], antenna.east_mps[order], len(later), gap
+    )
+
+
+def _drift(differences: Differences, reference_time_s: float, draws: FloatArray) -> tuple[float | None, float | None]:
+    """Slope of the error and its standard deviation, deg/h, by generalised least squares."""
+    if float(np.ptp(differences.time_s)) < LEAST_DRIFT_S:
+        return None, None
+    slope = Regressor(differences.time_s - reference_time_s, 0.0, FLAT_DEG_PER_S)
+    mean, sigma = fixed_noise_estimate(replace(differences, regressors=(*differences.regressors, slope)), draws)
+    return float(mean[-1]) * 3600.0, float(sigma[-1]) * 3600.0
+
+
+def _segment(differences: Differences, used: Samples, mask: BoolArray, draws: FloatArray) -> TaxiSegment:
+    mean, sigma = fixed_noise_estimate(_part(differences, mask), draws)
+    return TaxiSegment(
+        start_s=float(used.time_s[mask][0]),
+        end_s=float(used.time_s[mask][-1]),
+        samples=int(mask.sum()),
+        mean_track_deg=mean_heading(used.track_deg[mask]),
+        mean_speed_mps=float(np.mean(used.speed_mps[mask])),
+        error_deg=float(mean[0]),
+        sigma_deg=float(sigma[0]),
+    )
+
+
+def _directions(
+    differences: Differences, used: Samples, segments: tuple[TaxiSegment, ...], draws: FloatArray
+) -> tuple[TaxiSegment, ...]:
+    """Estimates out and back (a back-taxi tells what turns with the aircraft from what does not); empty if one way."""
+    away = np.abs(wrap_180(used.track_deg - segments[0].mean_track_deg))
+    groups = [away <= 45.0, away >= 135.0]
+    if not all(int(group.sum()) >= LEAST_IN_DIRECTION for group in groups):
+        return ()
+    return tuple(_segment(differences, used, group, draws) for group in groups)

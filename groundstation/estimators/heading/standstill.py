@@ -1,0 +1,169 @@
+"""Stage A: the GNSS velocity assessed while the aircraft stands."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.records import BoolArray
+from groundstation.estimators.heading.lines import window_bounds
+from groundstation.estimators.heading.samples import Samples
+from groundstation.estimators.heading.settings import HeadingSettings
+from groundstation.results.heading import Standstill
+
+FloatArray = NDArray[np.float64]
+PROBABILITY = 0.97  # of the bound of the mean speed (paper)
+
+
+@dataclass(frozen=True)
+class StandstillData:
+    """Epochs at standstill before take-off.
+
+    Parameters
+    ----------
+    answer : Standstill or None
+        The interval assessed; None where there is none of ``standstill_min_s``.
+    in_interval : ndarray of bool, shape (n,)
+        Epochs of that interval.
+    is_still : ndarray of bool, shape (n,)
+        All epochs at standstill, guards cut off.
+    stretches : tuple of (first, last + 1)
+        Index ranges of the stretches at standstill.
+    is_informative : bool
+        False where the receiver holds its velocity (mostly exact zeros or repetitions): nothing to learn from.
+    """
+
+    answer: Standstill | None
+    in_interval: BoolArray
+    is_still: BoolArray
+    stretches: tuple[tuple[int, int], ...]
+    is_informative: bool
+
+
+def _moving_mean(time_s: FloatArray, values: FloatArray, window_s: float) -> FloatArray:
+    low, high = window_bounds(time_s, time_s, window_s)
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    return np.asarray((total[high] - total[low]) / (high - low))
+
+
+def find_standstill(samples: Samples, settings: HeadingSettings) -> StandstillData:
+    """Find the standstill before the first straight taxi, and assess its last 10 to 30 s.
+
+    At standstill: ground contact proven where anything proves it, length of the 1-s mean velocity within the limit, INS
+    heading steady (or not known), geometry and integrity good; no GNSS gap inside; ``standstill_guard_s`` cut from both
+    ends. The interval assessed is the last ``standstill_max_s`` of the last stretch of at least
+    ``standstill_min_s`` that ends before the first used taxi sample: a rule that does not look at the answer.
+    """
+    mean_speed = np.hypot(
+        _moving_mean(samples.time_s, samples.north_mps, settings.standstill_mean_s),
+        _moving_mean(samples.time_s, samples.east_mps, settings.standstill_mean_s),
+    )
+    still = mean_speed <= settings.standstill_speed_max_mps
+    still &= ~(np.abs(samples.rate_dps) > settings.standstill_rate_max_dps)
+    still &= ~(samples.geometry > settings.geometry_max) & ~(samples.integrity == 0.0)
+    if samples.ground_method:
+        still &= samples.on_ground
+    stretches = _stretches(samples, still, settings)
+    is_still = np.zeros(len(samples), dtype=bool)
+    for first, end in stretches:
+        is_still[first:end] = True
+    used = np.flatnonzero(samples.is_used)
+    before = used[0] if len(used) else len(samples)
+    in_interval = np.zeros(len(samples), dtype=bool)
+    candidates = [
+        (first, end)
+        for first, end in stretches
+        if end <= before and samples.time_s[end - 1] - samples.time_s[first] >= settings.standstill_min_s - 1e-6
+    ]
+    answer = None
+    if candidates:
+        first, end = candidates[-1]
+        start_s = max(samples.time_s[first], samples.time_s[end - 1] - settings.standstill_max_s)
+        first = int(np.searchsorted(samples.time_s, start_s - 1e-6))
+        in_interval[first:end] = True
+        answer = assess_standstill(samples, slice(first, end), settings)
+    return StandstillData(answer, in_interval, is_still, stretches, _is_informative(samples, is_still))
+
+
+def _stretches(samples: Samples, still: BoolArray, settings: HeadingSettings) -> tuple[tuple[int, int], ...]:
+    gap = np.concatenate([[False], np.diff(samples.time_s) > max(settings.gnss_gap_max_s, 2.5 * samples.interval_s)])
+    found = []
+    start = None
+    for i in range(len(samples) + 1):
+        is_end = i == len(samples) or not still[i] or gap[i]
+        if start is not None and is_end:
+            low = np.searchsorted(
+                samples.time_s, samples.time_s[start] + (settings.standstill_guard_s if start else 0.0)
+            )
+            high = np.searchsorted(samples.time_s, samples.time_s[i - 1] - settings.standstill_guard_s, side="right")
+            if high - low > 2:
+                found.append((int(low), int(high)))
+            start = None
+        if i < len(samples) and still[i] and start is None:
+            start = i
+    return tuple(found)
+
+
+def _is_informative(samples: Samples, still: BoolArray) -> bool:
+    """A receiver that holds its velocity repeats itself; one with coarse steps has few distinct values."""
+    if still.sum() < 5:
+        return False
+    north, east = samples.north_mps[still], samples.east_mps[still]
+    changed = (np.diff(north) != 0.0) | (np.diff(east) != 0.0)
+    return bool(np.mean(changed) > 0.5 and len(np.unique(north)) + len(np.unique(east)) > 6)
+
+
+def effective_samples(values: FloatArray) -> float:
+    """Number of independent samples that give the mean the same variance: n / (1 + 2 sum of autocorrelations).
+
+    The sum ends at the first pair of lags whose sum is not positive.
+
+    Source: C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992), section 3.3 (initial
+    positive sequence).
+    """
+    count = len(values)
+    centred = values - np.mean(values)
+    variance = float(np.mean(centred**2))
+    if count < 4 or variance <= 0.0:
+        return float(count)
+    size = 2 ** int(np.ceil(np.log2(2 * count)))
+    spectrum = np.abs(np.fft.rfft(centred, size)) ** 2
+    correlation = np.fft.irfft(spectrum, size)[:count] / (count * variance)
+    pairs = correlation[0 : count - 1 : 2] + correlation[1:count:2]
+    end = int(np.argmax(pairs <= 0.0)) if bool(np.any(pairs <= 0.0)) else len(pairs)
+    factor = max(2.0 * float(np.sum(pairs[:end])) - 1.0, 1.0 / count)
+    return float(np.clip(count / factor, 1.0, count))
+
+
+def speed_bound_mps(length_mps: float, sigma_mps: float) -> float:
+    """The 0.97 bound of the length of the true mean velocity: a Rice distribution about the measured length.
+
+    Both components of the mean have the standard error ``sigma_mps``.
+    """
+    from scipy.stats import rice
+
+    if sigma_mps <= 0.0:
+        return length_mps
+    return float(rice.ppf(PROBABILITY, length_mps / sigma_mps, scale=sigma_mps))
+
+
+def assess_standstill(samples: Samples, part: slice, settings: HeadingSettings) -> Standstill:
+    """Mean and spread of the velocity over one interval, with both readings of the paper's mean speed."""
+    north, east = samples.north_mps[part], samples.east_mps[part]
+    time_s, speed = samples.time_s[part], np.hypot(samples.north_mps[part], samples.east_mps[part])
+    length = float(np.hypot(np.mean(north), np.mean(east)))
+    errors = [float(np.std(values)) / np.sqrt(effective_samples(values)) for values in (north, east)]
+    return Standstill(
+        start_s=float(time_s[0]),
+        end_s=float(time_s[-1]),
+        samples=len(north),
+        mean_north_mps=float(np.mean(north)),
+        mean_east_mps=float(np.mean(east)),
+        sigma_north_mps=float(np.std(north)),
+        sigma_east_mps=float(np.std(east)),
+        mean_of_speed_mps=float(np.mean(speed)),
+        speed_of_mean_mps=length,
+        speed_bound97_mps=speed_bound_mps(length, float(np.sqrt(np.mean(np.square(errors))))),
+        share_above_limit=float(np.mean(speed > settings.standstill_speed_max_mps)),
+        ground_proof=samples.ground_method or "not proven",
+    )

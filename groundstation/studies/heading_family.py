@@ -1,0 +1,215 @@
+"""The estimator on simulated taxi runs of the family: errors, coverage of both intervals, acceptance by gate."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.units import ARCMIN_PER_DEG
+from groundstation.estimators.heading.estimate import estimate_heading_error
+from groundstation.estimators.heading.settings import AircraftData, HeadingSettings
+from groundstation.results.figures import FigureData
+from groundstation.results.heading import HeadingResult
+from groundstation.simulation.taxi import Family, TaxiCase, draw_case, simulate_taxi, taxi_flight
+
+BoolArray = NDArray[np.bool_]
+Progress = Callable[[str], None]
+NAMED_ARM_SIGMA_M = 0.05
+
+
+@dataclass(frozen=True)
+class RunOutcome:
+    """One simulated run and what the estimator made of it. Errors are estimate minus truth, degrees.
+
+    ``seconds_to_precision`` is the taxi time after which the paper's e stays within its limit, None if it never does.
+    """
+
+    number: int
+    case: TaxiCase
+    error_deg: float
+    low_deg: float
+    high_deg: float
+    paper_error_deg: float
+    precision_deg: float
+    quality_deg: float
+    taxi_seconds: float
+    verdict: str
+    gates: dict[str, str]
+    seconds_to_precision: float | None
+
+    @property
+    def is_inside(self) -> bool:
+        """Whether our interval holds the truth (ends are given relative to it)."""
+        return self.low_deg <= 0.0 <= self.high_deg
+
+    @property
+    def is_inside_paper(self) -> bool:
+        """Whether the paper's mean +- e holds the truth."""
+        return abs(self.paper_error_deg) <= self.precision_deg
+
+    @property
+    def half_width_deg(self) -> float:
+        return 0.5 * (self.high_deg - self.low_deg)
+
+
+def run_once(family: Family, seed: int, number: int, settings: HeadingSettings | None = None) -> RunOutcome:
+    """Draw run ``number`` of a seed, pass it through tables and estimator, and compare with the truth."""
+    rng = np.random.default_rng((seed, number))
+    case = draw_case(rng, family)
+    run = simulate_taxi(case, rng)
+    aircraft = AircraftData(
+        antenna_arm_m=case.antenna_arm_m if case.is_arm_known else None, antenna_arm_sigma_m=NAMED_ARM_SIGMA_M
+    )
+    result = estimate_heading_error(taxi_flight(run), aircraft=aircraft, settings=settings)
+    return outcome_of(number, case, result, run.error_at(result.reference_time_s or 0.0))
+
+
+def outcome_of(number: int, case: TaxiCase, result: HeadingResult, truth_deg: float) -> RunOutcome:
+    """Set a result beside the true error of its run."""
+    running = next(figure for figure in result.figures if figure.name == "heading_running")
+    limit = next(gate.limit for gate in result.gates if gate.name == "precision")
+    above = np.flatnonzero(~(running["precision_deg"] <= limit))
+    reached = int(above[-1]) + 1 if len(above) else 0
+    step_s = float(np.median(np.diff(running["time_s"])))
+    return RunOutcome(
+        number=number,
+        case=case,
+        error_deg=result.error_deg - truth_deg,
+        low_deg=result.confidence95_deg[0] - truth_deg,
+        high_deg=result.confidence95_deg[1] - truth_deg,
+        paper_error_deg=result.paper_error_deg - truth_deg,
+        precision_deg=result.precision_deg,
+        quality_deg=result.quality_deg,
+        taxi_seconds=result.taxi_seconds,
+        verdict=result.verdict,
+        gates={gate.name: gate.state for gate in result.gates if gate.required},
+        seconds_to_precision=(reached + 1) * step_s if reached < len(running) else None,
+    )
+
+
+def run_family(
+    family: Family, seed: int, runs: int, progress: Progress | None = None, settings: HeadingSettings | None = None
+) -> tuple[RunOutcome, ...]:
+    """Runs 0 to ``runs`` - 1 of a seed. ``progress`` is called with a line for each."""
+    outcomes = []
+    for number in range(runs):
+        outcome = run_once(family, seed, number, settings)
+        outcomes.append(outcome)
+        if progress:
+            progress(
+                f"{family} run {number}: error {outcome.error_deg * ARCMIN_PER_DEG:+.1f} arcmin, {outcome.verdict}"
+            )
+    return tuple(outcomes)
+
+
+def runs_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
+    """One row for each run: parameters that matter, error, interval, verdict."""
+
+    def column(value: Callable[[RunOutcome], float | str | bool]) -> NDArray[np.generic]:
+        return np.array([value(outcome) for outcome in outcomes])
+
+    columns = {
+        "run": column(lambda run: run.number),
+        "taxi_s": column(lambda run: run.taxi_seconds),
+        "segments": column(lambda run: len(run.case.segments_s)),
+        "speed_mps": column(lambda run: run.case.cruise_mps),
+        "sway_damping": column(lambda run: run.case.sway_damping),
+        "sway_hz": column(lambda run: run.case.sway_hz),
+        "correlated_mps": column(lambda run: run.case.correlated_mps),
+        "correlation_s": column(lambda run: run.case.correlation_s),
+        "standstill_s": column(lambda run: run.case.standstill_s),
+        "arm_known": column(lambda run: run.case.is_arm_known),
+        "error_arcmin": column(lambda run: run.error_deg * ARCMIN_PER_DEG),
+        "low_arcmin": column(lambda run: run.low_deg * ARCMIN_PER_DEG),
+        "high_arcmin": column(lambda run: run.high_deg * ARCMIN_PER_DEG),
+        "paper_error_arcmin": column(lambda run: run.paper_error_deg * ARCMIN_PER_DEG),
+        "paper_e_arcmin": column(lambda run: run.precision_deg * ARCMIN_PER_DEG),
+        "inside": column(lambda run: run.is_inside),
+        "verdict": column(lambda run: run.verdict),
+    }
+    return FigureData(name, columns, dict.fromkeys(columns, 3))
+
+
+Cell = tuple[str, BoolArray]
+
+
+def _cells(outcomes: Sequence[RunOutcome]) -> Iterable[Cell]:
+    """Names of the cells and which runs belong to them. Edges hold the grid values and divide the continuous ones."""
+
+    def split(name: str, values: Iterable[float], edges: Sequence[float], unit: str) -> Iterable[Cell]:
+        array = np.array(list(values))
+        for low, high in pairwise(edges):
+            inside = (array > low) & (array <= high)
+            if inside.any():
+                shown = np.unique(array[inside])
+                label = f"{shown[0]:g}" if len(shown) == 1 else f"{low:g} to {high:g}"
+                yield f"{name} {label}{unit}", inside
+
+    cases = [outcome.case for outcome in outcomes]
+    yield "all", np.ones(len(outcomes), dtype=bool)
+    yield from split("sway damping", (case.sway_damping for case in cases), (0.0, 0.05, 0.15, 0.3, 1.0), "")
+    yield from split("GNSS correlated over", (case.correlation_s for case in cases), (0.0, 2.0, 5.0, 20.0), " s")
+    lengths = [round(sum(case.segments_s), 6) for case in cases]
+    yield from split("taxi", lengths, (0.0, 20.5, 40.5, 60.5, 90.5, 130.0), " s")
+    yield from split("standstill", (case.standstill_s for case in cases), (0.0, 60.0, 120.0, 400.0), " s")
+    known = np.array([case.is_arm_known for case in cases])
+    yield from (("arm known", known), ("arm not known", ~known))
+    verdicts = np.array([outcome.verdict for outcome in outcomes])
+    yield from ((f"verdict {verdict}", verdicts == verdict) for verdict in ("accept", "extend", "reject"))
+
+
+def coverage_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
+    """Coverage of our interval and of the paper's, and errors, for each cell of the family.
+
+    ``coverage_sigma`` is the sampling error of the coverage at 0.95.
+    """
+    error = np.array([outcome.error_deg for outcome in outcomes]) * ARCMIN_PER_DEG
+    paper_error = np.array([outcome.paper_error_deg for outcome in outcomes]) * ARCMIN_PER_DEG
+    half_width = np.array([outcome.half_width_deg for outcome in outcomes]) * ARCMIN_PER_DEG
+    inside = np.array([outcome.is_inside for outcome in outcomes])
+    inside_paper = np.array([outcome.is_inside_paper for outcome in outcomes])
+    cells = [(label, mask) for label, mask in _cells(outcomes) if mask.any()]
+
+    def column(value: Callable[[BoolArray], float]) -> NDArray[np.float64]:
+        return np.array([value(mask) for _label, mask in cells])
+
+    columns: dict[str, NDArray[np.generic]] = {
+        "cell": np.array([label for label, _mask in cells]),
+        "runs": np.array([int(mask.sum()) for _label, mask in cells]),
+        "coverage": column(lambda mask: float(np.mean(inside[mask]))),
+        "coverage_sigma": column(lambda mask: float(np.sqrt(0.95 * 0.05 / mask.sum()))),
+        "paper_coverage": column(lambda mask: float(np.mean(inside_paper[mask]))),
+        "rms_arcmin": column(lambda mask: float(np.sqrt(np.mean(error[mask] ** 2)))),
+        "p95_arcmin": column(lambda mask: float(np.quantile(np.abs(error[mask]), 0.95))),
+        "max_arcmin": column(lambda mask: float(np.max(np.abs(error[mask])))),
+        "paper_rms_arcmin": column(lambda mask: float(np.sqrt(np.mean(paper_error[mask] ** 2)))),
+        "half_width_arcmin": column(lambda mask: float(np.median(half_width[mask]))),
+    }
+    return FigureData(name, columns, {key: 3 if "coverage" in key else 1 for key in columns})
+
+
+def gates_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
+    """Share of runs that pass each required gate, and each verdict's share."""
+    names = list(outcomes[0].gates)
+    shares = [float(np.mean([outcome.gates.get(gate) == "passed" for outcome in outcomes])) for gate in names]
+    for verdict in ("accept", "extend", "reject", "undecided"):
+        names.append(f"verdict {verdict}")
+        shares.append(float(np.mean([outcome.verdict == verdict for outcome in outcomes])))
+    return FigureData(name, {"gate": np.array(names), "share": np.array(shares)}, {"share": 3})
+
+
+def time_to_precision_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
+    """Taxi time the paper's e needs to stay within its limit, by length of run: share that gets there, quartiles."""
+    lengths = np.array([sum(outcome.case.segments_s) for outcome in outcomes])
+    seconds = np.array([np.inf if run.seconds_to_precision is None else run.seconds_to_precision for run in outcomes])
+    rows = []
+    for low, high in ((0.0, 40.5), (40.5, 60.5), (60.5, 90.5), (90.5, 130.0)):
+        mask = (lengths > low) & (lengths <= high)
+        if mask.any():
+            reached = seconds[mask & np.isfinite(seconds)]
+            quartiles = np.quantile(reached, [0.25, 0.5, 0.75]) if len(reached) else np.full(3, np.nan)
+            rows.append((high, int(mask.sum()), len(reached) / mask.sum(), *quartiles))
+    columns = ("taxi_up_to_s", "runs", "share_reached", "lower_quartile_s", "median_s", "upper_quartile_s")
+    return FigureData(name, {key: np.array([row[i] for row in rows]) for i, key in enumerate(columns)}, {"median_s": 1})

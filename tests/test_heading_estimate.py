@@ -1,0 +1,385 @@
+"""The heading estimator on whole flights: exact without noise, invariant, honest about what it could not measure."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from groundstation.base.angles import wrap_180, wrap_360
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.records import Column
+from groundstation.estimators.heading.estimate import estimate_heading_error
+from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings, SiteData, Stand
+from groundstation.results.heading import Gate, HeadingResult
+from groundstation.simulation.taxi import TaxiCase, TaxiRun, noiseless, simulate_taxi, taxi_flight
+from groundstation.tables.table import Flight, Table
+
+NOISELESS_DEG = 1e-6  # rounding of headings and positions
+SAME_DEG = 1e-6  # the same numbers in another order of rounding
+AIRCRAFT = AircraftData(antenna_arm_m=4.0)
+CASE = TaxiCase(
+    segments_s=(45.0, 45.0),
+    turns_deg=(-95.0,),
+    correlated_mps=0.002,
+    correlation_s=1.0,
+    sway_sigma_deg=0.3,
+    white_mps=0.04,
+)
+
+
+def run_of(case: TaxiCase = CASE, seed: int = 1) -> TaxiRun:
+    return simulate_taxi(case, np.random.default_rng(seed))
+
+
+def estimate(flight: Flight, **options: object) -> HeadingResult:
+    return estimate_heading_error(flight, **({"aircraft": AIRCRAFT} | options))  # type: ignore[arg-type]
+
+
+def with_table(flight: Flight, topic: str, change: Callable[[Table], Table]) -> Flight:
+    return replace(flight, tables={**flight.tables, topic: change(flight[topic])})
+
+
+def with_column(flight: Flight, topic: str, name: str, values: np.ndarray) -> Flight:
+    return with_table(flight, topic, lambda table: replace(table, columns={**table.columns, name: Column(values)}))
+
+
+def without_column(flight: Flight, topic: str, *names: str) -> Flight:
+    def drop(table: Table) -> Table:
+        return replace(table, columns={key: column for key, column in table.columns.items() if key not in names})
+
+    return with_table(flight, topic, drop)
+
+
+def without_topic(flight: Flight, topic: str) -> Flight:
+    return replace(flight, tables={name: table for name, table in flight.tables.items() if name != topic})
+
+
+def gate_of(result: HeadingResult, name: str) -> Gate:
+    return next(gate for gate in result.gates if gate.name == name)
+
+
+@pytest.fixture(scope="module")
+def flight() -> Flight:
+    return taxi_flight(run_of())
+
+
+@pytest.fixture(scope="module")
+def result(flight: Flight) -> HeadingResult:
+    return estimate(flight)
+
+
+# Truth
+
+
+@pytest.mark.parametrize("error_deg", [0.8, -3.0, 179.9])
+def test_noiseless_in_error_at_rounding(error_deg: float) -> None:
+    run = run_of(noiseless(replace(CASE, heading_error_deg=error_deg, drift_deg_per_h=0.0)))
+    found = estimate(taxi_flight(run))
+    assert found.reference_time_s is not None
+    truth = run.error_at(found.reference_time_s)
+    assert wrap_180(found.error_deg - truth) == pytest.approx(0.0, abs=NOISELESS_DEG)
+    assert wrap_180(found.paper_error_deg - truth) == pytest.approx(0.0, abs=NOISELESS_DEG)
+    assert found.precision_deg < NOISELESS_DEG
+
+
+def test_a_good_run_is_accepted_with_the_number_to_type(result: HeadingResult) -> None:
+    assert [gate.name for gate in result.gates if gate.required and gate.state != "passed"] == []
+    assert result.verdict == "accept"
+    assert result.error_deg == pytest.approx(0.8, abs=0.15)
+    assert result.correction_deg == pytest.approx(-round(result.error_deg, 1))
+    assert result.confidence95_deg[0] < 0.8 < result.confidence95_deg[1]
+    assert len(result.segments) == 2
+    assert result.uncorrected_error_deg is not None
+
+
+def test_number_to_type_is_given_only_with_accept() -> None:
+    found = estimate(taxi_flight(run_of(replace(CASE, segments_s=(15.0,), turns_deg=()))))
+    assert found.verdict == "extend"
+    assert found.correction_deg is None
+    assert "Not to be entered" in found.verdict_reason
+
+
+def test_parking_heading_is_corrected_and_compared() -> None:
+    """Worked example: parked at 310 deg true, INS error +0.8: shows 310.8; corrected 310.0."""
+    run = run_of()
+    site = SiteData(stands=(Stand("7", 310.0, 0.02),))
+    found = estimate(taxi_flight(run), site=site)
+    assert found.parking_ins_heading_deg == pytest.approx(310.8, abs=0.01)
+    assert found.parking_heading_deg == pytest.approx(310.8 - found.error_deg, abs=1e-3)
+    assert found.reference_residual_arcmin == pytest.approx((found.parking_heading_deg or 0.0) * 60 - 310.0 * 60)
+    flown = replace(taxi_flight(run), metadata={"reference.parking_heading_deg": "311.0"})
+    assert estimate(flown, site=site).reference_parking_heading_deg == 311.0
+
+
+def test_known_arm_removes_the_bias_of_a_gentle_curve() -> None:
+    case = noiseless(
+        TaxiCase(segments_s=(40.0,), curve_dps=0.8, cruise_mps=6.8, antenna_arm_m=5.0, drift_deg_per_h=0.0)
+    )
+    flight = taxi_flight(run_of(case))
+    known = estimate(flight, aircraft=AircraftData(antenna_arm_m=5.0))
+    assert abs(known.paper_error_deg - 0.8) * 60 < 0.1
+    assert known.uncorrected_error_deg is not None
+    assert 6.0 < abs(known.uncorrected_error_deg - 0.8) * 60 < 12.0
+
+
+def test_drift_is_found_with_its_error() -> None:
+    case = replace(CASE, segments_s=(120.0,), turns_deg=(), drift_deg_per_h=120.0)
+    found = estimate(taxi_flight(run_of(case)))
+    assert found.drift_deg_per_h is not None
+    assert found.drift_sigma_deg_per_h is not None
+    assert abs(found.drift_deg_per_h - 120.0) < 3.0 * found.drift_sigma_deg_per_h < 120.0
+    assert gate_of(found, "drift").state == "failed"
+    assert gate_of(found, "quality").value == pytest.approx(0.58, abs=0.12)
+    assert gate_of(found, "quality").state == "failed"
+    assert found.verdict == "reject"
+
+
+def test_back_taxi_gives_both_directions() -> None:
+    found = estimate(taxi_flight(run_of(replace(CASE, turns_deg=(180.0,)))))
+    assert len(found.directions) == 2
+    assert abs(wrap_180(found.directions[0].mean_track_deg - found.directions[1].mean_track_deg)) > 170.0
+
+
+def test_mounting_is_taken_out_and_its_sigma_enters_the_interval(flight: Flight, result: HeadingResult) -> None:
+    mounted = estimate(flight, aircraft=AircraftData(antenna_arm_m=4.0, mounting_deg=0.5, mounting_sigma_deg=0.3))
+    assert mounted.error_deg == pytest.approx(result.error_deg - 0.5, abs=1e-3)
+    assert mounted.standard_error_deg == pytest.approx(np.hypot(result.standard_error_deg, 0.3), rel=1e-2)
+
+
+# Invariances
+
+
+def test_turning_the_world_changes_nothing(result: HeadingResult) -> None:
+    run = run_of()
+    angle = np.deg2rad(137.0)
+    north, east = run.velocity_north_mps, run.velocity_east_mps
+    turned = replace(
+        run,
+        ins_heading_deg=wrap_360(run.ins_heading_deg + 137.0),
+        velocity_north_mps=np.cos(angle) * north - np.sin(angle) * east,
+        velocity_east_mps=np.sin(angle) * north + np.cos(angle) * east,
+    )
+    found = estimate(taxi_flight(turned))
+    assert found.paper_error_deg == pytest.approx(result.paper_error_deg, abs=SAME_DEG)
+    assert found.error_deg == pytest.approx(result.error_deg, abs=2e-3)  # the search starts from other roundings
+    assert found.samples == result.samples
+
+
+def test_north_is_crossed() -> None:
+    case = replace(CASE, first_track_deg=359.9, segments_s=(60.0,), turns_deg=())
+    found = estimate(taxi_flight(run_of(case)))
+    assert found.error_deg == pytest.approx(0.8, abs=0.15)
+    assert found.estimate_sd_deg < 1.0
+
+
+def test_shifting_time_changes_nothing(flight: Flight, result: HeadingResult) -> None:
+    shift = 86_400_000_000_000 * 365
+
+    def later(table: Table) -> Table:
+        return replace(table, time_ns=table.time_ns + shift)
+
+    tables = {topic: later(table) for topic, table in flight.tables.items()}
+    found = estimate(replace(flight, tables=tables, start_ns=flight.start_ns + shift))
+    assert found.error_deg == result.error_deg
+    assert found.confidence95_deg == result.confidence95_deg
+
+
+def test_dropping_a_third_of_the_samples_stays_inside_the_interval(flight: Flight, result: HeadingResult) -> None:
+    keep = np.random.default_rng(3).random(len(flight["gnss"])) > 1 / 3
+    found = estimate(with_table(flight, "gnss", lambda table: table.take(keep)))
+    assert abs(found.error_deg - result.error_deg) < result.standard_error_deg
+    assert found.samples < result.samples
+
+
+def test_duplicated_gnss_rows_change_nothing(flight: Flight, result: HeadingResult) -> None:
+    found = estimate(with_table(flight, "gnss", lambda table: table.take(np.repeat(np.arange(len(table)), 2))))
+    assert found.samples == result.samples
+    assert found.error_deg == result.error_deg
+
+
+def test_truth_is_never_looked_at(flight: Flight, result: HeadingResult) -> None:
+    assert estimate(without_topic(flight, "truth")).error_deg == result.error_deg
+
+
+# Gates: failed and not measured (passed: the good run above)
+
+
+def test_geometry_gate(flight: Flight) -> None:
+    bad = np.where(np.random.default_rng(0).random(len(flight["gnss"])) < 0.3, 2.5, 1.5)
+    failed = estimate(with_column(flight, "gnss", "gdop", bad))
+    assert gate_of(failed, "geometry").state == "failed"
+    assert gate_of(failed, "geometry").value == pytest.approx(0.7, abs=0.05)
+    assert failed.verdict == "reject"
+    missing = estimate(without_column(flight, "gnss", "gdop"))
+    assert gate_of(missing, "geometry").state == "not_measured"
+    assert missing.verdict == "undecided"
+    assert missing.correction_deg is None
+
+
+def test_pdop_stands_in_for_gdop_and_is_named(flight: Flight) -> None:
+    table = flight["gnss"]
+    other = with_column(without_column(flight, "gnss", "gdop"), "gnss", "pdop", table.values("gdop"))
+    found = estimate(other)
+    assert "PDOP" in gate_of(found, "geometry").title
+    assert found.verdict == "accept"
+
+
+def test_integrity_gate(flight: Flight) -> None:
+    good = np.random.default_rng(0).random(len(flight["gnss"])) > 0.3
+    assert gate_of(estimate(with_column(flight, "gnss", "integrity_ok", good)), "integrity").state == "failed"
+    missing = estimate(without_column(flight, "gnss", "integrity_ok"))
+    assert gate_of(missing, "integrity").state == "not_measured"
+    assert missing.verdict == "undecided"
+
+
+def test_ground_gate(flight: Flight) -> None:
+    unproven = estimate(without_topic(flight, "discrete"))
+    assert gate_of(unproven, "ground").state == "not_measured"
+    assert unproven.verdict == "undecided"
+
+
+def test_mode_change_rejects_and_a_missing_mode_does_not(flight: Flight) -> None:
+    ins = flight["ins"]
+    seconds = flight.seconds(ins.time_ns)
+    changed = estimate(with_column(flight, "ins", "mode", np.where(seconds < 90.0, "align", "nav")))
+    assert gate_of(changed, "ins_mode").state == "failed"
+    assert changed.verdict == "reject"
+    aligned = estimate(with_column(flight, "ins", "mode", np.where(seconds < 50.0, "align", "nav")))
+    assert aligned.verdict == "accept"
+    missing = estimate(without_column(flight, "ins", "mode"))
+    assert gate_of(missing, "ins_mode").state == "not_measured"
+    assert missing.verdict == "accept"
+
+
+def test_standstill_gates(flight: Flight) -> None:
+    moved = flight["gnss"].values("velocity_north_mps") + np.where(flight.time_s("gnss") < 62.0, 0.03, 0.0)
+    failed = estimate(with_column(flight, "gnss", "velocity_north_mps", moved))
+    assert gate_of(failed, "standstill_speed_of_mean").state == "failed"
+    assert failed.verdict == "reject"
+    none = estimate(with_table(flight, "gnss", lambda table: table.take(flight.time_s("gnss") > 55.0)))
+    assert gate_of(none, "standstill_speed_of_mean").state == "not_measured"
+    assert gate_of(none, "variance_ratio").state == "not_measured"
+    assert none.standstill is None
+    assert none.verdict == "undecided"
+
+
+def test_variance_gate_fails_where_heading_and_track_disagree(flight: Flight) -> None:
+    """Track noise three times what the standstill showed."""
+    gnss, time_s = flight["gnss"], flight.time_s("gnss")
+    noise = 0.15 * np.random.default_rng(1).standard_normal((2, len(gnss))) * (time_s > 62.0)
+    north = gnss.values("velocity_north_mps") + noise[0]
+    noisy = with_column(flight, "gnss", "velocity_north_mps", north)
+    found = estimate(with_column(noisy, "gnss", "velocity_east_mps", gnss.values("velocity_east_mps") + noise[1]))
+    assert gate_of(found, "variance_ratio").state == "failed"
+
+
+def test_precision_and_width_gates_ask_for_more(flight: Flight) -> None:
+    strict = HeadingSettings(precision_max_deg=0.01, half_width_max_deg=0.01)
+    found = estimate(flight, settings=strict)
+    assert {gate.name for gate in found.gates if gate.state == "failed" and gate.required} == {
+        "precision",
+        "half_width",
+    }
+    assert found.verdict == "extend"
+
+
+def test_gates_of_normality_can_fail(flight: Flight) -> None:
+    strict = HeadingSettings(skewness_max=1e-6, excess_kurtosis_range=(1.0, 2.0), normal_distance_max=1e-6)
+    states = {gate.name: gate.state for gate in estimate(flight, settings=strict).gates}
+    assert [states[name] for name in ("skewness", "kurtosis", "normal_distance")] == ["failed"] * 3
+
+
+# Real logs are worse
+
+
+def test_one_hertz_log_of_coarse_headings_is_not_precise(flight: Flight) -> None:
+    slow = with_table(flight, "gnss", lambda table: table.take(slice(0, None, 10)))
+    slow = with_table(slow, "ins", lambda table: table.take(slice(0, None, 50)))
+    coarse = with_column(slow, "ins", "true_heading_deg", np.round(slow["ins"].values("true_heading_deg"), 1) % 360.0)
+    found = estimate(coarse)
+    assert found.precision_deg > 0.08
+    assert found.verdict in ("extend", "reject")
+    assert found.error_deg == pytest.approx(0.8, abs=3.0 * found.standard_error_deg)
+
+
+def test_given_ground_and_heading_are_used(flight: Flight) -> None:
+    class Given:
+        def __init__(self, values: np.ndarray) -> None:
+            self.mask, self.method = values, "detector"
+            self.values_deg, self.description, self.declination_sigma_deg = values, "magnetic + declination", 0.4
+
+    heading = flight["ins"].values("true_heading_deg") + 1.0
+    found = estimate(
+        flight,
+        on_ground=lambda time_ns: Given(np.ones(len(time_ns), dtype=bool)),
+        heading=lambda topic: Given(heading),
+    )
+    assert found.error_deg == pytest.approx(1.8, abs=0.15)
+    assert found.standard_error_deg > 0.4
+    assert found.heading_source == "magnetic + declination"
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (lambda flight: without_topic(flight, "ins"), "no INS heading"),
+        (lambda flight: without_topic(flight, "gnss"), "no GNSS velocity"),
+        (
+            lambda flight: with_table(flight, "gnss", lambda t: t.take(flight.time_s("gnss") < 61.0)),
+            "never above 6 m/s",
+        ),
+        (lambda flight: with_table(flight, "ins", lambda t: t.take(slice(0, 1))), "no INS heading"),
+    ],
+)
+def test_what_cannot_be_assessed_says_why(flight: Flight, change: Callable[[Flight], Flight], reason: str) -> None:
+    with pytest.raises(NotAssessableError, match=reason):
+        estimate(change(flight))
+
+
+def test_unknown_topic_is_named(flight: Flight) -> None:
+    with pytest.raises(NotAssessableError, match=r"no topic ins\.3"):
+        estimate(flight, request=HeadingRequest(ins_topic="ins.3"))
+
+
+# Figures
+
+
+FIGURES = {
+    "heading_samples": (
+        *("time_s", "segment", "heading_deg", "track_deg", "ground_speed_mps"),
+        *("difference_deg", "residual_deg", "used", "gate", "weight"),
+    ),
+    "heading_lanes": ("start_s", "end_s", "state"),
+    "heading_running": (
+        *("time_s", "cycles", "mean_deg", "sigma_deg", "precision_deg", "quality_deg", "honest_half_width_deg"),
+    ),
+    "heading_distribution": ("bin_low_deg", "bin_high_deg", "density_per_deg"),
+    "heading_normal": ("difference_deg", "density_per_deg"),
+    "heading_growth": ("step", "time_s", "bin_center_deg", "density_per_deg"),
+    "standstill_velocity": ("time_s", "velocity_north_mps", "velocity_east_mps", "in_interval"),
+    "standstill_mean_speed": ("window_s", "speed_of_mean_mps", "density_per_mps"),
+    "heading_spectrum": ("frequency_hz", "density_deg2_per_hz", "model_deg2_per_hz"),
+}
+
+
+def test_figures_have_their_columns(result: HeadingResult) -> None:
+    assert {figure.name: tuple(figure.columns) for figure in result.figures} == FIGURES
+
+
+def test_figures_agree_with_the_answer(result: HeadingResult) -> None:
+    figures = {figure.name: figure for figure in result.figures}
+    samples, running = figures["heading_samples"], figures["heading_running"]
+    assert int(samples["used"].sum()) == result.samples == len(running)
+    assert float(running["mean_deg"][-1]) == pytest.approx(result.paper_error_deg)
+    assert float(np.mean(samples["weight"][samples["used"]])) == pytest.approx(1.0)
+    low, high = result.confidence95_deg
+    assert float(running["honest_half_width_deg"][-1]) == pytest.approx(0.5 * (high - low), rel=0.1)
+    bins = figures["heading_distribution"]
+    width = bins["bin_high_deg"] - bins["bin_low_deg"]
+    assert float(np.sum(bins["density_per_deg"] * width)) == pytest.approx(1.0)
+    growth = figures["heading_growth"]
+    last = growth["density_per_deg"][growth["step"] == growth["step"].max()]
+    assert last == pytest.approx(bins["density_per_deg"])
+    lanes = figures["heading_lanes"]
+    assert (lanes["end_s"] >= lanes["start_s"]).all()

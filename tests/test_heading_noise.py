@@ -1,0 +1,189 @@
+"""The noise model's filter against dense matrices, and the interval made from it."""
+
+import numpy as np
+import pytest
+
+from groundstation.estimators.heading import noise
+from groundstation.estimators.heading.interval import (
+    PRIOR_MEAN,
+    PRIOR_SIGMA,
+    Differences,
+    Regressor,
+    StandstillVelocities,
+    error_posterior,
+    fixed_noise_estimate,
+    mixture_quantile,
+    sample_weights,
+)
+from groundstation.simulation.processes import damped_oscillation, gauss_markov
+
+DENSE_TOLERANCE = 1e-8  # relative: rounding of two ways to the same number
+
+
+def random_differences(rng: np.random.Generator, count: int = 60) -> Differences:
+    speed = rng.uniform(6.0, 9.0, count)
+    return Differences(
+        time_s=np.cumsum(rng.uniform(0.05, 0.5, count)),
+        difference_deg=rng.normal(2.0, 1.0, count),
+        direction_deg=rng.uniform(0.0, 360.0, count),
+        speed_mps=speed,
+        regressors=(Regressor(rng.normal(size=count), 3.0, 2.0),),
+    )
+
+
+def dense_covariance(data: Differences, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance of the differences, and what each GNSS component does to them, straight from autocovariances."""
+    white, correlated, tau, sway, frequency, damping, heading_white, motion = np.exp(theta)
+    natural = 2 * np.pi * frequency
+    damped = natural * np.sqrt(1 - damping**2)
+    lag = np.abs(data.time_s[:, None] - data.time_s[None, :])
+    angle = np.deg2rad(data.direction_deg)
+    effect = np.rad2deg(np.column_stack([np.sin(angle), -np.cos(angle)]) / data.speed_mps[:, None])
+    shape = np.cos(damped * lag) + damping * natural / damped * np.sin(damped * lag)
+    covariance = effect @ effect.T * (motion * correlated) ** 2 * np.exp(-lag / tau)
+    covariance += sway**2 * np.exp(-damping * natural * lag) * shape
+    covariance += np.diag(white**2 * np.sum(effect**2, axis=1) + heading_white**2)
+    return covariance, effect
+
+
+def draw_theta(rng: np.random.Generator) -> np.ndarray:
+    theta = PRIOR_MEAN + 0.3 * rng.standard_normal(len(PRIOR_MEAN))
+    theta[noise.DAMPING] = min(theta[noise.DAMPING], np.log(0.9))
+    return theta
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_filter_gives_the_dense_least_squares(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    data, theta = random_differences(rng), draw_theta(rng)
+    covariance, _effect = dense_covariance(data, theta)
+    columns = np.column_stack([np.ones(len(data.time_s)), data.regressors[0].values])
+    inverse = np.linalg.inv(covariance)
+    information = columns.T @ inverse @ columns + np.diag([0.0, 1 / 2.0**2])
+    right = columns.T @ inverse @ data.difference_deg + np.array([0.0, 3.0 / 2.0**2])
+    mean, sigma = fixed_noise_estimate(data, theta[None, :])
+    assert mean == pytest.approx(np.linalg.solve(information, right), rel=DENSE_TOLERANCE)
+    assert sigma == pytest.approx(np.sqrt(np.diag(np.linalg.inv(information))), rel=DENSE_TOLERANCE)
+
+
+def test_weights_are_the_row_sums_of_the_inverse_covariance() -> None:
+    rng = np.random.default_rng(4)
+    data, theta = random_differences(rng), draw_theta(rng)
+    covariance, _effect = dense_covariance(data, theta)
+    expected = np.linalg.solve(covariance, np.ones(len(data.time_s)))
+    assert sample_weights(data, theta) == pytest.approx(expected / expected.sum(), abs=DENSE_TOLERANCE)
+
+
+def test_likelihood_of_standstill_and_taxi_together_is_the_dense_one() -> None:
+    rng = np.random.default_rng(5)
+    data, theta = random_differences(rng, 30), draw_theta(rng)
+    still = np.arange(-25.0, -5.0)
+    north, east = rng.normal(size=(2, len(still)))
+    covariance, effect = dense_covariance(data, theta)
+    white, correlated, tau, motion = np.exp(theta[[noise.WHITE, noise.CORRELATED, noise.TAU, noise.MOTION]])
+    decay = np.exp(-np.abs(still[:, None] - still[None, :]) / tau)
+    own = correlated**2 * decay + white**2 * np.eye(len(still))
+    across = motion * correlated**2 * np.exp(-(data.time_s[:, None] - still[None, :]) / tau)
+    size = len(still)
+    joint = np.zeros((2 * size + len(data.time_s),) * 2)
+    joint[:size, :size] = joint[size : 2 * size, size : 2 * size] = own
+    joint[2 * size :, 2 * size :] = covariance
+    joint[2 * size :, :size] = effect[:, :1] * across
+    joint[2 * size :, size : 2 * size] = effect[:, 1:] * across
+    joint[: 2 * size, 2 * size :] = joint[2 * size :, : 2 * size].T
+    columns = np.zeros((len(joint), 1))
+    columns[2 * size :] = 1.0
+    values = np.concatenate([north, east, data.difference_deg])
+    inverse = np.linalg.inv(joint)
+    information = float((columns.T @ inverse @ columns)[0, 0])
+    mean = float((columns.T @ inverse @ values)[0]) / information
+    squares = float(values @ inverse @ values) - information * mean**2
+    expected = -0.5 * (np.linalg.slogdet(joint)[1] + np.log(information) + squares)
+    expected -= size * np.log(2 * np.pi)
+
+    log_likelihood, estimate, variance = np.empty(1), np.empty((1, 1)), np.empty((1, 1, 1))
+    taxi = (data.time_s, np.column_stack([data.difference_deg, np.ones(len(data.time_s))]), *effect.T.copy())
+    prior = (np.zeros(1), np.zeros(1))
+    ends = np.array([len(data.time_s)], dtype=np.int64)
+    gap_s = float(data.time_s[0] - still[-1])
+    noise.evaluate(
+        theta[None, :], (still, north, east, 0, gap_s), taxi, prior, ends, log_likelihood, estimate, variance
+    )
+    assert log_likelihood[0] == pytest.approx(expected, rel=DENSE_TOLERANCE)
+    assert estimate[0, 0] == pytest.approx(mean, rel=DENSE_TOLERANCE)
+    assert variance[0, 0, 0] == pytest.approx(1 / information, rel=DENSE_TOLERANCE)
+
+
+def simulated(
+    rng: np.random.Generator, seconds: float, correlated_mps: float
+) -> tuple[Differences, StandstillVelocities]:
+    count, speed = round(seconds * 10), 8.0
+    velocity = gauss_markov(rng, (2, 2000 + count), 0.1, correlated_mps, 3.0) + 0.05 * rng.standard_normal(
+        (2, 2000 + count)
+    )
+    sway = damped_oscillation(rng, (count,), 0.1, 0.5, 0.4, 0.1)
+    time_s = 0.1 * np.arange(2000 + count)
+    difference = sway - np.rad2deg(velocity[1, 2000:] / speed)
+    taxi = Differences(time_s[2000:], difference, np.zeros(count), np.full(count, speed))
+    return taxi, StandstillVelocities(time_s[:1900], velocity[0, :1900], velocity[1, :1900], 0, 10.0)
+
+
+def test_interval_narrows_with_time_and_widens_with_correlated_noise() -> None:
+    def half_width(seconds: float, correlated_mps: float) -> float:
+        taxi, still = simulated(np.random.default_rng(6), seconds, correlated_mps)
+        low, high = error_posterior(taxi, still).interval_deg()
+        return 0.5 * (high - low)
+
+    short, long, noisy = half_width(20.0, 0.02), half_width(120.0, 0.02), half_width(120.0, 0.08)
+    assert long < 0.7 * short
+    assert noisy > 1.8 * long
+
+
+def test_posterior_finds_the_noise_of_a_long_run() -> None:
+    taxi, still = simulated(np.random.default_rng(7), 120.0, 0.04)
+    posterior = error_posterior(taxi, still)
+    assert posterior.parameter("white_mps") == pytest.approx(0.05, rel=0.1)
+    assert posterior.parameter("correlated_mps") == pytest.approx(0.04, rel=0.4)
+    assert posterior.parameter("sway_hz") == pytest.approx(0.4, rel=0.1)
+    assert posterior.has_converged
+    assert posterior.effective_draws > 50
+
+
+def test_same_data_give_the_same_interval() -> None:
+    taxi, still = simulated(np.random.default_rng(8), 30.0, 0.03)
+    assert error_posterior(taxi, still).interval_deg() == error_posterior(taxi, still).interval_deg()
+
+
+@pytest.mark.parametrize("count", [2, 3, 10])
+@pytest.mark.parametrize("value", ["constant", "noisy"])
+def test_few_samples_and_no_standstill_give_a_wide_finite_interval(count: int, value: str) -> None:
+    rng = np.random.default_rng(9)
+    difference = np.full(count, 1.5) if value == "constant" else 1.5 + 0.5 * rng.standard_normal(count)
+    taxi = Differences(0.1 * np.arange(count), difference, np.zeros(count), np.full(count, 8.0))
+    low, high = error_posterior(taxi).interval_deg()
+    assert low < 1.5 < high
+    assert 0.1 < high - low < 20.0
+
+
+def test_mixture_quantile_of_unequal_normals() -> None:
+    from scipy.stats import norm
+
+    mean, sigma, weight = np.array([0.0, 1.0]), np.array([1.0, 3.0]), np.array([0.4, 0.6])
+    quantile = mixture_quantile(0.9, mean, sigma, weight)
+    assert float(weight @ norm.cdf((quantile - mean) / sigma)) == pytest.approx(0.9, abs=1e-9)
+
+
+def test_priors_are_broader_than_the_family() -> None:
+    """Two sigma of every prior reach beyond what docs/heading-family.md draws."""
+    family = {
+        "white_mps": (0.03, 0.07),
+        "correlated_mps": (0.02, 0.05),
+        "correlation_s": (1.0, 10.0),
+        "sway_deg": (0.25, 0.75),
+        "sway_hz": (0.2, 0.6),
+        "sway_damping": (0.02, 0.5),
+    }
+    for name, (low, high) in family.items():
+        index = noise.PARAMETER_NAMES.index(name)
+        assert PRIOR_MEAN[index] - 2.0 * PRIOR_SIGMA[index] < np.log(low)
+        assert PRIOR_MEAN[index] + 2.0 * PRIOR_SIGMA[index] > np.log(high)

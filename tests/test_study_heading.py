@@ -1,0 +1,88 @@
+"""Honesty of the interval over simulated taxi runs, and the figures of the paper measured again."""
+
+import numpy as np
+import pytest
+
+from groundstation.studies.heading import StudyResult, study_heading
+from groundstation.studies.heading_family import RunOutcome, run_family
+from groundstation.studies.heading_paper import arm_table, precision_table, quality_table, standstill_tables
+
+FEW_RUNS, FEW_SEED = 24, 5
+MANY_RUNS = 1000
+JUDGING_SEEDS = {"grid": 71, "continuous": 72}
+
+
+@pytest.fixture(scope="module")
+def few() -> tuple[RunOutcome, ...]:
+    return run_family("continuous", FEW_SEED, FEW_RUNS)
+
+
+def test_error_squared_is_what_the_interval_says(few: tuple[RunOutcome, ...]) -> None:
+    """Mean of (error / sigma)^2 inside the 99.9 % band of chi-square over 24 degrees of freedom, per degree."""
+    sigma = np.array([run.half_width_deg / 1.96 for run in few])
+    normalised = np.array([run.error_deg for run in few]) / sigma
+    assert 0.27 < np.mean(normalised**2) < 2.2
+
+
+def test_interval_holds_the_truth_more_often_than_e(few: tuple[RunOutcome, ...]) -> None:
+    inside, inside_paper = (sum(getattr(run, name) for run in few) for name in ("is_inside", "is_inside_paper"))
+    assert inside >= 20  # of 24 at 0.95: fewer in 1 of 200 seeds
+    assert inside > inside_paper
+
+
+def test_accepted_runs_are_within_twenty_arcmin(few: tuple[RunOutcome, ...]) -> None:
+    assert all(abs(run.error_deg) <= 20.0 / 60.0 for run in few if run.verdict == "accept")
+
+
+def test_coverage_of_e_is_as_stated_for_sway() -> None:
+    table = precision_table(np.random.default_rng(1), 600)
+    sway = np.array([label.startswith("sway") for label in table["errors"]])
+    assert table["measured"][sway] == pytest.approx(table["stated"][sway], abs=0.06)
+    gnss = table["measured"][~sway]  # pure and with white noise by turns: the stated figures lie between
+    stated = table["stated"][~sway][::2]
+    assert (gnss[::2] < stated).all()
+    assert (stated < gnss[1::2] + 0.03).all()
+
+
+def test_quality_of_ordinary_and_drifting_runs() -> None:
+    table = quality_table(np.random.default_rng(2), 60)
+    assert 0.03 < table["p05_deg"][0] < table["p95_deg"][0] < 0.25
+    assert table["median_deg"][1] == pytest.approx(0.58, abs=0.05)
+    assert table["p05_deg"][1] > 0.3
+
+
+def test_receiver_that_passes_30_s_often_fails_10_s() -> None:
+    passing, _density = standstill_tables(np.random.default_rng(3), 600)
+    share = {(name, int(window)): float(value) for name, window, value in zip(
+        passing["receiver"], passing["window_s"], passing["share_within_limit"], strict=True
+    )}  # fmt: skip
+    assert share["white 0.065 m/s", 30] == pytest.approx(0.97, abs=0.02)
+    assert share["white 0.065 m/s", 10] == pytest.approx(0.70, abs=0.06)
+
+
+def test_arm_inside_the_gates() -> None:
+    assert arm_table()["largest_deg"] == pytest.approx([0.33, 0.83, 1.67], abs=0.01)
+
+
+def test_study_writes_its_tables_and_page() -> None:
+    lines: list[str] = []
+    study = study_heading(runs=2, seed=FEW_SEED, progress=lines.append)
+    assert isinstance(study, StudyResult)
+    assert len(lines) == 4
+    names = [table.name for table in study.tables]
+    assert len(names) == len(set(names))
+    assert "heading_coverage_continuous" in names
+    assert all(len(table) for table in study.tables)
+    assert "| all | 2 |" in study.markdown
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", ["grid", "continuous"])
+def test_interval_holds_the_truth_in_93_to_97_of_100_runs(family: str) -> None:
+    outcomes = run_family(family, JUDGING_SEEDS[family], MANY_RUNS)  # type: ignore[arg-type]
+    assert 0.93 <= np.mean([run.is_inside for run in outcomes]) <= 0.97
+    twenty = [run.is_inside for run in outcomes if sum(run.case.segments_s) <= 20.5]
+    assert 0.91 <= np.mean(twenty) <= 0.99  # some 200 runs: sampling error 1.5 %
+    accepted = [run for run in outcomes if run.verdict == "accept"]
+    assert len(accepted) > 20
+    assert max(abs(run.error_deg) for run in accepted) <= 20.0 / 60.0
