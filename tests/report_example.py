@@ -188,10 +188,10 @@ def gates() -> tuple[Gate, ...]:
         Gate("speed_of_mean", "Mean GNSS velocity at standstill", 0.0047, 0.01, "mps", "passed"),
         Gate("geometry", "Geometric factor (PDOP: no GDOP logged)", 1.62, 2.0, "", "passed"),
         Gate("integrity", "GNSS integrity flag", None, 0.9, "", "not_measured", False, "no integrity flag in the log"),
-        Gate("taxi", "Straight taxi", 148.3, 20.0, "s", "passed"),
+        Gate("taxi", "Straight taxi", 148.3, 20.0, "s", "passed", sense="at_least"),
         Gate("precision", "Precision e", 0.0221, 0.05, "deg", "passed"),
         Gate("quality", "Quality", 0.061, 0.3, "deg", "passed"),
-        Gate("skewness", "Skewness", -0.12, (-0.5, 0.5), "", "passed", False),
+        Gate("skewness", "Skewness", -0.12, (-0.5, 0.5), "", "passed", False, sense="between"),
         Gate(
             "kurtosis", "Excess kurtosis", 2.4, (-1.2, 2.0), "", "failed", False, "heavy tails: gusts near the hangar"
         ),

@@ -239,6 +239,45 @@ def test_ground_gate(flight: Flight) -> None:
     assert unproven.verdict == "undecided"
 
 
+def flown_between(flight: Flight, start_s: float, end_s: float) -> Flight:
+    """The taxi with a flight cut into it: off the wheels and four times as fast from ``start_s`` to ``end_s``."""
+    wheels_s, gnss_s = flight.time_s("discrete"), flight.time_s("gnss")
+    on_wheels = flight["discrete"].values("weight_on_wheels") * ~((wheels_s >= start_s) & (wheels_s <= end_s))
+    flown = with_column(flight, "discrete", "weight_on_wheels", on_wheels > 0.5)
+    for name in ("velocity_north_mps", "velocity_east_mps"):
+        faster = np.where((gnss_s >= start_s) & (gnss_s <= end_s), 4.0, 1.0)
+        flown = with_column(flown, "gnss", name, flown["gnss"].values(name) * faster)
+    return flown
+
+
+def test_ground_runs_after_the_flight_are_used_where_those_before_are_too_short(
+    flight: Flight, result: HeadingResult
+) -> None:
+    first_s = result.segments[0].start_s
+    flown = flown_between(flight, first_s + 10.0, first_s + 25.0)
+    whole = estimate(flown)
+    assert gate_of(whole, "before_take_off").state == "failed"
+    assert whole.verdict == "reject" and whole.correction_deg is None
+    assert whole.segments[-1].start_s > first_s + 25.0
+    assert whole.confidence95_deg[0] < result.error_deg < whole.confidence95_deg[1]
+    strict = estimate(flown, settings=HeadingSettings(runs="before_take_off"))
+    assert strict.segments[-1].end_s <= first_s + 10.0
+    assert gate_of(strict, "before_take_off").state == "passed"
+    late = flown_between(flight, result.segments[-1].start_s, result.segments[-1].start_s + 15.0)
+    assert gate_of(estimate(late), "before_take_off").state == "passed", "enough before take-off: nothing else is used"
+
+
+def test_a_receiver_that_holds_its_velocity_leaves_the_standstill_not_measured(flight: Flight) -> None:
+    still = np.hypot(*(flight["gnss"].values(f"velocity_{axis}_mps") for axis in ("north", "east"))) < 0.5
+    held = flight
+    for name in ("velocity_north_mps", "velocity_east_mps"):
+        held = with_column(held, "gnss", name, np.where(still, 0.0, flight["gnss"].values(name)))
+    found = estimate(held)
+    assert found.standstill is not None and found.standstill.velocity_is_held
+    assert gate_of(found, "standstill_speed_of_mean").state == "not_measured"
+    assert gate_of(found, "standstill_duration").state == "passed"
+
+
 def test_mode_change_rejects_and_a_missing_mode_does_not(flight: Flight) -> None:
     ins = flight["ins"]
     seconds = flight.seconds(ins.time_ns)

@@ -171,10 +171,9 @@ def test_gates_show_state_in_words_and_symbols(full: str, tmp_path: Path) -> Non
 
 
 def test_least_values_are_told_from_largest_ones_even_on_the_limit() -> None:
-    ground = {"name": "ground", "value": 1.0, "limit": 1.0, "unit": "", "state": "passed"}
+    ground = {"name": "ground", "value": 1.0, "limit": 1.0, "unit": "", "state": "passed", "sense": "at_least"}
     assert limit_text(ground) == "≥ 1"
-    assert limit_text({**ground, "value": None, "state": "not_measured"}) == "≥ 1"
-    assert limit_text({**ground, "name": "ins_mode", "value": 0.0, "limit": 0.0}) == "≤ 0"
+    assert limit_text({**ground, "name": "ins_mode", "value": 0.0, "limit": 0.0, "sense": "at_most"}) == "≤ 0"
 
 
 def test_flight_without_heading_says_why_and_shows_the_rest(tmp_path: Path) -> None:

@@ -82,7 +82,10 @@ def test_logged_true_heading_comes_first_with_its_origin() -> None:
     np.testing.assert_array_equal(result.values_deg, [0.0, np.nan])
     assert (result.description, result.declination_sigma_deg) == ("true heading as logged", None)
     told = flight(ins, derived__ins__true_heading_deg="magnetic heading + logged variation")
-    assert true_heading(told).description == "true heading as logged: magnetic heading + logged variation"
+    assert (
+        true_heading(told).description
+        == "true heading, which the reader derived from magnetic heading + logged variation"
+    )
 
 
 def test_position_of_the_receiver_is_carried_over_at_most_ten_minutes() -> None:

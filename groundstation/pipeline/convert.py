@@ -70,7 +70,12 @@ def _convert_recorded(log: Log, target: Path) -> Converted:
 def _derivations(remarks: tuple[Remark, ...]) -> dict[str, str]:
     """What each derived field was derived from, ``derived.<topic>.<field>``: it stays with the flight."""
     derived = (remark for remark in remarks if remark.code == "derived")
-    return {f"derived.{remark.topic}.{field}": remark.text for remark in derived for field in remark.fields}
+    origin = " derived from "
+    return {
+        f"derived.{remark.topic}.{field}": remark.text.rpartition(origin)[2]
+        for remark in derived
+        for field in remark.fields
+    }
 
 
 def _copy_store(log: Log, target: Path) -> Converted:

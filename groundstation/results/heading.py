@@ -6,6 +6,7 @@ from typing import Literal
 from groundstation.results.figures import FigureData
 
 GateState = Literal["passed", "failed", "not_measured"]
+Sense = Literal["at_most", "at_least", "between"]
 Verdict = Literal["accept", "reject", "extend", "undecided"]
 
 
@@ -13,7 +14,8 @@ Verdict = Literal["accept", "reject", "extend", "undecided"]
 class Gate:
     """One acceptance gate: figure, limit, unit, state. ``value`` is None when it could not be measured.
 
-    ``limit`` is a number or a pair [low, high]; ``required`` gates decide the verdict, others inform.
+    ``limit`` is a number that the figure must reach or not exceed, as ``sense`` says, or a pair [low, high];
+    ``required`` gates decide the verdict, others inform.
     ``reason`` says in a few words why it failed or was not measured.
     """
 
@@ -25,6 +27,7 @@ class Gate:
     state: GateState
     required: bool = True
     reason: str = ""
+    sense: Sense = "at_most"
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,8 @@ class Standstill:
 
     Times are flight seconds. ``speed_of_mean_mps`` is the length of the mean velocity vector (gated),
     ``mean_of_speed_mps`` the mean of the speeds: the two readings of the paper. ``speed_bound97_mps`` is the 0.97
-    bound of the former from the effective number of samples.
+    bound of the former from the effective number of samples. ``velocity_is_held``: the receiver freezes its velocity
+    when standing (or shows it in coarse steps), so that its error cannot be seen.
     """
 
     start_s: float
@@ -51,6 +55,7 @@ class Standstill:
     white_sigma_mps: float | None = None
     correlated_sigma_mps: float | None = None
     correlation_time_s: float | None = None
+    velocity_is_held: bool = False
 
 
 @dataclass(frozen=True)

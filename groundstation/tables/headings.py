@@ -68,7 +68,7 @@ def true_heading(flight: Flight, ins_topic: str = "ins") -> TrueHeading:
     true_deg = table.values("true_heading_deg")
     if np.isfinite(true_deg).any():
         origin = flight.metadata.get(f"derived.{ins_topic}.true_heading_deg", "")
-        description = f"true heading as logged: {origin}" if origin else "true heading as logged"
+        description = f"true heading, which the reader derived from {origin}" if origin else "true heading as logged"
         return TrueHeading(np.where(np.isfinite(true_deg), wrap_360(true_deg), np.nan), description)
     magnetic_deg = table.values("magnetic_heading_deg")
     if not np.isfinite(magnetic_deg).any():

@@ -28,6 +28,9 @@ def estimate_heading_error(
 ) -> HeadingResult:
     """Estimate the INS heading error from straight taxi before take-off.
 
+    Where that taxi is shorter than ``taxi_min_s``, the ground runs after the flight are used too (``runs`` in the
+    settings); the gate ``before_take_off`` then fails, so that the verdict is reject and nothing is to be typed.
+
     Parameters
     ----------
     flight : Flight
@@ -61,10 +64,24 @@ def estimate_heading_error(
     settings, aircraft = settings or HeadingSettings(), aircraft or AircraftData()
     site, request = site or SiteData(), request or HeadingRequest()
     ins_topic, gnss_topic = choose_topics(flight, request)
-    paired = pair_samples(flight, ins_topic, gnss_topic, settings=settings, on_ground=on_ground, heading=heading)
-    if aircraft.mounting_deg:
-        paired = replace(paired, heading_deg=wrap_360(paired.heading_deg - aircraft.mounting_deg))
-    antenna = gate_samples(paired, settings, request)
+
+    def gated(with_later_runs: bool) -> Samples:
+        paired = pair_samples(
+            *(flight, ins_topic, gnss_topic),
+            settings=settings,
+            on_ground=on_ground,
+            heading=heading,
+            with_later_runs=with_later_runs,
+        )
+        if aircraft.mounting_deg:
+            paired = replace(paired, heading_deg=wrap_360(paired.heading_deg - aircraft.mounting_deg))
+        return gate_samples(paired, settings, request)
+
+    antenna = gated(with_later_runs=settings.runs == "all_ground")
+    if settings.runs == "auto" and antenna.is_used.sum() * antenna.interval_s < settings.taxi_min_s:
+        # Too little before take-off: what the whole flight says is worth more, though never a number to type.
+        whole = gated(with_later_runs=True)
+        antenna = whole if whole.is_used.sum() > antenna.is_used.sum() else antenna
     if antenna.is_used.sum() < 2:
         raise NotAssessableError("heading", _why_nothing_is_used(antenna, settings))
     standstill = find_standstill(antenna, settings)

@@ -84,6 +84,7 @@ class Samples:
     difference_deg : INS heading minus track
     geometry, integrity : NaN where not logged; integrity 1 good, 0 bad
     on_ground : proven
+    is_after_lift_off : the epoch is later than the first lift-off
     gate : why a sample is used or not
     segment : number of the straight segment, from 1; 0 for none
     """
@@ -98,6 +99,7 @@ class Samples:
     geometry: FloatArray
     integrity: FloatArray
     on_ground: BoolArray
+    is_after_lift_off: BoolArray
     gate: TextArray
     segment: NDArray[np.int64]
     geometry_name: str = ""
@@ -220,8 +222,11 @@ def pair_samples(
     settings: HeadingSettings,
     on_ground: OnGround | None = None,
     heading: HeadingOf | None = None,
+    with_later_runs: bool = False,
 ) -> Samples:
     """Pair each distinct GNSS epoch before lift-off with the INS heading interpolated to its time.
+
+    ``with_later_runs`` adds the epochs after lift-off at which ground contact is proven: landing roll and taxi in.
 
     The heading is interpolated along the shorter arc between INS samples no farther apart than
     ``heading_gap_max_s``; elsewhere it is NaN. The part before lift-off ends where ground contact, once proven, is
@@ -233,7 +238,7 @@ def pair_samples(
     method = "" if ground.method.startswith("none") else ground.method
     if not len(gnss):
         raise NotAssessableError(f"heading, {gnss_topic}", "no GNSS velocity in the log")
-    part = _before_lift_off(gnss, np.asarray(ground.mask), bool(method), settings)
+    part, is_after = _ground_part(gnss, np.asarray(ground.mask), bool(method), settings, with_later_runs)
     gnss, mask = gnss.take(part), np.asarray(ground.mask)[part]
     time_s = flight.seconds(gnss.time_ns)
     ins_time, ins_heading = _ins_heading(flight, ins_topic, given.values_deg, time_s)
@@ -250,6 +255,7 @@ def pair_samples(
         geometry=gnss.values(geometry_field) if geometry_field else np.full(len(gnss), np.nan),
         integrity=gnss.values("integrity_ok"),
         on_ground=mask,
+        is_after_lift_off=is_after,
         gate=np.full(len(gnss), "", dtype=GATE_TEXT),
         segment=np.zeros(len(gnss), dtype=np.int64),
         geometry_name=GEOMETRY_NAMES.get(geometry_field, ""),
@@ -257,6 +263,18 @@ def pair_samples(
         heading_source=given.description,
         heading_sigma_deg=given.declination_sigma_deg or 0.0,
     )
+
+
+def _ground_part(
+    gnss: Table, on_ground: BoolArray, is_proven: bool, settings: HeadingSettings, with_later_runs: bool
+) -> tuple[NDArray[np.int64], BoolArray]:
+    """Numbers of the epochs to pair, and which of them are later than lift-off."""
+    before = _before_lift_off(gnss, on_ground, is_proven, settings)
+    index = np.arange(before.start, before.stop)
+    later = np.arange(before.stop, len(gnss))
+    if with_later_runs and is_proven:
+        index = np.concatenate([index, later[on_ground[later]]])
+    return index, index >= before.stop
 
 
 def _before_lift_off(gnss: Table, on_ground: BoolArray, is_proven: bool, settings: HeadingSettings) -> slice:

@@ -6,6 +6,7 @@ from typing import Literal
 from groundstation.base.errors import SettingsError
 
 RateKind = Literal["slope", "raw"]
+Runs = Literal["auto", "before_take_off", "all_ground"]
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class HeadingSettings:
     spectrum_max_s: float = 300.0  # standstill used for the spectrum of the GNSS error
 
     # Stage B: taxi
+    runs: Runs = "auto"  # ground runs used; auto: those before take-off, all of the flight's where those are too short
     taxi_speed_min_mps: float = 6.0  # paper
     taxi_speed_max_mps: float = 20.0  # faster is a take-off run
     lift_off_speed_mps: float = 40.0  # bounds the taxi phase where nothing tells ground from air

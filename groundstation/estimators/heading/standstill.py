@@ -1,6 +1,6 @@
 """Stage A: the GNSS velocity assessed while the aircraft stands."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +82,10 @@ def find_standstill(samples: Samples, settings: HeadingSettings) -> StandstillDa
         first = int(np.searchsorted(samples.time_s, start_s - 1e-6))
         in_interval[first:end] = True
         answer = assess_standstill(samples, slice(first, end), settings)
-    return StandstillData(answer, in_interval, is_still, stretches, _is_informative(samples, is_still))
+    is_informative = _is_informative(samples, is_still)
+    if answer is not None:
+        answer = replace(answer, velocity_is_held=not is_informative)
+    return StandstillData(answer, in_interval, is_still, stretches, is_informative)
 
 
 def _stretches(samples: Samples, still: BoolArray, settings: HeadingSettings) -> tuple[tuple[int, int], ...]:

@@ -8,7 +8,7 @@ from groundstation.estimators.heading.checks import Normality, VarianceRatio
 from groundstation.estimators.heading.gating import is_straight_and_fast
 from groundstation.estimators.heading.samples import Samples
 from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.results.heading import Gate, Standstill, Verdict
+from groundstation.results.heading import Gate, Sense, Standstill, Verdict
 
 # Required gates whose failure more data may cure; the failure of any other required gate rejects.
 CURED_BY_MORE_DATA = frozenset({"standstill_duration", "taxi_seconds", "precision", "half_width"})
@@ -45,10 +45,11 @@ def _gate(
     """A gate that passes where low <= value <= high; its limit is the one bound given, or both."""
     bounds = tuple(bound for bound in (low, high) if bound is not None)
     limit = bounds[0] if len(bounds) == 1 else (bounds[0], bounds[1])
+    sense: Sense = "between" if len(bounds) == 2 else "at_most" if low is None else "at_least"
     if value is None or not np.isfinite(value):
-        return Gate(name, title, None, limit, unit, "not_measured", required, reason or "not measurable")
+        return Gate(name, title, None, limit, unit, "not_measured", required, reason or "not measurable", sense)
     passed = (low is None or value >= low) and (high is None or value <= high)
-    return Gate(name, title, float(value), limit, unit, "passed" if passed else "failed", required, reason)
+    return Gate(name, title, float(value), limit, unit, "passed" if passed else "failed", required, reason, sense)
 
 
 def build_gates(
@@ -108,6 +109,9 @@ def _throughout_gates(samples: Samples, figures: Figures, settings: HeadingSetti
 def _standstill_gates(standstill: Standstill | None, settings: HeadingSettings) -> tuple[Gate, ...]:
     missing = "no standstill before taxi in the log" if standstill is None else ""
     seconds = None if standstill is None else standstill.end_s - standstill.start_s
+    seen, unseen = standstill, missing
+    if standstill is not None and standstill.velocity_is_held:
+        seen, unseen = None, "the receiver holds its velocity when standing: its error cannot be seen"
     return (
         _gate(
             "standstill_duration",
@@ -120,18 +124,18 @@ def _standstill_gates(standstill: Standstill | None, settings: HeadingSettings) 
         _gate(
             STANDSTILL_GATE,
             "length of the mean GNSS velocity at standstill",
-            None if standstill is None else standstill.speed_of_mean_mps,
+            None if seen is None else seen.speed_of_mean_mps,
             high=settings.speed_of_mean_max_mps,
             unit="m/s",
-            reason=missing or f"over {seconds:.0f} s",
+            reason=unseen or f"over {seconds:.0f} s",
         ),
         _gate(
             "standstill_bound97",
             "its 0.97 bound, from the effective number of samples",
-            None if standstill is None else standstill.speed_bound97_mps,
+            None if seen is None else seen.speed_bound97_mps,
             high=settings.speed_of_mean_max_mps,
             unit="m/s",
-            reason=missing,
+            reason=unseen,
             required=False,
         ),
     )
@@ -139,7 +143,15 @@ def _standstill_gates(standstill: Standstill | None, settings: HeadingSettings) 
 
 def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings) -> tuple[Gate, ...]:
     outliers, used = int(np.sum(samples.gate == "outlier")), int(samples.is_used.sum())
+    later = int(samples.is_after_lift_off[samples.is_used].sum())
     return (
+        _gate(
+            "before_take_off",
+            "share of used samples before take-off",
+            (used - later) / max(used, 1),
+            low=1.0,
+            reason=f"{later} of {used} are from after the flight: too little straight taxi before it" if later else "",
+        ),
         _gate("taxi_seconds", "straight taxi", figures.taxi_seconds, low=settings.taxi_min_s, unit="s"),
         _gate(
             "outliers",

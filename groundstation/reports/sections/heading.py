@@ -22,8 +22,7 @@ from groundstation.reports.wording import (
 )
 from groundstation.results.files import SavedFlight
 
-# Gates whose limit is a least value; of the others the figure and the state tell.
-AT_LEAST = frozenset({"geometry", "integrity", "ground", "standstill_duration", "taxi_seconds", "gnss_rate"})
+SENSE_SIGNS = {"at_most": "≤ ", "at_least": "≥ "}
 GATE_MARKS = {
     "passed": Mark("good", "passed"),
     "failed": Mark("bad", "failed"),
@@ -72,27 +71,22 @@ def _drawn(*drawings: Drawing | None) -> tuple[Part, ...]:
 
 
 def limit_text(gate: Mapping[str, Any]) -> str:
-    """A gate's limit with the sense that its figure and state imply.
+    """A gate's limit with its sense.
 
     Examples
     --------
-    >>> limit_text({"value": 0.03, "limit": 0.05, "unit": "deg", "state": "passed"})
+    >>> limit_text({"limit": 0.05, "unit": "deg", "sense": "at_most"})
     '≤ 0.05°'
-    >>> limit_text({"value": 12.0, "limit": 20.0, "unit": "s", "state": "failed"})
+    >>> limit_text({"limit": 20.0, "unit": "s", "sense": "at_least"})
     '≥ 20\u202fs'
-    >>> limit_text({"value": None, "limit": [-1.2, 2.0], "unit": "", "state": "not_measured"})
+    >>> limit_text({"limit": [-1.2, 2.0], "unit": "", "sense": "between"})
     '−1.2 … 2'
     """
-    limit, unit, value = gate.get("limit"), unit_sign(str(gate.get("unit", ""))), gate.get("value")
-    state = gate.get("state")
+    limit, unit = gate.get("limit"), unit_sign(str(gate.get("unit", "")))
     if isinstance(limit, list | tuple) and len(limit) == 2:
         return number_with_unit(f"{significant(limit[0], 4)} … {significant(limit[1], 4)}", unit)
     text = number_with_unit(significant(limit, 4), unit)
-    if gate.get("name") in AT_LEAST:
-        return f"≥ {text}"
-    if not is_number(value) or not is_number(limit) or state not in ("passed", "failed"):
-        return text
-    return f"{'≤' if (value <= limit) == (state == 'passed') else '≥'} {text}"
+    return SENSE_SIGNS.get(str(gate.get("sense")), "") + text
 
 
 def _gates(heading: Mapping[str, Any]) -> Grid | None:

@@ -65,7 +65,8 @@ def _with_sigma(value: float | None, sigma: float | None, digits: int, unit: str
 
 def _gate_row(gate: Gate) -> list[str]:
     unit = UNITS.get(gate.unit, gate.unit)
-    limit = f"{gate.limit[0]:g} … {gate.limit[1]:g}" if isinstance(gate.limit, tuple) else f"{gate.limit:g}"
+    sign = {"at_most": "≤ ", "at_least": "≥ "}.get(gate.sense, "")
+    limit = f"{gate.limit[0]:g} … {gate.limit[1]:g}" if isinstance(gate.limit, tuple) else f"{sign}{gate.limit:g}"
     title = markdown_text(gate.title) + ("" if gate.required else " *(informs)*")
     if gate.reason:
         title += f": {markdown_text(gate.reason)}"
