@@ -75,9 +75,9 @@ def test_what_no_reader_claims_is_exit_1_in_one_line(tmp_path: Path, content: by
 def test_a_foreign_file_in_a_folder_is_skipped_and_listed(tmp_path: Path) -> None:
     (tmp_path / "logs").mkdir()
     (tmp_path / "logs/readme.txt").write_text("notes", encoding="utf-8")
-    code, out, _ = groundstation("run", str(tmp_path / "logs"), "-o", str(tmp_path / "out"))
+    code, _, err = groundstation("run", str(tmp_path / "logs"), "-o", str(tmp_path / "out"))
     assert code == 0
-    assert "readme.txt" in out
+    assert "skipped: readme.txt" in err
     assert "readme.txt" in (tmp_path / "out/index.csv").read_text(encoding="utf-8")
 
 

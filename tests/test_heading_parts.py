@@ -48,7 +48,8 @@ def simple_samples(time_s: np.ndarray, north: np.ndarray, east: np.ndarray, head
     zeros, nothing = np.zeros(count), np.full(count, np.nan)
     return Samples(
         time_s, (time_s * 1e9).astype(np.int64), heading, north, east, zeros, zeros, nothing, nothing,
-        np.ones(count, dtype=bool), np.zeros(count, dtype=bool), np.full(count, "", dtype="U20"), np.zeros(count, dtype=np.int64),
+        np.ones(count, dtype=bool), np.zeros(count, dtype=bool), np.full(count, "", dtype="U20"),
+        np.zeros(count, dtype=np.int64),
         ground_method="weight on wheels",
     )  # fmt: skip
 

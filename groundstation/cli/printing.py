@@ -77,6 +77,8 @@ def outcomes(
     for outcome in sorted(done, key=lambda one: one.state == "failed"):
         if outcome.state == "failed":
             typer.echo(f"error: {printable(outcome.text)}", err=True)
+        elif outcome.state == "skipped" and not quiet:
+            typer.echo(f"skipped: {printable(outcome.text)}", err=True)
         elif not quiet:
             typer.echo(f"{printable(outcome.flight_id or outcome.source)}  {printable(outcome.text)}")
         if with_times and outcome.times_s:
