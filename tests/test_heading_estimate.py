@@ -10,7 +10,9 @@ from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.estimators.heading.estimate import estimate_heading_error
+from groundstation.estimators.heading.figures import IN_PAUSE
 from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings, SiteData, Stand
+from groundstation.results.figures import FigureData
 from groundstation.results.heading import Gate, HeadingResult
 from groundstation.simulation.taxi import TaxiCase, TaxiRun, noiseless, simulate_taxi, taxi_flight
 from groundstation.tables.table import Flight, Table
@@ -57,6 +59,10 @@ def without_topic(flight: Flight, topic: str) -> Flight:
 
 def gate_of(result: HeadingResult, name: str) -> Gate:
     return next(gate for gate in result.gates if gate.name == name)
+
+
+def figure_of(result: HeadingResult, name: str) -> FigureData:
+    return next(figure for figure in result.figures if figure.name == name)
 
 
 @pytest.fixture(scope="module")
@@ -260,6 +266,9 @@ def test_ground_runs_after_the_flight_are_used_where_those_before_are_too_short(
     assert whole.verdict == "reject" and whole.correction_deg is None
     assert whole.segments[-1].start_s > first_s + 25.0
     assert whole.confidence95_deg[0] < result.error_deg < whole.confidence95_deg[1]
+    lanes = figure_of(estimate(flown_between(flight, first_s + 10.0, first_s + 55.0)), "heading_lanes")
+    pause = list(lanes["state"]).index(IN_PAUSE)
+    assert lanes["end_s"][pause] - lanes["start_s"][pause] > 30.0, "nothing is drawn across the flight"
     strict = estimate(flown, settings=HeadingSettings(runs="before_take_off"))
     assert strict.segments[-1].end_s <= first_s + 10.0
     assert gate_of(strict, "before_take_off").state == "passed"

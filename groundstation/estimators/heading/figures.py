@@ -1,5 +1,7 @@
 """Arrays behind the figures of the heading tab and the report; names and columns are fixed, times flight seconds."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,11 +15,31 @@ FloatArray = NDArray[np.float64]
 NORMAL_POINTS = 600
 FIRST_MOTION_MPS = 1.0
 LEAST_HALF_WIDTH_DEG = 0.05  # of the histogram
+PAUSE_S = 30.0  # a longer one between epochs (a flight between ground runs) breaks the lines
+IN_PAUSE = "no ground run"
 
 
 def _moving_part(samples: Samples) -> slice:
     moving = np.flatnonzero((samples.speed_mps > FIRST_MOTION_MPS) | samples.is_used)
     return slice(int(moving[0]), len(samples)) if len(moving) else slice(0, len(samples))
+
+
+def _with_breaks(columns: dict[str, NDArray[Any]], held: tuple[str, ...] = ()) -> dict[str, NDArray[Any]]:
+    """Insert a row without values after the epoch before each pause, so that lines break there.
+
+    Columns named in ``held`` keep the value of that epoch; numbers become NaN, flags False, text :data:`IN_PAUSE`.
+    """
+    before = np.flatnonzero(np.diff(columns["time_s"]) > PAUSE_S)
+    if not len(before):
+        return columns
+    filler: dict[str, Any] = {"f": np.nan, "b": False, "i": 0, "U": IN_PAUSE}
+    out = {
+        name: np.insert(values, before + 1, values[before] if name in held else filler[values.dtype.kind])
+        for name, values in columns.items()
+        if name != "time_s"
+    }
+    usual_s = float(np.median(np.diff(columns["time_s"])))
+    return {"time_s": np.insert(columns["time_s"], before + 1, columns["time_s"][before] + usual_s), **out}
 
 
 def samples_figure(samples: Samples, error_deg: float, weight: FloatArray) -> FigureData:
@@ -39,13 +61,14 @@ def samples_figure(samples: Samples, error_deg: float, weight: FloatArray) -> Fi
         "weight": weight,
     }
     digits = {"time_s": 3, "ground_speed_mps": 3, "heading_deg": 4, "track_deg": 4, "difference_deg": 4, "weight": 3}
-    return FigureData("heading_samples", {name: values[part] for name, values in columns.items()}, digits)
+    return FigureData("heading_samples", _with_breaks({name: values[part] for name, values in columns.items()}), digits)
 
 
 def lanes_figure(samples: Samples) -> FigureData:
     """Runs of equal gate, from first motion on."""
     part = _moving_part(samples)
-    time_s, gate = samples.time_s[part], samples.gate[part]
+    broken = _with_breaks({"time_s": samples.time_s[part], "gate": samples.gate[part]})
+    time_s, gate = broken["time_s"], broken["gate"]
     edges = np.flatnonzero(gate[1:] != gate[:-1]) + 1
     starts = np.concatenate([[0], edges]) if len(gate) else np.zeros(0, dtype=np.int64)
     ends = np.concatenate([edges, [len(gate) - 1]]) if len(gate) else np.zeros(0, dtype=np.int64)
@@ -69,7 +92,7 @@ def running_figure(
         "quality_deg": running.quality_deg,
         "honest_half_width_deg": half_width,
     }
-    return FigureData("heading_running", columns, {"time_s": 3})
+    return FigureData("heading_running", _with_breaks(columns, held=("cycles",)), {"time_s": 3})
 
 
 def _bin_edges(difference_deg: FloatArray) -> FloatArray:
