@@ -50,7 +50,7 @@ def wraps_after(heading_deg: FloatArray) -> BoolArray:
     [False, True, False]
     """
     jumps = np.abs(np.diff(heading_deg, axis=0)) > 180.0
-    return np.asarray(jumps.reshape(len(jumps), -1).any(axis=1))
+    return np.asarray(jumps.any(axis=tuple(range(1, jumps.ndim))))
 
 
 def break_line(time_ns: Int64Array, values: FloatArray, breaks: BoolArray) -> tuple[Int64Array, FloatArray]:

@@ -99,7 +99,7 @@ def _turning(samples: Samples, settings: HeadingSettings) -> NDArray[np.bool_]:
         )
     if samples.ground_method:
         turning &= samples.on_ground
-    return np.asarray(turning & ~np.isin(samples.gate, ["excluded", "outlier", "take-off run"]))
+    return np.asarray(turning & ~np.isin(samples.gate, ["excluded", "outlier", "too fast"]))
 
 
 def _from_turns(

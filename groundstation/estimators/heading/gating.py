@@ -23,7 +23,7 @@ def gate_samples(samples: Samples, settings: HeadingSettings, request: HeadingRe
     with np.errstate(invalid="ignore"):
         gate[~(np.abs(samples.rate_dps) <= settings.turn_rate_max_dps)] = "turning"
     gate[~(speed > settings.taxi_speed_min_mps)] = "too slow"
-    gate[speed > settings.taxi_speed_max_mps] = "take-off run"
+    gate[speed > settings.taxi_speed_max_mps] = "too fast"
     for interval in request.intervals:
         inside = (samples.time_s >= interval.start_s) & (samples.time_s <= interval.end_s)
         if interval.use == "force":

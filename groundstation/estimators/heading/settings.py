@@ -36,7 +36,7 @@ class HeadingSettings:
     # Stage B: taxi
     runs: Runs = "auto"  # ground runs used; auto: those before take-off, all of the flight's where those are too short
     taxi_speed_min_mps: float = 6.0  # paper
-    taxi_speed_max_mps: float = 20.0  # faster is a take-off run
+    taxi_speed_max_mps: float = 20.0  # faster is a take-off run or a landing roll
     lift_off_speed_mps: float = 40.0  # bounds the taxi phase where nothing tells ground from air
     turn_rate_max_dps: float = 1.0  # paper: |rate of INS heading|
     turn_rate_window_s: float = 2.0
