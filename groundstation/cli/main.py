@@ -239,8 +239,8 @@ def simulate(
 def study(
     name: Annotated[Literal["heading"], typer.Argument(help="Which study.", metavar="NAME")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the tables.", metavar="DIR")],
-    runs: Annotated[int, typer.Option("--runs", help="Simulated runs.", min=10)] = 1000,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the random numbers.")] = 20150601,
+    runs: Annotated[int, typer.Option("--runs", help="Simulated runs of each family.", min=10)] = 200,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the first family; the second has the next one.")] = 71,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,

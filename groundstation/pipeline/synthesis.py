@@ -38,9 +38,10 @@ def study_to(name: str, folder: Path, *, runs: int, seed: int, force: bool, list
     if page.exists() and not force:
         raise UsageError(str(page), "a file that exists", "a new folder", "-f overwrites it")
     (folder / "tables").mkdir(parents=True, exist_ok=True)
-    listen(Event("begin", total=runs))
-    result = study_heading(runs=runs, seed=seed, progress=lambda text: listen(Event("end", name, text)))
+    listen(Event("begin", total=1))
+    result = study_heading(runs=runs, seed=seed, progress=lambda text: listen(Event("stage", name, text)))
     for table in result.tables:
         write_text(folder / "tables" / f"{table.name}.csv", csv_text(table))
     write_text(page, result.markdown)
+    listen(Event("end", name, str(page)))
     return result.markdown

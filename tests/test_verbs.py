@@ -1,0 +1,136 @@
+"""The smaller verbs: info, convert, simulate, study, list, report; what they print and write."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from groundstation.cli.main import app
+from groundstation.simulation.scenario import scenario_names
+
+SAMPLES = Path(__file__).parents[1] / "sample_logs"
+
+
+def groundstation(*arguments: str) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr of a call in this process."""
+    result = CliRunner().invoke(app, list(arguments))
+    return result.exit_code, result.stdout, result.stderr
+
+
+def test_info_tells_topics_rates_and_findings(tmp_path: Path) -> None:
+    code, text, err = groundstation("info", str(SAMPLES / "taxi-good.csv"))
+    assert (code, err) == (0, "")
+    assert "flat-csv" in text and "gnss" in text and "2026-05-04T06:00:00" in text
+    code, text, _ = groundstation("info", str(SAMPLES / "taxi-good.csv"), "--json")
+    described = json.loads(text)
+    rows = {topic["name"]: topic["rows"] for topic in described["topics"]}
+    assert code == 0 and rows["gnss"] == rows["ins"] > 1000
+
+
+def test_info_of_a_damaged_log_is_exit_3() -> None:
+    code, text, _ = groundstation("info", str(SAMPLES / "taxi-damaged.csv"))
+    assert code == 3 and "stepped back" in text
+
+
+def test_info_of_the_mcap_tells_what_the_log_told(tmp_path: Path) -> None:
+    mcap = tmp_path / "x.mcap"
+    assert groundstation("convert", str(SAMPLES / "taxi-good.csv"), "-o", str(mcap))[0] == 0
+    first, second = (
+        json.loads(groundstation("info", str(path), "--json")[1]) for path in (SAMPLES / "taxi-good.csv", mcap)
+    )
+    strip = [{key: topic[key] for key in ("name", "rows", "rate_hz", "span_s")} for topic in first["topics"]]
+    assert [{key: topic[key] for key in strip[0]} for topic in second["topics"]] == strip
+
+
+def test_a_foreign_mcap_is_listed_by_info_and_refused_by_run(tmp_path: Path) -> None:
+    from mcap.writer import Writer
+
+    path = tmp_path / "foreign.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("", "somebody")
+        schema = writer.register_schema("Thing", "jsonschema", b"{}")
+        channel = writer.register_channel("/thing", "json", schema)
+        writer.add_message(channel, 10**18, b"{}", 10**18)
+        writer.finish()
+    code, text, _ = groundstation("info", str(path))
+    assert code == 0 and "/thing" in text and "Thing" in text
+    code, _, err = groundstation("run", str(path), "-o", str(tmp_path / "out"))
+    assert code == 1 and "foreign.mcap" in err
+
+
+def test_convert_does_not_overwrite_without_force(tmp_path: Path) -> None:
+    target = tmp_path / "x.mcap"
+    target.write_text("mine", encoding="utf-8")
+    arguments = ["convert", str(SAMPLES / "taxi-good.csv"), "-o", str(target)]
+    code, _, err = groundstation(*arguments)
+    assert code == 2 and "-f" in err and target.read_text(encoding="utf-8") == "mine"
+    assert groundstation(*arguments, "-f")[0] == 0
+
+
+def test_simulate_writes_what_run_accepts(tmp_path: Path) -> None:
+    code, out, _ = groundstation("simulate", "taxi-short", "-o", str(tmp_path), "--seed", "3")
+    assert code == 0
+    log = Path(out.strip())
+    assert log.is_file()
+    assert groundstation("simulate", "taxi-short", "-o", str(tmp_path))[0] == 2
+    assert groundstation("info", str(log))[0] == 0
+    code, _, err = groundstation("simulate", "no-such", "-o", str(tmp_path))
+    assert code == 2 and "taxi-good" in err
+
+
+def test_list_names_analyses_formats_and_scenarios() -> None:
+    code, text, _ = groundstation("list")
+    assert code == 0
+    assert all(name in text for name in ("heading", "flat-csv", *scenario_names()))
+
+
+def test_list_of_a_log_says_whether_it_would_run_and_why_not(tmp_path: Path) -> None:
+    assert "would run" in groundstation("list", str(SAMPLES / "taxi-good.csv"))[1]
+    log = tmp_path / "still.csv"
+    log.write_text("time_s,ins.true_heading_deg\n0,1\n1,1\n2,1\n", encoding="utf-8")
+    code, text, _ = groundstation("list", str(log), "--json")
+    (entry,) = json.loads(text)
+    assert code == 0 and entry["would_run"] is False and "GNSS" in entry["reason"]
+
+
+def test_study_writes_page_and_tables(tmp_path: Path) -> None:
+    code, text, _ = groundstation("study", "heading", "-o", str(tmp_path), "--runs", "10")
+    assert code == 0
+    assert text.strip() == (tmp_path / "heading.md").read_text(encoding="utf-8").strip()
+    assert (tmp_path / "tables/heading_published.csv").is_file()
+    assert groundstation("study", "heading", "-o", str(tmp_path), "--runs", "10")[0] == 2
+
+
+def test_progress_as_json_lines_goes_to_stderr(tmp_path: Path) -> None:
+    arguments = ["run", str(SAMPLES / "taxi-short.csv"), "-o", str(tmp_path / "out"), "--progress", "json"]
+    code, _, err = groundstation(*arguments)
+    events = [json.loads(line) for line in err.splitlines()]
+    assert code == 0 and [events[0]["event"], events[-1]["event"]] == ["begin", "end"]
+
+
+def test_fail_on_reaches_exit_4(tmp_path: Path) -> None:
+    arguments = ["run", str(SAMPLES / "taxi-drift.csv"), "-o", str(tmp_path / "out")]
+    assert groundstation(*arguments)[0] == 0
+    assert groundstation(*arguments, "--fail-on", "warn")[0] == 4
+
+
+def test_results_go_to_stdout_and_nothing_else_does(tmp_path: Path) -> None:
+    arguments = ["run", str(SAMPLES), "-o", str(tmp_path / "out"), "--json", "-j", "1"]
+    code, out, err = groundstation(*arguments)
+    assert code == 3
+    assert {entry["state"] for entry in json.loads(out)} == {"done", "data_lost", "skipped"}
+    assert "Traceback" not in err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX pipes")
+def test_a_closed_pipe_is_no_error(tmp_path: Path) -> None:
+    command = f"{sys.executable} -m groundstation list | head -n 1"
+    done = subprocess.run(
+        ["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True, env=dict(os.environ)
+    )
+    assert done.stderr == "" and done.stdout.startswith("heading")
