@@ -1,7 +1,6 @@
 """Several logs: each in its turn or several at once, one bad log never stopping the others."""
 
 import shutil
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -46,10 +45,12 @@ def run_many(
     _prepare(out, force)
     work = [Job(one.path, out, configuration, fail_on, one.is_named) for one in inputs]
     listen(Event("begin", total=len(work)))
-    outcomes = list(_carry_out(work, jobs, listen))
-    outcomes = _settle(outcomes, work, out, listen)
+    shelf = Shelf(out)
+    for job, outcome in zip(work, _carry_out(work, jobs, listen), strict=True):
+        shelf.put(job, outcome)
+    outcomes = shelf.settled(listen)
     _write_index(out, outcomes)
-    return tuple(outcomes)
+    return outcomes
 
 
 def _prepare(out: Path, force: bool) -> None:
@@ -91,29 +92,52 @@ def _carry_out(work: Sequence[Job], jobs: int, listen: Listener) -> Iterator[Out
             yield outcome
 
 
-def _settle(outcomes: list[Outcome], work: Sequence[Job], out: Path, listen: Listener) -> list[Outcome]:
-    """Move finished flights into place; flights of one id are run again with the log's digest in their names."""
-    first_of_content: dict[str, str] = {}
-    settled = list(outcomes)
-    for place_in_list, outcome in enumerate(outcomes):
-        if not outcome.flight_id:
-            continue
-        twin = first_of_content.setdefault(outcome.sha256, outcome.source)
-        if twin != outcome.source:
-            text = f"same content as {twin}: listed once"
-            settled[place_in_list] = replace(outcome, state="skipped", text=text, flight_id="", folder="", row={})
-    count = Counter(outcome.flight_id for outcome in settled if outcome.flight_id)
-    for place_in_list, outcome in enumerate(settled):
-        identity = outcome.flight_id
-        is_clash = count[identity] > 1 or _is_of_another_log(out / identity, outcome)
-        if identity and is_clash and not identity.startswith("NOTIME_"):
+class Shelf:
+    """Where finished flights are put: into place at once, so that a run that is killed keeps what it had finished.
+
+    Two flights of one id get the digests of their logs into their names; as that is known only when the second one
+    is finished, they are run again at the end. A log that is listed twice (same content) is kept once.
+    """
+
+    def __init__(self, out: Path) -> None:
+        self._out = out
+        self._jobs: list[Job] = []
+        self._outcomes: list[Outcome] = []
+        self._first_of_content: dict[str, str] = {}
+        self._ids: set[str] = set()
+        self._clashes: set[str] = set()
+
+    def put(self, job: Job, outcome: Outcome) -> None:
+        """Take a finished log over."""
+        twin = self._first_of_content.setdefault(outcome.sha256, outcome.source) if outcome.sha256 else outcome.source
+        if outcome.flight_id and twin != outcome.source:
             shutil.rmtree(outcome.folder, ignore_errors=True)
-            settled[place_in_list] = outcome = run_flight(replace(work[place_in_list], add_suffix=True), listen)
-        if outcome.flight_id:
-            target = out / outcome.flight_id
-            place(Path(outcome.folder), target)
-            settled[place_in_list] = replace(outcome, folder=str(target))
-    return settled
+            text = f"{job.path.name}: same content as {twin}, listed once"
+            outcome = replace(outcome, state="skipped", text=text, flight_id="", folder="", row={})
+        self._jobs.append(job)
+        self._outcomes.append(self._placed(outcome) if outcome.flight_id else outcome)
+
+    def _placed(self, outcome: Outcome) -> Outcome:
+        target = self._out / outcome.flight_id
+        is_first = outcome.flight_id not in self._ids
+        self._ids.add(outcome.flight_id)
+        if not is_first or _is_of_another_log(target, outcome):
+            self._clashes.add(outcome.flight_id)
+            return outcome
+        place(Path(outcome.folder), target)
+        return replace(outcome, folder=str(target))
+
+    def settled(self, listen: Listener) -> tuple[Outcome, ...]:
+        """What became of each log, in the order of the inputs, once all are put."""
+        for number, (job, outcome) in enumerate(zip(self._jobs, self._outcomes, strict=True)):
+            if outcome.flight_id in self._clashes:
+                shutil.rmtree(outcome.folder, ignore_errors=True)
+                again = run_flight(replace(job, add_suffix=True), listen)
+                if again.flight_id:
+                    place(Path(again.folder), self._out / again.flight_id)
+                    again = replace(again, folder=str(self._out / again.flight_id))
+                self._outcomes[number] = again
+        return tuple(self._outcomes)
 
 
 def _is_of_another_log(folder: Path, outcome: Outcome) -> bool:

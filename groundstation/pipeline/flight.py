@@ -100,7 +100,7 @@ def _run(log: Log, job: Job, partial: Path, watch: Stopwatch) -> Outcome:
         flight = read_flight(mcap, converted)
     start_utc_ns = flight.start_ns if flight.has_utc else None
     identity = flight_id(start_utc_ns, flight.metadata, log.source.sha256)
-    if job.add_suffix and start_utc_ns is not None:
+    if job.add_suffix and start_utc_ns is not None:  # NOTIME ids hold the digest already
         identity += f"_{log.source.sha256[:8]}"
     with watch.stage("estimating"):
         results = analyse(flight, given_of(log, converted, identity), job.configuration)
