@@ -115,11 +115,15 @@ class LogHeader:
     utc_of_zero_ns : int, optional
         UTC (nanoseconds since 1970) of device time zero. 0 when device times are themselves UTC; None when the log
         has no absolute time (NOTIME: never today's date).
+    has_counting_clock : bool
+        Device times count up from power-up and nothing sets them: a record that comes after a later one of another
+        topic was written late, and is no step of the clock.
     """
 
     reader: str
     metadata: Mapping[str, str] = field(default_factory=dict)
     utc_of_zero_ns: int | None = None
+    has_counting_clock: bool = False
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,9 @@
 import re
 from datetime import UTC, datetime, timedelta, timezone
 
+import numpy as np
+from numpy.typing import NDArray
+
 from groundstation.base.errors import GroundstationError
 from groundstation.base.units import NS_PER_S
 
@@ -109,3 +112,49 @@ def duration_text(seconds: float) -> str:
     hours, minutes = divmod(minutes, 60)
     tail = f"{rest // 10:02d}.{rest % 10}"
     return f"{hours}:{minutes:02d}:{tail}" if hours else f"{minutes}:{tail}"
+
+
+# First day of each GPS-UTC difference in whole seconds. Source: IERS Bulletin C; the IANA list leap-seconds.list.
+_LEAP_SECONDS = (
+    ("1981-07-01", 1),
+    ("1982-07-01", 2),
+    ("1983-07-01", 3),
+    ("1985-07-01", 4),
+    ("1988-01-01", 5),
+    ("1990-01-01", 6),
+    ("1991-01-01", 7),
+    ("1992-07-01", 8),
+    ("1993-07-01", 9),
+    ("1994-07-01", 10),
+    ("1996-01-01", 11),
+    ("1997-07-01", 12),
+    ("1999-01-01", 13),
+    ("2006-01-01", 14),
+    ("2009-01-01", 15),
+    ("2012-07-01", 16),
+    ("2015-07-01", 17),
+    ("2017-01-01", 18),
+)
+_GPS_EPOCH_S = 315_964_800  # 1980-01-06, seconds since 1970
+_S_PER_WEEK = 604_800
+
+
+def gps_week_to_utc_ns(week: NDArray[np.int64] | int, week_ms: NDArray[np.int64] | int) -> NDArray[np.int64]:
+    """UTC nanoseconds since 1970 of GPS week and milliseconds of the week, less the leap seconds of that day.
+
+    Weeks count from 6 January 1980 without rolling over at 1024.
+
+    Examples
+    --------
+    The week of 31 December 2016, before and after the last leap second so far:
+
+    >>> [utc_ns_to_iso(int(gps_week_to_utc_ns(1930, ms))) for ms in (16_000, 18_000)]
+    ['2016-12-31T23:59:59.000Z', '2017-01-01T00:00:00.000Z']
+    """
+    gps_s = np.asarray(week, dtype=np.int64) * _S_PER_WEEK + np.asarray(week_ms, dtype=np.int64) // 1000
+    days = np.array([day for day, _leap in _LEAP_SECONDS], dtype="datetime64[s]").astype(np.int64)
+    leaps = np.array([0, *(leap for _day, leap in _LEAP_SECONDS)], dtype=np.int64)
+    starts_s = days - _GPS_EPOCH_S + leaps[1:]
+    leap_s = leaps[np.searchsorted(starts_s, gps_s, side="right")]
+    whole_ns = (gps_s + _GPS_EPOCH_S - leap_s) * NS_PER_S
+    return np.asarray(whole_ns + np.asarray(week_ms, dtype=np.int64) % 1000 * 1_000_000, dtype=np.int64)

@@ -93,6 +93,8 @@ class Clock:
         False when no record has a time: then nothing can be placed.
     stray_index : ndarray of int64
         Records that are out of order with a time that is believed.
+    stale_times : int
+        Records of a counting clock with the time of an earlier publication (see ``integrity.counting``).
     lateness_ns : mapping of topic to int
         How far a record comes after a later one of its topic, at most: the hold-back that restores order.
     """
@@ -111,6 +113,7 @@ class Clock:
     shift_ns: int = 0
     has_times: bool = False
     stray_index: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    stale_times: int = 0
     lateness_ns: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -124,9 +127,15 @@ class Clock:
         """
         segment = np.searchsorted(self.starts, record_index, side="right") - 1
         time = device_time_ns.values + self.offsets_ns[np.maximum(segment, 0)]
-        if len(self.placed_index):
+        if not len(self.placed_index) or not len(record_index):
+            return np.asarray(time, dtype=np.int64)
+        if (np.diff(record_index) <= 0).any():
             at = np.minimum(np.searchsorted(self.placed_index, record_index), len(self.placed_index) - 1)
-            time = np.where(self.placed_index[at] == record_index, self.placed_ns[at], time)
+            return np.where(self.placed_index[at] == record_index, self.placed_ns[at], time)
+        low, high = np.searchsorted(self.placed_index, (record_index[0], record_index[-1] + 1))
+        at = np.searchsorted(record_index, self.placed_index[low:high])  # few are placed: they are looked for
+        found = record_index[at] == self.placed_index[low:high]
+        time[at[found]] = self.placed_ns[low:high][found]
         return np.asarray(time, dtype=np.int64)
 
     def correct(self, batch: RecordBatch) -> RecordBatch:
@@ -164,6 +173,7 @@ class Clock:
             ],
             "missing_times": self.missing_times,
             "implausible_times": self.implausible_times,
+            "stale_times": self.stale_times,
             "stray_rows": self.stray_rows,
             "is_unordered": self.is_unordered,
             "shift_s": round(self.shift_ns / NS_PER_S, 3),
@@ -211,8 +221,8 @@ def estimate_clock(
     nodes = believed & ~found.stray
     placed_index = np.concatenate((record_index[~timed], index[found.implausible]))
     placed_index.sort()
-    placed = _interpolated(placed_index, index[nodes], own[nodes], found.period_per_record_ns)
-    zero = _zero(int(np.concatenate((own[believed], placed)).min()), utc_of_zero_ns)
+    placed = interpolated(placed_index, index[nodes], own[nodes], found.period_per_record_ns)
+    zero = zero_of(int(np.concatenate((own[believed], placed)).min()), utc_of_zero_ns)
     return Clock(
         is_absolute=zero.is_absolute,
         period_ns=found.period_ns,
@@ -231,16 +241,18 @@ def estimate_clock(
     )
 
 
-class _Zero(NamedTuple):
+class Zero(NamedTuple):
+    """What is added to all times, and whether they then are UTC."""
+
     is_absolute: bool
     ns: int
 
 
-def _zero(earliest_ns: int, utc_of_zero_ns: int | None) -> _Zero:
+def zero_of(earliest_ns: int, utc_of_zero_ns: int | None) -> Zero:
     """What to add to all times: UTC of zero, or as much as leaves none negative. Nothing is recorded before 1970."""
     if utc_of_zero_ns is not None and earliest_ns + utc_of_zero_ns >= 0:
-        return _Zero(True, utc_of_zero_ns)
-    return _Zero(False, max(0, -earliest_ns))
+        return Zero(True, utc_of_zero_ns)
+    return Zero(False, max(0, -earliest_ns))
 
 
 class _Steps:
@@ -347,7 +359,7 @@ class _Steps:
             self.implausible[first:stop] = away
 
 
-def _interpolated(wanted: Int64Array, index: Int64Array, time: Int64Array, period_ns: float) -> Int64Array:
+def interpolated(wanted: Int64Array, index: Int64Array, time: Int64Array, period_ns: float) -> Int64Array:
     """Times of places between known ones by place, outside them by the nominal period; integers throughout."""
     if not len(wanted):
         return np.zeros(0, dtype=np.int64)

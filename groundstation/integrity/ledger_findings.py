@@ -8,16 +8,16 @@ from groundstation.integrity.clock import Clock, ClockStep
 from groundstation.integrity.ledger import Ledger, TopicLedger
 
 MANY_MISSING_TIMES = 0.01  # share of records without a time above which it is a warning
-_REMARKS_THAT_WARN = ("assumed_utc", "unreadable_metadata", "plug_in", "duplicate_column")
+_REMARKS_THAT_WARN = ("assumed_utc", "clock_disagrees", "unreadable_metadata", "plug_in", "duplicate_column")
 
 
 def ledger_findings(ledger: Ledger) -> tuple[Finding, ...]:
     """Findings of a ledger: clock first, then losses, topics and the reader's remarks.
 
     Codes: ``clock.backward_step``, ``clock.forward_step``, ``clock.missing_times``, ``clock.implausible_times``,
-    ``clock.shifted``, ``clock.no_utc``, ``clock.no_times``, ``time.unordered``, ``time.stray_rows``,
-    ``time.duplicates``, ``data.none``, ``data.gaps``, ``data.<kind of damage>`` (``data.truncated``,
-    ``data.dropped_rows``, ``data.unreadable_cells`` ...), ``values.out_of_range``, ``values.nan``,
+    ``clock.stale_times``, ``clock.shifted``, ``clock.no_utc``, ``clock.no_times``, ``time.unordered``,
+    ``time.stray_rows``, ``time.duplicates``, ``data.none``, ``data.gaps``, ``data.<kind of damage>``
+    (``data.truncated``, ``data.dropped_rows``, ``data.unreadable_cells`` ...), ``values.out_of_range``, ``values.nan``,
     ``reader.<remark>`` (``reader.derived``, ``reader.assumed_utc`` ...).
     """
     findings = [*_clock(ledger), *_damages(ledger)]
@@ -47,6 +47,12 @@ def _clock(ledger: Ledger) -> Iterator[Finding]:
             f"{_counted(clock.implausible_times, 'record')} with a time that cannot be true: placed by their neighbours"
         )
         yield Finding("warn", "clock.implausible_times", text, count=clock.implausible_times)
+    if clock.stale_times:
+        text = (
+            f"{_counted(clock.stale_times, 'record')} with the time of an earlier publication (the newest value when "
+            "the log began, or a topic whose time does not advance): placed by their neighbours"
+        )
+        yield Finding("info", "clock.stale_times", text, count=clock.stale_times)
     if clock.is_unordered:
         text = f"the log is not in order of time ({clock.stray_rows} records after a later one): sorted"
         yield Finding("warn", "time.unordered", text, count=clock.stray_rows)

@@ -21,6 +21,7 @@ from groundstation.base.records import (
 )
 from groundstation.base.signals import field_of
 from groundstation.integrity.clock import Clock, ClockSettings, estimate_clock
+from groundstation.integrity.counting import estimate_counting_clock, frozen_records
 from groundstation.integrity.ledger import FieldLedger, Gaps, Ledger, LedgerSettings, TopicLedger, topic_ledger
 
 
@@ -62,6 +63,7 @@ class _FieldTally:
 
     low: float
     high: float
+    is_known: bool = True  # of a field that nobody knows, infinity may be meant: "no limit"
     present: int = 0
     nan: int = 0
     out_of_range: int = 0
@@ -74,7 +76,9 @@ class _FieldTally:
             return
         values = column.values
         nan = np.isnan(values)
-        outside = (values < self.low) | (values > self.high) | np.isinf(values)
+        outside = (values < self.low) | (values > self.high)
+        if self.is_known:
+            outside |= np.isinf(values)
         if mask is not None:
             nan, outside = nan & mask, outside & mask
         self.nan += int(nan.sum())
@@ -151,7 +155,7 @@ class _TopicTally:
             if tally is None:
                 known = field_of(self.topic, name)
                 low, high = (known.low, known.high) if known else (float("-inf"), float("inf"))
-                tally = self.fields[name] = _FieldTally(low, high)
+                tally = self.fields[name] = _FieldTally(low, high, known is not None)
             tally.add(column, batch.record_index)
 
     def ledger(self, whole: _Piece, clock: Clock, settings: LedgerSettings) -> tuple[TopicLedger, int]:
@@ -204,13 +208,22 @@ def survey(
         else:
             header = item
     joined = {topic: pieces.joined(tallies[topic].pieces) for topic in sorted(tallies)}
-    clock = estimate_clock(*_all_records(joined.values()), header.utc_of_zero_ns, settings=clock_settings)
+    clock = _clock_of(header, joined.values(), clock_settings)
     settings = ledger_settings or LedgerSettings()
     named = joined.items() if clock.has_times else ()
     results = [tallies[topic].ledger(whole, clock, settings) for topic, whole in named]
     topics = tuple(ledger for ledger, _lateness in results)
     clock = replace(clock, lateness_ns={ledger.topic: lateness for ledger, lateness in results})
     return Survey(header, clock, Ledger(topics, clock, tuple(damages), tuple(remarks), settings))
+
+
+def _clock_of(header: LogHeader, pieces: Iterable[_Piece], settings: ClockSettings | None) -> Clock:
+    """The model of the log's clock, of the kind that its reader names."""
+    index, time = _all_records(pieces)
+    if not header.has_counting_clock:
+        return estimate_clock(index, time, header.utc_of_zero_ns, settings=settings)
+    frozen = frozen_records(index, ((piece.index, piece.time, piece.mask) for piece in pieces))
+    return estimate_counting_clock(index, time, frozen, header.utc_of_zero_ns)
 
 
 def _all_records(pieces: Iterable[_Piece]) -> tuple[Int64Array, Column]:
@@ -221,9 +234,23 @@ def _all_records(pieces: Iterable[_Piece]) -> tuple[Int64Array, Column]:
     largest = max(distinct, key=lambda piece: len(piece.index))
     if all(_contains(largest.index, piece.index) for piece in distinct):
         return largest.index, Column(largest.time, largest.mask)
-    index, first = np.unique(np.concatenate([piece.index for piece in distinct]), return_index=True)
-    time = np.concatenate([piece.time for piece in distinct])[first]
-    return index, Column(time, np.concatenate([piece.mask for piece in distinct])[first])
+    return _united(distinct)
+
+
+def _united(pieces: list[_Piece]) -> tuple[Int64Array, Column]:
+    """Records of all pieces in order of their places, each place once."""
+    start, end = min(int(piece.index[0]) for piece in pieces), max(int(piece.index[-1]) for piece in pieces) + 1
+    if end - start <= 4 * sum(len(piece.index) for piece in pieces):  # places without many holes need no sorting
+        seen, mask = np.zeros(end - start, dtype=bool), np.zeros(end - start, dtype=bool)
+        time = np.zeros(end - start, dtype=np.int64)
+        for piece in reversed(pieces):
+            at = piece.index - start
+            seen[at], time[at], mask[at] = True, piece.time, piece.mask
+        places = np.flatnonzero(seen)
+        return places + start, Column(time[places], mask[places])
+    index, first = np.unique(np.concatenate([piece.index for piece in pieces]), return_index=True)
+    time = np.concatenate([piece.time for piece in pieces])[first]
+    return index, Column(time, np.concatenate([piece.mask for piece in pieces])[first])
 
 
 def _contains(whole: Int64Array, part: Int64Array) -> bool:

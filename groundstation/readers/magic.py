@@ -4,7 +4,7 @@ from groundstation.readers.source import Source
 
 _AT_START: tuple[tuple[bytes, str], ...] = (
     (b"ULog\x01\x12\x35", "PX4 ULog"),
-    (b"\xa3\x95", "ArduPilot DataFlash"),
+    (b"\xa3\x95", "ArduPilot DataFlash without its definitions"),
     (b"\x25\xeb", "IRIG 106 Chapter 10"),
     (b"\xb5\x62", "u-blox UBX"),
     (b"$GP", "NMEA 0183"),

@@ -14,11 +14,12 @@ from typing import Any
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.records import Item, Remark
-from groundstation.readers import csv_profile, flat_csv, magic
+from groundstation.readers import csv_profile, dataflash, flat_csv, magic, ulog
 from groundstation.readers.source import Claim, Source
 
 ENTRY_POINT_GROUP = "groundstation.readers"
-_BUILT_IN: tuple[Any, ...] = (csv_profile, flat_csv)
+_OF_TEXT: tuple[Any, ...] = (csv_profile, flat_csv)
+_BUILT_IN: tuple[Any, ...] = (dataflash, ulog, *_OF_TEXT)
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,12 @@ def read(path: str | Path, profile: Path | None = None) -> Iterator[Item]:
         items = csv_profile.read(source, profile)
     else:
         items = reader.read(source) if reader in _BUILT_IN else _guarded(reader, claim, source)
-    return chain(items, (Remark("plug_in", trouble) for trouble in troubles))
+    return chain(items, _of_the_source(source), (Remark("plug_in", trouble) for trouble in troubles))
+
+
+def _of_the_source(source: Source) -> Iterator[Item]:
+    """Damage of the compressed file; known only when all was read."""
+    yield from source.damages()
 
 
 def _guarded(reader: Any, claim: Claim, source: Source) -> Iterator[Item]:
@@ -128,7 +134,7 @@ def _guarded(reader: Any, claim: Claim, source: Source) -> Iterator[Item]:
 
 
 def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]]:
-    if source.size == 0:
+    if source.is_empty:
         raise UnreadableLogError(source.name, "an empty file", "a recorded log", "check how it was copied")
     if profile is not None:
         return csv_profile.claim_by(source, profile), plug_in_failures()
@@ -136,6 +142,8 @@ def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]
     refusals: list[GroundstationError] = []
     troubles = list(plug_in_failures())
     for name, reader in _readers().items():
+        if claims and reader in _OF_TEXT:  # claimed by its first bytes: no text, and looking for rows takes time
+            continue
         try:
             claim = _own(reader.sniff(source), name)
         except GroundstationError as error:
@@ -159,6 +167,8 @@ def _own(claim: Any, name: str) -> Claim | None:
 
 
 def _unclaimed(source: Source, refusals: list[GroundstationError], troubles: list[str]) -> GroundstationError:
+    if source.compression and not source.head:
+        return UnreadableLogError(source.name, f"{source.compression} data that cannot be decompressed")
     known = magic.recognise(source)
     if known is not None:
         return UnreadableLogError(

@@ -1,5 +1,6 @@
-"""A log file as readers see it before one of them claims it."""
+"""A log file as readers see it before one of them claims it; gzip and zstd files are seen decompressed."""
 
+import io
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,7 +8,8 @@ from pathlib import Path
 from typing import Any, BinaryIO, Protocol, runtime_checkable
 
 from groundstation.base.errors import UnreadableLogError
-from groundstation.base.records import Item
+from groundstation.base.records import Damage, Item
+from groundstation.readers.compressed import Expanded, Window, compression_of, expand, head_of
 
 HEAD_BYTES = 1 << 20  # a header row of 10 000 columns takes about 300 kB
 
@@ -30,26 +32,56 @@ class Source:
 
     @cached_property
     def size(self) -> int:
-        """Size in bytes."""
+        """Size in bytes, of the decompressed log when the file is compressed."""
+        return self._expanded.size if self.compression else self._file_size
+
+    @cached_property
+    def compression(self) -> str:
+        """``gzip``, ``zstd`` or nothing, told by the content."""
+        with self._open_file() as stream:
+            return compression_of(stream.read(4))
+
+    @cached_property
+    def head(self) -> bytes:
+        """The first :data:`HEAD_BYTES` bytes, decompressed; fewer when the file is shorter."""
+        with self._open_file() as stream:
+            return head_of(stream, self.compression, HEAD_BYTES) if self.compression else stream.read(HEAD_BYTES)
+
+    def open(self) -> BinaryIO:
+        """Open for reading bytes; a compressed file is decompressed at the first call.
+
+        Raises
+        ------
+        UnreadableLogError
+            When the file is absent, a folder, may not be read, or expands beyond all measure.
+        """
+        if self.compression:
+            return io.BufferedReader(Window(self._expanded.file, self._expanded.size))
+        return self._open_file()
+
+    def damages(self) -> tuple[Damage, ...]:
+        """Damage of the compressed file itself, once it was opened."""
+        damage = self._expanded.damage if self.compression else None
+        return (damage,) if damage else ()
+
+    @cached_property
+    def is_empty(self) -> bool:
+        """Whether the file has no bytes."""
+        return self._file_size == 0
+
+    @cached_property
+    def _expanded(self) -> Expanded:
+        with self._open_file() as stream:
+            return expand(stream, self.compression, self._file_size, self.name)
+
+    @cached_property
+    def _file_size(self) -> int:
         try:
             return self.path.stat().st_size
         except OSError as error:
             raise self._unopenable(error) from error
 
-    @cached_property
-    def head(self) -> bytes:
-        """The first :data:`HEAD_BYTES` bytes, fewer when the file is shorter."""
-        with self.open() as stream:
-            return stream.read(HEAD_BYTES)
-
-    def open(self) -> BinaryIO:
-        """Open for reading bytes.
-
-        Raises
-        ------
-        UnreadableLogError
-            When the file is absent, a folder, or may not be read.
-        """
+    def _open_file(self) -> BinaryIO:
         try:
             return self.path.open("rb")
         except OSError as error:

@@ -1,0 +1,154 @@
+"""DataFlash to tables and to MCAP against pymavlink's recv_msg loop; a damaged log against a good one; peak memory."""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from groundstation.integrity.ordering import corrected
+from groundstation.integrity.survey import survey
+from groundstation.pipeline.convert import convert_log
+from groundstation.pipeline.log import open_log
+from groundstation.readers.dataflash import read
+from groundstation.readers.dataflash.blocks import Scanner
+from groundstation.readers.source import Source
+from groundstation.tables.assemble import flight_from_batches
+
+LOGS = Path(os.environ.get("GROUNDSTATION_REAL_LOGS", Path(__file__).parents[2] / "shared" / "data")) / "dataflash"
+LONG_BYTES = 60_000_000
+REPEATS = 5
+
+
+def repeated(source: Path, target: Path) -> None:
+    """A long log: the records behind the definitions again and again, their times going on."""
+    data = np.fromfile(source, np.uint8)
+    blocks = list(Scanner(Source(source)))  # the file is one piece: offsets count from its start
+    types, offsets = (np.concatenate([getattr(block, name) for block in blocks]) for name in ("types", "offsets"))
+    first = int(offsets[np.flatnonzero(types == 128)[-1] + 1])
+    body = data[first:].copy()
+    places, last = [], 0
+    for block in blocks:
+        for definition, which in block.groups():
+            if definition.time_field is not None:
+                name, _unit = definition.time_field
+                assert definition.dtype.fields is not None
+                at = block.offsets[which][:, None] + definition.dtype.fields[name][1] + np.arange(4) - first
+                places.append(at[at[:, 0] >= 0])
+                last = max(last, int(body[at[-1]].view("<u4")[0]))
+    index = np.concatenate(places)
+    with target.open("wb") as stream:
+        stream.write(data.tobytes())
+        for repeat in range(1, LONG_BYTES // len(body)):
+            copy = body.copy()
+            times = body[index].reshape(-1).view("<u4") + np.uint32(repeat * last)
+            copy[index] = times.view(np.uint8).reshape(-1, 4)
+            stream.write(copy.tobytes())
+
+
+def damaged(source: Path, target: Path, seed: int = 1) -> None:
+    """A copy with one bit in 5000 bytes flipped and one page in 100 overwritten by zeros."""
+    rng = np.random.default_rng(seed)
+    data = np.fromfile(source, np.uint8)
+    at = rng.integers(10_000, len(data), len(data) // 5000)
+    data[at] ^= (1 << rng.integers(0, 8, len(at))).astype(np.uint8)
+    for page in rng.integers(10_000, len(data) - 4096, len(data) // 409_600):
+        data[page : page + 4096] = 0
+    data.tofile(target)
+
+
+def to_tables(path: Path) -> int:
+    """Read, repair the clock and make the tables of all topics; returns the number of records."""
+    items = list(read(Source(path)))
+    found = survey(items)
+    batches = corrected(items, found.clock)
+    flight = flight_from_batches(batches, metadata={}, has_utc=found.clock.is_absolute, source_name=path.name)
+    return sum(len(table) for topic, table in flight.tables.items() if topic.startswith("raw."))
+
+
+def by_pymavlink(path: Path, values: bool) -> int:
+    """Take every message of a log; with its ``values``, or without a look at them."""
+    from pymavlink.DFReader import DFReader_binary
+
+    count = 0
+    with DFReader_binary(str(path)) as reader:
+        while (message := reader.recv_msg()) is not None:
+            if values:
+                message.to_dict()
+            count += 1
+    return count
+
+
+def best(work: Callable[[], object], repeats: int = REPEATS) -> float:
+    """Shortest wall seconds of several runs."""
+    seconds = []
+    for _ in range(repeats):
+        started = time.perf_counter()
+        work()
+        seconds.append(time.perf_counter() - started)
+    return min(seconds)
+
+
+def peak_mb(path: Path, work: str) -> float:
+    """Peak resident memory of a process that reads a log (``read``) or converts it (``convert``)."""
+    done = subprocess.run([sys.executable, __file__, work, str(path)], check=True, capture_output=True, text=True)
+    return float(done.stdout)
+
+
+def child(work: str, path: Path) -> None:
+    """Do the work and print the peak memory of this process, MB."""
+    if work == "read":
+        for _item in read(Source(path)):
+            pass
+    elif work == "convert":
+        convert_log(open_log(path), path.with_suffix(".mcap"))
+    status = Path("/proc/self/status").read_text()  # a child's ru_maxrss begins at that of its parent
+    print(int(re.search(r"VmHWM:\s*(\d+) kB", status)[1]) / 1024)  # type: ignore[index]
+
+
+def report(path: Path, folder: Path, peer_repeats: int) -> None:
+    """Print the figures of one log."""
+    records = to_tables(path)  # compiles
+    target, broken = folder / "x.mcap", folder / "broken.BIN"
+    convert_log(open_log(path), target)
+    bare_s, peer_s = (best(lambda values=values: by_pymavlink(path, values), peer_repeats) for values in (False, True))
+    read_s = best(lambda: list(read(Source(path))))
+    tables_s = best(lambda: to_tables(path))
+    convert_s = best(lambda: convert_log(open_log(path), target))
+    damaged(path, broken)
+    broken_s = best(lambda: to_tables(broken))
+    print(f"{path.name}: {path.stat().st_size / 1e6:.1f} MB, {records} records")
+    print(f"  pymavlink recv_msg   {bare_s:8.3f} s without its values, {peer_s:.3f} s with them")
+    for work, seconds, limit in (("read", read_s, ""), ("to tables", tables_s, ", 20"), ("convert", convert_s, ", 5")):
+        ratios = f"{bare_s / seconds:.1f} and {peer_s / seconds:.1f} times as fast"
+        print(f"  {work:20} {seconds:8.3f} s, {ratios}" + (f"{limit} wanted" if limit else ""))
+    print(f"  damaged, to tables   {broken_s:8.3f} s, {broken_s / tables_s:.2f} of the good log, 1.5 allowed")
+    base = peak_mb(path, "nothing")
+    for work in ("read", "convert"):
+        print(f"  peak memory, {work:7} {peak_mb(path, work):6.0f} MB ({base:.0f} MB before the log is opened)")
+
+
+def main() -> None:
+    """Print speeds and memory for the largest recorded flight and for a long log made from it."""
+    if len(sys.argv) > 2:
+        child(sys.argv[1], Path(sys.argv[2]))
+        return
+    logs = sorted(LOGS.glob("*.BIN"), key=lambda path: path.stat().st_size)
+    if not logs:
+        print(f"no recorded logs in {LOGS} (GROUNDSTATION_REAL_LOGS)")
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        flight, long = Path(folder) / logs[-1].name, Path(folder) / "long.BIN"
+        flight.write_bytes(logs[-1].read_bytes())
+        report(flight, Path(folder), peer_repeats=2)
+        repeated(flight, long)
+        report(long, Path(folder), peer_repeats=1)
+
+
+if __name__ == "__main__":
+    main()

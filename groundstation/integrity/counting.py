@@ -1,0 +1,155 @@
+"""The clock of a log whose device times count up from power-up: nothing sets it, so it has no steps.
+
+Its records come topic by topic out of many buffers: an order between topics proves nothing, and each record keeps its
+own time. Not believed are times far from those of the records around them: an autopilot that begins a log writes the
+newest value of every topic with the time at which it was published, minutes before, and some topics never advance
+their time at all. Such records are placed where they stand in the log.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from groundstation.base.records import BoolArray, Column, Int64Array
+from groundstation.base.units import NS_PER_S
+from groundstation.integrity.clock import Clock, interpolated, zero_of
+
+FROZEN_SHARE, FROZEN_LEAST_RECORDS = 0.9, 10
+
+
+@dataclass(frozen=True)
+class CountingSettings:
+    """What a counting clock believes.
+
+    Parameters
+    ----------
+    tolerance_s : float
+        A record may be written so much later than others of its time: slow topics are up to two seconds old.
+    run_records : int
+        So many records in a row, each within the tolerance of the one before, are believed wherever they stand.
+    """
+
+    tolerance_s: float = 3.0
+    run_records: int = 50
+
+
+def is_frozen(time_ns: Int64Array) -> bool:
+    """Whether a topic repeats one time again and again instead of telling when its values were true.
+
+    Examples
+    --------
+    >>> is_frozen(np.full(20, 7)), is_frozen(np.arange(20))
+    (True, False)
+    """
+    repeats = int((np.diff(time_ns) == 0).sum())
+    return len(time_ns) >= FROZEN_LEAST_RECORDS and repeats >= FROZEN_SHARE * (len(time_ns) - 1)
+
+
+def estimate_counting_clock(
+    record_index: Int64Array,
+    device_time_ns: Column,
+    frozen: BoolArray,
+    utc_of_zero_ns: int | None,
+    *,
+    settings: CountingSettings | None = None,
+) -> Clock:
+    """Model a counting clock.
+
+    Parameters
+    ----------
+    record_index : ndarray of int64, shape (n,)
+        Places of the records, strictly increasing.
+    device_time_ns : Column of int64, shape (n,)
+    frozen : ndarray of bool, shape (n,)
+        Records of topics whose time does not advance.
+    utc_of_zero_ns : int or None
+        UTC of power-up.
+
+    Returns
+    -------
+    Clock
+        Without ``lateness_ns``, which needs the topics.
+
+    Examples
+    --------
+    >>> seconds = np.array([90, 3, 91, 92, 94, 93, 95, 96, 97])  # 3: published long before; 93: written late
+    >>> clock = estimate_counting_clock(np.arange(9), Column(seconds * NS_PER_S), np.zeros(9, dtype=bool), None)
+    >>> (clock.time_ns(np.arange(9), Column(seconds * NS_PER_S)) / NS_PER_S).tolist(), clock.stale_times
+    ([90.0, 90.5, 91.0, 92.0, 94.0, 93.0, 95.0, 96.0, 97.0], 1)
+    """
+    settings = settings or CountingSettings()
+    has_time = device_time_ns.mask
+    usable = has_time & ~frozen
+    if not usable.any():
+        usable, frozen = has_time, np.zeros(len(has_time), dtype=bool)
+    index, time = record_index[usable], device_time_ns.values[usable]
+    if not len(time):
+        return Clock(missing_times=len(record_index))
+    tolerance_ns = round(settings.tolerance_s * NS_PER_S)
+    judged = _judged(time, tolerance_ns, settings.run_records)
+    believed = ~(judged.stale | judged.ahead)
+    is_wanted = ~usable
+    is_wanted[np.flatnonzero(usable)[~believed]] = True
+    wanted = np.flatnonzero(is_wanted)
+    placed = interpolated(record_index[wanted], index[believed], time[believed], 0.0)
+    fits = (frozen & has_time)[wanted] & (np.abs(device_time_ns.values[wanted] - placed) <= tolerance_ns)
+    frozen_stale = int((frozen & has_time).sum() - fits.sum())
+    wanted, placed = record_index[wanted[~fits]], placed[~fits]
+    zero = zero_of(int(time[believed].min()), utc_of_zero_ns)
+    late = believed & (np.maximum.accumulate(np.where(believed, time, time[believed].min())) - time > tolerance_ns)
+    ahead = np.diff(time[believed])
+    ahead = ahead[ahead > 0]
+    return Clock(
+        is_absolute=zero.is_absolute,
+        period_ns=int(np.median(ahead)) if len(ahead) else 0,
+        starts=record_index[:1],
+        offsets_ns=np.array([zero.ns], dtype=np.int64),
+        placed_index=wanted,
+        placed_ns=placed + zero.ns,
+        missing_times=int((~has_time).sum()),
+        implausible_times=int(judged.ahead.sum()),
+        stale_times=int(judged.stale.sum()) + frozen_stale,
+        stray_rows=int(late.sum()),
+        stray_index=index[late],
+        is_unordered=bool(late.any()),
+        shift_ns=0 if zero.is_absolute else zero.ns,
+        has_times=True,
+    )
+
+
+class _Judged(NamedTuple):
+    stale: BoolArray
+    ahead: BoolArray
+
+
+def _judged(time: Int64Array, tolerance_ns: int, run_records: int) -> _Judged:
+    """Records earlier than the runs around them allow, and later than those; shape (n,) each.
+
+    A run is a stretch of records each within the tolerance of the one before. Long runs are believed; a short one is
+    believed when it lies between the end of the long run before it and the start of the one after, both widened by the
+    tolerance.
+    """
+    starts = np.concatenate(([0], np.flatnonzero(np.abs(np.diff(time)) > tolerance_ns) + 1))
+    lengths = np.diff(starts, append=len(time))
+    is_long = lengths >= min(run_records, int(lengths.max()))
+    long = np.flatnonzero(is_long)
+    after = np.searchsorted(long, np.arange(len(starts)))
+    last, first = time[starts + lengths - 1], time[starts]
+    before_ns = last[long[np.maximum(after - 1, 0)]]
+    after_ns = first[long[np.minimum(after, len(long) - 1)]]
+    before_ns = np.where(after > 0, before_ns, after_ns)
+    after_ns = np.where(after < len(long), after_ns, before_ns)
+    stale = ~is_long & (first < np.minimum(before_ns, after_ns) - tolerance_ns)
+    ahead = ~is_long & (last > np.maximum(before_ns, after_ns) + tolerance_ns) & ~stale
+    return _Judged(np.repeat(stale, lengths), np.repeat(ahead, lengths))
+
+
+def frozen_records(record_index: Int64Array, topics: Iterable[tuple[Int64Array, Int64Array, BoolArray]]) -> BoolArray:
+    """Which of ``record_index`` belong to a frozen topic; ``topics`` are (places, times, presence of the times)."""
+    frozen = np.zeros(len(record_index), dtype=bool)
+    for index, time, mask in topics:
+        if is_frozen(time[mask]):
+            frozen[np.searchsorted(record_index, index)] = True
+    return frozen

@@ -1,0 +1,208 @@
+"""Compressed logs: gzip and zstd, told by their content, decompressed once into an unnamed temporary file.
+
+Sizes that the file declares are not believed: what comes out is counted, and stops at a bound. What a cut or damaged
+file still gives is kept.
+"""
+
+import io
+import tempfile
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+import zstandard
+
+from groundstation.base.errors import UnreadableLogError
+from groundstation.base.records import Damage
+
+GZIP_MAGIC, ZSTD_MAGIC = b"\x1f\x8b\x08", b"\x28\xb5\x2f\xfd"
+MAX_RATIO = 200  # a recorded flight shrinks 2 to 20 times, a table of constants some 100 times
+MIN_LIMIT_BYTES = 64 << 20  # small files may expand this far whatever the ratio
+MAX_LIMIT_BYTES = 64 << 30
+_READ_BYTES = 256 << 10
+_STEP_BYTES = 1 << 20
+_GZIP_HEADER_BYTES = 70_000  # names, comments and extras are shorter
+_GZIP_STEP_BYTES = 4 << 10  # where data is damaged, what a step would have given is lost
+_ZSTD_STEP_BYTES = 256  # decompressobj has no bound on its output: 256 bytes expand to 8 MiB at most
+_Pieces = Iterator[bytes]
+
+
+@dataclass(frozen=True)
+class Expanded:
+    """What came out of a compressed file: a temporary file, its size, and the damage met (None when it was whole)."""
+
+    file: BinaryIO
+    size: int
+    damage: Damage | None
+
+
+def compression_of(start: bytes) -> str:
+    """``gzip``, ``zstd`` or nothing, by the first bytes of a file.
+
+    Examples
+    --------
+    >>> compression_of(bytes.fromhex("1f8b0800")), compression_of(b"ULog")
+    ('gzip', '')
+    """
+    return "gzip" if start.startswith(GZIP_MAGIC) else "zstd" if start.startswith(ZSTD_MAGIC) else ""
+
+
+def head_of(stream: BinaryIO, compression: str, size: int) -> bytes:
+    """The first ``size`` decompressed bytes, fewer where there are no more."""
+    head = bytearray()
+    try:
+        for piece in _PIECES[compression](stream):
+            head += piece
+            if len(head) >= size:
+                break
+    except _Broken:
+        pass  # what came before it is the head; the damage is told when all is read
+    return bytes(head[:size])
+
+
+def expand(stream: BinaryIO, compression: str, compressed_size: int, name: str) -> Expanded:
+    """Decompress all of a file into an unnamed temporary file.
+
+    Raises
+    ------
+    UnreadableLogError
+        When it expands beyond :data:`MAX_RATIO` times its size (64 MiB at least, 64 GiB at most), or the disk is full.
+    """
+    limit = min(max(MAX_RATIO * compressed_size, MIN_LIMIT_BYTES), MAX_LIMIT_BYTES)
+    size, damage = 0, None
+    try:
+        file: Any = tempfile.TemporaryFile()  # noqa: SIM115 -- it lives as long as the source
+        try:
+            for piece in _PIECES[compression](stream):
+                size += len(piece)
+                if size > limit:
+                    raise UnreadableLogError(
+                        name, f"{compression} data that expands beyond {limit} bytes", "", "decompress it yourself"
+                    )
+                file.write(piece)
+        except _Broken as broken:
+            damage = Damage(broken.kind, f"byte {size} of the decompressed log", 1, f"{compression} data: {broken}")
+        file.flush()
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise UnreadableLogError(name, f"{compression} data that cannot be decompressed ({reason})") from error
+    return Expanded(file, size, damage)
+
+
+class Window(io.RawIOBase):
+    """A read-only view of a shared file with a position of its own."""
+
+    def __init__(self, file: BinaryIO, size: int) -> None:
+        self._file, self._size, self._at = file, size, 0
+
+    def readable(self) -> bool:
+        """True."""
+        return True
+
+    def seekable(self) -> bool:
+        """True."""
+        return True
+
+    def tell(self) -> int:
+        """Position from the start."""
+        return self._at
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        """Move to a position; returns it."""
+        base = {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._size}[whence]
+        self._at = max(0, base + offset)
+        return self._at
+
+    def readinto(self, buffer: Any) -> int:
+        """Fill ``buffer`` from the position on; returns how many bytes there were."""
+        self._file.seek(self._at)
+        count: int = self._file.readinto(buffer)  # type: ignore[attr-defined]
+        self._at += count
+        return count
+
+
+class _Broken(Exception):  # noqa: N818 -- a signal inside this module
+    """Compressed data that ends early or makes no sense from some place on."""
+
+    def __init__(self, kind: str, text: str) -> None:
+        super().__init__(text)
+        self.kind = kind
+
+
+def _gzip_pieces(stream: BinaryIO) -> _Pieces:
+    """Decompressed pieces of all members of a gzip file; zero bytes after the last one are padding.
+
+    The frame of a member is read here: zlib's own reader withholds what it has when the checksum behind is wrong.
+    """
+    data = stream.read(_READ_BYTES)
+    while data:
+        data = _behind_gzip_header(data, stream)
+        member, checksum, size = zlib.decompressobj(wbits=-15), 0, 0
+        while not member.eof:
+            if not data:
+                data = stream.read(_READ_BYTES)
+            if not data:
+                raise _Broken("truncated", "it ends early: the file was cut")
+            try:
+                piece = member.decompress(data[:_GZIP_STEP_BYTES], _STEP_BYTES)
+            except zlib.error as error:
+                raise _Broken("corrupt", "it makes no sense from here on") from error
+            data = (member.unused_data if member.eof else member.unconsumed_tail) + data[_GZIP_STEP_BYTES:]
+            checksum, size = zlib.crc32(piece, checksum), size + len(piece)
+            if piece:
+                yield piece
+        data += stream.read(8) if len(data) < 8 else b""
+        if len(data) < 8:
+            raise _Broken("truncated", "it ends before its checksum: the file was cut")
+        if data[:8] != checksum.to_bytes(4, "little") + (size & 0xFFFFFFFF).to_bytes(4, "little"):
+            raise _Broken("corrupt", "its checksum or size is not that of what came out")
+        data = data[8:] or stream.read(_READ_BYTES)
+        while data and not data.strip(b"\0"):
+            data = stream.read(_READ_BYTES)
+
+
+def _behind_gzip_header(data: bytes, stream: BinaryIO) -> bytes:
+    """What follows the header of a member (RFC 1952)."""
+    if len(data) < _GZIP_HEADER_BYTES:
+        data += stream.read(_GZIP_HEADER_BYTES)
+    if not data.startswith(GZIP_MAGIC):
+        raise _Broken("corrupt", "it makes no sense from here on")
+    flags, at = (data[3] if len(data) > 3 else 0), 10
+    if flags & 4:
+        at += 2 + int.from_bytes(data[at : at + 2], "little")
+    for flag in (8, 16):  # name and comment, each ended by a zero byte
+        if flags & flag:
+            end = data.find(b"\0", at)
+            at = len(data) + 1 if end < 0 else end + 1
+    at += 2 if flags & 2 else 0
+    if at > len(data):
+        raise _Broken("truncated", "it ends within its header")
+    return data[at:]
+
+
+def _zstd_pieces(stream: BinaryIO) -> _Pieces:
+    """Decompressed pieces of all frames of a zstd file."""
+    data, is_open = stream.read(_READ_BYTES), False
+    frame: Any = None
+    while data or is_open:
+        if not is_open:
+            frame, is_open = zstandard.ZstdDecompressor(max_window_size=128 << 20).decompressobj(), True
+        if not data:
+            raise _Broken("truncated", "it ends early: the file was cut")
+        for at in range(0, len(data), _ZSTD_STEP_BYTES):
+            try:
+                piece = frame.decompress(data[at : at + _ZSTD_STEP_BYTES])
+            except zstandard.ZstdError as error:
+                raise _Broken("corrupt", "it makes no sense from here on") from error
+            if piece:
+                yield piece
+            if frame.eof:
+                data, is_open = frame.unused_data + data[at + _ZSTD_STEP_BYTES :], False
+                break
+        else:
+            data = b""
+        data = data or stream.read(_READ_BYTES)
+
+
+_PIECES: dict[str, Callable[[BinaryIO], _Pieces]] = {"gzip": _gzip_pieces, "zstd": _zstd_pieces}

@@ -1,0 +1,250 @@
+"""Cuts a log into blocks of records that the definitions in force describe; what belongs to no record is counted."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.errors import UnreadableLogError
+from groundstation.base.records import Damage, Int64Array
+from groundstation.readers.dataflash import scan
+from groundstation.readers.dataflash.definitions import (
+    FMT_BYTES,
+    FMT_ID,
+    HEADER_BYTES,
+    Definition,
+    fmt_definition,
+    parse_fmt,
+)
+from groundstation.readers.source import Source
+
+BLOCK_BYTES = 4 << 20
+SPANS_SHOWN = 20  # damaged spans that are told one by one; the others are told together
+MAX_SPANS = 4_096
+MOST_LOGS, MOST_DEFINITIONS = 256, 10_000  # joined in a file, and different ones in it: more is no log but an attack
+_LOG_BEGINS = bytes((FMT_ID, FMT_BYTES)) + b"FMT"  # every log begins with the definition of definitions
+FILLERS = (b"\0", b"\xff")  # what a recorder fills the rest of a page with
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Records of one stretch of the file.
+
+    Parameters
+    ----------
+    data : ndarray of uint8
+    offsets : ndarray of int64, shape (n,)
+        Where each record begins in ``data``.
+    types : ndarray of uint8, shape (n,)
+    first_index : int
+        Place of the first record among those of the file.
+    definitions : mapping of type id to Definition
+    """
+
+    data: NDArray[np.uint8]
+    offsets: Int64Array
+    types: NDArray[np.uint8]
+    first_index: int
+    definitions: dict[int, Definition]
+
+    def groups(self) -> Iterator[tuple[Definition, Int64Array]]:
+        """Each type that occurs and which of the block's records (numbered from 0) are of it, increasing."""
+        order = np.argsort(self.types, kind="stable")
+        ends = np.cumsum(np.bincount(self.types, minlength=256))
+        for type_id in np.unique(self.types).tolist():
+            yield self.definitions[type_id], order[ends[type_id - 1] if type_id else 0 : ends[type_id]]
+
+    def records(self, definition: Definition, which: Int64Array) -> NDArray[Any]:
+        """Records of one type as a structured array, shape (n,), copied from the block."""
+        windows = np.lib.stride_tricks.sliding_window_view(self.data, definition.length)
+        return windows[self.offsets[which]].view(definition.dtype)[:, 0]
+
+
+@dataclass
+class Spans:
+    """Bytes of a log that belong to no record."""
+
+    shown: list[tuple[int, int]] = field(default_factory=list)
+    others: int = 0
+    other_bytes: int = 0
+    other_first: int = 0
+    other_last: int = 0
+    padding: tuple[int, int] | None = None
+    cut: tuple[int, int, str] | None = None
+
+    def add(self, start: int, end: int) -> None:
+        """Count bytes from ``start`` to ``end`` of the file."""
+        if len(self.shown) < SPANS_SHOWN:
+            self.shown.append((start, end))
+            return
+        self.other_first = self.other_first if self.others else start
+        self.others, self.other_bytes, self.other_last = self.others + 1, self.other_bytes + end - start, end
+
+    def damages(self) -> Iterator[Damage]:
+        """What was skipped, in the order of the file."""
+        for start, end in self.shown:
+            yield Damage("corrupt", _bytes(start, end), end - start, "bytes that belong to no record, skipped")
+        if self.others:
+            what = f"bytes that belong to no record in {self.others} more places, skipped"
+            yield Damage("corrupt", _bytes(self.other_first, self.other_last), self.other_bytes, what)
+        if self.cut is not None:
+            start, end, name = self.cut
+            what = (
+                f"bytes of a {name} record that the end of the file cuts off" if name else "bytes of a record cut off"
+            )
+            yield Damage("truncated", _bytes(start, end), end - start, what)
+        if self.padding is not None:
+            start, end = self.padding
+            what = "filler bytes behind the last record"
+            yield Damage("padding", _bytes(start, end), end - start, what, loses_data=False)
+
+
+def _bytes(start: int, end: int) -> str:
+    return f"byte {start}" if end - start == 1 else f"bytes {start} to {end - 1}"
+
+
+class Scanner:
+    """Iterates over the blocks of a log.
+
+    Definitions are taken in as they come. One that contradicts an earlier one of the same id is believed while no
+    record of that id was met, or when a new log has begun in the file (logs joined end to end): a flipped bit in a late
+    definition must not cost the records of another type.
+
+    Parameters
+    ----------
+    source : Source
+    """
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self.spans = Spans()
+        self.refused: list[tuple[int, Definition]] = []
+        self.refused_more = 0
+        self._met = self._logs = 0
+        self.definitions = {FMT_ID: fmt_definition()}
+        self._lengths = np.zeros(256, dtype=np.int64)
+        self._time_kind = np.zeros(256, dtype=np.int64)
+        self._lengths[FMT_ID] = FMT_BYTES
+        self._payloads: dict[int, bytes] = {}
+        self._seen = np.zeros(256, dtype=bool)  # types met since the log (of those joined in the file) began
+        self._state = scan.new_state()
+        self._base = 0  # place in the file of the first byte of the data at hand
+        self._count = 0
+        self._spans = np.empty((MAX_SPANS, 2), dtype=np.int64)
+
+    def __iter__(self) -> Iterator[Block]:
+        data = np.zeros(0, dtype=np.uint8)
+        with self._source.open() as stream:
+            is_last = False
+            while not is_last:
+                read = self._read(stream)
+                is_last = len(read) < BLOCK_BYTES
+                data = np.concatenate((data, np.frombuffer(read, dtype=np.uint8)))
+                yield from self._blocks(data, is_last)
+                if is_last:
+                    break
+                done = int(self._state[scan.POSITION])
+                data, self._base = data[done:], self._base + done
+                self._state[scan.POSITION] = 0
+                if self._state[scan.SKIP_START] != scan.NOWHERE:
+                    self._state[scan.SKIP_START] -= done
+        self._finish(data)
+
+    def _read(self, stream: BinaryIO) -> bytes:
+        try:
+            return stream.read(BLOCK_BYTES)
+        except OSError as error:  # a failing disk or network share
+            raise UnreadableLogError(
+                self._source.name, f"no more data ({error.strerror})", "", "copy it again"
+            ) from error
+
+    def _blocks(self, data: NDArray[np.uint8], is_last: bool) -> Iterator[Block]:
+        """Blocks of the data at hand: one, and more where a definition changes or there are very many records."""
+        offsets = np.empty(len(data) // HEADER_BYTES + 1, dtype=np.int64)
+        types = np.empty(len(offsets), dtype=np.uint8)
+        state = self._state
+        state[scan.COUNT] = 0
+        limit = len(data) if is_last else len(data) - scan.LOOKAHEAD
+        while state[scan.POSITION] < limit:
+            state[scan.SPANS] = 0
+            stopped = scan.scan(
+                data, is_last, FMT_ID, self._lengths, self._time_kind, offsets, types, self._spans, state
+            )
+            for start, end in self._spans[: state[scan.SPANS]].tolist():
+                self.spans.add(self._base + start, self._base + end)
+            if stopped:
+                count = int(state[scan.COUNT])
+                at = int(offsets[count - 1])
+                payload = data[at + HEADER_BYTES : at + FMT_BYTES].tobytes()
+                if payload.startswith(_LOG_BEGINS) and (self._count or count > 1) and self._logs < MOST_LOGS:
+                    yield from self._block(data, offsets, types)
+                    self._seen[:] = False
+                    self._logs += 1
+                new = self._accepted(payload, types, self._base + at)
+                if new is not None:
+                    self._define(new)
+        yield from self._block(data, offsets, types)
+
+    def _block(self, data: NDArray[np.uint8], offsets: Int64Array, types: NDArray[np.uint8]) -> Iterator[Block]:
+        count = int(self._state[scan.COUNT])
+        if count:
+            block = Block(data, offsets[:count].copy(), types[:count].copy(), self._count, dict(self.definitions))
+            self._seen[block.types] = True
+            self._count += count
+            self._state[scan.COUNT] = 0
+            yield block
+
+    def _accepted(self, payload: bytes, types: NDArray[np.uint8], place: int) -> Definition | None:
+        """The definition of a FMT record where it is new and believed."""
+        type_id = payload[0]
+        if type_id == FMT_ID or self._payloads.get(type_id) == payload:
+            return None
+        self._met += 1
+        new = parse_fmt(payload) if self._met <= MOST_DEFINITIONS else None
+        if new is not None and not self._contradicts(type_id, types):
+            self._payloads[type_id] = payload
+            return new
+        if new is not None and len(self.refused) < SPANS_SHOWN:
+            self.refused.append((place, new))
+        elif self.refused:
+            self.refused_more += 1
+        return None
+
+    def _contradicts(self, type_id: int, types: NDArray[np.uint8]) -> bool:
+        """Whether records of an id that a new definition is for were met under another one."""
+        pending = types[: int(self._state[scan.COUNT])]
+        return type_id in self.definitions and (bool(self._seen[type_id]) or bool((pending == type_id).any()))
+
+    def _define(self, new: Definition) -> None:
+        self.definitions[new.type_id] = new
+        self._lengths[new.type_id] = new.length
+        self._time_kind[new.type_id] = _time_kind(new)
+
+    def _finish(self, data: NDArray[np.uint8]) -> None:
+        """Account for what stands behind the last record."""
+        size = self._base + len(data)
+        cut_at, skip_start = int(self._state[scan.CUT_AT]), int(self._state[scan.SKIP_START])
+        if cut_at != scan.NOWHERE:
+            definition = self.definitions.get(int(data[cut_at + 2])) if cut_at + 2 < len(data) else None
+            self.spans.cut = (self._base + cut_at, size, definition.name if definition else "")
+        elif skip_start != scan.NOWHERE:
+            left = data[max(skip_start, 0) :].tobytes()
+            if skip_start >= 0 and any(not left.strip(filler) for filler in FILLERS):
+                self.spans.padding = (self._base + skip_start, size)
+            else:
+                self.spans.add(self._base + skip_start, size)
+
+
+def _time_kind(definition: Definition) -> int:
+    """How the scan finds the time of a record of this type."""
+    time = definition.time_field
+    if time is None or definition.fields[0].name != time[0]:
+        return scan.NO_TIME
+    character = definition.fields[0].character
+    if character in "qQ" and time[0] == "TimeUS":
+        return scan.TIME_US_8
+    if character in "iI":
+        return scan.TIME_US_4 if time[0] == "TimeUS" else scan.TIME_MS
+    return scan.NO_TIME

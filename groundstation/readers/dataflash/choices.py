@@ -1,0 +1,164 @@
+"""Which of several sources a canonical field is taken from, and what must be said of it."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from groundstation.base.records import Remark
+from groundstation.readers.dataflash import rules
+from groundstation.readers.dataflash.overview import Overview, States, Unit
+from groundstation.readers.dataflash.rules import Rule
+
+_EKF_OF_TYPE = {2.0: "NKF", 3.0: "XKF"}  # parameter AHRS_EKF_TYPE
+_SECOND_CORE = {"1": "6", "2": "7"}  # old firmware logged the second core under these numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Choices:
+    """Sources of the canonical topics of a log.
+
+    Parameters
+    ----------
+    sensor_topics : mapping of sensor to topic
+    rates : tuple of sensors
+        Whose angular rates and accelerations are those of ``ins``.
+    ekf : str
+        ``XKF``, ``NKF``, ``EKF``: the filter in use; empty when none is, or none is logged.
+    ekf_topic : str
+        ``ins``; or ``ins.2`` where the first filter was only the second estimate, as AHR2 is then.
+    ekf_velocity, ekf_wind : mapping of sensor to core
+        Records of the filter, and the core that wrote them; None where the filter has but one.
+    primary_core : States
+    yaw : Rule
+        What the autopilot's yaw is: true heading, or magnetic where no declination is set.
+    yaw_origin : str
+    mode : str
+        Mode of ``ins``.
+    vehicle : str
+    """
+
+    sensor_topics: Mapping[Unit, str]
+    rates: tuple[Unit, ...]
+    ekf: str
+    ekf_topic: str
+    ekf_velocity: Mapping[Unit, int | None]
+    ekf_wind: Mapping[Unit, int | None]
+    primary_core: States
+    yaw: Rule
+    yaw_origin: str
+    mode: str
+    vehicle: str
+
+    def remarks(self, found: Overview, fields: Mapping[str, Iterable[str]]) -> list[Remark]:
+        """What must be said of the canonical topics that have records (``fields`` of each topic)."""
+        given = {topic: set(names) for topic, names in fields.items()}
+        remarks = []
+        for topic in sorted(given):
+            known = tuple(name for name in ("velocity_north_mps", "velocity_east_mps") if name in given[topic])
+            if topic.startswith("gnss") and known:
+                remarks.append(Remark("derived", "from GPS speed and course over ground", topic, known))
+            if self.yaw.field in given[topic]:
+                origin = self.yaw_origin if topic == "ins" else "yaw of AHR2, the autopilot's second estimate"
+                remarks.append(Remark("derived", origin, topic, (self.yaw.field,)))
+            if topic.startswith("magnetometer"):
+                text = "in body axes, the autopilot's calibration (offsets, soft iron, motors) already applied"
+                remarks.append(Remark("converted", f"field {text}; parameters COMPASS_* tell it", topic))
+            if topic.startswith("baro"):
+                text = "from measured pressure by the standard atmosphere (BARO.Alt counts from power-up, kept as raw)"
+                remarks.append(Remark("derived", text, topic, ("pressure_altitude_m",)))
+            if topic.startswith("radio_altimeter"):
+                text = "distance of a downward range finder along its axis, not corrected for tilt"
+                remarks.append(Remark("derived", text, topic, ("height_m",)))
+        if "discrete" in given:
+            text = "state of the land detector (EV land complete, not landed), repeated at each ATT record"
+            remarks.append(Remark("derived", text, "discrete", ("weight_on_wheels",)))
+        if "velocity_north_mps" in given.get(self.ekf_topic, ()):
+            fields_of = tuple(f"velocity_{axis}_mps" for axis in ("north", "east", "down"))
+            origin = f"velocity of {self.ekf}1, the core in use" if self.ekf else "velocity of EKF1, not in use"
+            remarks.append(Remark("derived", origin, self.ekf_topic, fields_of))
+        return remarks
+
+
+def choose(found: Overview, vehicle: str) -> Choices:
+    """Choose by the parameters, and by what has records."""
+    ekf = _filter_in_use(found)
+    is_second = not ekf and found.parameters.get("AHRS_EKF_USE") == 0.0 and "AHRS_EKF_TYPE" not in found.parameters
+    yaw, origin = _yaw(found, ekf)
+    rates = next((kinds for kinds in (("IMU",), ("GYR", "ACC")) if any(kind in found.types for kind in kinds)), ())
+    return Choices(
+        sensor_topics=_sensor_topics(found),
+        rates=tuple(min(_units_of(found, name), key=_instance) for name in rates if name in found.types),
+        ekf=ekf,
+        ekf_topic="ins.2" if is_second else "ins",
+        ekf_velocity=_cores(found, "EKF" if is_second else ekf, "1"),
+        ekf_wind=_cores(found, ekf, "2"),
+        primary_core=found.primary_core.get(f"{ekf}4", States()),
+        yaw=yaw,
+        yaw_origin=origin,
+        mode="gnss_aided" if found.has_fix else "attitude",
+        vehicle=vehicle,
+    )
+
+
+def _instance(unit: Unit) -> int:
+    return unit[1] or 0
+
+
+def _units_of(found: Overview, name: str) -> list[Unit]:
+    return [unit for unit in found.sensors if unit[0] == name]
+
+
+def _sensor_topics(found: Overview) -> dict[Unit, str]:
+    """Topic of each sensor: the kind alone where there is one sensor, else numbered from 1."""
+    topics: dict[Unit, str] = {}
+    for kind, groups in rules.SENSOR_TYPES.items():
+        for names in groups:
+            units = [unit for name in names for unit in sorted(_units_of(found, name), key=_instance)]
+            if units:
+                numbered = len(units) > 1
+                topics |= {unit: f"{kind}.{at + 1}" if numbered else kind for at, unit in enumerate(units)}
+                break
+    return topics
+
+
+def _filter_in_use(found: Overview) -> str:
+    """The Kalman filter that the parameters name, and that has records; without parameters the newest that has."""
+    kind, used = found.parameters.get("AHRS_EKF_TYPE"), found.parameters.get("AHRS_EKF_USE")
+    if kind is not None:
+        candidates = [_EKF_OF_TYPE[kind]] if kind in _EKF_OF_TYPE else []
+    elif used is not None:
+        candidates = ["EKF"] if used else []
+    else:
+        candidates = ["XKF", "NKF", "EKF"]
+    return next((name for name in candidates if f"{name}1" in found.types), "")
+
+
+def _cores(found: Overview, ekf: str, number: str) -> dict[Unit, int | None]:
+    """Records ``number`` of each core of a filter, the core told by the instance field or by the type's number."""
+    if not ekf:
+        return {}
+    if f"{ekf}4" not in found.primary_core:
+        return dict.fromkeys(_units_of(found, f"{ekf}{number}")[:1])
+    first = {unit: _instance(unit) for unit in _units_of(found, f"{ekf}{number}")}
+    second = {unit: 1 for unit in _units_of(found, f"{ekf}{_SECOND_CORE[number]}") if unit[1] is None}
+    return {**first, **second}
+
+
+def _yaw(found: Overview, ekf: str) -> tuple[Rule, str]:
+    """What the yaw of ATT is, by the parameters that set its declination."""
+    names = {"XKF": "EKF3", "NKF": "EKF2", "EKF": "the EKF"}
+    origin = f"yaw of ATT ({names.get(ekf, 'DCM or a filter that is not logged')})"
+    automatic, fixed_rad = found.parameters.get("COMPASS_AUTODEC"), found.parameters.get("COMPASS_DEC")
+    if automatic is None and fixed_rad is None:
+        return rules.TRUE_YAW, f"{origin}; the log does not tell which declination is in it"
+    if found.parameters.get("COMPASS_USE") == 0.0:
+        return rules.TRUE_YAW, f"{origin}, without a compass: aligned by GPS course"
+    declination = f"{math.degrees(fixed_rad or 0.0):+.2f} deg"
+    if automatic:
+        return (
+            rules.TRUE_YAW,
+            f"{origin} with compass, declination by the autopilot's own table (COMPASS_DEC {declination})",
+        )
+    if fixed_rad:
+        return rules.TRUE_YAW, f"{origin} with compass, declination set by hand to {declination}"
+    return rules.MAGNETIC_YAW, f"{origin} with compass, no declination set (COMPASS_AUTODEC 0, COMPASS_DEC 0): magnetic"

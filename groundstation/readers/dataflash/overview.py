@@ -1,0 +1,257 @@
+"""What a first pass over a log finds: units, parameters, firmware, satellite time, sensors, states that last."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray
+from groundstation.base.records import Damage, Int64Array
+from groundstation.readers.dataflash.blocks import Block, Scanner
+from groundstation.readers.dataflash.definitions import Definition, Units
+from groundstation.readers.dataflash.values import Rows, as_double, by_instance, rows_of
+from groundstation.readers.source import Source
+
+MESSAGES_KEPT = 100
+MOST_INSTANCES = 32  # more values than that tell no sensors apart
+EV_LANDED, EV_NOT_LANDED = 18, 28
+_GPS_TYPES = ("GPS", "GPS2")
+_ACCURACY_TYPES = {"GPA": "GPS", "GPA2": "GPS2"}
+_EKF_STATUS_TYPES = ("EKF4", "NKF4", "XKF4")
+
+Unit = tuple[str, int | None]  # type and instance: one sensor
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """A state that lasts until the next record of it: places where it was logged, and its values."""
+
+    record_index: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    values: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    def at(self, record_index: Int64Array, before: int) -> Int64Array:
+        """The state at places in the log; ``before`` where none was logged yet."""
+        at = np.searchsorted(self.record_index, record_index, side="right")
+        return np.concatenate(([before], self.values))[at]
+
+
+@dataclass(frozen=True, eq=False)
+class GpsTimes:
+    """Fixes of all receivers that tell a time: GPS week, milliseconds of the week, and the autopilot's clock."""
+
+    week: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    week_ms: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    device_ns: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+
+@dataclass(frozen=True, eq=False)
+class Overview:
+    """What a log holds.
+
+    Parameters
+    ----------
+    units : Units
+    types : mapping of str to Definition
+        Types that have records which can be read, by name.
+    sensors : tuple of (type, instance)
+        Each type that has records; several entries where it has an instance field.
+    split : set of int
+        Ids of the types whose records are told apart by their instance field.
+    parameters : mapping of str to float
+        The last value of each.
+    messages : tuple of str
+        The first texts that the autopilot wrote.
+    gps_times : GpsTimes
+    has_fix : bool
+        Whether any receiver had a position.
+    speed_sigma : mapping of receiver to (times in ns, m/s)
+    primary_core : mapping of EKF status type to States
+        Which of the filter's cores was in use.
+    landed : States
+        1 landed, 0 not, as the land detector's events say.
+    damages : tuple of Damage
+    """
+
+    units: Units
+    types: Mapping[str, Definition]
+    sensors: tuple[Unit, ...]
+    split: frozenset[int]
+    parameters: Mapping[str, float]
+    messages: tuple[str, ...]
+    gps_times: GpsTimes
+    has_fix: bool
+    speed_sigma: Mapping[Unit, tuple[Int64Array, FloatArray]]
+    primary_core: Mapping[str, States]
+    landed: States
+    damages: tuple[Damage, ...]
+
+
+def overview(source: Source) -> Overview:
+    """Read a log once and say what it holds; what is kept does not grow with the file but for GPS records."""
+    survey = _Survey()
+    scanner = Scanner(source)
+    for block in scanner:
+        survey.add(block)
+    return survey.result(scanner)
+
+
+class _Survey:
+    """Collects an :class:`Overview` block by block."""
+
+    def __init__(self) -> None:
+        self._units = Units()
+        self._types: dict[str, Definition] = {}
+        self._instances: dict[tuple[int, str], set[int]] = {}
+        self._parameters: dict[str, float] = {}
+        self._messages: list[str] = []
+        self._gps: list[tuple[Any, Any, Any]] = []
+        self._has_fix = False
+        self._sigma: dict[Unit, list[tuple[Any, Any]]] = {}
+        self._cores: dict[str, list[tuple[Any, Any]]] = {}
+        self._landed: list[tuple[Any, Any]] = []
+        self._unread: dict[str, tuple[int, str]] = {}
+        self._takers: dict[str, Callable[[Rows], None]] = {
+            "UNIT": self._unit,
+            "MULT": self._multiplier,
+            "FMTU": self._field_units,
+            "PARM": self._parameter,
+            "MSG": self._message,
+            "VER": self._version,
+            "EV": self._event,
+            **dict.fromkeys(_GPS_TYPES, self._fixes),
+            **dict.fromkeys(_ACCURACY_TYPES, self._accuracy),
+            **dict.fromkeys(_EKF_STATUS_TYPES, self._core),
+        }
+
+    def add(self, block: Block) -> None:
+        """Take in one block; units first, as they say which field tells instances apart."""
+        groups = sorted(block.groups(), key=lambda group: group[0].name not in ("UNIT", "MULT", "FMTU"))
+        for definition, which in groups:
+            name = definition.name
+            if definition.fault:
+                count = self._unread.get(name, (0, ""))[0]
+                self._unread[name] = (count + len(which), definition.fault)
+                continue
+            self._types.setdefault(name, definition)
+            instance_field = self._units.instance_field(definition)
+            if name not in self._takers and instance_field is None:
+                self._instances.setdefault((definition.type_id, name), set())
+                continue
+            rows = rows_of(definition, block.records(definition, which), block.first_index + which)
+            seen = self._instances.setdefault((definition.type_id, name), set())
+            if instance_field is not None and len(seen) <= MOST_INSTANCES:
+                seen.update(np.unique(rows.values(instance_field)).tolist())
+            if name in self._takers:
+                self._takers[name](rows)
+
+    def result(self, scanner: Scanner) -> Overview:
+        """What was found."""
+        split = frozenset(key[0] for key, seen in self._instances.items() if 0 < len(seen) <= MOST_INSTANCES)
+        sensors: list[Unit] = []
+        for (type_id, name), seen in self._instances.items():
+            sensors += [(name, value) for value in sorted(seen)] if type_id in split else [(name, None)]
+        return Overview(
+            units=self._units,
+            types=self._types,
+            sensors=tuple(sensors),
+            split=split,
+            parameters=self._parameters,
+            messages=tuple(self._messages),
+            gps_times=GpsTimes(*(_joined([part[n] for part in self._gps]) for n in range(3))),
+            has_fix=self._has_fix,
+            speed_sigma={unit: _sorted_pairs(parts) for unit, parts in self._sigma.items()},
+            primary_core={name: _states(parts) for name, parts in self._cores.items()},
+            landed=_states(self._landed),
+            damages=(*scanner.spans.damages(), *self._more_damages(scanner)),
+        )
+
+    def _more_damages(self, scanner: Scanner) -> list[Damage]:
+        found = [
+            Damage("dropped_channel", f"type {name}", count, f"records that cannot be read: {fault}", f"raw.{name}")
+            for name, (count, fault) in self._unread.items()
+        ]
+        for place, refused in scanner.refused:
+            what = f"definitions of a type {refused.name} that contradict records met before, left out"
+            found.append(Damage("corrupt", f"byte {place}", 1, what))
+        if scanner.refused_more:
+            what = "more definitions that contradict others, left out"
+            found.append(Damage("corrupt", f"behind byte {scanner.refused[-1][0]}", scanner.refused_more, what))
+        return found
+
+    def _unit(self, rows: Rows) -> None:
+        if rows.definition.has_integers("Id") and rows.definition.has_texts("Label"):
+            for code, text in zip(rows.values("Id").tolist(), rows.values("Label").tolist(), strict=True):
+                self._units.texts[_character(code)] = str(text)
+
+    def _multiplier(self, rows: Rows) -> None:
+        if rows.definition.has_integers("Id") and rows.definition.has_numbers("Mult"):
+            for code, value in zip(rows.values("Id").tolist(), rows.values("Mult").tolist(), strict=True):
+                self._units.multipliers[_character(code)] = float(f"{value:.7g}")  # single precision, logged as double
+
+    def _field_units(self, rows: Rows) -> None:
+        if rows.definition.has_integers("FmtType") and rows.definition.has_texts("UnitIds", "MultIds"):
+            columns = (rows.values(name).tolist() for name in ("FmtType", "UnitIds", "MultIds"))
+            self._units.of_type.update({type_id: (unit, scale) for type_id, unit, scale in zip(*columns, strict=True)})
+
+    def _parameter(self, rows: Rows) -> None:
+        if rows.definition.has_texts("Name") and rows.definition.has_numbers("Value"):
+            names, values = rows.values("Name").tolist(), rows.values("Value").tolist()
+            self._parameters.update(dict(zip(names, values, strict=True)))
+
+    def _message(self, rows: Rows) -> None:
+        if rows.definition.has_texts("Message"):
+            self._messages += rows.values("Message")[: MESSAGES_KEPT - len(self._messages)].tolist()
+
+    def _version(self, rows: Rows) -> None:
+        if rows.definition.has_texts("FWS"):
+            self._messages.insert(0, str(rows.values("FWS")[0]))
+
+    def _event(self, rows: Rows) -> None:
+        if rows.definition.has_integers("Id"):
+            values = rows.values("Id")
+            of_land = (values == EV_LANDED) | (values == EV_NOT_LANDED)
+            self._landed.append((rows.record_index[of_land], values[of_land] == EV_LANDED))
+
+    def _fixes(self, rows: Rows) -> None:
+        definition = rows.definition
+        names = next((pair for pair in (("GWk", "GMS"), ("Week", "TimeMS")) if definition.has_integers(*pair)), None)
+        fixed = rows.values("Status") >= 3 if definition.has_numbers("Status") else np.ones(len(rows), dtype=bool)
+        self._has_fix |= bool(fixed.any())
+        if names is not None:
+            timed = fixed & rows.time_ns.mask
+            week, week_ms = (rows.values(name).astype(np.int64)[timed] for name in names)
+            self._gps.append((week, week_ms, rows.time_ns.values[timed]))
+
+    def _accuracy(self, rows: Rows) -> None:
+        if not rows.definition.has_numbers("SAcc"):
+            return
+        instance_field = self._units.instance_field(rows.definition)
+        for part in by_instance(rows, instance_field) if instance_field else (rows,):
+            receiver = (_ACCURACY_TYPES[rows.definition.name], part.instance)
+            self._sigma.setdefault(receiver, []).append((part.time_ns.values, as_double(part.values("SAcc"))))
+
+    def _core(self, rows: Rows) -> None:
+        if rows.definition.has_integers("PI"):
+            values = rows.values("PI").astype(np.int64)
+            changed = np.flatnonzero(np.diff(values, prepend=-1))
+            self._cores.setdefault(rows.definition.name, []).append((rows.record_index[changed], values[changed]))
+
+
+def _character(code: int) -> str:
+    """The character of a unit's id, which is logged as a number."""
+    return chr(code & 0xFF)
+
+
+def _joined(parts: list[Any]) -> Int64Array:
+    return np.concatenate(parts).astype(np.int64) if parts else np.zeros(0, dtype=np.int64)
+
+
+def _states(parts: list[tuple[Any, Any]]) -> States:
+    return States(_joined([index for index, _values in parts]), _joined([values for _index, values in parts]))
+
+
+def _sorted_pairs(parts: list[tuple[Any, Any]]) -> tuple[Int64Array, FloatArray]:
+    times = np.concatenate([time for time, _values in parts])
+    order = np.argsort(times, kind="stable")
+    return times[order], np.concatenate([values for _time, values in parts])[order]

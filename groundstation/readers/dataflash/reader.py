@@ -1,0 +1,82 @@
+"""Puts a log together: an overview, then block by block every record as raw, and what maps to canonical topics."""
+
+import re
+from collections.abc import Iterator
+
+from groundstation.base.records import MAX_BATCH_ROWS, Damage, Item, LogHeader, RecordBatch
+from groundstation.readers.dataflash.blocks import Block, Scanner
+from groundstation.readers.dataflash.canonical import Mapper
+from groundstation.readers.dataflash.choices import choose
+from groundstation.readers.dataflash.definitions import Definition
+from groundstation.readers.dataflash.facts import metadata, utc_of_power_up
+from groundstation.readers.dataflash.overview import Overview, overview
+from groundstation.readers.dataflash.values import Rows, by_instance, rows_of
+from groundstation.readers.source import Source
+
+READER = "dataflash"
+
+
+def items(source: Source) -> Iterator[Item]:
+    """Yield the header, batches in the order of the blocks of the file, then remarks and damages."""
+    found = overview(source)
+    facts = metadata(found)
+    utc_ns, remarks = utc_of_power_up(found.gps_times)
+    yield LogHeader(READER, facts, utc_ns, has_counting_clock=True)
+    choices = choose(found, facts.get("vehicle", ""))
+    mapper, topics = Mapper(found, choices), _Topics()
+    unreadable: dict[str, int] = {}
+    for block in Scanner(source):
+        for rows in _rows(block, found):
+            topic = topics.of(rows)
+            if rows.definition.time_field is not None:
+                unreadable[topic] = unreadable.get(topic, 0) + int((~rows.time_ns.mask).sum())
+            yield from _batches(topic, rows)
+            mapper.take(rows)
+        yield from mapper.batches()
+    yield from remarks
+    yield from choices.remarks(found, mapper.fields)
+    yield from found.damages
+    for topic, count in unreadable.items():
+        if count:
+            yield Damage("unreadable_cells", topic, count, "times that no clock writes", topic)
+
+
+def _rows(block: Block, found: Overview) -> Iterator[Rows]:
+    """Rows of each type, and of each instance where the type tells them apart."""
+    for definition, which in block.groups():
+        if not definition.fields:
+            continue
+        rows = rows_of(definition, block.records(definition, which), block.first_index + which)
+        name = found.units.instance_field(definition)
+        if name is None or definition.type_id not in found.split:
+            yield rows
+        else:
+            yield from by_instance(rows, name)
+
+
+def _batches(topic: str, rows: Rows) -> Iterator[RecordBatch]:
+    columns = rows.columns()
+    batch = RecordBatch(topic, rows.record_index, rows.time_ns, columns)
+    for start in range(0, len(batch), MAX_BATCH_ROWS):
+        yield batch.take(slice(start, start + MAX_BATCH_ROWS)) if len(batch) > MAX_BATCH_ROWS else batch
+
+
+class _Topics:
+    """Names of the raw topics: one layout, one topic. A type that takes another's name gets its id added."""
+
+    def __init__(self) -> None:
+        self._layouts: dict[str, tuple[int, object]] = {}
+
+    def of(self, rows: Rows) -> str:
+        """``raw.<type>`` or ``raw.<type>.<instance>``."""
+        name = self._name(rows.definition)
+        return f"raw.{name}" if rows.instance is None else f"raw.{name}.{rows.instance}"
+
+    def _name(self, definition: Definition) -> str:
+        layout = (definition.type_id, definition.fields)
+        name, copy = definition.name, 1
+        while self._layouts.setdefault(name, layout) != layout:
+            copy += 1
+            base = re.sub(r"_$", "", definition.name)
+            name = f"{base}_{definition.type_id}" if copy == 2 else f"{base}_{definition.type_id}_{copy}"
+        return name

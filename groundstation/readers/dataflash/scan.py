@@ -1,0 +1,191 @@
+"""The one loop over the bytes of a log: where its records stand and which bytes belong to none. Compiled.
+
+A record is ``A3 95 id`` and as many bytes as the id's definition says; there is no checksum. While records follow one
+another each is believed if two magic bytes stand where it ends. Where they do not, either this record is false (a
+damaged id gave it a wrong length) or the next one is damaged: it is false if a credible record begins inside it. (A
+wrong length may also swallow whole records and end well: their times betray them.) After
+a damaged span a record is credible if two more follow it, or if its own time or the next one's is near that of the
+last good record: so an intact record between two damaged ones is kept.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.compile import compiled
+
+LOOKAHEAD = 1_024  # bytes that must follow the record that is judged: itself and two more, at most 255 each
+NEAR_US = 10_000_000  # a record whose time is within 10 s of the last good one is believed
+NO_TIME, TIME_US_8, TIME_US_4, TIME_MS = 0, 1, 2, 3
+
+# Places in the state array.
+POSITION, COUNT, SPANS, SKIP_START, LAST_US, CUT_AT, STATE_SIZE = 0, 1, 2, 3, 4, 5, 6
+NOWHERE = -(1 << 62)
+
+
+def new_state() -> NDArray[np.int64]:
+    """State of a scan at the start of a log."""
+    state = np.zeros(STATE_SIZE, dtype=np.int64)
+    state[SKIP_START], state[LAST_US], state[CUT_AT] = NOWHERE, NOWHERE, NOWHERE
+    return state
+
+
+@compiled
+def _length_at(data: Any, at: int, lengths: Any) -> int:
+    """Length of the record that begins at a place, 0 when none does."""
+    if at + 3 > len(data) or data[at] != 0xA3 or data[at + 1] != 0x95:
+        return 0
+    return int(lengths[data[at + 2]])
+
+
+@compiled
+def _time_us(data: Any, at: int, time_kind: Any) -> int:
+    """The record's time in microseconds, -1 when it has none."""
+    kind = time_kind[data[at + 2]]
+    if kind == NO_TIME:
+        return -1
+    width = 8 if kind == TIME_US_8 else 4
+    value = 0
+    for k in range(width - 1, -1, -1):
+        value = (value << 8) | int(data[at + 3 + k])
+    return value * 1000 if kind == TIME_MS else value
+
+
+@compiled
+def _is_near(data: Any, at: int, time_kind: Any, last_us: int) -> bool:
+    """Whether the record at a place has a time near that of the last good one."""
+    time = _time_us(data, at, time_kind)
+    return time >= 0 and last_us >= 0 and abs(time - last_us) <= NEAR_US
+
+
+@compiled
+def _is_credible(data: Any, at: int, lengths: Any, time_kind: Any, last_us: int) -> bool:
+    """Whether a record that begins at a place among doubtful bytes is one: see the module's first lines."""
+    length = _length_at(data, at, lengths)
+    if length == 0 or at + length > len(data):
+        return False
+    if _is_near(data, at, time_kind, last_us):
+        return True
+    for _ in range(2):
+        at += length
+        if at == len(data):
+            return True
+        length = _length_at(data, at, lengths)
+        if length == 0:
+            return False
+        if at + length <= len(data) and _is_near(data, at, time_kind, last_us):
+            return True
+    return True
+
+
+@compiled
+def _is_swallowed(data: Any, at: int, end: int, lengths: Any, time_kind: Any, last_us: int) -> bool:
+    """Whether a record with a near time begins inside another, and it or those after it end where that ends."""
+    length = _length_at(data, at, lengths)
+    if length == 0 or at + length > end or not _is_near(data, at, time_kind, last_us):
+        return False
+    while length > 0 and at + length < end:
+        at += length
+        length = _length_at(data, at, lengths)
+    return length > 0 and at + length == end
+
+
+@compiled
+def _is_false(data: Any, at: int, length: int, lengths: Any, time_kind: Any, last_us: int) -> bool:
+    """Whether a record is false, its id being damaged: another record begins inside it.
+
+    Where magic (or the end of the file) follows it, only a record that ends there too and has a near time counts: a
+    payload that looks like that by chance is not to be met.
+    """
+    end = at + length
+    ends_well = end + 2 > len(data) or (data[end] == 0xA3 and data[end + 1] == 0x95)
+    for inside in range(at + 3, end - 1 if ends_well else end):
+        if data[inside] == 0xA3 and data[inside + 1] == 0x95:
+            if ends_well and _is_swallowed(data, inside, end, lengths, time_kind, last_us):
+                return True
+            if not ends_well and _is_credible(data, inside, lengths, time_kind, last_us):
+                return True
+    return False
+
+
+@compiled
+def _is_cut(data: Any, at: int, length: int, lengths: Any, time_kind: Any, last_us: int) -> bool:
+    """Whether what is left of the file is the beginning of one record (and no other begins inside it)."""
+    left = len(data) - at
+    if length == 0:
+        return left < 3 and data[at] == 0xA3 and (left < 2 or data[at + 1] == 0x95)
+    for inside in range(at + 3, len(data)):
+        if data[inside] == 0xA3 and _is_credible(data, inside, lengths, time_kind, last_us):
+            return False
+    return True
+
+
+@compiled
+def scan(
+    data: Any,
+    is_last: bool,
+    stop_at: int,
+    lengths: Any,
+    time_kind: Any,
+    offsets: Any,
+    types: Any,
+    spans: Any,
+    state: Any,
+) -> bool:
+    """Find records from ``state[POSITION]`` on; returns whether it stopped behind a record of type ``stop_at``.
+
+    Parameters
+    ----------
+    data : ndarray of uint8, shape (n,)
+    is_last : bool
+        Nothing follows ``data`` in the file; else the last LOOKAHEAD bytes are left for the next call.
+    stop_at : int
+        Type id (that of definitions) behind whose records the scan stops, so that the caller can take them in.
+    lengths : ndarray of int64, shape (256,)
+        Length of the records of each type, 0 when unknown.
+    time_kind : ndarray of int64, shape (256,)
+        How the record's time stands behind the header: NO_TIME, TIME_US_8, TIME_US_4, TIME_MS.
+    offsets, types : ndarrays of int64 and uint8, out
+        Where each record begins, and its type; appended at ``state[COUNT]``.
+    spans : ndarray of int64, shape (k, 2), out
+        Bytes that belong to no record, from start to end; appended at ``state[SPANS]``.
+    state : ndarray of int64
+        Positions count from the start of ``data``; ``CUT_AT`` is where the file cuts a record off.
+    """
+    size = len(data)
+    limit = size if is_last else size - LOOKAHEAD
+    at, count, skip, last_us = state[POSITION], state[COUNT], state[SKIP_START], state[LAST_US]
+    stopped = False
+    while at < limit and count < len(offsets) and state[SPANS] < len(spans):
+        length = _length_at(data, at, lengths)
+        is_record = length > 0 and at + length <= size
+        if skip == NOWHERE and not is_record and is_last and _is_cut(data, at, length, lengths, time_kind, last_us):
+            state[CUT_AT] = at
+            at = size
+            break
+        if is_record and skip != NOWHERE:
+            is_record = _is_credible(data, at, lengths, time_kind, last_us)
+        if is_record:
+            is_record = not _is_false(data, at, length, lengths, time_kind, last_us)
+        if not is_record:
+            skip = at if skip == NOWHERE else skip
+            at += 1
+            while at < size and data[at] != 0xA3:
+                at += 1
+            continue
+        if skip != NOWHERE:
+            spans[state[SPANS], 0], spans[state[SPANS], 1] = skip, at
+            state[SPANS] += 1
+            skip = NOWHERE
+        time = _time_us(data, at, time_kind)
+        last_us = time if time >= 0 else last_us
+        offsets[count] = at
+        types[count] = data[at + 2]
+        count += 1
+        at += length
+        if types[count - 1] == stop_at:
+            stopped = True
+            break
+    state[POSITION], state[COUNT], state[SKIP_START], state[LAST_US] = at, count, skip, last_us
+    return stopped

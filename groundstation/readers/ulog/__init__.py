@@ -1,0 +1,40 @@
+"""PX4 ULog: every topic under its own definition, the canonical ones in their units, and what was lost on the way."""
+
+from collections.abc import Iterator
+
+from groundstation.base.errors import UnreadableLogError
+from groundstation.base.records import Item
+from groundstation.readers.source import Claim, Source
+
+NAME = "px4-ulog"
+_MAGIC = b"ULog\x01\x12\x35"
+
+
+def sniff(source: Source) -> Claim | None:
+    """Claim what begins with the seven bytes of a ULog."""
+    return Claim(NAME) if source.head.startswith(_MAGIC) else None
+
+
+def read(source: Source) -> Iterator[Item]:
+    """Yield the header, batches, remarks and damages of a ULog.
+
+    Raises
+    ------
+    UnreadableLogError
+        When the file is none, or its flags say that a reader must know more than this one does.
+    """
+    from groundstation.readers.ulog.messages import FILE_HEADER_BYTES, flag_bits
+    from groundstation.readers.ulog.reader import items
+
+    head = source.head[:FILE_HEADER_BYTES]
+    if not head.startswith(_MAGIC) or len(head) < FILE_HEADER_BYTES:
+        raise UnreadableLogError(source.name, "no ULog header", f"{FILE_HEADER_BYTES} bytes", "the file was cut")
+    flags = flag_bits(source.head)
+    if flags is not None and flags.has_unknown:
+        raise UnreadableLogError(
+            source.name,
+            f"ULog flags {flags.incompatible.hex()}, which this version does not know",
+            "",
+            "convert the log with the tools of the PX4 that wrote it",
+        )
+    return items(source, NAME, int.from_bytes(head[8:16], "little"))

@@ -1,0 +1,280 @@
+"""Cuts a ULog into blocks of messages, each under the definitions in force; what belongs to no message is counted."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.errors import GroundstationError, UnreadableLogError
+from groundstation.base.records import Damage, Int64Array
+from groundstation.readers.source import Source
+from groundstation.readers.ulog import scan
+from groundstation.readers.ulog.formats import Flattener, Format, Layout, parse_format
+from groundstation.readers.ulog.messages import FILE_HEADER_BYTES, flag_bits, text_of
+
+BLOCK_BYTES = 8 << 20
+MAX_TOPICS = 30_000  # numbers of topics have 16 bits
+SPANS_SHOWN = 20  # damaged spans told one by one; the others are told together
+SLACK = 7  # bytes behind the data, so that a row may be rounded up to a multiple of eight
+IDS = 1 << 16
+NOT_SUBSCRIBED = -scan.DATA  # topic number of data messages whose subscription is not there
+
+
+@dataclass(frozen=True, eq=False)
+class Topic:
+    """A subscription: a topic's instance and the layout of its messages; None when the log does not define it."""
+
+    number: int
+    name: str
+    instance: int
+    layout: Layout | None
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Messages of one stretch of the file, in its order; to be used before the next one is asked for.
+
+    Parameters
+    ----------
+    data : ndarray of uint8
+        Ends :data:`SLACK` bytes behind the last message.
+    at : ndarray of int64, shape (n,)
+        Where each message begins in ``data``.
+    topic : ndarray of int32, shape (n,)
+        Number of the topic of data messages, minus the type of all others.
+    first_index : int
+        Place of the first message among those of the file.
+    topics : list of Topic
+        By number; grows from block to block.
+    """
+
+    data: NDArray[np.uint8]
+    at: Int64Array
+    topic: NDArray[np.int32]
+    first_index: int
+    topics: list[Topic]
+
+    def groups(self) -> Iterator[tuple[Topic, Int64Array]]:
+        """Each topic that occurs, and which messages (numbered from 0) are of it, increasing."""
+        order = np.argsort(self.topic.astype(np.int16), kind="stable")  # 16 bits: sorted by radix
+        numbers = self.topic[order]
+        starts = np.flatnonzero(np.diff(numbers, prepend=-(1 << 20)))
+        for start, end in zip(starts, [*starts[1:], len(order)], strict=True):
+            if numbers[start] >= 0:
+                yield self.topics[int(numbers[start])], order[start:end].astype(np.int64)
+
+    def rows(self, layout: Layout, which: Int64Array) -> NDArray[Any]:
+        """Data of some messages of one topic as a structured array, shape (n,), copied from the block."""
+        width = layout.row_bytes
+        windows = np.ndarray((len(self.data) - width + 1,), f"V{width}", self.data, strides=(1,))
+        return windows[self.at[which] + (scan.HEADER + 2)].view(layout.dtype)
+
+    def controls(self) -> Iterator[tuple[int, str, bytes]]:
+        """Messages that are not data: number, type and body."""
+        for number in np.flatnonzero(self.topic < 0).tolist():
+            yield number, chr(-int(self.topic[number])), self.body(number)
+
+    def body(self, number: int) -> bytes:
+        """Bytes of a message behind its header."""
+        at = int(self.at[number])
+        size = int(self.data[at]) | int(self.data[at + 1]) << 8
+        return self.data[at + scan.HEADER : at + scan.HEADER + size].tobytes()
+
+
+class Definitions:
+    """Formats and subscriptions in force, and what was wrong with them.
+
+    Attributes
+    ----------
+    topics : list of Topic
+    least, most, number : ndarray of int64, shape (65536,)
+        By message id: sizes of its data and number of its topic, as the scan takes them.
+    """
+
+    def __init__(self) -> None:
+        self.topics: list[Topic] = []
+        self.damages: list[Damage] = []
+        self.least = np.zeros(IDS, dtype=np.int64)
+        self.most = np.full(IDS, scan.NOT_SUBSCRIBED, dtype=np.int64)
+        self.number = np.full(IDS, NOT_SUBSCRIBED, dtype=np.int64)
+        self._formats: dict[str, Format] = {}
+        self._flattener = Flattener(self._formats)
+        self._layouts: dict[str, Layout] = {}
+        self._known: dict[tuple[str, int], Topic] = {}
+
+    def heed(self, kind: str, body: bytes, place: int) -> None:
+        """Take in a format or a subscription that begins at byte ``place``."""
+        try:
+            if kind == "F":
+                fresh = parse_format(text_of(body))
+                if self._formats.get(fresh.name) != fresh:
+                    self._formats[fresh.name] = fresh
+                    self._layouts.clear()
+            elif kind == "A":
+                self._subscribe(body, place)
+        except GroundstationError as error:
+            self.damages.append(Damage("corrupt", f"byte {place}", 1, f"definition that cannot be used ({error})"))
+
+    def _subscribe(self, body: bytes, place: int) -> None:
+        instance, message_id, name = body[0], body[1] | body[2] << 8, text_of(body[3:])
+        layout = self._layout(name, place)
+        topic = self._known.get((name, instance))
+        if topic is None or topic.layout != layout:
+            if len(self.topics) >= MAX_TOPICS:
+                raise GroundstationError("log", f"more than {MAX_TOPICS} topics")
+            topic = self._known[name, instance] = Topic(len(self.topics), name, instance, layout)
+            self.topics.append(topic)
+        self.number[message_id] = topic.number
+        self.least[message_id] = layout.least_bytes if layout else 0
+        self.most[message_id] = layout.most_bytes if layout else scan.NOT_SUBSCRIBED
+
+    def _layout(self, name: str, place: int) -> Layout | None:
+        if name not in self._layouts:
+            try:
+                self._layouts[name] = self._flattener.layout(name)
+            except GroundstationError as error:
+                what = f"topic {name[:80]} whose definition cannot be used ({error})"
+                self.damages.append(Damage("dropped_channel", f"byte {place}", 1, what))
+                return None
+        return self._layouts[name]
+
+
+class Walk:
+    """One pass over the messages of a log.
+
+    Parameters
+    ----------
+    source : Source
+
+    Attributes
+    ----------
+    definitions : Definitions
+    """
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self.definitions = Definitions()
+        self._spans: list[tuple[int, int]] = []
+        self._more_spans = [0, 0, 0, 0]  # number, bytes, first, end
+        self._ends: list[Damage] = []
+        self._index = 0
+        self._capacity = max(1024, BLOCK_BYTES // 16)
+
+    def __iter__(self) -> Iterator[Block]:
+        with self._source.open() as stream:
+            flags = flag_bits(self._source.head)
+            start = min(flags.end if flags else FILE_HEADER_BYTES, self._source.size)
+            for end in self._section_ends(start, flags.appended_offsets if flags else ()):
+                yield from self._section(stream, start, end)
+                start = end
+
+    def _section_ends(self, start: int, appended: tuple[int, ...]) -> list[int]:
+        """Where sections end: a message that was cut when data was appended does not reach into the next section."""
+        size = self._source.size
+        offsets = sorted(appended)
+        beyond = [offset for offset in offsets if offset > size]
+        if beyond:
+            text = f"data appended at byte {beyond[0]}, behind the end of the file"
+            self._ends.append(Damage("truncated", f"byte {size}", 1, text))
+        return [*(offset for offset in dict.fromkeys(offsets) if start < offset < size), size]
+
+    def _section(self, stream: BinaryIO, start: int, end: int) -> Iterator[Block]:
+        """Messages of the bytes from ``start`` to ``end``."""
+        state = scan.new_state()
+        room = min(BLOCK_BYTES + 2 * scan.LOOKAHEAD, end - start)
+        buffer = np.zeros(room + SLACK, dtype=np.uint8)
+        base, filled, is_end = start, 0, False
+        while not is_end:
+            done = int(state[scan.POSITION])
+            base, filled, state[scan.POSITION] = base + done, filled - done, 0
+            buffer[:filled] = buffer[done : done + filled]
+            if state[scan.SKIP_START] != scan.NOWHERE:
+                state[scan.SKIP_START] -= done
+            fresh = self._read(stream, base + filled, buffer[filled : min(room, end - base)])
+            filled += fresh
+            is_end = base + filled >= end or not fresh
+            yield from self._messages(buffer[: filled + SLACK], is_end, base, state)
+        self._close(stream, state, base, base + filled)
+
+    def _messages(self, data: NDArray[np.uint8], is_end: bool, base: int, state: Int64Array) -> Iterator[Block]:
+        """Blocks of the messages in ``data`` (and slack), which begins at byte ``base`` of the file."""
+        definitions = self.definitions
+        spans = np.zeros((4096, 2), dtype=np.int64)
+        reason = scan.FULL
+        while reason != scan.MORE_DATA:
+            at, topic = np.empty(self._capacity, dtype=np.int64), np.empty(self._capacity, dtype=np.int32)
+            state[scan.COUNT], reason = 0, scan.DEFINITION
+            while reason == scan.DEFINITION:
+                state[scan.SPANS] = 0
+                tables = definitions.least, definitions.most, definitions.number
+                reason = scan.scan(
+                    data[: len(data) - SLACK], 0 if is_end else scan.LOOKAHEAD, *tables, at, topic, spans, state
+                )
+                self._count_spans(spans[: state[scan.SPANS]] + base)
+                if reason == scan.DEFINITION:
+                    last = int(state[scan.COUNT]) - 1
+                    place = int(at[last])
+                    size = int(data[place]) | int(data[place + 1]) << 8
+                    body = data[place + scan.HEADER : place + scan.HEADER + size].tobytes()
+                    definitions.heed(chr(-int(topic[last])), body, base + place)
+            count = int(state[scan.COUNT])
+            if count:
+                yield Block(data, at[:count], topic[:count], self._index, definitions.topics)
+                self._index += count
+
+    def _read(self, stream: BinaryIO, place: int, into: NDArray[np.uint8]) -> int:
+        """Fill ``into`` with bytes of the file from ``place`` on; returns how many there were."""
+        try:
+            stream.seek(place)
+            count: int = stream.readinto(into.data)  # type: ignore[attr-defined]
+            return count
+        except OSError as error:  # a failing disk or network share
+            where = f"{self._source.name}, byte {place}"
+            raise UnreadableLogError(where, f"no more data ({error.strerror})", "", "copy the file again") from error
+
+    def _count_spans(self, spans: NDArray[np.int64]) -> None:
+        for start, end in spans.tolist():
+            if len(self._spans) < SPANS_SHOWN:
+                self._spans.append((start, end))
+            else:
+                number, total, first, _last = self._more_spans
+                self._more_spans = [number + 1, total + end - start, first if number else start, end]
+
+    def _close(self, stream: BinaryIO, state: NDArray[np.int64], base: int, end: int) -> None:
+        """Count what is left at the end of a section."""
+        cut = int(state[scan.CUT_AT])
+        stop = end if cut == scan.NOWHERE else base + cut
+        if state[scan.SKIP_START] != scan.NOWHERE:
+            start = base + int(state[scan.SKIP_START])
+            if stop == end and self._is_filler(stream, start, end):
+                what = "zero bytes behind the last message"
+                self._ends.append(Damage("filler", f"bytes {start} to {end - 1}", end - start, what, loses_data=False))
+            else:
+                self._count_spans(np.array([[start, stop]]))
+        if stop < end:
+            why = "the end of the file" if end >= self._source.size else "data that was appended"
+            what = f"bytes of a message cut by {why}"
+            self._ends.append(Damage("truncated", f"byte {stop}", end - stop, what))
+
+    def _is_filler(self, stream: BinaryIO, start: int, end: int) -> bool:
+        """Whether all bytes are zero: a file that was made longer than its data."""
+        piece = np.empty(min(1 << 20, end - start), dtype=np.uint8)
+        counts = ((at, self._read(stream, at, piece[: end - at])) for at in range(start, end, len(piece)))
+        return not any(piece[:count].any() for _at, count in counts)
+
+    def damages(self) -> Iterator[Damage]:
+        """What was lost, once all blocks were gone through."""
+        listed = self.definitions.damages
+        yield from listed[:SPANS_SHOWN]
+        if len(listed) > SPANS_SHOWN:
+            rest = listed[SPANS_SHOWN:]
+            yield Damage("corrupt", f"from {rest[0].place} on", len(rest), "more definitions that cannot be used")
+        what = "bytes that belong to no message, skipped"
+        for start, end in self._spans:
+            yield Damage("corrupt", f"bytes {start} to {end - 1}", end - start, what)
+        number, total, first, last = self._more_spans
+        if number:
+            yield Damage("corrupt", f"bytes {first} to {last - 1}", total, f"{what}, in {number} more places")
+        yield from self._ends

@@ -1,0 +1,330 @@
+"""PX4 topics as canonical signals: which message gives which field, in which unit.
+
+Field names changed between versions of PX4; of the rules of a role the first whose topic has data with the fields it
+needs is taken. Units and senses are those of the message definitions (PX4-Autopilot, msg/*.msg, versions 1.4 to 1.16).
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import wrap_360
+from groundstation.base.records import BoolArray, Column
+from groundstation.base.units import DEG_PER_RAD, NT_PER_GAUSS
+
+FloatArray = NDArray[np.float64]
+Columns = dict[str, Column]
+_DOWNWARD = 25  # distance_sensor.orientation: ROTATION_DOWNWARD_FACING
+_2D_FIX, FIX_3D = 2, 3
+_HPA_BELOW = 1_200.0  # sensor_baro.pressure is in hPa before PX4 1.13, in Pa from then on
+_UNKNOWN_CURRENT = -1.0
+
+
+class Rows:
+    """Data of some messages of one topic, as floating-point numbers."""
+
+    def __init__(self, rows: NDArray[Any]) -> None:
+        self._rows = rows
+        self._names = frozenset(rows.dtype.names or ())
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._names
+
+    def __getitem__(self, name: str) -> FloatArray:
+        with np.errstate(invalid="ignore"):  # some NaN of four bytes signal when they are widened
+            return np.asarray(self._rows[name].astype(np.float64))
+
+    def holds(self, name: str) -> BoolArray | None:
+        """Where a flag is set, shape (n,); None in a version that has no such flag."""
+        return self._rows[name] != 0 if name in self else None
+
+
+@dataclass(frozen=True)
+class Rule:
+    """How one PX4 topic gives fields of a canonical one.
+
+    Parameters
+    ----------
+    source : str
+        Topic of PX4.
+    needs : tuple of str
+        Columns without which the rule does not apply.
+    columns : callable
+        Rows to canonical columns.
+    derived : mapping of field to str
+        What a user must know of a field.
+    """
+
+    source: str
+    needs: tuple[str, ...]
+    columns: Callable[[Rows], Columns]
+    derived: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Role:
+    """Something that a canonical topic tells, and the rules for it, best first.
+
+    ``has_instances``: each instance of the source is a topic of its own (``gnss.1``, ``gnss.2``).
+    """
+
+    topic: str
+    rules: tuple[Rule, ...]
+    has_instances: bool = False
+
+
+def _scaled(fields: Mapping[str, tuple[str, float]], valid: str = "") -> Callable[[Rows], Columns]:
+    """Rule of plain factors: canonical field -> (column, factor); absent where the flag ``valid`` is not set."""
+
+    def columns(rows: Rows) -> Columns:
+        present = rows.holds(valid) if valid else None
+        return {field: Column(rows[name] * factor, present) for field, (name, factor) in fields.items() if name in rows}
+
+    return columns
+
+
+def _vector(fields: tuple[str, str, str], name: str, factor: float) -> Callable[[Rows], Columns]:
+    return _scaled({field: (f"{name}[{axis}]", factor) for axis, field in enumerate(fields)})
+
+
+def _rule(source: str, fields: Mapping[str, tuple[str, float]], valid: str = "", **derived: str) -> Rule:
+    return Rule(source, tuple(name for name, _factor in fields.values()), _scaled(fields, valid), derived)
+
+
+def attitude_from_quaternion(rows: Rows) -> Columns:
+    """Roll, pitch and heading of ``q`` (w, x, y, z), which turns body forward-right-down into north-east-down.
+
+    A quaternion whose length is not one is none: PX4 writes zeros before the filter has started.
+    """
+    w, x, y, z = (rows[f"q[{k}]"] for k in range(4))
+    with np.errstate(invalid="ignore", over="ignore"):
+        norm = w * w + x * x + y * y + z * z
+        present = np.isnan(norm) | (np.abs(norm - 1.0) < 0.1)
+        roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+        heading = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return {
+            "roll_deg": Column(roll * DEG_PER_RAD, present),
+            "pitch_deg": Column(pitch * DEG_PER_RAD, present),
+            "true_heading_deg": Column(wrap_360(heading * DEG_PER_RAD), present),
+        }
+
+
+def attitude_from_angles(rows: Rows) -> Columns:
+    """Roll, pitch and heading that PX4 logged as angles (before 1.5)."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        heading = wrap_360(rows["yaw"] * DEG_PER_RAD)
+    roll, pitch = rows["roll"] * DEG_PER_RAD, rows["pitch"] * DEG_PER_RAD
+    return {"roll_deg": Column(roll), "pitch_deg": Column(pitch), "true_heading_deg": Column(heading)}
+
+
+def local_velocity(rows: Rows) -> Columns:
+    """Velocity of ``vehicle_local_position``, absent where the filter calls it invalid."""
+    level, vertical = rows.holds("v_xy_valid"), rows.holds("v_z_valid")
+    return {
+        "velocity_north_mps": Column(rows["vx"], level),
+        "velocity_east_mps": Column(rows["vy"], level),
+        "velocity_down_mps": Column(rows["vz"], vertical),
+    }
+
+
+def global_position(rows: Rows) -> Columns:
+    """Position of ``vehicle_global_position``; its flags of validity came with PX4 1.16."""
+    level, vertical = rows.holds("lat_lon_valid"), rows.holds("alt_valid")
+    columns = {"latitude_deg": Column(rows["lat"], level), "longitude_deg": Column(rows["lon"], level)}
+    names = {"altitude_msl_m": "alt", "altitude_ellipsoid_m": "alt_ellipsoid"}
+    return columns | {field: Column(rows[name], vertical) for field, name in names.items() if name in rows}
+
+
+def gnss(rows: Rows) -> Columns:
+    """Fix of a satellite receiver; position and velocity are absent where there is no fix."""
+    fix = rows["fix_type"] >= _2D_FIX
+    velocity = rows.holds("vel_ned_valid")
+    velocity = fix if velocity is None else fix & velocity
+    columns = {}
+    for field, choices in _GNSS_FIELDS.items():
+        name, factor = next(((name, factor) for name, factor in choices if name in rows), ("", 0.0))
+        if name:
+            is_velocity = field.startswith(("velocity", "ground", "track"))
+            columns[field] = Column(rows[name] * factor, velocity if is_velocity else fix)
+    if "track_deg" in columns:
+        with np.errstate(invalid="ignore"):
+            columns["track_deg"] = Column(wrap_360(columns["track_deg"].values), velocity)
+    if "satellites_used" in rows:
+        columns["satellites_used"] = Column(rows["satellites_used"])
+    columns["integrity_ok"] = Column(rows["fix_type"] >= FIX_3D)
+    return columns
+
+
+_GNSS_FIELDS: Mapping[str, tuple[tuple[str, float], ...]] = {
+    "latitude_deg": (("latitude_deg", 1.0), ("lat", 1e-7)),
+    "longitude_deg": (("longitude_deg", 1.0), ("lon", 1e-7)),
+    "altitude_msl_m": (("altitude_msl_m", 1.0), ("alt", 1e-3)),
+    "altitude_ellipsoid_m": (("altitude_ellipsoid_m", 1.0), ("alt_ellipsoid", 1e-3)),
+    "velocity_north_mps": (("vel_n_m_s", 1.0),),
+    "velocity_east_mps": (("vel_e_m_s", 1.0),),
+    "velocity_down_mps": (("vel_d_m_s", 1.0),),
+    "ground_speed_mps": (("vel_m_s", 1.0),),
+    "track_deg": (("cog_rad", DEG_PER_RAD),),
+    "hdop": (("hdop", 1.0),),
+    "velocity_sigma_mps": (("s_variance_m_s", 1.0),),
+}
+
+
+def pressure_altitude(pressure_pa: FloatArray) -> FloatArray:
+    """Altitude in the standard atmosphere, m, of a static pressure, Pa; NaN where there is none.
+
+    Source: ICAO Doc 7488 (1993), troposphere: h = 44330.77 (1 - (p / 101325)^0.190263).
+
+    Examples
+    --------
+    >>> pressure_altitude(np.array([101325.0, 89874.6])).round(1).tolist()
+    [0.0, 1000.0]
+    """
+    with np.errstate(invalid="ignore"):
+        ratio = np.where(pressure_pa > 0.0, pressure_pa, np.nan) / 101_325.0
+        return np.asarray(44_330.77 * (1.0 - ratio**0.190_263), dtype=np.float64)
+
+
+def _air_data(rows: Rows) -> Columns:
+    return {"pressure_altitude_m": Column(pressure_altitude(rows["baro_pressure_pa"]))}
+
+
+def _barometer(rows: Rows) -> Columns:
+    pressure = rows["pressure"]
+    with np.errstate(invalid="ignore"):
+        pascals = np.where(pressure < _HPA_BELOW, pressure * 100.0, pressure)
+    return {"pressure_altitude_m": Column(pressure_altitude(pascals))}
+
+
+def _current(rows: Rows) -> Columns:
+    current = rows["current_a"]
+    return {"current_a": Column(current, current != _UNKNOWN_CURRENT)}
+
+
+def _height(rows: Rows) -> Columns:
+    present = rows["orientation"] == _DOWNWARD
+    if "signal_quality" in rows:
+        present &= rows["signal_quality"] != 0.0
+    return {"height_m": Column(rows["current_distance"], present)}
+
+
+def _landed(rows: Rows) -> Columns:
+    landed = rows.holds("landed")
+    return {"weight_on_wheels": Column(landed)} if landed is not None else {}
+
+
+_RATES = ("rate_x_dps", "rate_y_dps", "rate_z_dps")
+_ACCEL = ("accel_x_mps2", "accel_y_mps2", "accel_z_mps2")
+_FIELD = ("field_forward_nt", "field_right_nt", "field_down_nt")
+_HEADING = {"true_heading_deg": "attitude of the autopilot's filter (vehicle_attitude)"}
+_QUATERNION = tuple(f"q[{k}]" for k in range(4))
+_PRESSURE = {"pressure_altitude_m": "pressure in the standard atmosphere"}
+_WIND = {"wind_north_mps": ("windspeed_north", 1.0), "wind_east_mps": ("windspeed_east", 1.0)}
+_GNSS_NEEDS = ("fix_type",)
+
+
+def _vector_rule(source: str, name: str, fields: tuple[str, str, str], factor: float = 1.0, **derived: str) -> Rule:
+    return Rule(source, tuple(f"{name}[{axis}]" for axis in range(3)), _vector(fields, name, factor), derived)
+
+
+ROLES: tuple[Role, ...] = (
+    Role(
+        "ins",
+        (
+            Rule("vehicle_attitude", _QUATERNION, attitude_from_quaternion, _HEADING),
+            Rule("vehicle_attitude", ("roll", "pitch", "yaw"), attitude_from_angles, _HEADING),
+        ),
+    ),
+    Role(
+        "ins",
+        (
+            _vector_rule("vehicle_angular_velocity", "xyz", _RATES, DEG_PER_RAD),
+            _rule(
+                "vehicle_attitude",
+                {
+                    field: (name, DEG_PER_RAD)
+                    for field, name in zip(_RATES, ("rollspeed", "pitchspeed", "yawspeed"), strict=True)
+                },
+            ),
+            _vector_rule("sensor_combined", "gyro_rad", _RATES, DEG_PER_RAD),
+        ),
+    ),
+    Role(
+        "ins",
+        (
+            _vector_rule("vehicle_acceleration", "xyz", _ACCEL),
+            _vector_rule("sensor_combined", "accelerometer_m_s2", _ACCEL),
+        ),
+    ),
+    Role(
+        "ins",
+        (
+            Rule("vehicle_local_position", ("vx", "vy", "vz"), local_velocity, {}),
+            _rule(
+                "vehicle_global_position",
+                {f"velocity_{axis}_mps": (f"vel_{axis[0]}", 1.0) for axis in ("north", "east", "down")},
+            ),
+        ),
+    ),
+    Role("ins", (Rule("vehicle_global_position", ("lat", "lon", "alt"), global_position, {}),)),
+    Role(
+        "gnss",
+        (Rule("vehicle_gps_position", _GNSS_NEEDS, gnss, {}), Rule("sensor_gps", _GNSS_NEEDS, gnss, {})),
+        has_instances=True,
+    ),
+    Role(
+        "magnetometer",
+        (
+            _vector_rule("vehicle_magnetometer", "magnetometer_ga", _FIELD, NT_PER_GAUSS),
+            _vector_rule("sensor_combined", "magnetometer_ga", _FIELD, NT_PER_GAUSS),
+            _rule(
+                "sensor_mag",
+                {field: (axis, NT_PER_GAUSS) for field, axis in zip(_FIELD, "xyz", strict=True)},
+                **dict.fromkeys(_FIELD, "sensor_mag, without the autopilot's calibration"),
+            ),
+        ),
+        has_instances=True,
+    ),
+    Role("electric", (Rule("battery_status", ("current_a",), _current, {}),), has_instances=True),
+    Role(
+        "baro",
+        (
+            Rule("vehicle_air_data", ("baro_pressure_pa",), _air_data, _PRESSURE),
+            _rule("sensor_combined", {"pressure_altitude_m": ("baro_alt_meter", 1.0)}),
+            Rule("sensor_baro", ("pressure",), _barometer, _PRESSURE),
+        ),
+    ),
+    Role(
+        "air",
+        (
+            _rule("airspeed_validated", {"true_airspeed_mps": ("true_airspeed_m_s", 1.0)}),
+            _rule("airspeed", {"true_airspeed_mps": ("true_airspeed_m_s", 1.0)}),
+        ),
+    ),
+    Role("air", (_rule("wind", _WIND), _rule("wind_estimate", _WIND), _rule("estimator_wind", _WIND))),
+    Role(
+        "radio_altimeter",
+        (Rule("distance_sensor", ("current_distance", "orientation"), _height, {}),),
+        has_instances=True,
+    ),
+    Role(
+        "discrete",
+        (
+            Rule(
+                "vehicle_land_detected",
+                ("landed",),
+                _landed,
+                {"weight_on_wheels": "landed flag of the autopilot (vehicle_land_detected)"},
+            ),
+        ),
+    ),
+)
+ARMING: tuple[tuple[str, str, int], ...] = (("vehicle_status", "arming_state", 2), ("actuator_armed", "armed", 1))
+UTC_SOURCES = ("vehicle_gps_position", "sensor_gps", "vehicle_global_position")

@@ -1,0 +1,247 @@
+"""The second pass over a ULog: batches of every topic, raw and canonical, then remarks and damages."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.records import (
+    MAX_BATCH_ROWS,
+    BoolArray,
+    Column,
+    Damage,
+    Int64Array,
+    Item,
+    LogHeader,
+    RecordBatch,
+    Remark,
+)
+from groundstation.readers.source import Source
+from groundstation.readers.ulog.blocks import NOT_SUBSCRIBED, Topic, Walk
+from groundstation.readers.ulog.canonical import Rows
+from groundstation.readers.ulog.formats import TIMESTAMP
+from groundstation.readers.ulog.survey import Overview, overview
+from groundstation.readers.ulog.texts import MAX_TIME_US, TextTopics, device_time
+
+MAX_NAME_CHARACTERS = 200
+_ODD = re.compile(r"[^A-Za-z0-9_\-/]")
+_WITH_MODE = "true_heading_deg"
+
+
+@dataclass
+class _Losses:
+    """Data messages without a usable definition, and times that no clock shows."""
+
+    unreadable: dict[str, int] = field(default_factory=dict)
+    beyond: dict[str, int] = field(default_factory=dict)
+
+    def damages(self) -> Iterator[Damage]:
+        """One for each topic."""
+        for name, count in self.unreadable.items():
+            yield Damage("dropped_channel", "the whole log", count, f"messages of {name} without a usable definition")
+        for topic, count in self.beyond.items():
+            what = "times more than 292 years after power-up"
+            yield Damage("unreadable_cells", "the whole log", count, what, topic)
+
+
+def items(source: Source, reader_name: str, start_us: int) -> Iterator[Item]:
+    """Items of a log; ``start_us`` is when its header says that logging began."""
+    found = overview(source)
+    yield LogHeader(reader_name, found.metadata, found.utc_of_zero_ns, has_counting_clock=True)
+    walk, losses = Walk(source), _Losses()
+    texts = TextTopics(start_us if start_us <= MAX_TIME_US else 0)
+    raw, canonical = _RawTopics(losses, found.odd_flags), _CanonicalTopics(found)
+    newest_us = 0
+    for block in walk:
+        messages_us = np.zeros(len(block.at), dtype=np.uint64)
+        for topic, which in block.groups():
+            if topic.layout is None:
+                losses.unreadable[topic.name] = losses.unreadable.get(topic.name, 0) + len(which)
+                continue
+            rows = block.rows(topic.layout, which)
+            if topic.layout.timestamp_offset is not None:
+                messages_us[which] = rows[TIMESTAMP]
+            index, time = block.first_index + which, device_time(messages_us[which])
+            yield from raw.batches(topic, index, time, rows)
+            canonical.take(topic, index, time, rows)
+        yield from canonical.batches()
+        unsubscribed = int((block.topic == NOT_SUBSCRIBED).sum())
+        if unsubscribed:
+            name = "topics that were not subscribed"
+            losses.unreadable[name] = losses.unreadable.get(name, 0) + unsubscribed
+        controls = np.flatnonzero(block.topic < 0)
+        newest = _newest_before(np.append(controls, len(messages_us)), messages_us, newest_us)
+        yield from texts.batches(block, newest[:-1])
+        newest_us = int(newest[-1])
+    yield from found.remarks
+    yield from canonical.remarks()
+    yield from walk.damages()
+    yield from losses.damages()
+    yield from texts.damages()
+
+
+def _newest_before(places: Int64Array, messages_us: NDArray[np.uint64], newest_us: int) -> Int64Array:
+    """Time of the last data message before each place, microseconds; what is no time counts as none."""
+    has_time = np.flatnonzero((messages_us > 0) & (messages_us <= MAX_TIME_US))
+    if not len(has_time):
+        return np.full(len(places), newest_us, dtype=np.int64)
+    last = np.searchsorted(has_time, places) - 1
+    times = messages_us[has_time[np.maximum(last, 0)]].astype(np.int64)
+    return np.where(last >= 0, times, newest_us)
+
+
+class _RawTopics:
+    """Batches of the log's own topics: ``raw.<topic>``, and ``raw.<topic>.<instance>`` of all instances but 0."""
+
+    def __init__(self, losses: _Losses, odd_flags: set[tuple[int, str]]) -> None:
+        self._losses, self._odd_flags = losses, odd_flags
+        self._names: dict[int, str] = {}
+        self._taken: set[str] = set()
+
+    def batches(self, topic: Topic, index: Int64Array, time: Column, rows: NDArray[Any]) -> Iterator[RecordBatch]:
+        """Rows of one topic with all its columns; the time of publication is the device time."""
+        layout = topic.layout
+        assert layout is not None and rows.dtype.names is not None
+        name = self._name(topic)
+        if time.present is not None and layout.timestamp_offset is not None:
+            beyond = int((rows[TIMESTAMP] > MAX_TIME_US).sum())
+            if beyond:
+                self._losses.beyond[name] = self._losses.beyond.get(name, 0) + beyond
+        flags = {column for column in layout.flags if (topic.number, column) not in self._odd_flags}
+        columns = {
+            column: Column(rows[column] != 0 if column in flags else rows[column])
+            for column in rows.dtype.names
+            if column != TIMESTAMP or layout.timestamp_offset is None or len(rows.dtype.names) == 1
+        }
+        yield from _bounded(RecordBatch(name, index, time, columns))
+
+    def _name(self, topic: Topic) -> str:
+        if topic.number not in self._names:
+            base = f"raw.{_ODD.sub('_', topic.name[:MAX_NAME_CHARACTERS]) or '_'}"
+            name = base = f"{base}.{topic.instance}" if topic.instance else base
+            copy = 1
+            while name in self._taken:
+                copy += 1
+                name = f"{base}_{copy}"
+            self._taken.add(name)
+            self._names[topic.number] = name
+        return self._names[topic.number]
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Canonical columns that one PX4 topic gave in a block."""
+
+    index: Int64Array
+    time: Column
+    columns: dict[str, Column]
+
+
+class _CanonicalTopics:
+    """Gathers canonical columns of a block, and puts those of several sources in the order of the log."""
+
+    def __init__(self, found: Overview) -> None:
+        self._found = found
+        self._parts: dict[str, list[_Part]] = {}
+        self._armed: bool | None = None
+        self._mode = "gnss_aided" if found.has_gnss else "attitude"
+
+    def take(self, topic: Topic, index: Int64Array, time: Column, rows: NDArray[Any]) -> None:
+        """Convert what a block has of a PX4 topic."""
+        values = Rows(rows)
+        of_topic: dict[str, dict[str, Column]] = {}
+        for assignment in self._found.assignments.get((topic.name, topic.instance), ()):
+            if all(name in values for name in assignment.rule.needs):
+                of_topic.setdefault(assignment.topic, {}).update(assignment.rule.columns(values))
+        for name, columns in of_topic.items():
+            if _WITH_MODE in columns:
+                columns["mode"] = Column(np.full(len(rows), self._mode), columns[_WITH_MODE].present)
+            part = _occupied(_Part(index, time, columns))
+            if part is not None:
+                self._parts.setdefault(name, []).append(part)
+        if self._found.arming and topic.instance == 0 and topic.name == self._found.arming[0]:
+            self._note_arming(index, time, values)
+
+    def _note_arming(self, index: Int64Array, time: Column, values: Rows) -> None:
+        """Changes between armed and disarmed as events, the first state among them."""
+        assert self._found.arming is not None
+        _source, column, armed_value = self._found.arming
+        if column not in values:
+            return
+        armed = values[column] == armed_value
+        before = np.concatenate(([armed[0] if self._armed is None else self._armed], armed[:-1]))
+        changed = armed != before
+        changed[0] |= self._armed is None
+        self._armed = bool(armed[-1])
+        if changed.any():
+            names = np.where(armed[changed], "armed", "disarmed")
+            part = _Part(index[changed], time.take(changed), {"name": Column(names)})
+            self._parts.setdefault("event", []).append(part)
+
+    def batches(self) -> Iterator[RecordBatch]:
+        """Batches of what was taken since the last call."""
+        parts, self._parts = self._parts, {}
+        for topic, several in parts.items():
+            yield from _bounded(_merged(topic, several))
+
+    def remarks(self) -> Iterator[Remark]:
+        """What serves as what."""
+        sources: dict[str, list[str]] = {}
+        for (source, instance), assignments in sorted(self._found.assignments.items()):
+            for assignment in assignments:
+                name = f"{source}.{instance}" if instance else source
+                if name not in sources.setdefault(assignment.topic, []):
+                    sources[assignment.topic].append(name)
+        if sources:
+            text = "; ".join(f"{topic} from {', '.join(names)}" for topic, names in sorted(sources.items()))
+            yield Remark("mapped", text)
+        if any(a.topic == "ins" for several in self._found.assignments.values() for a in several):
+            text = "ins.mode: the autopilot's own filter; gnss_aided when the log has a satellite fix, else attitude"
+            yield Remark("derived", text, "ins", ("mode",))
+
+
+def _occupied(part: _Part) -> _Part | None:
+    """The rows that have any value; None when there are none."""
+    columns = part.columns.values()
+    if not part.columns or any(column.present is None for column in columns):
+        return part if part.columns else None
+    rows: BoolArray = np.logical_or.reduce([column.mask for column in columns])
+    if rows.all():
+        return part
+    if not rows.any():
+        return None
+    kept = {name: column.take(rows) for name, column in part.columns.items()}
+    return _Part(part.index[rows], part.time.take(rows), kept)
+
+
+def _merged(topic: str, parts: list[_Part]) -> RecordBatch:
+    """One batch of parts from different messages, in the order of the log; each row has the fields of its source."""
+    if len(parts) == 1:
+        return RecordBatch(topic, parts[0].index, parts[0].time, parts[0].columns)
+    index = np.concatenate([part.index for part in parts])
+    order = np.argsort(index, kind="stable")
+    time = Column(
+        np.concatenate([part.time.values for part in parts])[order],
+        np.concatenate([part.time.mask for part in parts])[order],
+    )
+    columns = {}
+    for name in dict.fromkeys(name for part in parts for name in part.columns):
+        having = [part.columns.get(name) for part in parts]
+        dtype = np.result_type(*(column.values.dtype for column in having if column is not None))
+        values, present = np.zeros(len(index), dtype=dtype), np.zeros(len(index), dtype=bool)
+        start = 0
+        for part, column in zip(parts, having, strict=True):
+            rows = slice(start, start + len(part.index))
+            start += len(part.index)
+            if column is not None:
+                values[rows], present[rows] = column.values, column.mask
+        columns[name] = Column(values[order], present[order])
+    return RecordBatch(topic, index[order], time, columns)
+
+
+def _bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
+    for start in range(0, len(batch), MAX_BATCH_ROWS):
+        yield batch if len(batch) <= MAX_BATCH_ROWS else batch.take(slice(start, start + MAX_BATCH_ROWS))

@@ -1,0 +1,311 @@
+"""The loops over the bytes of a ULog: where its messages stand, and which bytes belong to none. Compiled.
+
+A message is a size (two bytes), a type (one byte) and as many bytes as the size says; there is no checksum. What can be
+checked is strong for most messages: a data message must have a known id and the size of its format, texts must be
+texts, the sync message is eleven fixed bytes. Such a message is believed by itself, so that an intact one between two
+damaged ones is kept. One with little to check is believed when a strong one follows within four. Texts, and data with
+padding that may be left out, have a size that nothing confirms: where no message follows, one that begins inside tells
+that the size is damaged.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.compile import compiled
+
+HEADER = 3
+MAX_MESSAGE = HEADER + 0xFFFF
+LOOKAHEAD = 6 * MAX_MESSAGE  # bytes that must follow the message that is judged: itself, four more, and a header
+LOOKED_AT = 256  # characters of a text or a name: bounds the work that a file made of letters causes
+NOT_SUBSCRIBED = -1  # of a message id, as its largest size
+
+DATA, SYNC = 0x44, 0x53
+NONE, WEAK, STRONG = 0, 1, 2
+
+# Why the scan returned.
+MORE_DATA, DEFINITION, FULL = 0, 1, 2
+# Places in the state array: positions count from the start of the data given.
+POSITION, COUNT, SPANS, SKIP_START, CUT_AT, STATE_SIZE = 0, 1, 2, 3, 4, 5
+NOWHERE = -(1 << 62)
+
+
+def new_state() -> NDArray[np.int64]:
+    """State of a scan at the start of a section."""
+    state = np.zeros(STATE_SIZE, dtype=np.int64)
+    state[SKIP_START] = state[CUT_AT] = NOWHERE
+    return state
+
+
+@compiled
+def _u16(data: Any, at: int) -> Any:
+    return np.int64(data[at]) | np.int64(data[at + 1]) << 8
+
+
+@compiled
+def _is_text(data: Any, start: int, end: int, is_name: bool) -> bool:
+    """Whether bytes are text: a name (letters, digits and ``_-/``), or anything but control characters."""
+    for at in range(start, end):
+        byte = data[at]
+        if is_name:
+            is_letter = 0x41 <= byte <= 0x5A or 0x61 <= byte <= 0x7A or 0x2D <= byte <= 0x39 or byte == 0x5F
+            if not is_letter:
+                return False
+        elif (byte < 0x20 and byte not in (0, 9, 10, 13, 27)) or byte == 0x7F:
+            return False
+    return True
+
+
+@compiled
+def _is_keyed(data: Any, start: int, end: int) -> bool:
+    """Whether a message body is a length, a key ``type name`` of that length, and a value."""
+    if start >= end:
+        return False
+    length = np.int64(data[start])
+    if length < 5 or start + 1 + length > end:
+        return False
+    first = data[start + 1]
+    if first not in (0x62, 0x63, 0x64, 0x66, 0x69, 0x75):  # bool, char, double, float, int, uint
+        return False
+    spaces = 0
+    for at in range(start + 1, start + 1 + length):
+        byte = data[at]
+        spaces += byte == 0x20
+        if byte < 0x20 or byte > 0x7E:
+            return False
+    return spaces == 1
+
+
+@compiled
+def _is_format(data: Any, start: int, end: int) -> bool:
+    """Whether a body is a name, a colon, and printable characters with no further colon."""
+    colons = 0
+    for at in range(start, end):
+        byte = data[at]
+        colons += byte == 0x3A
+        if byte < 0x20 or byte > 0x7E or colons > 1 or (colons == 0 and at - start > LOOKED_AT):
+            return False
+    return colons == 1
+
+
+@compiled
+def _is_logged_text(data: Any, start: int, end: int, time_at: int) -> bool:
+    """Whether a body is a level (a digit), a time (at ``time_at``) with nothing in its highest byte, and a text."""
+    if time_at + 8 > end or data[start] < 0x30 or data[start] > 0x37 or data[time_at + 7] != 0:
+        return False
+    return _is_text(data, time_at + 8, min(end, time_at + 8 + LOOKED_AT), False)
+
+
+@compiled
+def _is_sync(data: Any, start: int) -> Any:
+    return (
+        data[start] == 0x2F
+        and data[start + 1] == 0x73
+        and data[start + 2] == 0x13
+        and data[start + 3] == 0x20
+        and data[start + 4] == 0x25
+        and data[start + 5] == 0x0C
+        and data[start + 6] == 0xBB
+        and data[start + 7] == 0x12
+    )
+
+
+@compiled
+def _strength(data: Any, at: int, end: int, least: Any, most: Any) -> int:
+    """How much speaks for a whole message at a place: NONE, WEAK or STRONG."""
+    if at + 3 > end:
+        return NONE
+    size = _u16(data, at)
+    kind = data[at + 2]
+    start, stop = at + 3, at + 3 + size
+    if stop > end or size == 0:
+        return NONE
+    if kind == 0x44:  # D: data
+        if size < 2:
+            return NONE
+        message_id = _u16(data, start)
+        if most[message_id] < 0:
+            return WEAK
+        return STRONG if least[message_id] <= size - 2 <= most[message_id] else NONE
+    if kind == 0x53:  # S: sync
+        return STRONG if size == 8 and _is_sync(data, start) else NONE
+    if kind == 0x41:  # A: subscription
+        return STRONG if 4 <= size <= 3 + LOOKED_AT and _is_text(data, start + 3, stop, True) else NONE
+    if kind == 0x46:  # F: format
+        return STRONG if _is_format(data, start, stop) else NONE
+    if kind == 0x49 or kind == 0x50:  # I, P: information, parameter
+        return STRONG if _is_keyed(data, start, stop) else NONE
+    if kind == 0x4D or kind == 0x51:  # M, Q: multiple information, default parameter
+        return STRONG if _is_keyed(data, start + 1, stop) else NONE
+    if kind == 0x4C:  # L: text
+        return STRONG if _is_logged_text(data, start, stop, start + 1) else NONE
+    if kind == 0x43:  # C: tagged text
+        return STRONG if _is_logged_text(data, start, stop, start + 3) else NONE
+    if kind == 0x4F or kind == 0x52:  # O, R: dropout, unsubscription
+        return WEAK if size == 2 else NONE
+    return WEAK if 0x21 <= kind <= 0x7E else NONE  # a type that a later version may define
+
+
+@compiled
+def _is_known_type(kind: Any) -> bool:
+    return kind in (0x41, 0x42, 0x43, 0x44, 0x46, 0x49, 0x4C, 0x4D, 0x4F, 0x50, 0x51, 0x52, 0x53)
+
+
+@compiled
+def _is_cut(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
+    """Whether a data message begins at a place and is cut by the end."""
+    if at + 5 > end or data[at + 2] != 0x44:
+        return False
+    size = _u16(data, at)
+    message_id = _u16(data, at + 3)
+    return at + 3 + size > end and least[message_id] <= size - 2 <= most[message_id]
+
+
+@compiled
+def _leads_on(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
+    """Whether a strong message begins at a place, or behind at most three weak ones; the end of the data is as good."""
+    for _ in range(4):
+        if at + 3 > end:
+            return True
+        strength = _strength(data, at, end, least, most)
+        if strength == NONE and data[at + 2] != 0x44 and _is_known_type(data[at + 2]):
+            return at + 3 + _u16(data, at) > end  # cut by the end
+        if strength != WEAK:
+            return strength == STRONG or _is_cut(data, at, end, least, most)
+        at += 3 + _u16(data, at)
+    return False
+
+
+@compiled
+def _find(data: Any, at: int, limit: int, end: int, least: Any, most: Any) -> int:
+    """First place from ``at`` up to ``limit`` where a believable message begins; ``limit`` when there is none."""
+    while at < limit and at + 3 <= end:
+        kind = data[at + 2]
+        if 0x41 <= kind <= 0x53:
+            strength = _strength(data, at, end, least, most)
+            if strength == STRONG or (kind == 0x44 and _is_cut(data, at, end, least, most)):
+                return at
+            is_known = kind == 0x4F or kind == 0x52
+            if strength == WEAK and is_known and _leads_on(data, at + 5, end, least, most):
+                return at
+        at += 1
+    return limit
+
+
+@compiled
+def _is_data(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
+    """Whether the header of a data message of a known id and size stands at a place."""
+    if at + 5 > end or data[at + 2] != 0x44:
+        return False
+    message_id = _u16(data, at + 3)
+    return least[message_id] <= _u16(data, at) - 2 <= most[message_id]
+
+
+@compiled
+def _has_one_size(data: Any, at: int, least: Any, most: Any) -> Any:
+    """Whether the data of a message's id has one size only: no padding at its end that may be left out."""
+    message_id = _u16(data, at + 3)
+    return least[message_id] == most[message_id]
+
+
+@compiled
+def _is_believed(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
+    """Whether a message at a place is one; ``end`` is that of the data."""
+    strength = _strength(data, at, end, least, most)
+    if strength == NONE:
+        return False
+    kind = data[at + 2]
+    if strength == STRONG and (kind == 0x53 or (kind == 0x44 and _has_one_size(data, at, least, most))):
+        return True
+    stop = at + 3 + _u16(data, at)
+    if _leads_on(data, stop, end, least, most):
+        return True
+    return strength == STRONG and _find(data, at + 3, stop, end, least, most) == stop
+
+
+@compiled
+def scan(
+    data: Any, ahead: int, least: Any, most: Any, topic: Any, out_at: Any, out_topic: Any, spans: Any, state: Any
+) -> int:
+    """Find messages from ``state[POSITION]`` on until there is a reason to return.
+
+    Parameters
+    ----------
+    data : ndarray of uint8, shape (n,)
+    ahead : int
+        The scan stops so many bytes before the end of the data (LOOKAHEAD); 0 where the section ends there.
+    least, most, topic : ndarray of int64, shape (65536,)
+        By message id: sizes of its data, and the number of its topic.
+    out_at : ndarray of int64, shape (m,)
+        Gets the place of each message.
+    out_topic : ndarray of int32, shape (m,)
+        Gets the topic's number of data messages, and minus the type of all others.
+    spans : ndarray of int64, shape (k, 2)
+        Gets the first byte of each stretch that belongs to no message, and the first after it.
+    state : ndarray of int64
+        As :func:`new_state` made it; carried from call to call.
+
+    Returns
+    -------
+    int
+        MORE_DATA (all of the data was gone through), DEFINITION (the last message is one, to be heeded before the
+        scan goes on), FULL (an output is).
+    """
+    end = len(data)
+    limit, is_end = end - ahead, ahead == 0
+    at, count = state[POSITION], state[COUNT]
+    reason = MORE_DATA
+    while at < limit:
+        if count == len(out_at) or state[SPANS] == len(spans):
+            reason = FULL
+            break
+        if at + 5 <= end and data[at + 2] == 0x44 and state[SKIP_START] == NOWHERE:  # what nearly all messages are
+            size = _u16(data, at)
+            message_id = _u16(data, at + 3)
+            low, high, stop = least[message_id], most[message_id], at + 3 + size
+            if low <= size - 2 <= high and stop <= end and (low == high or _is_data(data, stop, end, least, most)):
+                out_at[count], out_topic[count] = at, topic[message_id]
+                count += 1
+                at = stop
+                continue
+        if not _is_believed(data, at, end, least, most):
+            if is_end and _is_cut_off(data, at, end, least, most):
+                state[CUT_AT] = at
+                at = end
+                break
+            if state[SKIP_START] == NOWHERE:
+                state[SKIP_START] = at
+            at = _find(data, at + 1, limit, end, least, most)
+            continue
+        if state[SKIP_START] != NOWHERE:
+            spans[state[SPANS], 0], spans[state[SPANS], 1] = state[SKIP_START], at
+            state[SPANS] += 1
+            state[SKIP_START] = NOWHERE
+            continue  # there is room for the message only if the outputs are looked at again
+        kind = data[at + 2]
+        out_at[count] = at
+        out_topic[count] = topic[_u16(data, at + 3)] if kind == 0x44 else -np.int32(kind)
+        count += 1
+        at += 3 + _u16(data, at)
+        if kind == 0x41 or kind == 0x46 or kind == 0x42:
+            reason = DEFINITION
+            break
+    state[POSITION], state[COUNT] = at, count
+    return reason
+
+
+@compiled
+def _is_cut_off(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
+    """Whether a message of any type begins at a place, is cut by the end, and no other begins inside what is there."""
+    if at + 3 <= end:
+        kind = data[at + 2]
+        size = _u16(data, at)
+        if kind == 0x44:
+            if at + 5 <= end:
+                return _is_cut(data, at, end, least, most)
+        elif not _is_known_type(kind):
+            return False
+        if at + 3 + size <= end:
+            return False
+    return _find(data, at + 1, end, end, least, most) == end

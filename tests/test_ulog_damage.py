@@ -1,0 +1,217 @@
+"""Cut, flipped and hostile ULogs: every intact record is kept, losses are counted to the byte, nothing is thrown."""
+
+import re
+import struct
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from groundstation.base.errors import GroundstationError
+from groundstation.base.records import Damage, RecordBatch
+from groundstation.readers.source import Source
+from groundstation.readers.ulog import read as read_ulog
+from groundstation.readers.ulog import scan
+from groundstation.readers.ulog.blocks import Walk
+from tests.test_ulog import BARO, T0_US, UlogWriter
+from tests.test_ulog import read as read_log
+from tests.ulog_writer import small_flight
+
+RAW = ("raw.vehicle_attitude", "raw.vehicle_air_data", "raw.ulog.text")
+
+
+def times_us(items: list[Any], topic: str) -> list[int]:
+    batches = [item for item in items if isinstance(item, RecordBatch) and item.topic == topic]
+    return [int(time) // 1000 for batch in batches for time in batch.device_time_ns.values]
+
+
+def items_of(path: Path, data: bytes) -> list[Any]:
+    path.write_bytes(data)
+    return list(read_ulog(Source(path)))
+
+
+def damages_of(items: list[Any]) -> list[Damage]:
+    return [item for item in items if isinstance(item, Damage)]
+
+
+def test_cut_at_every_byte(tmp_path: Path) -> None:
+    """All messages in front of the cut are there, and a cut within a message is told with the bytes it left."""
+    log = small_flight(8)
+    path, ends = tmp_path / "cut.ulg", [*log.starts[1:], len(log.data)]
+    kinds = [chr(log.data[start + 2]) for start in log.starts]
+    for size in range(log.starts[0], len(log.data)):
+        items = items_of(path, bytes(log.data[:size]))
+        whole = [kind for kind, end in zip(kinds, ends, strict=True) if end <= size]
+        counted = sum(len(times_us(items, topic)) for topic in RAW)
+        assert counted == whole.count("D") + whole.count("L"), size
+        left = size - max([log.starts[0], *(end for end in ends if end <= size)])
+        told = [(damage.kind, damage.count) for damage in damages_of(items)]
+        assert told == ([("truncated", left)] if left else []), size
+    for size in range(log.starts[0]):
+        with pytest.raises(GroundstationError):
+            items_of(path, bytes(log.data[:size]))
+
+
+def spans_of(damages: list[Damage]) -> list[tuple[int, int]]:
+    """Bytes told as skipped, (first, behind the last)."""
+    found = (re.fullmatch(r"bytes (\d+) to (\d+)", damage.place) for damage in damages if damage.kind == "corrupt")
+    return [(int(match[1]), int(match[2]) + 1) for match in found if match]
+
+
+def test_flipped_bits_lose_no_other_record(tmp_path: Path) -> None:
+    """Seeded flips in the data section: every record that was not hit is there; skipped bytes lie around the hits."""
+    rng, path = np.random.default_rng(20_240_607), tmp_path / "flipped.ulg"
+    log = small_flight(400)
+    starts = np.array(log.starts)
+    first = next(place for place in log.starts if log.data[place + 2] == ord("D"))
+    for _ in range(150):
+        data, hits = bytearray(log.data), rng.integers(first, len(log.data), size=int(rng.integers(1, 12)))
+        for hit in hits.tolist():
+            data[hit] ^= 1 << int(rng.integers(8))
+        touched = {int(np.searchsorted(starts, hit, side="right")) - 1 for hit in hits.tolist()}
+        expected: dict[str, list[int]] = {topic: [] for topic in RAW}
+        for number, start in enumerate(log.starts):
+            kind = chr(log.data[start + 2])
+            if number in touched or kind not in "DL":
+                continue
+            topic = RAW[2] if kind == "L" else RAW[log.data[start + 3]]
+            expected[topic].append(struct.unpack_from("<Q", log.data, start + (4 if kind == "L" else 5))[0])
+        items = items_of(path, bytes(data))
+        for topic in RAW:
+            assert set(expected[topic]) <= set(times_us(items, topic))
+        ends = np.append(starts[1:], len(data))
+        for start, end in spans_of(damages_of(items)):
+            assert any(start < ends[number] and end > starts[number] for number in touched)
+
+
+def test_garbage_between_messages_is_counted_to_the_byte(tmp_path: Path) -> None:
+    rng = np.random.default_rng(7)
+    log = small_flight(50)
+    place = log.starts[60]
+    garbage = rng.integers(0, 256, 300_000, dtype=np.uint8).tobytes()
+    items = items_of(tmp_path / "x.ulg", bytes(log.data[:place]) + garbage + bytes(log.data[place:]))
+    assert spans_of(damages_of(items)) == [(place, place + len(garbage))]
+    assert sum(len(times_us(items, topic)) for topic in RAW) == 106
+    filled = items_of(tmp_path / "x.ulg", bytes(log.data) + bytes(70_000))
+    assert [(damage.kind, damage.count, damage.loses_data) for damage in damages_of(filled)] == [
+        ("filler", 70_000, False)
+    ]
+
+
+def test_an_intact_record_between_two_damaged_ones_is_kept(tmp_path: Path) -> None:
+    log = small_flight(10)
+    rows = [start for start in log.starts if log.data[start + 2] == ord("D")]
+    for damaged in (rows[6], rows[8]):
+        log.data[damaged + 2] ^= 0xFF
+    items = items_of(tmp_path / "x.ulg", bytes(log.data))
+    assert len(times_us(items, RAW[0])) == 8 and len(times_us(items, RAW[1])) == 10
+    assert [end - start for start, end in spans_of(damages_of(items))] == [29, 29]
+
+
+def test_a_damaged_size_of_a_text_swallows_nothing(tmp_path: Path) -> None:
+    log = small_flight(16)
+    text = next(start for start in log.starts if log.data[start + 2] == ord("L"))
+    log.data[text] ^= 0x40
+    items = items_of(tmp_path / "x.ulg", bytes(log.data))
+    assert len(times_us(items, RAW[0])) == len(times_us(items, RAW[1])) == 16
+
+
+def test_damaged_definitions_cost_their_topic_alone(tmp_path: Path) -> None:
+    log = small_flight(10)
+    definition = bytes(log.data).index(b"vehicle_air_data:uint64_t")
+    log.data[definition + 18] = ord("?")
+    items = items_of(tmp_path / "x.ulg", bytes(log.data))
+    assert len(times_us(items, RAW[0])) == 10 and not times_us(items, RAW[1])
+    lost = {damage.kind: damage.count for damage in damages_of(items)}
+    assert lost["dropped_channel"] == 10
+
+
+@pytest.mark.parametrize(
+    "formats",
+    [
+        ["a:a x;", "b:c[2] x;", "c:b[2] x;"],
+        ["a:uint64_t timestamp;uint8_t[999999] x;"],
+        [*(f"f{n}:f{n + 1}[9999] x;" for n in range(19)), "f19:uint8_t y;"],
+        [*(f"g{n}:g{n + 1}[2] x;" for n in range(60)), "g60:;"],
+        ["noname", ":", "x:;", "x:float;", "x:float[-1] y;", "x:float[3 y;", "x:missing y;"],
+        ["dup:uint64_t timestamp;float x;float x;float x_2;"],
+        ["odd:uint64_t timestamp;float \u00e4\u00f6;float a/b;float [0];"],
+    ],
+    ids=["loops", "huge", "deep", "empty", "malformed", "duplicates", "odd names"],
+)
+def test_hostile_formats(tmp_path: Path, formats: list[str]) -> None:
+    log = UlogWriter().flags().format(BARO)
+    for number, text in enumerate(formats):
+        log.format(text).subscribe(number + 10, text.partition(":")[0] or "x")
+    log.subscribe(0, "vehicle_air_data")
+    for row in range(20):
+        log.row(0, "Qf", T0_US + row, 1e5)
+        log.row(10, "Q3f", T0_US + row, 1.0, 2.0, 3.0)
+    found = read_log(tmp_path, log)
+    assert found.rows("raw.vehicle_air_data") == 20
+
+
+def test_ten_thousand_topics(tmp_path: Path) -> None:
+    log = UlogWriter().flags()
+    for number in range(10_000):
+        log.format(f"t{number}:uint64_t timestamp;float x;").subscribe(number, f"t{number}")
+    for number in range(10_000):
+        log.row(number, "Qf", T0_US + number, number)
+    found = read_log(tmp_path, log)
+    assert len([topic for topic in found.batches if topic.startswith("raw.t")]) == 10_000 and not found.damages
+
+
+def test_more_topics_than_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("groundstation.readers.ulog.blocks.MAX_TOPICS", 30)
+    log = UlogWriter().flags()
+    for number in range(60):
+        log.format(f"t{number}:uint64_t timestamp;float x;").subscribe(number, f"t{number}").row(
+            number, "Qf", T0_US, 1.0
+        )
+    items = items_of(tmp_path / "x.ulg", bytes(log.data))
+    assert any("more than 30 topics" in damage.what for damage in damages_of(items))
+
+
+def test_random_bytes_after_a_header_raise_nothing(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    header = bytes(UlogWriter().flags().format(BARO).subscribe(0, "vehicle_air_data").data)
+    for size in (1, 10, 1_000, 400_000):
+        items = items_of(tmp_path / "x.ulg", header + rng.integers(0, 256, size, dtype=np.uint8).tobytes())
+        assert sum(damage.count for damage in damages_of(items)) >= 1
+    mostly_types = rng.choice(np.frombuffer(b"\0\x01\x05DALIPMQFSCOR0[]:; ", dtype=np.uint8), 300_000).tobytes()
+    items_of(tmp_path / "x.ulg", header + mostly_types)
+
+
+def test_many_damaged_places_are_told_in_few_lines(tmp_path: Path) -> None:
+    log = small_flight(2_000)
+    rows = [start for start in log.starts if log.data[start + 2] == ord("D")]
+    for start in rows[10::4]:
+        log.data[start + 2] ^= 0xFF
+    walk = Walk(Source(tmp_path / "x.ulg"))
+    (tmp_path / "x.ulg").write_bytes(log.data)
+    found = sum(int((block.topic >= 0).sum()) for block in walk)
+    damages = list(walk.damages())
+    assert found == len(rows) - len(rows[10::4]) and len(damages) < 30
+    skipped = sum(damage.count for damage in damages)
+    assert skipped == sum(scan.HEADER + log.data[start] for start in rows[10::4])
+
+
+def test_offsets_of_appended_data_behind_the_end(tmp_path: Path) -> None:
+    log = small_flight(5)
+    log.append_section()
+    items = items_of(tmp_path / "x.ulg", bytes(log.data))
+    assert len(times_us(items, RAW[0])) == 5 and not damages_of(items)
+    log.data[16 + 3 + 16 : 16 + 3 + 24] = struct.pack("<Q", 10**15)
+    items = items_of(tmp_path / "x.ulg", bytes(log.data))
+    assert len(times_us(items, RAW[0])) == 5 and [damage.kind for damage in damages_of(items)] == ["truncated"]
+
+
+@pytest.mark.parametrize("pattern", [b"AAAAAA!", b"~~F a:", b"~~L0123456\0 ", b"~~I\x08uint x y", b"\x02\0O12", b"~}Z"])
+def test_files_made_to_be_slow_are_not(tmp_path: Path, pattern: bytes) -> None:
+    header = bytes(UlogWriter().flags().format(BARO).subscribe(0, "vehicle_air_data").data)
+    (tmp_path / "x.ulg").write_bytes(header + pattern * (3_000_000 // len(pattern)))
+    started = time.process_time()
+    list(read_ulog(Source(tmp_path / "x.ulg")))
+    assert time.process_time() - started < 15.0
