@@ -13,6 +13,7 @@ from groundstation.integrity.clock import Clock
 GAPS_LISTED = 100
 SPORADIC_KINDS = ("event", "onboard")  # written when something happens: a pause in them is no gap
 MOST_STEPS = 10_000  # of which a typical step is taken
+FEWEST_STEPS, UNEVEN = 4, 3.0  # a raw topic with fewer steps, or a fifth of them so much longer than usual, has no rate
 
 
 @dataclass(frozen=True)
@@ -186,7 +187,7 @@ def gaps_of(topic: str, time_ns: Int64Array, *, settings: LedgerSettings | None 
     settings = settings or LedgerSettings()
     steps = np.diff(time_ns)
     ahead = steps[steps > 0]
-    if not len(ahead) or kind_of(topic) in SPORADIC_KINDS:
+    if not len(ahead) or _is_sporadic(topic, ahead):
         return Gaps(topic, np.zeros(0, dtype=np.int64), np.zeros(0))
     longest_ns = max(settings.gap_periods * _typical_ns(ahead), settings.gap_min_s * NS_PER_S)
     before = np.flatnonzero(steps > longest_ns)
@@ -207,7 +208,7 @@ def topic_ledger(
     ahead = steps[steps > 0]
     span_ns = int(time_ns[-1] - time_ns[0])
     period_ns = _typical_ns(ahead) if len(ahead) else 0.0
-    is_regular = period_ns > 0.0 and kind_of(topic) not in SPORADIC_KINDS
+    is_regular = period_ns > 0.0 and not _is_sporadic(topic, ahead)
     return TopicLedger(
         topic,
         rows=len(time_ns),
@@ -224,9 +225,24 @@ def topic_ledger(
     )
 
 
+def _is_sporadic(topic: str, steps_ns: Int64Array) -> bool:
+    """Whether a topic is written when something happens: by its kind, or, of a raw one, by steps of every length."""
+    if kind_of(topic) != "raw":
+        return kind_of(topic) in SPORADIC_KINDS
+    if len(steps_ns) < FEWEST_STEPS:
+        return True
+    usual_ns, long_ns = np.percentile(_some(steps_ns), (50.0, 80.0))
+    return bool(long_ns > UNEVEN * usual_ns)
+
+
 def _typical_ns(steps_ns: Int64Array) -> float:
-    """Median of steps, of an evenly spread part when they are very many: it takes most of a survey's time else."""
-    return float(np.median(steps_ns[:: len(steps_ns) // MOST_STEPS | 1]))  # odd: two steps in turn are both met
+    """Median of steps."""
+    return float(np.median(_some(steps_ns)))
+
+
+def _some(steps_ns: Int64Array) -> Int64Array:
+    """An evenly spread part of steps when they are very many: a median takes most of a survey's time else."""
+    return steps_ns[:: len(steps_ns) // MOST_STEPS | 1]  # odd: two steps in turn are both met
 
 
 def _rounded(value: float | None, digits: int) -> float | None:

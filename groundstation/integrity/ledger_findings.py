@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from groundstation.base.findings import Finding, Severity
+from groundstation.base.signals import is_canonical
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import Clock, ClockStep
 from groundstation.integrity.ledger import Ledger, TopicLedger
@@ -97,7 +98,8 @@ def _topic(topic: TopicLedger, ledger: Ledger) -> Iterator[Finding]:
             f"{topic.topic}: {_counted(len(topic.gaps), 'gap')}, {topic.gaps.length_s.sum():.1f} s together, "
             f"the longest {topic.gaps.length_s[longest]:.1f} s after {place}"
         )
-        yield Finding("warn", "data.gaps", text, topic.topic, place, len(topic.gaps))
+        severity: Severity = "warn" if is_canonical(topic.topic) else "info"  # nothing is estimated from raw topics
+        yield Finding(severity, "data.gaps", text, topic.topic, place, len(topic.gaps))
     for field in topic.fields:
         name = f"{topic.topic}.{field.name}"
         if field.out_of_range:

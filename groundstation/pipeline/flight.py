@@ -69,6 +69,8 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
         log = open_log(job.path, Path(job.configuration.profile) if job.configuration.profile else None)
     except UnreadableLogError as error:
         return Outcome(str(job.path), "failed" if job.is_named else "skipped", str(error))
+    except OSError as error:
+        return Outcome(str(job.path), "failed", f"{job.path.name}: {error.strerror or error}")
     partial = job.out / f"{PARTIAL_PREFIX}{log.source.sha256[:16]}"
     try:
         return _run(log, job, partial, watch)

@@ -305,10 +305,11 @@ def _ins_heading(
         known &= table.values("valid") != 0.0
     ins_time = flight.seconds(table.time_ns)
     known &= (ins_time > time_s[0] - 10.0) & (ins_time < time_s[-1] + 10.0)
-    known[1:] &= np.diff(table.time_ns) > 0
-    if known.sum() < 2:
+    index = np.flatnonzero(known)
+    index = index[np.diff(table.time_ns[index], prepend=np.iinfo(np.int64).min) > 0]
+    if len(index) < 2:
         raise NotAssessableError(f"heading, {ins_topic}", "no INS heading while the aircraft was on the ground")
-    return ins_time[known], unwrap(np.asarray(heading_deg)[known])
+    return ins_time[index], unwrap(np.asarray(heading_deg)[index])
 
 
 def _interpolated(at: FloatArray, time_s: FloatArray, heading_deg: FloatArray, gap_max_s: float) -> FloatArray:

@@ -6,6 +6,8 @@ from groundstation.reports.wording import ABSENT, clean, number
 from groundstation.results.files import SavedFlight
 
 BYTES_PER_MB = 1e6
+LONG_LISTS = ("parameter.", "units.")  # of autopilot logs, hundreds of them
+MOST_METADATA = 40
 
 
 def build(saved: SavedFlight) -> Section:
@@ -25,7 +27,10 @@ def build(saved: SavedFlight) -> Section:
     parts: list[Part] = [Facts("Source and files", pairs)]
     metadata = mapping(flight, "metadata")
     if metadata:
-        parts.append(Facts("Metadata of the log", [(str(key), str(value), "") for key, value in metadata.items()]))
+        rows = [(str(key), str(value), "") for key, value in metadata.items() if not str(key).startswith(LONG_LISTS)]
+        parts.append(Facts("Metadata of the log", rows[:MOST_METADATA]))
+        if len(rows[:MOST_METADATA]) < len(metadata):
+            parts.append(Note("The rest of the metadata, parameters and units among it, stands in summary.json."))
     parts.append(
         Note(
             "Every number on these pages stands in summary.json or in tables/*.csv beside this file. Time of run, "
