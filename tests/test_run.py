@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ from groundstation.pipeline.batch import convert_many, report_again, run_many
 from groundstation.pipeline.configuration import Configuration, Interval
 from groundstation.pipeline.flight import Job, run_flight
 from groundstation.pipeline.outcome import Outcome, worst_code
+from groundstation.pipeline.progress import Event
 from groundstation.results.files import load
 from tests.real_logs import real_log
 
@@ -84,7 +86,7 @@ def test_the_report_is_made_again_from_the_saved_results_alone(good: Outcome) ->
     folder = Path(good.folder)
     before = (folder / "report.html").read_bytes()
     (folder / "report.html").unlink()
-    assert list(report_again(folder.parent)) == [folder / "report.html"]
+    assert folder / "report.html" in report_again(folder.parent)[0]
     assert (folder / "report.html").read_bytes() == before
 
 
@@ -199,3 +201,105 @@ def test_a_real_light_aircraft_is_not_accepted(tmp_path: Path, name: str) -> Non
     heading = load(Path(outcome.folder)).summary["results"]["heading"]
     assert heading["verdict"] in ("reject", "undecided")
     assert heading["precision_deg"] > 0.05
+
+
+def test_copies_of_one_log_are_kept_once_however_many_run_at_a_time(tmp_path: Path) -> None:
+    (tmp_path / "logs").mkdir()
+    for name in ("b", "a", "c"):
+        (tmp_path / f"logs/{name}.csv").write_bytes((SAMPLES / "taxi-short.csv").read_bytes())
+    outcomes = run_many([tmp_path / "logs"], tmp_path / "out", Configuration(), jobs=2)
+    assert [outcome.state for outcome in outcomes] == ["done", "skipped", "skipped"]
+    (folder,) = [path for path in (tmp_path / "out").iterdir() if path.is_dir()]
+    assert {path.suffix for path in folder.iterdir()} >= {".mcap", ".rrd", ".html", ".json"}
+    assert load(folder).summary["flight"]["source"]["name"] == "a.csv"
+
+
+def test_a_log_and_its_mcap_are_one_flight(tmp_path: Path) -> None:
+    (tmp_path / "logs").mkdir()
+    log = tmp_path / "logs/x.csv"
+    log.write_bytes((SAMPLES / "taxi-notime.csv").read_bytes())
+    convert_many([log], tmp_path / "logs/x.mcap")
+    outcomes = run_many([tmp_path / "logs"], tmp_path / "out", Configuration(), jobs=1)
+    assert [outcome.state for outcome in outcomes] == ["done", "skipped"]
+    assert outcomes[0].flight_id == f"NOTIME_{outcomes[0].sha256[:8]}"
+
+
+def test_damage_of_an_mcap_is_kept_with_it(good: Outcome, tmp_path: Path) -> None:
+    data = bytearray((Path(good.folder) / f"{good.flight_id}.mcap").read_bytes())
+    data[len(data) // 2] ^= 1
+    (tmp_path / "flipped.mcap").write_bytes(data)
+    (first,) = convert_many([tmp_path / "flipped.mcap"], tmp_path / "again.mcap")
+    outcome = run_flight(Job(tmp_path / "again.mcap", tmp_path / "out", Configuration()))
+    assert (first.state, outcome.state) == ("data_lost", "data_lost")
+    summary, before = load(Path(outcome.folder)).summary, load(Path(good.folder)).summary
+    assert summary["status"] == "degraded" and summary["ledger"]["damages"]
+    rows = {topic: entry["rows"] for topic, entry in summary["ledger"]["topics"].items()}
+    rows_before = {topic: entry["rows"] for topic, entry in before["ledger"]["topics"].items()}
+    assert sum(rows.values()) < sum(rows_before.values())
+    assert min(summary["completeness"].values()) < 1.0
+
+
+def test_a_killed_run_keeps_what_was_finished_and_can_go_on(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "groundstation", "run", str(SAMPLES), "-o", str(out), "-j", "1"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        while not list(out.glob("2*/manifest.json")):
+            assert process.poll() is None, "the run ended before it could be killed"
+        process.kill()
+    (outcome, *_) = run_many([SAMPLES / "taxi-short.csv"], out, Configuration())
+    assert outcome.state == "done"
+    assert not list(out.glob(".partial*"))
+    index = json.loads((out / "index.json").read_text(encoding="utf-8"))
+    assert len(index["rows"]) >= 2
+
+
+def test_an_interrupted_run_ends_soon_and_keeps_its_index(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+
+    def interrupt(event: Event) -> None:
+        if event.kind == "end":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_many([SAMPLES], out, Configuration(), jobs=2, listen=interrupt)
+    assert (out / "index.json").is_file()
+
+
+def test_a_broken_flight_folder_is_told_and_stops_nothing(good: Outcome, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(Path(good.folder), out / good.flight_id)
+    (out / good.flight_id / "results.parquet/overview.parquet").write_bytes(b"PAR1")
+    (out / "index.json").write_text('{"rows": []}', encoding="utf-8")
+    (out / "index.csv").write_text("", encoding="utf-8")
+    outcomes = run_many([SAMPLES / "taxi-short.csv"], out, Configuration())
+    assert [outcome.state for outcome in outcomes] == ["done", "failed"]
+    written, problems = report_again(out)
+    assert len(problems) == 1 and "overview.parquet" in problems[0].text
+    assert any(path.name == "report.html" for path in written)
+
+
+def test_reports_again_make_the_index_again(good: Outcome, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(Path(good.folder), out / good.flight_id)
+    report_again(out)
+    assert good.flight_id in (out / "index.csv").read_text(encoding="utf-8")
+
+
+def test_a_rerun_leaves_notes_of_the_crew_alone(tmp_path: Path) -> None:
+    (outcome,) = run_many([SAMPLES / "taxi-short.csv"], tmp_path, Configuration())
+    (Path(outcome.folder) / "notes.txt").write_text("mine", encoding="utf-8")
+    run_many([SAMPLES / "taxi-short.csv"], tmp_path, Configuration())
+    assert (Path(outcome.folder) / "notes.txt").read_text(encoding="utf-8") == "mine"
+
+
+def test_what_is_no_regular_file_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    outcome = run_flight(Job(tmp_path / "pipe", tmp_path / "out", Configuration()))
+    assert outcome.code == 1 and "no regular file" in outcome.text
+
+
+def test_utc_intervals_of_a_flight_without_utc_are_a_finding(tmp_path: Path) -> None:
+    interval = Interval("2026-05-04T06:00:00Z", "2026-05-04T06:01:00Z")
+    outcome = run_flight(Job(SAMPLES / "taxi-notime.csv", tmp_path, Configuration(exclude=(interval,))))
+    summary = load(Path(outcome.folder)).summary
+    assert outcome.code == 0 and "UTC" in summary["not_assessable"][0]["reason"]

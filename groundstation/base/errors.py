@@ -35,6 +35,10 @@ class UnreadableLogError(GroundstationError):
     """No reader claims the file, or nothing in it could be read (exit code 1)."""
 
 
+class UnclaimedLogError(UnreadableLogError):
+    """No reader claims the file: in a folder it is skipped, named on the command line it is an error."""
+
+
 class UsageError(GroundstationError):
     """The call cannot be carried out as asked (exit code 2)."""
 

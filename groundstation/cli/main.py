@@ -40,17 +40,25 @@ Json = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")
 Force = Annotated[bool, typer.Option("-f", "--force", help="Overwrite what is there.")]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
 Profile = Annotated[
-    Path | None, typer.Option("--profile", help="Profile (TOML) that describes the columns of a CSV.", metavar="FILE")
+    Path | None,
+    typer.Option(
+        "--profile", help="Profile (TOML) that describes the columns of a CSV.", metavar="FILE", readable=False
+    ),
 ]
-ConfigFile = Annotated[Path | None, typer.Option("--config", help="Settings (TOML).", metavar="FILE")]
+ConfigFile = Annotated[Path | None, typer.Option("--config", help="Settings (TOML).", metavar="FILE", readable=False)]
 AircraftFile = Annotated[
-    Path | None, typer.Option("--aircraft", help="Aircraft file (TOML): antenna arm, entry step.", metavar="FILE")
+    Path | None,
+    typer.Option("--aircraft", help="Aircraft file (TOML): antenna arm, entry step.", metavar="FILE", readable=False),
 ]
 SiteFile = Annotated[
-    Path | None, typer.Option("--site", help="Site file (TOML): stands, runways and their bearings.", metavar="FILE")
+    Path | None,
+    typer.Option(
+        "--site", help="Site file (TOML): stands, runways and their bearings.", metavar="FILE", readable=False
+    ),
 ]
 IntervalsFile = Annotated[
-    Path | None, typer.Option("--intervals", help="Intervals to exclude or force (TOML).", metavar="FILE")
+    Path | None,
+    typer.Option("--intervals", help="Intervals to exclude or force (TOML).", metavar="FILE", readable=False),
 ]
 
 
@@ -109,10 +117,9 @@ def common(
 @app.command()
 @answers_with_exit_code
 def info(
-    log: Annotated[Path, typer.Argument(help="A recorded log or an MCAP.", metavar="LOG")],
+    log: Annotated[Path, typer.Argument(help="A recorded log or an MCAP.", metavar="LOG", readable=False)],
     profile: Profile = None,
     json: Json = False,
-    quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> int | None:
     """Tell what a log is: format, clock, span, topics with rows, rates and fields."""
@@ -127,7 +134,7 @@ def info(
 @app.command()
 @answers_with_exit_code
 def convert(
-    logs: Annotated[list[Path], typer.Argument(help="Recorded logs.", metavar="LOG...")],
+    logs: Annotated[list[Path], typer.Argument(help="Recorded logs.", metavar="LOG...", readable=False)],
     output: Annotated[Path, typer.Option("-o", "--output", help="MCAP to write; a folder for several logs.")],
     profile: Profile = None,
     force: Force = False,
@@ -150,7 +157,7 @@ def convert(
 @app.command()
 @answers_with_exit_code
 def run(
-    paths: Annotated[list[Path], typer.Argument(help="Logs or folders of logs.", metavar="PATH...")],
+    paths: Annotated[list[Path], typer.Argument(help="Logs or folders of logs.", metavar="PATH...", readable=False)],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.", metavar="OUT")],
     config: ConfigFile = None,
     aircraft: AircraftFile = None,
@@ -190,10 +197,13 @@ def report(
     from groundstation.cli import printing
     from groundstation.pipeline.batch import report_again
 
-    written = [str(path) for path in report_again(out)]
+    paths, problems = report_again(out)
+    written = [str(path) for path in paths]
     if not quiet:
         typer.echo(printing.as_json({"written": written}) if json else "\n".join(written))
-    return DONE
+    for problem in problems:
+        say(f"error: {printing.printable(problem.text)}")
+    return printing.worst_code(problems)
 
 
 @app.command()
@@ -260,7 +270,9 @@ def study(
 @app.command(name="list")
 @answers_with_exit_code
 def list_(
-    log: Annotated[Path | None, typer.Argument(help="A log: would each analysis run on it?", metavar="[LOG]")] = None,
+    log: Annotated[
+        Path | None, typer.Argument(help="A log: would each analysis run on it?", metavar="[LOG]", readable=False)
+    ] = None,
     profile: Profile = None,
     json: Json = False,
     verbose: Verbose = False,

@@ -6,7 +6,6 @@ from typing import Any
 
 import typer
 
-from groundstation.base.timescales import duration_text
 from groundstation.pipeline.describe import Description
 from groundstation.pipeline.outcome import Outcome, worst_code
 
@@ -15,7 +14,8 @@ __all__ = ["as_json", "catalogue", "description", "outcomes", "worst_code"]
 
 def as_json(document: Any) -> str:
     """Render a document as JSON text."""
-    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    return text.encode("utf-8", "backslashreplace").decode()  # file names need not be UTF-8
 
 
 def printable(text: str) -> str:
@@ -84,6 +84,8 @@ def outcomes(
         if with_times and outcome.times_s:
             spent = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in outcome.times_s.items())
             typer.echo(f"  {spent}", err=True)
+        if with_times and outcome.trace:
+            typer.echo(outcome.trace, err=True)
     if len(done) > 1 and not quiet:
         typer.echo(totals(done), err=True)
 
@@ -129,8 +131,3 @@ def catalogue(entries: Sequence[Mapping[str, Any]], is_about_a_log: bool) -> str
         if is_about_a_log and "would_run" in entry:
             lines.append("    would run" if entry["would_run"] else f"    would not run: {printable(entry['reason'])}")
     return "\n".join(lines)
-
-
-def span(seconds: float) -> str:
-    """Length of time for people."""
-    return duration_text(seconds)

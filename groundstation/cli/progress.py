@@ -22,9 +22,9 @@ def listener(mode: Literal["auto", "none", "json"]) -> Iterator[Listener]:
 
 
 def _as_json(event: Event) -> None:
-    document = {"event": event.kind, "name": event.name, "text": event.text}
+    document: dict[str, str | int] = {"event": event.kind, "name": event.name, "text": event.text}
     if event.kind == "begin":
-        document["total"] = str(event.total)
+        document["total"] = event.total
     print(json.dumps(document, ensure_ascii=False), file=sys.stderr, flush=True)
 
 

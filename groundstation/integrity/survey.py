@@ -6,6 +6,7 @@ Kept are 17 bytes a record for each set of topics that are sampled together, not
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -93,6 +94,17 @@ class _FieldTally:
         )
 
 
+def _tally_fields(fields: dict[str, _FieldTally], batch: RecordBatch) -> None:
+    """Add a batch to the counts of its topic's fields."""
+    for name, column in batch.columns.items():
+        tally = fields.get(name)
+        if tally is None:
+            known = field_of(batch.topic, name)
+            low, high = (known.low, known.high) if known else (float("-inf"), float("inf"))
+            tally = fields[name] = _FieldTally(low, high, known is not None)
+        tally.add(column, batch.record_index)
+
+
 @dataclass(frozen=True, eq=False)
 class _Piece:
     """Places and device times of one batch; topics that are sampled together share it."""
@@ -150,13 +162,7 @@ class _TopicTally:
     def add(self, batch: RecordBatch, piece: _Piece) -> None:
         """Count one more batch."""
         self.pieces.append(piece)
-        for name, column in batch.columns.items():
-            tally = self.fields.get(name)
-            if tally is None:
-                known = field_of(self.topic, name)
-                low, high = (known.low, known.high) if known else (float("-inf"), float("inf"))
-                tally = self.fields[name] = _FieldTally(low, high, known is not None)
-            tally.add(column, batch.record_index)
+        _tally_fields(self.fields, batch)
 
     def ledger(self, whole: _Piece, clock: Clock, settings: LedgerSettings) -> tuple[TopicLedger, int]:
         """The topic's ledger and the lateness of its records, nanoseconds."""
@@ -224,6 +230,39 @@ def _clock_of(header: LogHeader, pieces: Iterable[_Piece], settings: ClockSettin
         return estimate_clock(index, time, header.utc_of_zero_ns, settings=settings)
     frozen = frozen_records(index, ((piece.index, piece.time, piece.mask) for piece in pieces))
     return estimate_counting_clock(index, time, frozen, header.utc_of_zero_ns)
+
+
+class Census:
+    """Ledger of records whose corrected time is known: what is left in a store file that was damaged."""
+
+    def __init__(self, is_absolute: bool) -> None:
+        self._clock = Clock(is_absolute=is_absolute)
+        self._times: dict[str, list[Int64Array]] = {}
+        self._fields: dict[str, dict[str, _FieldTally]] = {}
+        self.rows = 0
+
+    def add(self, batch: RecordBatch) -> None:
+        """Count a batch with ``time_ns``."""
+        self.rows += len(batch)
+        if not len(batch) or batch.time_ns is None:
+            return
+        self._times.setdefault(batch.topic, []).append(np.array(batch.time_ns))
+        _tally_fields(self._fields.setdefault(batch.topic, {}), batch)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Topics as in the ledger's plain form, in alphabetical order."""
+        found = {}
+        for topic, times in sorted(self._times.items()):
+            ledger = topic_ledger(
+                topic,
+                np.sort(np.concatenate(times), kind="stable"),
+                backward_steps=0,
+                stray_rows=0,
+                fields=tuple(tally.ledger(name) for name, tally in self._fields[topic].items()),
+                settings=LedgerSettings(),
+            )
+            found[topic] = ledger.to_dict(self._clock)
+        return found
 
 
 def _all_records(pieces: Iterable[_Piece]) -> tuple[Int64Array, Column]:

@@ -7,8 +7,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.errors import NotAssessableError
-from groundstation.base.findings import Finding
+from groundstation.base.errors import NotAssessableError, SettingsError
+from groundstation.base.findings import Finding, Severity
 from groundstation.base.toml_settings import settings_from
 from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings, Interval, SiteData
 from groundstation.pipeline import configuration as configured
@@ -20,6 +20,9 @@ from groundstation.results.flight import FlightResults, NotAssessable, Source, S
 from groundstation.results.heading import HeadingResult
 from groundstation.tables.phases import Phases, flight_phases, ground_mask
 from groundstation.tables.table import Flight
+
+INFO: Severity = "info"
+WARN: Severity = "warn"
 
 
 @dataclass(frozen=True)
@@ -130,9 +133,12 @@ def _heading_or_reason(
     try:
         return estimate_heading(flight, configuration, settings)
     except NotAssessableError as error:
-        not_assessable.append(NotAssessable("heading", str(error)))
-        findings.append(Finding("info", "heading.not_assessable", f"heading correction not assessable: {error}"))
-        return None
+        reason, severity = str(error).removeprefix("heading: "), INFO
+    except SettingsError as error:  # intervals in UTC for a flight without it: this flight's trouble alone
+        reason, severity = str(error), WARN
+    not_assessable.append(NotAssessable("heading", reason))
+    findings.append(Finding(severity, "heading.not_assessable", f"heading correction not assessable: {reason}"))
+    return None
 
 
 def heading_findings(result: HeadingResult) -> tuple[Finding, ...]:

@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -113,4 +114,19 @@ def _intervals(listed: Any, where: str) -> tuple[Interval, ...]:
         _refuse_unknown(part, ("from", "to", "reason"), where)
         if not {"from", "to"} <= set(part):
             raise SettingsError(where, repr(part), "from and to: flight seconds, +mm:ss or ISO UTC")
-    return tuple(Interval(str(part["from"]), str(part["to"]), str(part.get("reason", ""))) for part in listed)
+    return tuple(
+        Interval(_time(part["from"], where), _time(part["to"], where), str(part.get("reason", ""))) for part in listed
+    )
+
+
+def _time(value: Any, where: str) -> str:
+    """A time as text; what cannot be one in any flight is refused before the work begins."""
+    from groundstation.pipeline.intervals import flight_seconds
+
+    if isinstance(value, bool) or not isinstance(value, int | float | str | datetime):
+        raise SettingsError(where, repr(value), "flight seconds, +mm:ss or ISO UTC")
+    try:
+        flight_seconds(str(value), 0, True)
+    except SettingsError as error:
+        raise SettingsError(where, repr(str(value)), "flight seconds, +mm:ss or ISO UTC") from error
+    return str(value)

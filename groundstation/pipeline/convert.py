@@ -1,7 +1,7 @@
 """A log becomes an MCAP: its clock is repaired, its ledger is kept beside the data."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import metadata as installed
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,8 @@ from typing import Any
 from groundstation import __version__
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.findings import Finding, Severity
-from groundstation.base.records import Damage, LogHeader, RecordBatch, Remark
+from groundstation.base.records import Damage, RecordBatch, Remark
+from groundstation.integrity.survey import Census
 from groundstation.pipeline.log import Log, Replay
 from groundstation.store.info import StoreInfo
 
@@ -85,21 +86,32 @@ def _copy_store(log: Log, target: Path) -> Converted:
 
     info = read_info(log.path)
     damages: list[Damage] = []
-    rows = 0
+    census = Census(info.has_utc)
     with StoreWriter(target, info) as writer:
         for item in log.items():
             if isinstance(item, RecordBatch):
                 writer.write(item)
-                rows += len(item)
+                census.add(item)
             elif isinstance(item, Damage):
                 damages.append(item)
-            elif isinstance(item, LogHeader):
-                continue
-        if not rows:
+        if not census.rows:
             raise UnreadableLogError(log.path.name, "no intact record", "", "the file is damaged beyond its index")
-    findings = (*stored_findings(info), *(damage_finding(damage) for damage in damages))
-    lost_before = any(entry.get("loses_data") for entry in info.damages)
-    return Converted(info, findings, lost_before or any(damage.loses_data for damage in damages))
+        if damages:
+            info = writer.info = _with_damage(info, damages, census)
+    return Converted(info, stored_findings(info), any(entry.get("loses_data") for entry in info.damages))
+
+
+def _with_damage(info: StoreInfo, damages: list[Damage], census: Census) -> StoreInfo:
+    """Facts of a store file that was damaged: what is left of each topic is counted anew, the damage is kept."""
+    listed = [asdict(damage) for damage in damages]
+    findings = [*info.ledger.get("findings", ()), *(asdict(damage_finding(damage)) for damage in damages)]
+    ledger = {
+        **info.ledger,
+        "topics": census.to_dict(),
+        "damages": [*info.ledger.get("damages", ()), *listed],
+        "findings": findings,
+    }
+    return replace(info, ledger=ledger, damages=(*info.damages, *listed))
 
 
 def stored_findings(info: StoreInfo) -> tuple[Finding, ...]:

@@ -7,8 +7,7 @@ from typing import Any
 from groundstation.base.findings import Finding
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.pipeline.log import Log, open_log
-
-MCAP_MAGIC = b"\x89MCAP0\r\n"
+from groundstation.store.info import StoreInfo
 
 
 @dataclass(frozen=True)
@@ -45,21 +44,16 @@ def describe(path: Path, profile: Path | None = None) -> Description:
         When the file is missing, or nothing can be said about it.
     """
     from groundstation.base.errors import UsageError
-    from groundstation.store.reader import is_groundstation_mcap
+    from groundstation.store.reader import is_groundstation_mcap, is_mcap
 
     if not path.exists():
         raise UsageError(str(path), "no such file")
     if path.is_dir():
         raise UsageError(str(path), "a folder", "a log", "`run` takes folders")
-    if _is_mcap(path) and not is_groundstation_mcap(path):
+    if is_mcap(path) and not is_groundstation_mcap(path):
         return _foreign(path)
     log = open_log(path, profile)
     return _stored(log) if log.is_store else _recorded(log)
-
-
-def _is_mcap(path: Path) -> bool:
-    with path.open("rb") as stream:
-        return stream.read(len(MCAP_MAGIC)) == MCAP_MAGIC
 
 
 def _recorded(log: Log) -> Description:
@@ -94,7 +88,12 @@ def _stored(log: Log) -> Description:
     facts = _facts(log, dict(info.metadata), dict(info.ledger))
     facts["log"] = f"{info.source_name}, read as {info.reader}"
     findings = (*stored_findings(info), *(damage_finding(damage) for damage in damages))
-    return Description(facts, _topics(dict(info.ledger), fields), findings, any(d.loses_data for d in damages))
+    return Description(facts, _topics(dict(info.ledger), fields), findings, _has_lost(info, damages))
+
+
+def _has_lost(info: StoreInfo, damages: list[Damage]) -> bool:
+    """Whether data was lost: when the log was converted, or of the MCAP since."""
+    return any(entry.get("loses_data") for entry in info.damages) or any(damage.loses_data for damage in damages)
 
 
 def _facts(log: Log, metadata: dict[str, str], ledger: dict[str, Any]) -> dict[str, str]:

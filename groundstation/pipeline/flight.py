@@ -1,13 +1,17 @@
 """One log from beginning to end: MCAP, answers, recording and report in a folder of its own."""
 
+import os
+import re
 import shutil
+import tempfile
 import time
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from groundstation.base.errors import GroundstationError, UnreadableLogError
+from groundstation.base.errors import GroundstationError, UnclaimedLogError
 from groundstation.base.findings import SEVERITIES, worst
 from groundstation.base.records import RecordBatch
 from groundstation.pipeline.analyse import Given, analyse
@@ -18,10 +22,11 @@ from groundstation.pipeline.log import Log, open_log
 from groundstation.pipeline.manifest import manifest_of
 from groundstation.pipeline.outcome import Outcome, State
 from groundstation.pipeline.progress import Event, Listener, silent
+from groundstation.results.files import MANIFEST
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight
 
-PARTIAL_PREFIX = ".partial-"
+PARTIAL_PREFIX = ".partial-"  # then the process that runs the logs, and a name of its own
 
 
 @dataclass
@@ -47,7 +52,7 @@ class Stopwatch:
 class Job:
     """One log to run; plain values, so that it travels to a worker process.
 
-    ``suffix`` is added to the flight id (two flights of one id get ``_<sha8>``).
+    ``owner`` is the process that runs the logs; ``add_suffix``: two flights of one id get ``_<sha8>`` of their logs.
     """
 
     path: Path
@@ -55,36 +60,55 @@ class Job:
     configuration: Configuration
     fail_on: str = "none"
     is_named: bool = True
+    owner: int = 0
     add_suffix: bool = False
 
 
 def run_flight(job: Job, listen: Listener = silent) -> Outcome:
-    """Run one log into ``out/.partial-<sha8>``; the caller moves it into place (see :func:`place`).
+    """Run one log into a partial folder in ``out``; the caller moves it into place (see :func:`place`).
 
     A log that cannot be read or computed gives an outcome with the reason, never an exception: one bad log never
     stops the others.
     """
     watch = Stopwatch(listen, job.path.name)
+    name, sha256, trace = job.path.name, "", ""
+    partial: Path | None = None
     try:
         log = open_log(job.path, Path(job.configuration.profile) if job.configuration.profile else None)
-    except UnreadableLogError as error:
-        return Outcome(str(job.path), "failed" if job.is_named else "skipped", str(error))
-    except OSError as error:
-        return Outcome(str(job.path), "failed", f"{job.path.name}: {error.strerror or error}")
-    partial = job.out / f"{PARTIAL_PREFIX}{log.source.sha256[:16]}"
-    try:
+        sha256 = log.source.sha256
+        job.out.mkdir(parents=True, exist_ok=True)
+        partial = Path(tempfile.mkdtemp(prefix=f"{PARTIAL_PREFIX}{job.owner or os.getpid()}-", dir=job.out))
+        partial.chmod(0o755)  # mkdtemp's folders are private
         return _run(log, job, partial, watch)
+    except UnclaimedLogError as error:
+        return Outcome(str(job.path), "failed" if job.is_named else "skipped", str(error))
     except GroundstationError as error:
         reason = str(error)
     except OSError as error:
-        reason = f"{error.filename or job.path}: {error.strerror or error}"
+        reason = f"{name}: {Path(error.filename).name + ': ' if error.filename else ''}{error.strerror or error}"
     except MemoryError:
-        reason = f"{job.path.name}: not enough memory"
+        reason = f"{name}: not enough memory"
     except Exception as error:
-        # One bad log never stops the others; what is wrong is ours to mend, and the line says so.
-        reason = f"{job.path.name}: internal error ({type(error).__name__}: {error}); please report it"
-    shutil.rmtree(partial, ignore_errors=True)
-    return Outcome(str(job.path), "failed", reason, sha256=log.source.sha256, times_s=watch.times_s)
+        # What is wrong is ours to mend, and the line says so; -v shows where.
+        trace = traceback.format_exc()
+        reason = f"{name}: internal error ({type(error).__name__}: {error}); please report it"
+    if partial is not None:
+        shutil.rmtree(partial, ignore_errors=True)
+    return Outcome(str(job.path), "failed", reason, sha256=sha256, times_s=watch.times_s, trace=trace)
+
+
+def is_abandoned(folder: Path) -> bool:
+    """Whether a partial folder was left by a run that is no more."""
+    match = re.fullmatch(re.escape(PARTIAL_PREFIX) + r"(\d+)-\w+", folder.name)
+    if match is None:
+        return False
+    try:
+        os.kill(int(match.group(1)), 0)
+    except (ProcessLookupError, OverflowError):
+        return True
+    except PermissionError:  # somebody else's process
+        return False
+    return int(match.group(1)) == os.getpid()
 
 
 def _run(log: Log, job: Job, partial: Path, watch: Stopwatch) -> Outcome:
@@ -93,8 +117,6 @@ def _run(log: Log, job: Job, partial: Path, watch: Stopwatch) -> Outcome:
     from groundstation.results.files import load, save
     from groundstation.viewer.recording import write_recording
 
-    shutil.rmtree(partial, ignore_errors=True)
-    partial.mkdir(parents=True)
     mcap = partial / "flight.mcap"
     with watch.stage("converting"):
         converted = convert_log(log, mcap)
@@ -165,7 +187,16 @@ def sentence(results: FlightResults) -> str:
 
 
 def place(partial: Path, target: Path) -> None:
-    """Move a finished flight folder into place; one that was there is replaced."""
-    if target.exists():
-        shutil.rmtree(target)
-    partial.rename(target)
+    """Move a finished flight folder into place; of a folder that is there, only what a run makes is replaced."""
+    if not target.exists():
+        partial.rename(target)
+        return
+    (target / MANIFEST).unlink(missing_ok=True)  # the mark of a whole folder goes first and comes back last
+    for entry in sorted(partial.iterdir(), key=lambda path: path.name == MANIFEST):
+        old = target / entry.name
+        if old.is_dir() and not old.is_symlink():
+            shutil.rmtree(old)
+        else:
+            old.unlink(missing_ok=True)
+        entry.rename(old)
+    partial.rmdir()

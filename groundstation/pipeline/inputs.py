@@ -6,7 +6,7 @@ from pathlib import Path
 
 from groundstation.base.errors import UsageError
 
-FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK = "manifest.json", "index.json"
+FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, STUDY_MARK = "manifest.json", "index.json", ".groundstation-study"
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ def collect(paths: Sequence[Path], out: Path | None = None) -> tuple[Input, ...]
             raise UsageError(str(path), "no such file or folder")
         if path.is_dir():
             for file in _walk(path, out.resolve() if out else None):
-                found.setdefault(file.resolve(), Input(file, is_named=False))
+                found.setdefault(file.resolve(), Input(file, is_named=file.is_dir()))
         else:
             found[path.resolve()] = Input(path, is_named=True)
     return tuple(sorted(found.values(), key=lambda item: str(item.path)))
@@ -42,15 +42,22 @@ def collect(paths: Sequence[Path], out: Path | None = None) -> tuple[Input, ...]
 
 def is_ours(folder: Path) -> bool:
     """Whether groundstation made the folder: a flight folder or an OUT."""
-    names = {FLIGHT_FOLDER_MARK, "summary.json"}, {OUT_FOLDER_MARK, "index.csv"}
-    return any(all((folder / name).is_file() for name in marks) for marks in names)
+    names = {FLIGHT_FOLDER_MARK, "summary.json"}, {OUT_FOLDER_MARK, "index.csv"}, {STUDY_MARK}
+    try:
+        return any(all((folder / name).is_file() for name in marks) for marks in names)
+    except OSError:
+        return False
 
 
 def _walk(folder: Path, out: Path | None) -> list[Path]:
     if folder.resolve() == out or is_ours(folder):
         return []
     files: list[Path] = []
-    for entry in sorted(folder.iterdir()):
+    try:
+        entries = sorted(folder.iterdir())
+    except OSError:
+        return [folder]  # it fails in its turn, with its name, and stops nothing else
+    for entry in entries:
         if entry.name.startswith("."):
             continue
         if entry.is_dir() and not entry.is_symlink():

@@ -1,15 +1,13 @@
 """Times as users write them: flight seconds, +mm:ss or ISO UTC, turned into flight seconds."""
 
+import math
 import re
 from collections.abc import Sequence
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Protocol
 
 from groundstation.base.errors import GroundstationError, SettingsError
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.configuration import Interval
 from groundstation.tables.table import Flight
 
 _CLOCK = re.compile(r"\+?(?:(\d+):)?(\d+):(\d+(?:\.\d*)?)$")
@@ -35,9 +33,11 @@ def flight_seconds(text: str, start_ns: int, has_utc: bool) -> float:
         hours, minutes, seconds = match.groups()
         return int(hours or 0) * 3600.0 + int(minutes) * 60.0 + float(seconds)
     try:
-        return float(text)
+        seconds = float(text)
     except ValueError:
-        pass
+        seconds = math.nan
+    if math.isfinite(seconds):
+        return seconds
     if not has_utc:
         raise SettingsError("time", repr(text), "flight seconds or +mm:ss: the flight has no UTC")
     try:
@@ -47,15 +47,16 @@ def flight_seconds(text: str, start_ns: int, has_utc: bool) -> float:
     return (utc_ns - start_ns) / NS_PER_S
 
 
-def inside(flight: Flight, intervals: Sequence[Interval], time_s: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Where flight seconds ``time_s``, shape (n,), lie in any of the intervals (both ends included)."""
-    mask = np.zeros(len(time_s), dtype=bool)
-    for start_s, end_s in seconds_of(flight, intervals):
-        mask |= (time_s >= start_s) & (time_s <= end_s)
-    return mask
+class HasEnds(Protocol):
+    """An interval whose ends are written as users write times."""
+
+    @property
+    def start(self) -> str: ...
+    @property
+    def end(self) -> str: ...
 
 
-def seconds_of(flight: Flight, intervals: Sequence[Interval]) -> tuple[tuple[float, float], ...]:
+def seconds_of(flight: Flight, intervals: Sequence[HasEnds]) -> tuple[tuple[float, float], ...]:
     """Intervals as pairs of flight seconds.
 
     Raises

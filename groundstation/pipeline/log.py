@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Item, RecordBatch
 from groundstation.pipeline.identity import sha256_of
 from groundstation.results.flight import Source
@@ -43,11 +44,17 @@ def open_log(path: Path, profile: Path | None = None) -> Log:
         When no reader claims it, or it is an MCAP of another program.
     """
     from groundstation.readers.registry import identify
-    from groundstation.store.reader import is_groundstation_mcap
+    from groundstation.store.reader import is_groundstation_mcap, read_info
 
-    is_store = is_groundstation_mcap(path)
-    claimed_by = "groundstation-mcap" if is_store else identify(path, profile).title
-    return Log(path, Source(path.name, sha256_of(path), path.stat().st_size, claimed_by), is_store, profile)
+    if not path.is_file():
+        raise UnreadableLogError(str(path), "no regular file", "a recorded log")
+    size = path.stat().st_size
+    if is_groundstation_mcap(path):
+        info = read_info(path)  # the flight is that of the log, whichever of the two is run
+        name, sha256 = info.source_name or path.name, info.source_sha256 or sha256_of(path)
+        return Log(path, Source(name, sha256, size, f"groundstation-mcap of {info.reader}"), True, profile)
+    claim = identify(path, profile)
+    return Log(path, Source(path.name, sha256_of(path), size, claim.title), False, profile)
 
 
 class Replay:

@@ -4,7 +4,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from groundstation.base.errors import UnreadableLogError, UsageError
+from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.flight import Job, run_flight
 
@@ -24,25 +24,26 @@ def look_at(
     ------
     UsageError
         When the path is missing or a folder without a recording.
-    UnreadableLogError
-        When the log cannot be run.
+    GroundstationError
+        When the log cannot be run, or the viewer does not start.
     """
     from groundstation.viewer.launch import open_viewer
 
     if not path.exists():
         raise UsageError(str(path), "no such file or folder")
-    if path.is_dir():
-        open_viewer(recording_in(path), web=web, host=host, port=port)
-    elif path.suffix == ".rrd":
-        open_viewer(path, web=web, host=host, port=port)
+    if path.is_dir() or path.suffix == ".rrd":
+        recording = recording_in(path) if path.is_dir() else path
+        code = open_viewer(recording, web=web, host=host, port=port)
     else:
         with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
             say(f"computing {path.name} ...")
             configuration = Configuration(profile=str(profile) if profile else None)
             outcome = run_flight(Job(path, Path(folder), configuration))
             if outcome.state == "failed":
-                raise UnreadableLogError(path.name, outcome.text)
-            open_viewer(recording_in(Path(outcome.folder)), web=web, host=host, port=port)
+                raise GroundstationError(path.parent.name or ".", outcome.text)
+            code = open_viewer(recording_in(Path(outcome.folder)), web=web, host=host, port=port)
+    if code:
+        raise GroundstationError("the Rerun viewer", f"ended with code {code}; its own lines stand above")
 
 
 def recording_in(folder: Path) -> Path:

@@ -26,6 +26,8 @@ class Outcome:
         Row of the index; empty for a log that was skipped or failed before it had one.
     times_s : mapping
         Seconds spent, by stage.
+    trace : str
+        Where an internal error came from; shown on request.
     """
 
     source: str
@@ -36,6 +38,7 @@ class Outcome:
     sha256: str = ""
     row: Mapping[str, Any] = field(default_factory=dict)
     times_s: Mapping[str, float] = field(default_factory=dict)
+    trace: str = ""
 
     @property
     def code(self) -> int:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from groundstation.base.errors import UsageError
+from groundstation.pipeline.inputs import STUDY_MARK
 from groundstation.pipeline.progress import Event, Listener
 
 
@@ -43,5 +44,6 @@ def study_to(name: str, folder: Path, *, runs: int, seed: int, force: bool, list
     for table in result.tables:
         write_text(folder / "tables" / f"{table.name}.csv", csv_text(table))
     write_text(page, result.markdown)
+    (folder / STUDY_MARK).touch()
     listen(Event("end", name, str(page)))
     return result.markdown

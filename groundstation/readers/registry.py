@@ -12,7 +12,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from groundstation.base.errors import GroundstationError, UnreadableLogError
+from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
 from groundstation.base.records import Item, Remark
 from groundstation.readers import csv_profile, dataflash, flat_csv, magic, ulog
 from groundstation.readers.source import Claim, Source
@@ -135,7 +135,7 @@ def _guarded(reader: Any, claim: Claim, source: Source) -> Iterator[Item]:
 
 def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]]:
     if source.is_empty:
-        raise UnreadableLogError(source.name, "an empty file", "a recorded log", "check how it was copied")
+        raise UnclaimedLogError(source.name, "an empty file", "a recorded log", "check how it was copied")
     if profile is not None:
         return csv_profile.claim_by(source, profile), plug_in_failures()
     claims: list[Claim] = []
@@ -168,10 +168,10 @@ def _own(claim: Any, name: str) -> Claim | None:
 
 def _unclaimed(source: Source, refusals: list[GroundstationError], troubles: list[str]) -> GroundstationError:
     if source.compression and not source.head:
-        return UnreadableLogError(source.name, f"{source.compression} data that cannot be decompressed")
+        return UnclaimedLogError(source.name, f"{source.compression} data that cannot be decompressed")
     known = magic.recognise(source)
     if known is not None:
-        return UnreadableLogError(
+        return UnclaimedLogError(
             source.name, f"recognised as {known}, not readable in this version", "", "convert it to the flat CSV"
         )
     if refusals:
@@ -179,4 +179,4 @@ def _unclaimed(source: Source, refusals: list[GroundstationError], troubles: lis
     found = "binary data of an unknown format" if magic.is_binary(source) else "text that no reader claims"
     names = ", ".join(reader for reader in _readers())
     found += f" ({'; '.join(troubles)})" if troubles else ""
-    return UnreadableLogError(source.name, found, f"one of {names}", "describe a table by a profile (--profile FILE)")
+    return UnclaimedLogError(source.name, found, f"one of {names}", "describe a table by a profile (--profile FILE)")
