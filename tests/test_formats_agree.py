@@ -1,0 +1,202 @@
+"""One simulated flight written as flat CSV, PX4 ULog and ArduPilot DataFlash gives equal tables and equal answers.
+
+Each signal agrees within the step that the format stores it in (``RESOLUTION``); the heading error within what those
+steps can move it.
+"""
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from groundstation.base.angles import wrap_180
+from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.base.units import NS_PER_S
+from groundstation.pipeline.convert import convert_log
+from groundstation.pipeline.flight import read_flight
+from groundstation.pipeline.log import open_log
+from groundstation.simulation.flat_csv_writer import write_flat_csv
+from groundstation.simulation.flight import Simulated, simulate
+from groundstation.simulation.scenario import load_scenario
+from groundstation.tables.table import Flight
+from tests.dataflash_writer import DataFlash
+from tests.ulog_writer import ATTITUDE, GPS, GPS_CODE, UlogWriter
+
+BOOT_US = 5_000_000  # both autopilots have run for five seconds when the log begins
+GPS_UTC_LEAP_NS = 18 * NS_PER_S
+GPS_EPOCH_NS = iso_to_utc_ns("1980-01-06T00:00:00Z")[0]
+LOCAL = (
+    "vehicle_local_position:uint64_t timestamp;float vx;float vy;float vz;bool v_xy_valid;bool v_z_valid;"
+    "uint8_t[2] _padding0;"
+)
+LANDED = "vehicle_land_detected:uint64_t timestamp;bool landed;uint8_t[7] _padding0;"
+
+# Largest difference to the flat CSV: half a stored step and a rounding, in the unit of the field.
+FLOAT32 = 1.2e-7
+RESOLUTION: Mapping[str, Mapping[str, float]] = {
+    "ulog": {
+        "ins.true_heading_deg": 2e-5,
+        "ins.roll_deg": 2e-5,
+        "ins.pitch_deg": 2e-5,
+        "ins.velocity_north_mps": 100 * FLOAT32,
+        "ins.velocity_east_mps": 100 * FLOAT32,
+        "gnss.velocity_north_mps": 100 * FLOAT32,
+        "gnss.velocity_east_mps": 100 * FLOAT32,
+        "gnss.latitude_deg": 0.51e-7,
+        "gnss.longitude_deg": 0.51e-7,
+        "gnss.altitude_msl_m": 0.51e-3,
+    },
+    "dataflash": {
+        "ins.true_heading_deg": 0.0051,
+        "ins.roll_deg": 0.0051,
+        "ins.pitch_deg": 0.0051,
+        "gnss.ground_speed_mps": 100 * FLOAT32,
+        "gnss.velocity_north_mps": 100 * FLOAT32,
+        "gnss.velocity_east_mps": 100 * FLOAT32,
+        "gnss.latitude_deg": 0.51e-7,
+        "gnss.longitude_deg": 0.51e-7,
+        "gnss.altitude_msl_m": 0.0051,
+    },
+}
+ANSWER_DEG = {"ulog": 1e-3, "dataflash": 3e-3}  # heading steps of 0.01 deg average out over a thousand samples
+
+
+@cache
+def simulated() -> Simulated:
+    return simulate(load_scenario("taxi-good"))
+
+
+def as_csv(path: Path) -> None:
+    flight = simulated()
+    write_flat_csv(path, flight.flight, resolution=flight.resolution)
+
+
+def columns(topic: str, *names: str) -> list[np.ndarray]:
+    """Columns as the CSV holds them: time in microseconds of the autopilot's clock, then the fields."""
+    flight = simulated()
+    table = flight.flight[topic]
+    time_us = BOOT_US + (table.time_ns - flight.flight.start_ns) // 1000
+    rounded = []
+    for name in names:
+        step = flight.resolution.get(f"{topic}.{name}", 0.0)
+        values = table.values(name)
+        rounded.append(np.round(values / step) * step if step else values)
+    return [time_us, *rounded]
+
+
+def quaternion_wxyz(roll_deg: float, pitch_deg: float, heading_deg: float) -> tuple[float, float, float, float]:
+    half = np.deg2rad([roll_deg, pitch_deg, heading_deg]) / 2
+    (cr, cp, ch), (sr, sp, sh) = np.cos(half), np.sin(half)
+    return (
+        cr * cp * ch + sr * sp * sh,
+        sr * cp * ch - cr * sp * sh,
+        cr * sp * ch + sr * cp * sh,
+        cr * cp * sh - sr * sp * ch,
+    )
+
+
+def start_utc_ns() -> int:
+    return simulated().flight.start_ns
+
+
+def as_ulog(path: Path) -> None:
+    log = UlogWriter(start_us=BOOT_US).flags().format(ATTITUDE).format(GPS).format(LOCAL).format(LANDED)
+    for number, name in enumerate(("vehicle_attitude", "vehicle_gps_position", "vehicle_local_position")):
+        log.subscribe(number, name)
+    log.subscribe(3, "vehicle_land_detected")
+    rows: list[tuple[int, int, str, tuple[float, ...]]] = []
+    for time_us, roll, pitch, heading in zip(*columns("ins", "roll_deg", "pitch_deg", "true_heading_deg"), strict=True):
+        rows.append((int(time_us), 0, "Q4f", quaternion_wxyz(roll, pitch, heading)))
+    for time_us, north, east in zip(*columns("ins", "velocity_north_mps", "velocity_east_mps"), strict=True):
+        rows.append((int(time_us), 2, "Q3fBB", (north, east, 0.0, 1, 1)))
+    fields = ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m", "velocity_north_mps", "velocity_east_mps")
+    for time_us, lat, lon, alt, north, east in zip(*columns("gnss", *fields), strict=True):
+        utc_us = (start_utc_ns() // 1000) + int(time_us) - BOOT_US
+        place = (round(lat * 1e7), round(lon * 1e7), round(alt * 1e3), 0)
+        rest = (0.05, 1.0, float(np.hypot(north, east)), north, east, 0.0, 0.0, 3, 1, 12)
+        rows.append((int(time_us), 1, GPS_CODE, (utc_us, *place, *rest)))
+    for time_us, wheels in zip(*columns("discrete", "weight_on_wheels"), strict=True):
+        rows.append((int(time_us), 3, "QB", (int(wheels),)))
+    for time_us, number, code, values in sorted(rows, key=lambda row: row[:2]):
+        log.row(number, code, time_us, *values)
+    path.write_bytes(log.data)
+
+
+def as_dataflash(path: Path) -> None:
+    log = DataFlash()
+    log.define(1, "PARM", "QNf", "TimeUS,Name,Value")
+    log.define(5, "ATT", "QccccCC", "TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw")
+    log.define(8, "GPS", "QBIHBcLLefff", "TimeUS,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ")
+    log.write("PARM", BOOT_US - 1, "COMPASS_AUTODEC", 1.0)
+    rows: list[tuple[int, str, tuple[float, ...]]] = []
+    for time_us, roll, pitch, heading in zip(*columns("ins", "roll_deg", "pitch_deg", "true_heading_deg"), strict=True):
+        stored = (0, round(roll * 100), 0, round(pitch * 100), 0, round(heading * 100) % 36000)
+        rows.append((int(time_us), "ATT", stored))
+    fields = ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m", "velocity_north_mps", "velocity_east_mps")
+    for time_us, lat, lon, alt, north, east in zip(*columns("gnss", *fields), strict=True):
+        since_gps_ns = start_utc_ns() + (int(time_us) - BOOT_US) * 1000 - GPS_EPOCH_NS + GPS_UTC_LEAP_NS
+        week, rest_ns = divmod(since_gps_ns, 604_800 * NS_PER_S)
+        course = float(np.rad2deg(np.arctan2(east, north)) % 360.0)
+        place = (round(lat * 1e7), round(lon * 1e7), round(alt * 100))
+        speed = float(np.hypot(north, east))
+        rows.append((int(time_us), "GPS", (3, rest_ns // 1_000_000, week, 12, 100, *place, speed, course, 0.0)))
+    for time_us, name, values in sorted(rows, key=lambda row: row[:2]):
+        log.write(name, time_us, *values)
+    path.write_bytes(log.content)
+
+
+WRITERS = {"csv": (as_csv, "x.csv"), "ulog": (as_ulog, "x.ulg"), "dataflash": (as_dataflash, "x.BIN")}
+
+
+@pytest.fixture(scope="module")
+def flights(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Flight]:
+    folder = tmp_path_factory.mktemp("formats")
+    found = {}
+    for name, (write, file_name) in WRITERS.items():
+        write(folder / file_name)
+        mcap = folder / f"{name}.mcap"
+        found[name] = read_flight(mcap, convert_log(open_log(folder / file_name), mcap))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("form", "signal"), [(form, signal) for form, signals in RESOLUTION.items() for signal in signals]
+)
+def test_tables_are_equal_within_the_formats_step(flights: dict[str, Flight], form: str, signal: str) -> None:
+    topic, field = signal.rsplit(".", 1)
+    expected_table, table = flights["csv"][topic], flights[form][topic]
+    if field == "ground_speed_mps":
+        expected = np.hypot(expected_table.values("velocity_north_mps"), expected_table.values("velocity_east_mps"))
+    elif field == "altitude_msl_m":  # the simulation has no geoid: the autopilots are given the one altitude it has
+        expected = expected_table.values("altitude_ellipsoid_m")
+    else:
+        expected = expected_table.values(field)
+    known = np.isfinite(table.values(field))
+    values, time_ns = table.values(field)[known], table.time_ns[known]
+    assert len(values) == np.isfinite(expected).sum()
+    assert np.abs(time_ns - expected_table.time_ns[np.isfinite(expected)]).max() <= 1_000_000  # GPS time to 1 ms
+    difference = values - expected[np.isfinite(expected)]
+    if field.endswith("heading_deg"):
+        difference = wrap_180(difference)
+    assert np.abs(difference).max() <= RESOLUTION[form][signal]
+
+
+@pytest.mark.parametrize("form", sorted(ANSWER_DEG))
+def test_the_heading_error_is_the_same(flights: dict[str, Flight], form: str) -> None:
+    from groundstation.pipeline.analyse import estimate_heading, user_settings
+    from groundstation.pipeline.configuration import Configuration
+
+    configuration = Configuration()
+    settings = user_settings(configuration)
+    expected = estimate_heading(flights["csv"], configuration, settings)
+    found = estimate_heading(flights[form], configuration, settings)
+    assert found.paper_error_deg == pytest.approx(expected.paper_error_deg, abs=10 * ANSWER_DEG[form])
+    assert found.confidence95_deg[0] < expected.error_deg < found.confidence95_deg[1]
+
+
+def test_every_format_has_the_same_absolute_time(flights: dict[str, Flight]) -> None:
+    starts = {form: flight["gnss"].time_ns[0] for form, flight in flights.items()}
+    assert all(flight.has_utc for flight in flights.values())
+    assert max(starts.values()) - min(starts.values()) <= 1_000_000
