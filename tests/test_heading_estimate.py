@@ -11,6 +11,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.figures import IN_PAUSE
+from groundstation.estimators.heading.references import reference_findings
 from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings, SiteData, Stand
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import Gate, HeadingResult
@@ -114,8 +115,19 @@ def test_parking_heading_is_corrected_and_compared() -> None:
     assert found.parking_ins_heading_deg == pytest.approx(310.8, abs=0.01)
     assert found.parking_heading_deg == pytest.approx(310.8 - found.error_deg, abs=1e-3)
     assert found.reference_residual_arcmin == pytest.approx((found.parking_heading_deg or 0.0) * 60 - 310.0 * 60)
-    flown = replace(taxi_flight(run), metadata={"reference.parking_heading_deg": "311.0"})
-    assert estimate(flown, site=site).reference_parking_heading_deg == 311.0
+    flown = replace(taxi_flight(run), metadata={"reference.parking_heading_deg": "-49.0"})
+    both, logged = estimate(flown, site=site), estimate(flown)
+    assert both.reference_parking_heading_deg == 310.0, "the user's site file stands above the log"
+    assert logged.reference_parking_heading_deg == 311.0, "the log's own, brought into [0, 360)"
+    assert (logged.error_deg, logged.confidence95_deg) == (both.error_deg, both.confidence95_deg)
+    assert [line.split(":")[0] for line in reference_findings(both, flown.metadata, site)] == [
+        "references of the parking heading disagree"
+    ]
+    astray = SiteData(stands=(Stand("8", 40.0),))
+    (far,) = reference_findings(estimate(taxi_flight(run), site=astray), {}, astray)
+    assert "-90.0 deg from its reference of 40.00 deg (site file, stand 8)" in far
+    nothing = replace(taxi_flight(run), metadata={"reference.parking_heading_deg": "nan"})
+    assert estimate(nothing).reference_parking_heading_deg is None
 
 
 def test_known_arm_removes_the_bias_of_a_gentle_curve() -> None:

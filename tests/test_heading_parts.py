@@ -1,16 +1,28 @@
 """Parts of the heading estimator: recursion, pairing, gates, standstill, arm, checks, references, verdict."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from groundstation.base.errors import SettingsError
 from groundstation.base.records import Column
+from groundstation.base.toml_settings import settings_from
 from groundstation.estimators.heading.arms import know_arm
 from groundstation.estimators.heading.checks import about_running_line, normality
-from groundstation.estimators.heading.gating import gate_samples
+from groundstation.estimators.heading.estimate import estimate_heading_error
+from groundstation.estimators.heading.gating import gate_samples, intervals_without_epoch, unused_intervals
 from groundstation.estimators.heading.recursion import run_recursion
-from groundstation.estimators.heading.references import onboard_comparison, runway_checks, shrunk_drift
+from groundstation.estimators.heading.references import (
+    logged_reference,
+    onboard_comparison,
+    parking_reference,
+    reference_conflict,
+    runway_checks,
+    shrunk_drift,
+)
 from groundstation.estimators.heading.samples import (
     Samples,
     distinct_epochs,
@@ -25,6 +37,7 @@ from groundstation.estimators.heading.settings import (
     Interval,
     Runway,
     SiteData,
+    Stand,
 )
 from groundstation.estimators.heading.standstill import effective_samples, find_standstill, speed_bound_mps
 from groundstation.estimators.heading.verdict import decide, explain
@@ -204,6 +217,23 @@ def test_samples_after_lift_off_are_not_looked_at() -> None:
     assert pair_samples(replace(flight, tables=tables), "ins", "gnss", settings=SETTINGS).time_s.max() <= 120.0
 
 
+def test_intervals_that_touch_no_epoch_are_told() -> None:
+    samples = paired(TWO_TURNS)
+    first, second, last = float(samples.time_s[0]), float(samples.time_s[1]), float(samples.time_s[-1])
+    touching = Interval(first, first)
+    between, after = Interval(first + 0.01, second - 0.01, "force"), Interval(last + 1.0, last + 2.0)
+    request = HeadingRequest(intervals=(touching, between, after))
+    assert unused_intervals(samples, request) == (between, after)
+    assert unused_intervals(samples, HeadingRequest()) == ()
+    assert intervals_without_epoch(np.zeros(0), (touching,)) == (touching,)
+
+
+@pytest.mark.parametrize("ends", [(np.nan, 1.0), (0.0, np.inf), (-np.inf, 0.0)])
+def test_an_interval_has_finite_ends(ends: tuple[float, float]) -> None:
+    with pytest.raises(SettingsError, match="finite flight seconds"):
+        Interval(*ends)
+
+
 # Standstill
 
 
@@ -365,6 +395,105 @@ def test_drift_of_taxi_is_shrunk_to_what_an_ins_can_drift() -> None:
     drift, sigma = shrunk_drift(0.1, 0.01)
     assert drift == pytest.approx(0.1, rel=0.02)
     assert sigma == pytest.approx(0.01, rel=0.01)
+
+
+def test_reference_of_the_log_is_a_finite_heading_with_its_sigma() -> None:
+    heading, sigma = "reference.parking_heading_deg", "reference.parking_heading_sigma_deg"
+    for text in ("", "north", "nan", "inf"):
+        assert logged_reference({heading: text}) is None
+    for text, expected in (("0.02", 0.02), ("0", 0.05), ("-1", 0.05), ("nan", 0.05), ("inf", 0.05), ("?", 0.05)):
+        found = logged_reference({heading: "361.5", sigma: text})
+        assert found is not None
+        assert (found.heading_deg, found.sigma_deg) == (1.5, expected)
+    assert logged_reference({sigma: "0.02"}) is None
+
+
+def test_site_file_and_log_that_disagree_are_told() -> None:
+    """Worked example: 0.01 and 0.40 deg apart across north, sigmas 0.10 and 0.09: 3 sigma are 0.404 deg."""
+    site = SiteData(stands=(Stand("7", 360.0, 0.10),))
+    heading, sigma = "reference.parking_heading_deg", "reference.parking_heading_sigma_deg"
+    assert reference_conflict({heading: "359.99", sigma: "0.09"}, site) is None
+    assert reference_conflict({heading: "359.60", sigma: "0.09"}, site) is None
+    told = reference_conflict({heading: "359.59", sigma: "0.09"}, site)
+    assert told is not None and "0.00 deg (site file, stand 7), 359.59 deg (log)" in told
+    sure = SiteData(stands=(Stand("7", 0.0, 0.0),))
+    assert reference_conflict({heading: "0.14", sigma: "0.001"}, sure) is None, "never below 3 x 0.05 deg"
+    assert reference_conflict({heading: "0.16", sigma: "0.001"}, sure) is not None
+    assert reference_conflict({}, site) is None
+    assert reference_conflict({heading: "90"}, SiteData()) is None
+    used = parking_reference({heading: "90"}, site)
+    assert used is not None and used.heading_deg == 0.0
+
+
+# Settings
+
+
+@pytest.mark.parametrize(
+    ("made", "table", "says"),
+    [
+        (AircraftData, {"entry_step_deg": 0}, r"file, key entry_step_deg: found 0, expected within \[1e-06, 10\]"),
+        (AircraftData, {"entry_step_deg": -0.1}, "key entry_step_deg: found -0.1"),
+        (AircraftData, {"mounting_deg": 400}, r"key mounting_deg: found 400, expected within \[-10, 10\]"),
+        (AircraftData, {"mounting_sigma_deg": -1}, "key mounting_sigma_deg: found -1, expected 0 or more"),
+        (AircraftData, {"antenna_arm_sigma_m": -1}, "key antenna_arm_sigma_m"),
+        (AircraftData, {"antenna_arm_m": 51.0}, "key antenna_arm_m"),
+        (SiteData, {"stands": [{"name": "7", "heading_deg": 1e9}]}, r"key stands\[0\].heading_deg: found 1e\+09"),
+        (SiteData, {"stands": [{"name": "7", "heading_deg": 1, "sigma_deg": -1}]}, r"key stands\[0\].sigma_deg"),
+        (SiteData, {"stand": "9Z", "stands": [{"name": "7", "heading_deg": 1}]}, "key stand: found '9Z', expected one"),
+        (SiteData, {"stand": "9Z"}, "key stand: found '9Z', expected a stand listed"),
+        (SiteData, {"stands": [{"name": "7", "heading_deg": 1}] * 2}, "key stands: found '7' more than once"),
+        (SiteData, {"runways": [{"name": "09", "true_bearing_deg": 90}] * 2}, "key runways: found '09' more than once"),
+        (SiteData, {"runways": [{"name": "09", "true_bearing_deg": -1}]}, r"key runways\[0\].true_bearing_deg"),
+        (
+            SiteData,
+            {"runways": [{"name": "09", "true_bearing_deg": 90, "latitude_deg": 48}]},
+            r"file, key runways\[0\].longitude_deg: found nothing, expected a value beside latitude_deg",
+        ),
+        (
+            SiteData,
+            {"runways": [{"name": "09", "true_bearing_deg": 90, "latitude_deg": 91, "longitude_deg": 0}]},
+            r"key runways\[0\].latitude_deg: found 91",
+        ),
+        (HeadingSettings, {"posterior_draws": 0}, "key posterior_draws: found 0, expected 100 or more"),
+        (HeadingSettings, {"growth_steps": 1}, "key growth_steps"),
+        (HeadingSettings, {"geometry_share_min": 1.1}, "key geometry_share_min"),
+        (HeadingSettings, {"taxi_speed_min_mps": 25}, "key taxi_speed_min_mps: found 25, expected at most taxi_sp"),
+        (HeadingSettings, {"standstill_max_s": 5}, "key standstill_min_s: found 10, expected at most"),
+        (HeadingSettings, {"variance_ratio_range": [2.0, 0.5]}, "key variance_ratio_range: found 2 to 0.5"),
+    ],
+)
+def test_a_value_that_cannot_be_used_is_refused_by_file_and_key(made: type, table: dict[str, Any], says: str) -> None:
+    with pytest.raises(SettingsError, match=says):
+        settings_from(made, table, "file")
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: AircraftData(mounting_deg=np.nan),
+        lambda: AircraftData(antenna_arm_sigma_m=np.inf),
+        lambda: AircraftData(entry_step_deg=0.0),
+        lambda: Stand("7", 361.0),
+        lambda: Runway("09", np.inf),
+        lambda: HeadingSettings(precision_max_deg=np.inf),
+        lambda: HeadingSettings(excess_kurtosis_range=(np.nan, 2.0)),
+        lambda: HeadingSettings(quality_max_deg=-1.0),
+    ],
+)
+def test_settings_made_without_a_file_are_checked_too(make: Callable[[], object]) -> None:
+    with pytest.raises(SettingsError):
+        make()
+
+
+def test_the_ends_of_the_ranges_can_be_used() -> None:
+    """The fewest draws and steps still give an answer; a runway at a position, a stand at 360 deg are in order."""
+    site = SiteData((Stand("7", 360.0),), (Runway("09", 0.0, 0.0, -90.0, 180.0),), "7")
+    assert site.parked_on() == site.stands[0]
+    settings = HeadingSettings(posterior_draws=100, growth_steps=2)
+    aircraft = AircraftData(antenna_arm_m=4.0, antenna_arm_sigma_m=0.0, entry_step_deg=10.0)
+    flight = taxi_flight(simulate_taxi(TWO_TURNS, np.random.default_rng(0)))
+    found = estimate_heading_error(flight, settings=settings, aircraft=aircraft)
+    assert np.isfinite([found.error_deg, *found.confidence95_deg]).all()
 
 
 # Verdict

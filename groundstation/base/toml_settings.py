@@ -1,6 +1,8 @@
 """Frozen dataclasses filled from TOML, strictly: an unknown key, a wrong type or a value out of range is an error.
 
-A field states its range in its metadata: ``number(0.5, low=0.0)``. A field that holds one of several classes (legs,
+A field states its range in its metadata: ``number(0.5, low=0.0)``; a class that is also built without a file calls
+:func:`check_ranges` in its ``__post_init__``. A SettingsError raised there says the field as its place, and
+:func:`settings_from` puts file and table before it. A field that holds one of several classes (legs,
 faults) is a union whose members carry a class attribute ``kind``; the TOML table names it with the key ``kind``.
 """
 
@@ -22,7 +24,7 @@ class HasKind(Protocol):
     kind: ClassVar[str]
 
 
-def number(default: float, low: float = -math.inf, high: float = math.inf) -> Any:
+def number(default: float | None, low: float = -math.inf, high: float = math.inf) -> Any:
     """Declare a dataclass field: a number with its range, both ends allowed."""
     return dataclasses.field(default=default, metadata={"low": low, "high": high})
 
@@ -30,6 +32,33 @@ def number(default: float, low: float = -math.inf, high: float = math.inf) -> An
 def required_number(low: float = -math.inf, high: float = math.inf) -> Any:
     """Declare a dataclass field: a number that the file must state, with its range, both ends allowed."""
     return dataclasses.field(metadata={"low": low, "high": high})
+
+
+def check_ranges(settings: Any) -> None:
+    """Refuse numbers of a settings dataclass that are not finite or out of the range their field states.
+
+    Raises
+    ------
+    SettingsError
+        Naming the field.
+
+    Examples
+    --------
+    >>> @dataclasses.dataclass(frozen=True)
+    ... class Wind:
+    ...     north_mps: float = number(0.0, -100.0, 100.0)
+    >>> check_ranges(Wind(300.0))
+    Traceback (most recent call last):
+    groundstation.base.errors.SettingsError: north_mps: found 300, expected within [-100, 100]
+    """
+    for field in dataclasses.fields(settings):
+        value = getattr(settings, field.name)
+        for item in value if isinstance(value, tuple) else (value,):
+            if isinstance(item, float) and not math.isfinite(item):
+                raise SettingsError(field.name, f"{item:g}", "a finite number")
+        expected = _out_of_range(value, field)
+        if expected:
+            raise SettingsError(field.name, *expected)
 
 
 def settings_from(cls: type[Settings], table: Mapping[str, Any], where: str, key: str = "") -> Settings:
@@ -76,7 +105,11 @@ def settings_from(cls: type[Settings], table: Mapping[str, Any], where: str, key
             _check_range(values[name], field, where, place)
         elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
             raise _error(where, place, "nothing", "a value")
-    return cls(**values)
+    try:
+        return cls(**values)
+    except SettingsError as error:  # raised by the class itself, which knows neither file nor table
+        place = f"{where}, key {_join(key, error.where)}"
+        raise SettingsError(place, error.found, error.expected, error.next_step) from error
 
 
 def _convert(hint: Any, value: Any, where: str, key: str) -> Any:
@@ -130,10 +163,18 @@ def _convert_plain(hint: Any, value: Any, where: str, key: str) -> Any:
 
 
 def _check_range(value: Any, field: "dataclasses.Field[Any]", where: str, key: str) -> None:
+    expected = _out_of_range(value, field)
+    if expected:
+        raise _error(where, key, *expected)
+
+
+def _out_of_range(value: Any, field: "dataclasses.Field[Any]") -> tuple[str, str] | None:
+    """What was found and what was expected, where a number is out of the range of its field."""
     low, high = field.metadata.get("low", -math.inf), field.metadata.get("high", math.inf)
     for item in value if isinstance(value, tuple) else (value,):
         if isinstance(item, int | float) and not low <= item <= high:
-            raise _error(where, key, f"{item:g}", f"within [{low:g}, {high:g}]")
+            return f"{item:g}", f"{low:g} or more" if math.isinf(high) else f"within [{low:g}, {high:g}]"
+    return None
 
 
 def _join(key: str, name: str) -> str:

@@ -55,9 +55,9 @@ def user_settings(configuration: Configuration) -> UserSettings:
         For an unknown key or a value of the wrong kind.
     """
     return UserSettings(
-        settings_from(HeadingSettings, configuration.heading, "[heading]"),
-        settings_from(AircraftData, configuration.aircraft, "aircraft file"),
-        settings_from(SiteData, configuration.site, "site file"),
+        settings_from(HeadingSettings, configuration.heading, configuration.file_of("heading"), "heading"),
+        settings_from(AircraftData, configuration.aircraft, configuration.file_of("aircraft"), "aircraft"),
+        settings_from(SiteData, configuration.site, configuration.file_of("site"), "site"),
     )
 
 
@@ -77,6 +77,7 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     figures = _figures(flight, given, settings, phases, heading)
     if heading is not None:
         findings += heading_findings(heading)
+        findings += _findings_of_what_was_set(flight, heading, configuration, settings)
     return FlightResults(
         flight_id=given.flight_id,
         source=given.source,
@@ -105,13 +106,6 @@ def estimate_heading(flight: Flight, configuration: Configuration, settings: Use
     from groundstation.estimators.heading.estimate import estimate_heading_error
     from groundstation.tables.headings import true_heading
 
-    uses: tuple[tuple[Literal["exclude", "force"], tuple[configured.Interval, ...]], ...] = (
-        ("exclude", configuration.exclude),
-        ("force", configuration.force),
-    )
-    intervals = tuple(
-        Interval(start_s, end_s, use) for use, listed in uses for start_s, end_s in seconds_of(flight, listed)
-    )
     return estimate_heading_error(
         flight,
         on_ground=lambda time_ns: ground_mask(flight, time_ns),
@@ -119,7 +113,7 @@ def estimate_heading(flight: Flight, configuration: Configuration, settings: Use
         settings=settings.heading,
         aircraft=settings.aircraft,
         site=settings.site,
-        request=HeadingRequest(intervals=intervals),
+        request=HeadingRequest(intervals=_intervals(flight, configuration)),
     )
 
 
@@ -146,6 +140,30 @@ def heading_findings(result: HeadingResult) -> tuple[Finding, ...]:
     grave = result.verdict == "reject"
     text = f"heading correction: {result.verdict}: {result.verdict_reason}"
     return (Finding("warn" if grave else "info", f"heading.{result.verdict}", text),)
+
+
+def _findings_of_what_was_set(
+    flight: Flight, heading: HeadingResult, configuration: Configuration, settings: UserSettings
+) -> list[Finding]:
+    """Findings on the user's references and intervals: what contradicts the log, or touches none of its samples."""
+    from groundstation.estimators.heading.gating import intervals_without_epoch
+    from groundstation.estimators.heading.references import reference_findings
+
+    lines = reference_findings(heading, flight.metadata, settings.site)
+    findings = [Finding("warn", "heading.reference", line) for line in lines]
+    intervals = _intervals(flight, configuration)
+    for part in intervals_without_epoch(flight.time_s(heading.gnss_topic), intervals):
+        text = f"interval to {part.use}, {part.start_s:g} to {part.end_s:g} s: no GNSS epoch in it"
+        findings.append(Finding("warn", "heading.interval", text))
+    return findings
+
+
+def _intervals(flight: Flight, configuration: Configuration) -> tuple[Interval, ...]:
+    uses: tuple[tuple[Literal["exclude", "force"], tuple[configured.Interval, ...]], ...] = (
+        ("exclude", configuration.exclude),
+        ("force", configuration.force),
+    )
+    return tuple(Interval(start_s, end_s, use) for use, listed in uses for start_s, end_s in seconds_of(flight, listed))
 
 
 def _status(given: Given, findings: list[Finding]) -> Status:

@@ -34,6 +34,11 @@ class Configuration:
     exclude: tuple[Interval, ...] = ()
     force: tuple[Interval, ...] = ()
     profile: str | None = None
+    files: Mapping[str, str] = field(default_factory=dict)
+
+    def file_of(self, section: str) -> str:
+        """The file a section was read from, for messages."""
+        return self.files.get(section, "settings")
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for the manifest and the MCAP; only what the user set."""
@@ -81,6 +86,7 @@ def load_configuration(
     """
     document = read_toml(config) if config else {}
     _refuse_unknown(document, SECTIONS, str(config))
+    files = {"heading": config, "aircraft": aircraft or config, "site": site or config}
     for name, path in (("aircraft", aircraft), ("site", site)):
         if path:
             document[name] = read_toml(path)
@@ -98,6 +104,7 @@ def load_configuration(
         exclude=_intervals(document.get("exclude", []), f"{intervals or config}, exclude"),
         force=_intervals(document.get("force", []), f"{intervals or config}, force"),
         profile=str(profile) if profile else None,
+        files={name: str(path) for name, path in files.items() if path},
     )
 
 

@@ -147,7 +147,7 @@ class MagnetometerSettings:
     soft_iron: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     noise_nt: float = number(30.0, 0.0, 10_000.0)
     resolution_nt: float = number(1.0, 1e-3, 1000.0)
-    decimal_year: float | None = number(None, 2010.0, 2030.0)  # type: ignore[arg-type]
+    decimal_year: float | None = number(None, 2010.0, 2030.0)
 
 
 @dataclass(frozen=True)

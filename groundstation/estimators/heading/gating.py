@@ -1,5 +1,6 @@
 """Why a sample is used or not, and the straight segments."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 from groundstation.base.angles import wrap_180
 from groundstation.base.records import BoolArray
 from groundstation.estimators.heading.samples import GATE_TEXT, USED, Samples
-from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings, Interval
 
 
 def gate_samples(samples: Samples, settings: HeadingSettings, request: HeadingRequest) -> Samples:
@@ -41,6 +42,33 @@ def gate_samples(samples: Samples, settings: HeadingSettings, request: HeadingRe
     segment = _segments(samples, gate == USED, settings)
     gate[(gate == USED) & (segment == 0)] = "GNSS gap"  # a single epoch between two gaps
     return replace(samples, gate=gate, segment=segment)
+
+
+def unused_intervals(samples: Samples, request: HeadingRequest) -> tuple[Interval, ...]:
+    """Intervals of the request that touch no sample: they changed nothing.
+
+    Parameters
+    ----------
+    samples : Samples
+        As paired: the ground part of the flight, so that an interval in the air counts as unused.
+    """
+    return intervals_without_epoch(samples.time_s, request.intervals)
+
+
+def intervals_without_epoch(time_s: NDArray[np.float64], intervals: Sequence[Interval]) -> tuple[Interval, ...]:
+    """Intervals, both ends included, that hold none of the times: outside the flight, or in a gap.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (n,)
+        Flight seconds of the GNSS epochs.
+
+    Examples
+    --------
+    >>> intervals_without_epoch(np.arange(5.0), [Interval(3.0, 9.0), Interval(7.0, 9.0), Interval(1.2, 1.8, "force")])
+    (Interval(start_s=7.0, end_s=9.0, use='exclude'), Interval(start_s=1.2, end_s=1.8, use='force'))
+    """
+    return tuple(part for part in intervals if not ((time_s >= part.start_s) & (time_s <= part.end_s)).any())
 
 
 def is_straight_and_fast(samples: Samples, settings: HeadingSettings) -> BoolArray:

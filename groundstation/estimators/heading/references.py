@@ -1,6 +1,7 @@
 """What the estimate is compared with: parking heading, runway bearing, the aircraft's own figures."""
 
-from contextlib import suppress
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,13 +13,27 @@ from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.heading.samples import Samples
 from groundstation.estimators.heading.settings import HeadingSettings, SiteData
 from groundstation.estimators.heading.standstill import effective_samples
-from groundstation.results.heading import OnboardComparison, RunwayCheck
+from groundstation.results.heading import HeadingResult, OnboardComparison, RunwayCheck
 from groundstation.tables.table import Flight
 
 FloatArray = NDArray[np.float64]
 DRIFT_PRIOR_DEG_PER_H = 0.1  # sigma of the azimuth drift of an INS in order: all that taxi can add to it is noise
 RUNWAY_ALONG_DEG = 10.0
 REFERENCE_KEY = "reference.parking_heading_deg"
+REFERENCE_SIGMA_KEY = "reference.parking_heading_sigma_deg"
+REFERENCE_SIGMA_DEG = 0.05  # of a reference in the log without a sigma, as of a stand's
+CONFLICT_SIGMAS = 3.0
+CONFLICT_SIGMA_LEAST_DEG = 0.05
+ABSURD_RESIDUAL_DEG = 5.0
+
+
+@dataclass(frozen=True)
+class Reference:
+    """True heading of the aircraft as parked, [0, 360), its sigma, and who says so."""
+
+    heading_deg: float
+    sigma_deg: float
+    origin: str
 
 
 @dataclass(frozen=True)
@@ -47,6 +62,78 @@ def shrunk_drift(drift_deg_per_h: float | None, sigma_deg_per_h: float | None) -
     return weight * drift_deg_per_h, float(np.sqrt(weight)) * sigma_deg_per_h
 
 
+def site_reference(site: SiteData) -> Reference | None:
+    """Reference of the stand that the user's site file names."""
+    stand = site.parked_on()
+    if stand is None:
+        return None
+    return Reference(float(wrap_360(stand.heading_deg)), stand.sigma_deg, f"site file, stand {stand.name}")
+
+
+def logged_reference(flight_metadata: Mapping[str, str]) -> Reference | None:
+    """Reference that the log itself brings; None without one, or where it is no finite number.
+
+    Examples
+    --------
+    >>> logged_reference({"reference.parking_heading_deg": "-10", "reference.parking_heading_sigma_deg": "0.02"})
+    Reference(heading_deg=350.0, sigma_deg=0.02, origin='log')
+    >>> logged_reference({"reference.parking_heading_deg": "nan"}) is None
+    True
+    """
+    heading = _finite(flight_metadata.get(REFERENCE_KEY))
+    if heading is None:
+        return None
+    sigma = _finite(flight_metadata.get(REFERENCE_SIGMA_KEY))
+    return Reference(float(wrap_360(heading)), sigma if sigma and sigma > 0.0 else REFERENCE_SIGMA_DEG, "log")
+
+
+def _finite(text: str | None) -> float | None:
+    try:
+        value = float(text) if text else math.nan
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def parking_reference(flight_metadata: Mapping[str, str], site: SiteData) -> Reference | None:
+    """The reference compared with: the user's site file stands above the log."""
+    return site_reference(site) or logged_reference(flight_metadata)
+
+
+def reference_conflict(flight_metadata: Mapping[str, str], site: SiteData) -> str | None:
+    """One line where site file and log disagree by more than three of their combined sigma (at least 0.05 deg).
+
+    Examples
+    --------
+    >>> from groundstation.estimators.heading.settings import Stand
+    >>> reference_conflict({"reference.parking_heading_deg": "311"}, SiteData((Stand("7", 310.0),)))
+    'references of the parking heading disagree: 310.00 deg (site file, stand 7), 311.00 deg (log); the former is used'
+    """
+    of_site, of_log = site_reference(site), logged_reference(flight_metadata)
+    if of_site is None or of_log is None:
+        return None
+    sigma = max(math.hypot(of_site.sigma_deg, of_log.sigma_deg), CONFLICT_SIGMA_LEAST_DEG)
+    if abs(float(wrap_180(of_log.heading_deg - of_site.heading_deg))) <= CONFLICT_SIGMAS * sigma:
+        return None
+    return (
+        f"references of the parking heading disagree: {of_site.heading_deg:.2f} deg ({of_site.origin}), "
+        f"{of_log.heading_deg:.2f} deg (log); the former is used"
+    )
+
+
+def reference_findings(result: HeadingResult, flight_metadata: Mapping[str, str], site: SiteData) -> tuple[str, ...]:
+    """Lines to warn with: references that disagree, and a reference too far from the estimate to be the right one."""
+    conflict = reference_conflict(flight_metadata, site)
+    lines = [conflict] if conflict else []
+    used, residual = parking_reference(flight_metadata, site), result.reference_residual_arcmin
+    if used and residual is not None and abs(residual) > ABSURD_RESIDUAL_DEG * ARCMIN_PER_DEG:
+        lines.append(
+            f"corrected parking heading is {residual / ARCMIN_PER_DEG:+.1f} deg from its reference of "
+            f"{used.heading_deg:.2f} deg ({used.origin}): check the stand and the reference"
+        )
+    return tuple(lines)
+
+
 def parking_heading(
     samples: Samples,
     in_interval: NDArray[np.bool_],
@@ -65,11 +152,8 @@ def parking_heading(
     error : (error_deg, sigma_deg, t_taxi_s)
     drift : (drift, sigma), deg/h
     """
-    stand = site.parked_on()
-    text = flight.metadata.get(REFERENCE_KEY, "")
-    reference = stand.heading_deg if stand else None
-    with suppress(ValueError):  # the flight's own reference stands above the stand's
-        reference = float(text) if text else reference
+    known = parking_reference(flight.metadata, site)
+    reference = known.heading_deg if known else None
     if not in_interval.any() or not np.isfinite(samples.heading_deg[in_interval]).any():
         return Parking(reference_deg=reference)
     shown = mean_heading(samples.heading_deg[in_interval])

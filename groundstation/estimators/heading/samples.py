@@ -306,7 +306,7 @@ def _ins_heading(
     ins_time = flight.seconds(table.time_ns)
     known &= (ins_time > time_s[0] - 10.0) & (ins_time < time_s[-1] + 10.0)
     index = np.flatnonzero(known)
-    index = index[np.diff(table.time_ns[index], prepend=np.iinfo(np.int64).min) > 0]
+    index = index[np.concatenate([[True], np.diff(table.time_ns[index]) > 0])[: len(index)]]
     if len(index) < 2:
         raise NotAssessableError(f"heading, {ins_topic}", "no INS heading while the aircraft was on the ground")
     return ins_time[index], unwrap(np.asarray(heading_deg)[index])

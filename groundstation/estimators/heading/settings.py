@@ -1,12 +1,17 @@
 """Settings, gates and what is known of the aircraft and the airfield. Every limit of the method stands here."""
 
-from dataclasses import dataclass, field, fields
+import math
+from collections import Counter
+from dataclasses import dataclass, field
 from typing import Literal
 
 from groundstation.base.errors import SettingsError
+from groundstation.base.toml_settings import check_ranges, number, required_number
 
 RateKind = Literal["slope", "raw"]
 Runs = Literal["auto", "before_take_off", "all_ground"]
+LEAST_ENTRY_STEP_DEG = 1e-6  # the places an answer is shown with
+LEAST_DRAWS = 100  # of a posterior of eight parameters
 
 
 @dataclass(frozen=True)
@@ -17,68 +22,73 @@ class HeadingSettings:
     """
 
     # Throughout
-    geometry_max: float = 2.0  # geometric factor (paper)
-    geometry_share_min: float = 0.9  # of the epochs that would otherwise be used
-    integrity_share_min: float = 0.9
-    heading_gap_max_s: float = 1.5  # INS heading is interpolated over no longer gap
-    gnss_gap_max_s: float = 0.5  # a longer one closes the segment; at least 2.5 usual intervals
+    geometry_max: float = number(2.0, 0.0)  # geometric factor (paper)
+    geometry_share_min: float = number(0.9, 0.0, 1.0)  # of the epochs that would otherwise be used
+    integrity_share_min: float = number(0.9, 0.0, 1.0)
+    heading_gap_max_s: float = number(1.5, 0.0)  # INS heading is interpolated over no longer gap
+    gnss_gap_max_s: float = number(0.5, 0.0)  # a longer one closes the segment; at least 2.5 usual intervals
 
     # Stage A: standstill
-    standstill_speed_max_mps: float = 0.2  # of the 1-s mean velocity (paper)
-    standstill_mean_s: float = 1.0
-    standstill_rate_max_dps: float = 0.2  # INS heading steady
-    standstill_guard_s: float = 2.0  # cut from both ends: the aircraft starts to move below the limit
-    standstill_min_s: float = 10.0  # paper: 10 to 30 s
-    standstill_max_s: float = 30.0
-    speed_of_mean_max_mps: float = 0.01  # paper
-    spectrum_max_s: float = 300.0  # standstill used for the spectrum of the GNSS error
+    standstill_speed_max_mps: float = number(0.2, 0.0)  # of the 1-s mean velocity (paper)
+    standstill_mean_s: float = number(1.0, 0.0)
+    standstill_rate_max_dps: float = number(0.2, 0.0)  # INS heading steady
+    standstill_guard_s: float = number(2.0, 0.0)  # cut from both ends: the aircraft starts to move below the limit
+    standstill_min_s: float = number(10.0, 0.0)  # paper: 10 to 30 s
+    standstill_max_s: float = number(30.0, 0.0)
+    speed_of_mean_max_mps: float = number(0.01, 0.0)  # paper
+    spectrum_max_s: float = number(300.0, 0.0)  # standstill used for the spectrum of the GNSS error
 
     # Stage B: taxi
     runs: Runs = "auto"  # ground runs used; auto: those before take-off, all of the flight's where those are too short
-    taxi_speed_min_mps: float = 6.0  # paper
-    taxi_speed_max_mps: float = 20.0  # faster is a take-off run or a landing roll
-    lift_off_speed_mps: float = 40.0  # bounds the taxi phase where nothing tells ground from air
-    turn_rate_max_dps: float = 1.0  # paper: |rate of INS heading|
-    turn_rate_window_s: float = 2.0
+    taxi_speed_min_mps: float = number(6.0, 0.0)  # paper
+    taxi_speed_max_mps: float = number(20.0, 0.0)  # faster is a take-off run or a landing roll
+    lift_off_speed_mps: float = number(40.0, 0.0)  # bounds the taxi phase where nothing tells ground from air
+    turn_rate_max_dps: float = number(1.0, 0.0)  # paper: |rate of INS heading|
+    turn_rate_window_s: float = number(2.0, 0.0)
     turn_rate_kind: RateKind = "slope"
-    segment_break_s: float = 5.0  # unused stretch that ends a segment
-    segment_turn_deg: float = 20.0  # change of heading over an unused stretch that ends a segment
-    outlier_sigmas: float = 6.0  # against the running median of 5 s
-    outlier_floor_deg: float = 1.0
-    outlier_share_max: float = 0.02
+    segment_break_s: float = number(5.0, 0.0)  # unused stretch that ends a segment
+    segment_turn_deg: float = number(20.0, 0.0)  # change of heading over an unused stretch that ends a segment
+    outlier_sigmas: float = number(6.0, 0.0)  # against the running median of 5 s
+    outlier_floor_deg: float = number(1.0, 0.0)
+    outlier_share_max: float = number(0.02, 0.0, 1.0)
 
     # Acceptance
-    taxi_min_s: float = 20.0  # paper
-    precision_max_deg: float = 0.05  # paper: e
-    quality_max_deg: float = 0.3  # paper
-    half_width_max_deg: float = 0.2  # of the honest interval: 20 arcmin is then more than three sigma
-    skewness_max: float = 0.5
+    taxi_min_s: float = number(20.0, 0.0)  # paper
+    precision_max_deg: float = number(0.05, 0.0)  # paper: e
+    quality_max_deg: float = number(0.3, 0.0)  # paper
+    half_width_max_deg: float = number(0.2, 0.0)  # of the honest interval: 20 arcmin is then more than three sigma
+    skewness_max: float = number(0.5, 0.0)
     excess_kurtosis_range: tuple[float, float] = (-1.2, 2.0)
-    normal_distance_max: float = 0.08
+    normal_distance_max: float = number(0.08, 0.0)
     variance_ratio_range: tuple[float, float] = (0.5, 2.0)
-    sway_line_s: float = 5.0
-    drift_sigmas_max: float = 3.0
+    sway_line_s: float = number(5.0, 0.0)
+    drift_sigmas_max: float = number(3.0, 0.0)
 
     # Lever arm and time offset
-    arm_speed_min_mps: float = 3.0  # turns slower than this are not used to find the arm
-    arm_rate_window_s: float = 0.2
-    arm_interval_max_s: float = 0.5  # logs slower than this do not show the rate of a turn at the GNSS time
-    arm_prior_m: float = 3.0  # an arm that is neither known nor observable: 3 +- 3 m ahead
-    arm_prior_sigma_m: float = 3.0
-    arm_observable_sigma_m: float = 1.0
-    offset_prior_sigma_s: float = 0.1
-    offset_observable_sigma_s: float = 0.05
+    arm_speed_min_mps: float = number(3.0, 0.0)  # turns slower than this are not used to find the arm
+    arm_rate_window_s: float = number(0.2, 0.0)
+    arm_interval_max_s: float = number(0.5, 0.0)  # slower logs do not show the rate of a turn at the GNSS time
+    arm_prior_m: float = number(3.0, 0.0)  # an arm that is neither known nor observable: 3 +- 3 m ahead
+    arm_prior_sigma_m: float = number(3.0, 0.0)
+    arm_observable_sigma_m: float = number(1.0, 0.0)
+    offset_prior_sigma_s: float = number(0.1, 0.0)
+    offset_observable_sigma_s: float = number(0.05, 0.0)
 
     # Honest interval
-    posterior_draws: int = 400
-    posterior_seed: int = 2015
-    growth_steps: int = 120
+    posterior_draws: int = number(400, LEAST_DRAWS)
+    posterior_seed: int = number(2015, 0)
+    growth_steps: int = number(120, 2)
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, int | float) and value < 0:
-                raise SettingsError(f"heading settings, {item.name}", str(value), "a value of 0 or more")
+        check_ranges(self)
+        for name in ("excess_kurtosis_range", "variance_ratio_range"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise SettingsError(name, f"{low:g} to {high:g}", "the low end first")
+        for least, most in (("taxi_speed_min_mps", "taxi_speed_max_mps"), ("standstill_min_s", "standstill_max_s")):
+            low, high = getattr(self, least), getattr(self, most)
+            if low > high:
+                raise SettingsError(least, f"{low:g}", f"at most {most} = {high:g}")
 
 
 @dataclass(frozen=True)
@@ -99,12 +109,15 @@ class AircraftData:
         For the record.
     """
 
-    antenna_arm_m: float | None = None
-    antenna_arm_sigma_m: float = 0.05
-    entry_step_deg: float = 0.1
-    mounting_deg: float = 0.0
-    mounting_sigma_deg: float = 0.0
+    antenna_arm_m: float | None = number(None, -50.0, 50.0)
+    antenna_arm_sigma_m: float = number(0.05, 0.0)
+    entry_step_deg: float = number(0.1, LEAST_ENTRY_STEP_DEG, 10.0)
+    mounting_deg: float = number(0.0, -10.0, 10.0)
+    mounting_sigma_deg: float = number(0.0, 0.0)
     ins_class: str = ""
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -112,8 +125,11 @@ class Stand:
     """Parking stand with a reference heading (theodolite) and its sigma."""
 
     name: str
-    heading_deg: float
-    sigma_deg: float = 0.05
+    heading_deg: float = required_number(0.0, 360.0)
+    sigma_deg: float = number(0.05, 0.0)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -121,10 +137,18 @@ class Runway:
     """Runway with its true bearing (in the direction of take-off) and the position of its threshold."""
 
     name: str
-    true_bearing_deg: float
-    sigma_deg: float = 0.05
-    latitude_deg: float | None = None
-    longitude_deg: float | None = None
+    true_bearing_deg: float = required_number(0.0, 360.0)
+    sigma_deg: float = number(0.05, 0.0)
+    latitude_deg: float | None = number(None, -90.0, 90.0)
+    longitude_deg: float | None = number(None, -180.0, 180.0)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+        if (self.latitude_deg is None) != (self.longitude_deg is None):
+            missing, other = "latitude_deg", "longitude_deg"
+            if self.longitude_deg is None:
+                missing, other = other, missing
+            raise SettingsError(missing, "nothing", f"a value beside {other}, or neither of the two")
 
 
 @dataclass(frozen=True)
@@ -134,6 +158,16 @@ class SiteData:
     stands: tuple[Stand, ...] = ()
     runways: tuple[Runway, ...] = ()
     stand: str = ""
+
+    def __post_init__(self) -> None:
+        for key, listed in (("stands", self.stands), ("runways", self.runways)):
+            twice = [name for name, count in Counter(item.name for item in listed).items() if count > 1]
+            if twice:
+                raise SettingsError(key, f"{twice[0]!r} more than once", "names that differ")
+        names = [stand.name for stand in self.stands]
+        if self.stand and self.stand not in names:
+            expected = f"one of {', '.join(names)}" if names else "a stand listed under [[stands]]: there is none"
+            raise SettingsError("stand", repr(self.stand), expected)
 
     def parked_on(self) -> Stand | None:
         """The named stand; the only one where none is named; else None."""
@@ -149,6 +183,10 @@ class Interval:
     start_s: float
     end_s: float
     use: Literal["exclude", "force"] = "exclude"
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.start_s) and math.isfinite(self.end_s)):
+            raise SettingsError("interval", f"{self.start_s:g} to {self.end_s:g} s", "finite flight seconds")
 
 
 @dataclass(frozen=True)
