@@ -5,6 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from groundstation.base.records import Column, LogHeader, RecordBatch
+from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity import ClockSettings, Survey, corrected, ledger_findings, survey
 from groundstation.integrity.clock import Clock, estimate_clock
@@ -141,6 +142,26 @@ def test_nanoseconds_of_absolute_times_survive() -> None:
     device = Column(np.array([5, 0, 25], dtype=np.int64), np.array([True, False, True]))
     clock = estimate_clock(np.arange(3), device, zero_ns)
     assert clock.time_ns(np.arange(3), device).tolist() == [zero_ns + 5, zero_ns + 15, zero_ns + 25]
+
+
+@pytest.mark.parametrize("start", ["2240-01-01T00:00:00Z", "1970-01-02T00:00:00Z"])
+def test_times_beyond_64_bits_are_no_absolute_time(start: str) -> None:
+    century_s = 100 * 365.25 * 86_400
+    utc_ns = iso_to_utc_ns(start)[0]
+    clock, corrected = model([0.0, 1.0, 2.0, century_s, century_s + 1.0, century_s + 2.0], utc_ns, forward_step_s=1e10)
+    assert clock.is_absolute == start.startswith("1970")
+    assert corrected == sorted(corrected) and corrected[-1] - corrected[0] == century_s + 2.0
+
+
+def test_rows_without_time_are_placed_within_64_bits() -> None:
+    clock, corrected = model([0.0, 1e9, 2e9] + [NAN] * 50)
+    assert clock.missing_times == 50 and corrected == sorted(corrected) and corrected[-1] < 2**62 / 1e9 + 1.0
+
+
+def test_steps_that_add_up_beyond_64_bits_are_none() -> None:
+    ramp = [day * 86_000.0 for day in range(40_000)]  # a century in steps of less than a day, four times over
+    clock, corrected = model(ramp * 4)
+    assert clock.is_unordered and not clock.steps and corrected[: len(ramp)] == ramp
 
 
 def test_absolute_time_before_1970_is_no_absolute_time() -> None:

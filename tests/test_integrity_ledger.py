@@ -61,6 +61,16 @@ def test_values_outside_the_range_and_nan_are_counted() -> None:
     assert "1 of 4 values are NaN" in texts["values.nan"]
 
 
+@pytest.mark.parametrize(
+    ("topic", "counting", "severity"), [("ins", False, "warn"), ("raw.a", False, "info"), ("ins", True, "info")]
+)
+def test_a_clock_that_stands_still_is_a_warning(topic: str, counting: bool, severity: str) -> None:
+    found = survey([LogHeader("t", has_counting_clock=counting), batch(topic, [7.0] * 30 + [8.0])])
+    (finding,) = [finding for finding in ledger_findings(found.ledger) if finding.code == "time.duplicates"]
+    assert (finding.severity, finding.count) == (severity, 29)
+    assert ("stands still" in finding.text) == (severity == "warn")
+
+
 def test_damages_and_remarks_reach_the_findings() -> None:
     items: list[Item] = [
         LogHeader("t"),
@@ -69,12 +79,14 @@ def test_damages_and_remarks_reach_the_findings() -> None:
         Damage("repeated_header", "row 9", 1, "header lines", loses_data=False),
         Remark("assumed_utc", "3 times without a zone"),
         Remark("derived", "velocities", "gnss"),
+        Remark("unreadable_metadata", "reference.parking_heading_deg: 'abc'"),
     ]
     found = survey(items)
-    assert found.ledger.loses_data and len(found.damages) == 2 and len(found.remarks) == 2
+    assert found.ledger.loses_data and len(found.damages) == 2 and len(found.remarks) == 3
     codes = {finding.code: finding.severity for finding in ledger_findings(found.ledger)}
     assert codes["data.dropped_rows"] == "warn" and codes["data.repeated_header"] == "info"
-    assert codes["reader.assumed_utc"] == "warn" and codes["reader.derived"] == "info"
+    assert codes["reader.assumed_utc"] == codes["reader.unreadable_metadata"] == "warn"
+    assert codes["reader.derived"] == "info"
 
 
 def test_dictionaries_are_json_and_repeat_exactly() -> None:

@@ -117,7 +117,9 @@ def test_seconds_become_integer_nanoseconds_exactly(write: Write, text: str, ns:
     assert Read(write(f"time_s,ins.roll_deg\n{text},1\n")).times("ins") == [ns]
 
 
-@pytest.mark.parametrize("text", ["x", "1:2", "1_5", "99999999999", "1e99", "1e-99x", "nan", "12-5", "9" * 30])
+@pytest.mark.parametrize(
+    "text", ["x", "1:2", "1_5", "99999999999", "1e99", "1e-99x", "nan", "12-5", "9" * 30, "-9223372036.854775808"]
+)
 def test_a_time_that_cannot_be_read_is_absent_and_counted(write: Write, text: str) -> None:
     log = Read(write(f"time_s,ins.roll_deg\n1,1\n{text},2\n3,3\n"))
     assert log.times("ins") == [10**9, None, 3 * 10**9] and log.values("ins", "roll_deg") == [1, 2, 3]
@@ -148,6 +150,37 @@ def test_start_utc_gives_the_zero(write: Write) -> None:
     assert naive.header.utc_of_zero_ns == 2 * 10**9 and "assumed_utc" in naive.remarks
     broken = Read(write("# start_utc: yesterday\ntime_s,ins.roll_deg\n"))
     assert broken.header.utc_of_zero_ns is None and "unreadable_metadata" in broken.remarks
+
+
+@pytest.mark.parametrize("year", ["9999", "1600", "2262", "0001"])
+def test_a_start_beyond_64_bits_is_none(write: Write, year: str) -> None:
+    log = Read(write(f"# start_utc: {year}-12-31T00:00:00Z\ntime_s,ins.roll_deg\n1,2\n"))
+    assert log.header.utc_of_zero_ns is None and "start_utc" in log.remarks["unreadable_metadata"].text
+    assert log.times("ins") == [10**9]
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "is_usable"),
+    [
+        *(("heading", text, False) for text in ("abc", "nan", "inf", "1e9", "-361", "12,5")),
+        *(("heading", text, True) for text in ("-90", "0", "719.5", "")),
+        *(("heading_sigma", text, False) for text in ("0", "-1", "nan", "inf", "x")),
+        ("heading_sigma", "0.02", True),
+    ],
+)
+def test_a_reference_that_cannot_be_used_is_told(write: Write, key: str, text: str, is_usable: bool) -> None:
+    log = Read(write(f"# reference.parking_{key}_deg: {text}\ntime_s,ins.roll_deg\n1,2\n"))
+    assert ("unreadable_metadata" in log.remarks) != is_usable
+    assert is_usable or f"reference.parking_{key}_deg" in log.remarks["unreadable_metadata"].text
+
+
+@pytest.mark.parametrize("absurd", ["1e308", "-1e308", "inf", "-inf", "nan"])
+def test_absurd_numbers_are_kept_without_a_murmur(write: Write, absurd: str) -> None:
+    log = Read(
+        write(f"time_s,ins.true_heading_deg,gnss.track_deg,gnss.ground_speed_mps\n1,-10,90,5\n2{f',{absurd}' * 3}\n")
+    )
+    assert log.values("ins", "true_heading_deg")[0] == 350.0 and len(log.values("gnss", "velocity_north_mps")) == 2
+    assert str(log.values("ins", "true_heading_deg")[1]) == str(float(absurd))
 
 
 def test_recorder_time_beside_utc_gives_the_zero(write: Write) -> None:

@@ -1,7 +1,12 @@
 """The recording as a file: read back with Rerun's own reader and held against tables and results."""
 
+import os
 import re
+import subprocess
+import sys
+import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,15 +17,18 @@ from rerun.chunk import RrdReader
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Column
+from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, Source
 from groundstation.tables.table import Flight
 from groundstation.viewer import recording
+from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.recording import stream_recording, write_recording
 from groundstation.viewer.tabs import raw
 from groundstation.viewer.tabs.log import place_s
 from tests.viewer_example import GNSS_GAP_S, START_NS, make_flight, make_results, table
 from tests.viewer_shots import free_port
 
+MANY_TOPICS_S = 60.0  # it takes one; without a cap it never ends
 HOSTILE = [
     "raw.../../etc/passwd",
     "raw.a b\x00\n\u202ec",
@@ -268,6 +276,56 @@ def test_a_folder_that_is_not_there_is_one_line(tmp_path: Path, flight: Flight, 
 def test_streaming_to_nobody_is_said_at_once(flight: Flight, results: FlightResults) -> None:
     with pytest.raises(GroundstationError, match="start the viewer first"):
         stream_recording(flight, results, connect_url=f"rerun+http://127.0.0.1:{free_port()}/proxy")
+
+
+def test_ten_thousand_topics_are_recorded_and_those_without_a_page_are_named(tmp_path: Path) -> None:
+    time_s = np.arange(3.0)
+    names = [*(f"raw.t{number}" for number in range(10_000)), "ins"]
+    flight = Flight({name: table(name, time_s, roll_deg=time_s) for name in names}, {}, START_NS, True, "a.csv")
+    started = time.monotonic()
+    write_recording(tmp_path / "a.rrd", flight, _bare_results(flight))
+    assert time.monotonic() - started < MANY_TOPICS_S
+    contents = Contents(tmp_path / "a.rrd")
+    about = contents.text("/raw/about")
+    assert f"{10_001 - raw.MAX_TOPICS} topics beyond" in about and "raw\\.t9999" in about
+    assert "/raw/ins/roll" in contents.batches  # canonical topics come first
+
+
+def test_fewer_views_a_topic_where_there_are_many_topics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(raw, "MAX_ALL_VIEWS", 6)
+    time_s = np.arange(3.0)
+    fields = {f"{letter}_deg": time_s for letter in "abcdef"}
+    flight = Flight({f"raw.t{n}": table(f"raw.t{n}", time_s, **fields) for n in range(3)}, {}, START_NS, True, "a.csv")
+    with rr.RecordingStream("a") as stream:
+        stream.save(tmp_path / "a.rrd")
+        tab = raw.raw(Recorder(stream, flight.start_ns, True), flight, _bare_results(flight))
+    assert tab is not None
+    (other, _about) = tab.contents
+    assert [len(page.contents) for page in other.contents] == [2, 2, 2]
+    assert all(page.contents[1].name == "5 more" for page in other.contents)
+
+
+@pytest.mark.parametrize("absurd", [1e308, -1e308, 1e30, np.inf, 91.0])
+def test_positions_that_are_none_are_left_out_of_the_track(tmp_path: Path, absurd: float) -> None:
+    flight = make_flight(duration_s=200.0, rate_hz=10.0)
+    results = make_results(flight)
+    figures = []
+    for figure in results.figures:
+        columns = dict(figure.columns)
+        if figure.name == "overview":
+            for name in ("latitude_deg", "altitude_m", "ground_speed_mps"):
+                columns[name] = np.where(np.arange(len(figure)) % 50 == 0, absurd, columns[name])  # the first row too
+        figures.append(FigureData(figure.name, columns, figure.digits))
+    write_recording(tmp_path / "a.rrd", flight, replace(results, figures=tuple(figures)))
+    assert "/plan/now" in Contents(tmp_path / "a.rrd").batches
+
+
+def test_rerun_writes_no_log_lines_of_its_own() -> None:
+    code = "import groundstation.viewer.recording, os; print(os.environ['RUST_LOG'])"
+    environment = {name: value for name, value in os.environ.items() if name != "RUST_LOG"}
+    run = partial(subprocess.run, [sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run(env=environment).stdout == "off\n"
+    assert run(env=environment | {"RUST_LOG": "debug"}).stdout == "debug\n"  # who asks for it gets it
 
 
 def _bare_results(flight: Flight) -> FlightResults:

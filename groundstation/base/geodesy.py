@@ -29,6 +29,20 @@ def curvature_radii_m(latitude_deg: ArrayLike) -> tuple[FloatArray, FloatArray]:
     return prime_vertical * (1.0 - ECCENTRICITY_SQUARED) / denominator, prime_vertical
 
 
+def on_earth(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Latitude and longitude, degrees, both NaN where the latitude is beyond 90 deg or the longitude beyond a turn.
+
+    Examples
+    --------
+    >>> latitude, longitude = on_earth([56.0, 1e308, 56.0], [38.0, 38.0, np.inf])
+    >>> latitude.tolist(), longitude.tolist()
+    ([56.0, nan, nan], [38.0, nan, nan])
+    """
+    latitude, longitude = np.asarray(latitude_deg, dtype=np.float64), np.asarray(longitude_deg, dtype=np.float64)
+    is_place = (np.abs(latitude) <= 90.0) & (np.abs(longitude) <= 360.0)
+    return np.where(is_place, latitude, np.nan), np.where(is_place, longitude, np.nan)
+
+
 def north_east_m(
     latitude_deg: ArrayLike,
     longitude_deg: ArrayLike,
@@ -38,7 +52,8 @@ def north_east_m(
 ) -> tuple[FloatArray, FloatArray]:
     """Displacements from an origin in metres north and east, good to 0.1 % within 50 km.
 
-    The date line is crossed as if it were not there.
+    The date line is crossed as if it were not there. What is no position (a latitude beyond 90 deg, a longitude beyond
+    a turn) has no displacement: NaN.
 
     Examples
     --------
@@ -46,11 +61,11 @@ def north_east_m(
     >>> round(float(north), 2), round(float(east), 2)
     (110.57, 222.64)
     """
-    latitude = np.asarray(latitude_deg, dtype=np.float64)
+    latitude, longitude = on_earth(latitude_deg, longitude_deg)
     meridian, prime_vertical = curvature_radii_m(0.5 * (latitude + origin_latitude_deg))
     mid_latitude_rad = np.deg2rad(0.5 * (latitude + origin_latitude_deg))
     north = np.deg2rad(latitude - origin_latitude_deg) * (meridian + altitude_m)
-    difference = wrap_180(np.asarray(longitude_deg, dtype=np.float64) - origin_longitude_deg)
+    difference = wrap_180(longitude - origin_longitude_deg)
     east = np.deg2rad(difference) * (prime_vertical + altitude_m) * np.cos(mid_latitude_rad)
     return north, east
 

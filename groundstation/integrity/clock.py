@@ -13,10 +13,11 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch, frozen
-from groundstation.base.timescales import duration_text, utc_ns_to_iso
+from groundstation.base.timescales import duration_text, iso_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 
 _DAY_NS = 86_400 * NS_PER_S
+LARGEST_NS = 2**62  # of a time and of what is added to it: sums fit 64 bits
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,8 @@ class Clock:
         Records of a counting clock with the time of an earlier publication (see ``integrity.counting``).
     lateness_ns : mapping of topic to int
         How far a record comes after a later one of its topic, at most: the hold-back that restores order.
+    is_counting : bool
+        A counting clock (see ``integrity.counting``): records of several sources may share a time.
     """
 
     is_absolute: bool = False
@@ -115,6 +118,7 @@ class Clock:
     stray_index: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     stale_times: int = 0
     lateness_ns: Mapping[str, int] = field(default_factory=dict)
+    is_counting: bool = False
 
     def __post_init__(self) -> None:
         for name in ("starts", "offsets_ns", "placed_index", "placed_ns", "stray_index"):
@@ -214,6 +218,8 @@ def estimate_clock(
     if not len(time):
         return Clock(missing_times=len(record_index))
     found = _Steps(index, time, settings or ClockSettings())
+    if any(abs(offset) > LARGEST_NS for offset in found.offsets_ns()):
+        found.sort()
     offsets = np.array(found.offsets_ns(), dtype=np.int64)
     starts = np.array([record_index[0], *(index[at] for at, _last in found.steps)], dtype=np.int64)
     own = time + offsets[np.searchsorted(starts, index, side="right") - 1]
@@ -222,7 +228,8 @@ def estimate_clock(
     placed_index = np.concatenate((record_index[~timed], index[found.implausible]))
     placed_index.sort()
     placed = interpolated(placed_index, index[nodes], own[nodes], found.period_per_record_ns)
-    zero = zero_of(int(np.concatenate((own[believed], placed)).min()), utc_of_zero_ns)
+    everyone = np.concatenate((own[believed], placed))
+    zero = zero_of(int(everyone.min()), int(everyone.max()), utc_of_zero_ns)
     return Clock(
         is_absolute=zero.is_absolute,
         period_ns=found.period_ns,
@@ -241,6 +248,9 @@ def estimate_clock(
     )
 
 
+_END_NS = iso_to_utc_ns("2262-01-01T00:00:00Z")[0]
+
+
 class Zero(NamedTuple):
     """What is added to all times, and whether they then are UTC."""
 
@@ -248,9 +258,12 @@ class Zero(NamedTuple):
     ns: int
 
 
-def zero_of(earliest_ns: int, utc_of_zero_ns: int | None) -> Zero:
-    """What to add to all times: UTC of zero, or as much as leaves none negative. Nothing is recorded before 1970."""
-    if utc_of_zero_ns is not None and earliest_ns + utc_of_zero_ns >= 0:
+def zero_of(earliest_ns: int, latest_ns: int, utc_of_zero_ns: int | None) -> Zero:
+    """What to add to all times: UTC of zero, or as much as leaves none negative.
+
+    Nothing is recorded before 1970, nor after 2261, the last whole year that 64 bits hold.
+    """
+    if utc_of_zero_ns is not None and 0 <= earliest_ns + utc_of_zero_ns <= latest_ns + utc_of_zero_ns < _END_NS:
         return Zero(True, utc_of_zero_ns)
     return Zero(False, max(0, -earliest_ns))
 
@@ -271,10 +284,16 @@ class _Steps:
         backward = int((changes < 0).sum())
         self.is_unordered = backward > max(2.0, settings.unordered_share * len(time))
         if self.is_unordered:
-            self.stray[1:] = time[1:] < np.maximum.accumulate(time)[:-1]
+            self.sort()
             return
         for at in np.flatnonzero((changes < 0) | (changes > self._forward_ns)) + 1:
             self._judge(int(at))
+
+    def sort(self) -> None:
+        """Take the log as unordered: without steps, each record at its own time."""
+        self.is_unordered, self.steps = True, []
+        self.implausible[:] = self.stray[:] = False
+        self.stray[1:] = self.time[1:] < np.maximum.accumulate(self.time)[:-1]
 
     @property
     def period_per_record_ns(self) -> float:
@@ -360,7 +379,10 @@ class _Steps:
 
 
 def interpolated(wanted: Int64Array, index: Int64Array, time: Int64Array, period_ns: float) -> Int64Array:
-    """Times of places between known ones by place, outside them by the nominal period; integers throughout."""
+    """Times of places between known ones by place, outside them by the nominal period; integers throughout.
+
+    None is placed further than :data:`LARGEST_NS` from zero.
+    """
     if not len(wanted):
         return np.zeros(0, dtype=np.int64)
     after = np.searchsorted(index, wanted)
@@ -368,5 +390,6 @@ def interpolated(wanted: Int64Array, index: Int64Array, time: Int64Array, period
     inside = (after > 0) & (after < len(index))
     share = np.where(inside, (wanted - index[low]) / np.maximum(index[high] - index[low], 1), 0.0)
     between = np.rint((time[high] - time[low]) * share).astype(np.int64)
-    outside = np.rint((wanted - index[low]) * period_ns).astype(np.int64)
+    shift = np.clip(np.rint((wanted - index[low]) * period_ns), -LARGEST_NS - time[low], LARGEST_NS - time[low])
+    outside = np.where(inside, 0, shift).astype(np.int64)
     return np.asarray(time[low] + np.where(inside, between, outside), dtype=np.int64)

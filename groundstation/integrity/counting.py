@@ -97,7 +97,7 @@ def estimate_counting_clock(
     fits = (frozen & has_time)[wanted] & (np.abs(device_time_ns.values[wanted] - placed) <= tolerance_ns)
     frozen_stale = int((frozen & has_time).sum() - fits.sum())
     wanted, placed = record_index[wanted[~fits]], placed[~fits]
-    zero = zero_of(int(time[believed].min()), utc_of_zero_ns)
+    zero = zero_of(int(time[believed].min()), int(time[believed].max()), utc_of_zero_ns)
     late = believed & (np.maximum.accumulate(np.where(believed, time, time[believed].min())) - time > tolerance_ns)
     ahead = np.diff(time[believed])
     ahead = ahead[ahead > 0]
@@ -116,6 +116,7 @@ def estimate_counting_clock(
         is_unordered=bool(late.any()),
         shift_ns=0 if zero.is_absolute else zero.ns,
         has_times=True,
+        is_counting=True,
     )
 
 

@@ -9,6 +9,8 @@ from groundstation.integrity.clock import Clock, ClockStep
 from groundstation.integrity.ledger import Ledger, TopicLedger
 
 MANY_MISSING_TIMES = 0.01  # share of records without a time above which it is a warning
+MANY_DUPLICATES, STANDS_STILL = 0.2, 0.9  # share of a topic's records: a warning, and a clock that stands still
+FEWEST_DUPLICATES = 10  # that are worth a warning
 _REMARKS_THAT_WARN = ("assumed_utc", "clock_disagrees", "unreadable_metadata", "plug_in", "duplicate_column")
 
 
@@ -87,10 +89,20 @@ def _damages(ledger: Ledger) -> Iterator[Finding]:
         yield Finding(severity, f"data.{damage.kind}", text, damage.topic, damage.place, damage.count)
 
 
+def _duplicates(topic: TopicLedger, clock: Clock) -> Finding:
+    """Records at one time: a warning where many, but of a counting clock's topics, whose sources share times."""
+    share = topic.duplicates / topic.rows
+    text = f"{topic.topic}: {topic.duplicates} of {topic.rows} records repeat the time of the one before"
+    is_many = topic.duplicates >= FEWEST_DUPLICATES and share > MANY_DUPLICATES
+    is_odd = is_many and is_canonical(topic.topic) and not clock.is_counting
+    if is_odd and share > STANDS_STILL:
+        text += ": the clock stands still"
+    return Finding("warn" if is_odd else "info", "time.duplicates", text, topic.topic, count=topic.duplicates)
+
+
 def _topic(topic: TopicLedger, ledger: Ledger) -> Iterator[Finding]:
     if topic.duplicates:
-        text = f"{topic.topic}: {topic.duplicates} of {topic.rows} records repeat the time of the one before"
-        yield Finding("info", "time.duplicates", text, topic.topic, count=topic.duplicates)
+        yield _duplicates(topic, ledger.clock)
     if len(topic.gaps):
         longest = int(topic.gaps.length_s.argmax())
         place = ledger.clock.text(int(topic.gaps.start_ns[longest]))

@@ -151,7 +151,7 @@ def decimal_ns(text: Any, digits: int = 9, multiple: int = 1) -> Cells:
     for at in np.flatnonzero(filled & ~_mask(fits)):  # 1.5e3: rare, so one by one
         exact = _exact(text[int(at)].as_py(), digits)
         values[at], readable[at] = exact or 0, exact is not None
-    readable &= np.abs(values) < MAX_TIME_NS // multiple
+    readable &= (values > -MAX_TIME_NS // multiple) & (values < MAX_TIME_NS // multiple)
     return _times(np.where(readable, values, 0) * multiple, filled, readable)
 
 
@@ -172,7 +172,7 @@ def integers_ns(text: Any) -> Cells:
 
 def _times(values: Int64Array, filled: BoolArray, readable: BoolArray) -> Cells:
     """Times of cells that are filled and readable; one beyond the range of :data:`MAX_TIME_NS` is not."""
-    present = readable & (np.abs(values) < MAX_TIME_NS)
+    present = readable & (values > -MAX_TIME_NS) & (values < MAX_TIME_NS)  # of the least integer abs() is negative
     return Cells(Column(np.where(present, values, 0), present), filled & ~present)
 
 

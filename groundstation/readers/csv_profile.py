@@ -25,7 +25,7 @@ from groundstation.readers.dialect import (
 from groundstation.readers.layout import Derivation, Layout, Rule, TimeRule, rule_for
 from groundstation.readers.profile import Profile, load, shipped
 from groundstation.readers.source import Claim, Source
-from groundstation.readers.start import utc_of_zero
+from groundstation.readers.start import unusable_references, utc_of_zero
 
 NAME = "csv-profile"
 
@@ -96,7 +96,7 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
     dialect = Dialect(fit.encoding, fit.delimiter, cells, last.next_byte, last.number + 1, header_lines)
     items = TableReader(source, dialect, layout).items(header)
     yield next(items)
-    yield from remarks + layout_remarks
+    yield from remarks + layout_remarks + unusable_references(metadata)
     yield from items
 
 

@@ -8,7 +8,7 @@ import pyarrow.compute as pc
 
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.cells import Cells
+from groundstation.readers.cells import MAX_TIME_NS, Cells
 
 _NS_PER_DAY = 86_400 * NS_PER_S
 _EPOCH_DAY = datetime(1970, 1, 1).toordinal()
@@ -17,9 +17,11 @@ _EPOCH_DAY = datetime(1970, 1, 1).toordinal()
 def _day_ns(text: str, formats: tuple[str, ...]) -> int | None:
     for form in formats:
         try:
-            return (datetime.strptime(text, form).toordinal() - _EPOCH_DAY) * _NS_PER_DAY
+            day_ns = (datetime.strptime(text, form).toordinal() - _EPOCH_DAY) * _NS_PER_DAY
         except ValueError:
             continue
+        if abs(day_ns) < MAX_TIME_NS - _NS_PER_DAY:
+            return day_ns
     return None
 
 

@@ -24,7 +24,7 @@ from groundstation.readers.dialect import (
 )
 from groundstation.readers.layout import Derivation, Layout, Rule, TimeRule, rule_for
 from groundstation.readers.source import Claim, Source
-from groundstation.readers.start import utc_of_zero
+from groundstation.readers.start import unusable_references, utc_of_zero
 
 NAME = "flat-csv"
 TIME_COLUMNS = {"time_ns": "nanoseconds", "time_s": "seconds", "time_utc": "iso"}  # the recorder's own clock first
@@ -90,7 +90,7 @@ def read(source: Source) -> Iterator[Item]:
     if top is None or sniff(source) is None:
         raise UnreadableLogError(source.name, "no flat-CSV header row", "a time column and <topic>.<field> columns")
     layout, remarks = _layout(top)
-    remarks += _mistakes(top)
+    remarks += _mistakes(top) + unusable_references(top.metadata)
     if not top.header.ended:
         yield LogHeader(NAME, top.metadata, None)
         yield from remarks

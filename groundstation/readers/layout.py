@@ -205,8 +205,9 @@ def apply(derivation: Derivation, known: Mapping[Key, Column]) -> dict[Key, Colu
     inputs = [known[key] for key in derivation.inputs]
     present = np.logical_and.reduce([column.mask for column in inputs])
     factors = derivation.factors or (1.0,) * len(inputs)
-    values = [np.where(present, column.values * factor, np.nan) for column, factor in zip(inputs, factors, strict=True)]
-    results = METHODS[derivation.method].function(*values)
+    with np.errstate(over="ignore", invalid="ignore"):  # of absurd numbers: becomes infinite or NaN
+        values = [np.where(present, one.values * factor, np.nan) for one, factor in zip(inputs, factors, strict=True)]
+        results = METHODS[derivation.method].function(*values)
     return {
         (derivation.topic, name): Column(np.asarray(result), present)
         for name, result in zip(derivation.outputs, results, strict=True)

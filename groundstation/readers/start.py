@@ -1,10 +1,43 @@
 """UTC of a recorder's time zero, from the metadata of a log."""
 
+import math
 from collections.abc import Mapping
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Remark
 from groundstation.base.timescales import iso_to_utc_ns
+
+_FIRST_UTC_NS = iso_to_utc_ns("1678-01-01T00:00:00Z")[0]  # what 64 bits of nanoseconds hold
+_LAST_UTC_NS = iso_to_utc_ns("2262-01-01T00:00:00Z")[0]
+_REFERENCES = {
+    "reference.parking_heading_deg": (-360.0, 720.0, "a heading in degrees"),
+    "reference.parking_heading_sigma_deg": (math.ulp(0.0), 360.0, "degrees above 0"),
+}
+
+
+def unusable_references(metadata: Mapping[str, str]) -> list[Remark]:
+    """A remark for each reference in the metadata that is no number in its range.
+
+    Examples
+    --------
+    >>> [remark.text for remark in unusable_references({"reference.parking_heading_deg": "north"})]
+    ["reference.parking_heading_deg: 'north' is not a heading in degrees: there is no such reference"]
+    """
+    remarks = []
+    for key, (low, high, what) in _REFERENCES.items():
+        text = metadata.get(key, "")
+        if text and not low <= _number(text) <= high:
+            remarks.append(
+                Remark("unreadable_metadata", f"{key}: {text[:40]!r} is not {what}: there is no such reference")
+            )
+    return remarks
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 def utc_of_zero(metadata: Mapping[str, str]) -> tuple[int | None, list[Remark]]:
@@ -20,6 +53,8 @@ def utc_of_zero(metadata: Mapping[str, str]) -> tuple[int | None, list[Remark]]:
         return None, []
     try:
         utc_ns, named_zone = iso_to_utc_ns(text)
+        if not _FIRST_UTC_NS <= utc_ns < _LAST_UTC_NS:
+            raise GroundstationError("time", repr(text), "a year from 1678 to 2261")
     except GroundstationError as error:
         return None, [Remark("unreadable_metadata", f"start_utc: {error}; the flight has no absolute time")]
     return utc_ns, [] if named_zone else [Remark("assumed_utc", f"start_utc {text} names no zone: read as UTC")]

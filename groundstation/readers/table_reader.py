@@ -140,7 +140,8 @@ class TableReader:
             self._losses.add("cut_text", what, lines[read.cut], where=rule.target, topic=rule.topic)
         column = read.column
         if rule.factor != 1.0 or rule.offset != 0.0:
-            column = Column(column.values * rule.factor + rule.offset, column.present)
+            with np.errstate(over="ignore"):  # becomes infinite: the ledger flags it
+                column = Column(column.values * rule.factor + rule.offset, column.present)
         return self._on_the_circle(rule, column) if rule.is_heading else column
 
     def _read_cells(self, rule: Rule, array: Any) -> tuple[Cells, str]:
@@ -161,7 +162,9 @@ class TableReader:
         if not astray.any():
             return column
         self._wrapped[rule.target] = self._wrapped.get(rule.target, 0) + int(astray.sum())
-        return Column(np.where(astray, wrap_360(values), values), column.present)
+        whole = values.copy()
+        whole[astray] = wrap_360(values[astray])
+        return Column(whole, column.present)
 
     def _batches(self, lines: Int64Array, time: Column, columns: Mapping[Key, Column]) -> Iterator[RecordBatch]:
         topics: dict[str, dict[str, Column]] = {}

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Column, Int64Array, frozen
+from groundstation.base.signals import field_of
 from groundstation.base.units import NS_PER_S
 
 if TYPE_CHECKING:
@@ -59,14 +60,23 @@ class Table:
         return all(name in self.columns and bool(self.columns[name].mask.any()) for name in names)
 
     def values(self, name: str) -> FloatArray:
-        """Field as float64, shape (n,), NaN where absent (also where the device wrote NaN, and for no such field)."""
+        """Field as float64, shape (n,), NaN where absent (also where the device wrote NaN, and for no such field).
+
+        NaN also where a measured quantity is further outside its physical range than that range is wide (1e308 m/s,
+        infinity): nothing is computed with it. Quality figures (dilutions, sigmas) are given as they are.
+        """
         if name not in self.columns:
             return np.full(len(self), np.nan)
         column = self.columns[name]
         out = np.asarray(column.values, dtype=np.float64)
         if column.present is not None:
             out = np.where(column.present, out, np.nan)
-        return out
+        known = field_of(self.topic, name)
+        if known is None or not known.unit or "sigma" in name or not np.isfinite(known.high - known.low):
+            return out
+        width = known.high - known.low
+        absurd = (out < known.low - width) | (out > known.high + width)
+        return np.where(absurd, np.nan, out) if absurd.any() else out
 
     def valid(self, *names: str) -> BoolArray:
         """Where every named field is present and finite, shape (n,)."""

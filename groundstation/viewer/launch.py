@@ -1,9 +1,11 @@
 """Open a recording in the viewer that the rerun-sdk wheel ships, native or in a browser."""
 
 import importlib.util
+import os
 import socket
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError
@@ -50,6 +52,17 @@ def viewer_command(
     return [*command, "--headless"] if headless else command
 
 
+def viewer_environment(environment: Mapping[str, str]) -> dict[str, str]:
+    """Environment of the viewer: it may log, for that is how it tells the address of its page.
+
+    Examples
+    --------
+    >>> viewer_environment({"HOME": "/home/a", "RUST_LOG": "off"})
+    {'HOME': '/home/a'}
+    """
+    return {name: value for name, value in environment.items() if (name, value) != ("RUST_LOG", "off")}
+
+
 def _web_port(host: str) -> int:
     """Rerun's usual port for the page, or any free one when another viewer has it."""
     try:
@@ -93,7 +106,9 @@ def open_viewer(
         raise GroundstationError(str(path), "no such file", next_step="run the log first")
     try:
         return subprocess.run(
-            viewer_command(path, web=web, host=host, port=port, headless=headless), check=False
+            viewer_command(path, web=web, host=host, port=port, headless=headless),
+            check=False,
+            env=viewer_environment(os.environ),
         ).returncode
     except KeyboardInterrupt:
         return 0

@@ -17,7 +17,7 @@ TEXT, PARAMETERS, INFORMATION, DROPOUTS = (
 )
 ROWS_A_BATCH = 2_048
 CHARACTERS_A_BATCH = 1 << 21  # a text column is as wide as its longest text, for every row
-MAX_TIME_US = (1 << 63) // 1_000 - 1
+MAX_TIME_US = (1 << 62) // 1_000 - 1  # sums and differences of two such times fit 64 bits of nanoseconds
 _DEFAULTS = ((1, "system default"), (2, "default of the configuration"))
 
 
@@ -141,7 +141,7 @@ def _column(values: list[Any]) -> Column:
 
 
 def device_time(times_us: Any) -> Column:
-    """Device time in nanoseconds of times in microseconds; zero means none, and so does what an int64 cannot hold."""
+    """Device time in nanoseconds of times in microseconds; zero means none, and so does what is past any clock."""
     times = np.asarray(times_us, dtype=np.uint64)
     present = (times > 0) & (times <= MAX_TIME_US)
     values = np.where(present, times, 0).astype(np.int64) * 1_000

@@ -22,6 +22,8 @@ COLUMNS_OF_VIEWS = 2
 CIRCULAR = ("heading", "track")
 STATES = "states"  # part of the path of every lane: no family may have it
 MAX_VIEWS = 24  # of one topic; the fields of the families beyond share the last one
+MAX_TOPICS = 300  # with a page: the SDK never returns from sending a layout of some 5000 views
+MAX_ALL_VIEWS = 2_000  # where many topics have many families, each topic has fewer views
 MAX_LANE_ROWS = 5_000  # a lane with more changes is no lane
 _AXES = re.compile(r"(_(north|east|down|x|y|z|w|forward|right|roll|pitch|xx|xy|xz|yy|yz|zz)|\[?\d+\]?)$")
 
@@ -55,7 +57,9 @@ class Family:
 def raw(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Container | None:
     """Log every topic; None for a flight without samples."""
     gaps = figure_of(results, "gaps", "topic", "start_s")
-    topics = sorted((topic for topic in flight.topics() if len(flight[topic])), key=_reading_order)
+    filled = sorted((topic for topic in flight.topics() if len(flight[topic])), key=_reading_order)
+    topics, without_page = filled[:MAX_TOPICS], filled[MAX_TOPICS:]
+    most_views = min(MAX_VIEWS, max(MAX_ALL_VIEWS // max(len(topics), 1), 1))
     families: dict[str, list[Family]] = {}
     for topic in topics:
         starts = np.zeros(0) if gaps is None else numbers(gaps, "start_s")[gaps["topic"] == topic]
@@ -68,7 +72,7 @@ def raw(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Conta
     other: list[rrb.Container] = []
     for topic, part in zip(topics, path_parts(topics), strict=True):
         base = f"raw/{part}"
-        kept[topic], views = _log_families(recorder, base, families[topic], limit)
+        kept[topic], views = _log_families(recorder, base, families[topic], limit, most_views)
         pictures, too_busy = _lanes(recorder, base, flight[topic])
         views += pictures
         left_out += [f"{topic}.{field}" for field in too_busy]
@@ -78,7 +82,7 @@ def raw(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Conta
     pages = [*canonical, *([rrb.Tabs(contents=other, name="other topics")] if other else [])]
     if not pages and not left_out:
         return None
-    recorder.document("raw/about", _about(flight, families, kept, left_out))
+    recorder.document("raw/about", _about(flight, families, kept, left_out, without_page))
     pages.append(rrb.Vertical(contents=[document("What is shown here", "raw/about")], name="about"))
     return rrb.Tabs(contents=pages, name="Raw", active_tab=0)
 
@@ -139,7 +143,9 @@ def _families(table_of_topic: Table, gap_starts_ns: Int64Array) -> list[Family]:
     return found
 
 
-def _log_families(recorder: Recorder, base: str, families: list[Family], limit: int) -> tuple[int, list[rrb.View]]:
+def _log_families(
+    recorder: Recorder, base: str, families: list[Family], limit: int, most_views: int
+) -> tuple[int, list[rrb.View]]:
     """Log the families of one topic; most rows kept of any, and their views."""
     paths = [f"{base}/{part}" for part in path_parts([STATES, *(family.name for family in families)])[1:]]
     most = 0
@@ -158,8 +164,8 @@ def _log_families(recorder: Recorder, base: str, families: list[Family], limit: 
     views: list[rrb.View] = [
         plot(family.title, path, legend=len(family.fields) > 1) for family, path in zip(families, paths, strict=True)
     ]
-    if len(views) > MAX_VIEWS:
-        views[MAX_VIEWS - 1 :] = [plot(f"{len(views) - MAX_VIEWS + 1} more", paths[MAX_VIEWS - 1 :])]
+    if len(views) > most_views:
+        views[most_views - 1 :] = [plot(f"{len(views) - most_views + 1} more", paths[most_views - 1 :])]
     return most, views
 
 
@@ -184,7 +190,13 @@ def _states(column: Column) -> np.ndarray:
     return np.where(column.mask, values, "")
 
 
-def _about(flight: Flight, families: dict[str, list[Family]], kept: dict[str, int], left_out: list[str]) -> str:
+def _about(
+    flight: Flight,
+    families: dict[str, list[Family]],
+    kept: dict[str, int],
+    left_out: list[str],
+    without_page: list[str],
+) -> str:
     rows = []
     for topic, own in families.items():
         total = max((len(family.time_ns) for family in own), default=len(flight[topic]))
@@ -200,4 +212,7 @@ def _about(flight: Flight, families: dict[str, list[Family]], kept: dict[str, in
     if left_out:
         names = ", ".join(markdown_text(name) for name in left_out)
         parts.append(f"Texts that change more than {MAX_LANE_ROWS} times are no lanes and are not shown: {names}.")
+    if without_page:
+        names = ", ".join(markdown_text(topic) for topic in without_page)
+        parts.append(f"{len(without_page)} topics beyond the first {MAX_TOPICS} have no page: {names}.")
     return "\n\n".join(parts)

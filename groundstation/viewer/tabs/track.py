@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from groundstation.base.geodesy import north_east_m
+from groundstation.base.geodesy import north_east_m, on_earth
 from groundstation.base.records import BoolArray
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
@@ -26,12 +26,12 @@ SMALLEST_M = 20.0  # side of the plan of an aircraft that never moved
 
 
 def track(recorder: Recorder, results: FlightResults, figure: FigureData) -> rrb.Container | None:
-    """Log the track by flight phase with a marker at the cursor; None without positions."""
+    """Log the track by flight phase with a marker at the cursor; None without positions on Earth."""
     if not {"latitude_deg", "longitude_deg"} <= set(figure.columns):
         return None
     time_s = numbers(figure, "time_s")
-    positions = np.column_stack([numbers(figure, "latitude_deg"), numbers(figure, "longitude_deg")])
-    known = np.isfinite(positions).all(axis=1)
+    positions = np.column_stack(on_earth(numbers(figure, "latitude_deg"), numbers(figure, "longitude_deg")))
+    known = np.asarray(np.isfinite(positions).all(axis=1), dtype=bool)
     if not known.any():
         return None
     pieces, shades = _pieces(results, time_s, known)
