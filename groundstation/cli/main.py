@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, Literal, ParamSpec, TypeVar
+from typing import Annotated, Any, Literal, ParamSpec
 
 import typer
 
@@ -29,7 +29,6 @@ app = typer.Typer(
 )
 
 Parameters = ParamSpec("Parameters")
-Answer = TypeVar("Answer")
 
 ProgressMode = Literal["auto", "none", "json"]
 FailOn = Literal["none", "warn", "fail"]

@@ -113,8 +113,7 @@ def is_abandoned(folder: Path) -> bool:
 
 def _run(log: Log, job: Job, partial: Path, watch: Stopwatch) -> Outcome:
     from groundstation.reports.flight_report import write_flight_report
-    from groundstation.reports.index import index_row
-    from groundstation.results.files import load, save
+    from groundstation.results.files import save
     from groundstation.viewer.recording import write_recording
 
     mcap = partial / "flight.mcap"
@@ -143,7 +142,6 @@ def _run(log: Log, job: Job, partial: Path, watch: Stopwatch) -> Outcome:
         flight_id=identity,
         folder=str(partial),
         sha256=log.source.sha256,
-        row=index_row(load(partial)),
         times_s=watch.times_s,
     )
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 State = Literal["done", "data_lost", "limit_reached", "failed", "skipped"]
 EXIT_CODE: Mapping[State, int] = {"done": 0, "skipped": 0, "data_lost": 3, "limit_reached": 4, "failed": 1}
@@ -22,8 +22,6 @@ class Outcome:
         One line for people: the verdict, or the reason of a failure.
     flight_id, folder : str
         Empty when there is none.
-    row : mapping
-        Row of the index; empty for a log that was skipped or failed before it had one.
     times_s : mapping
         Seconds spent, by stage.
     trace : str
@@ -36,7 +34,6 @@ class Outcome:
     flight_id: str = ""
     folder: str = ""
     sha256: str = ""
-    row: Mapping[str, Any] = field(default_factory=dict)
     times_s: Mapping[str, float] = field(default_factory=dict)
     trace: str = ""
 

@@ -136,12 +136,7 @@ def _break_at_gaps(columns: dict[str, NDArray[np.float64]], thinned_step_s: floa
 
 def phase_figure(phases: Phases) -> FigureData:
     """Phases of the flight as figure data."""
-    intervals = phases.intervals
-    columns: dict[str, NDArray[Any]] = {
-        "start_s": np.array([interval.start_s for interval in intervals], dtype=float),
-        "end_s": np.array([interval.end_s for interval in intervals], dtype=float),
-        "phase": np.array([interval.phase for interval in intervals], dtype=np.str_),
-    }
+    columns: dict[str, NDArray[Any]] = {"start_s": phases.start_s, "end_s": phases.end_s, "phase": phases.phase}
     return FigureData("phases", columns, {"start_s": 1, "end_s": 1})
 
 

@@ -5,7 +5,6 @@ from groundstation.reports.sections.saved import mapping
 from groundstation.reports.wording import ABSENT, clean, number
 from groundstation.results.files import SavedFlight
 
-BYTES_PER_MB = 1e6
 LONG_LISTS = ("parameter.", "units.")  # of autopilot logs, hundreds of them
 MOST_METADATA = 40
 
