@@ -16,6 +16,8 @@ from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, c
 from groundstation.pipeline.log import open_log
 from groundstation.pipeline.outcome import Outcome
 from groundstation.pipeline.progress import Event, Listener, silent
+from groundstation.reports.index import INDEX_CSV, INDEX_JSON
+from groundstation.results.files import SUMMARY
 
 TASKS_PER_PROCESS = 32  # Rerun leaves a few threads behind for every recording
 
@@ -210,7 +212,7 @@ def _write_index(
 
 def flight_folders(out: Path) -> list[Path]:
     """Flight folders in an OUT, in the order of their names."""
-    return sorted(folder for folder in out.iterdir() if folder.name[0] != "." and (folder / "summary.json").is_file())
+    return sorted(folder for folder in out.iterdir() if folder.name[0] != "." and (folder / SUMMARY).is_file())
 
 
 def convert_many(
@@ -288,7 +290,7 @@ def report_again(out: Path) -> tuple[list[Path], tuple[Outcome, ...]]:
         except GroundstationError:
             continue  # the index names it
     problems = _write_index(out, (), _rows_without_flight(out))
-    return [*written, out / OUT_FOLDER_MARK, out / "index.csv"], problems
+    return [*written, out / INDEX_JSON, out / INDEX_CSV], problems
 
 
 def _rows_without_flight(out: Path) -> list[dict[str, Any]]:

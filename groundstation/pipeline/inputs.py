@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.base.errors import UsageError
+from groundstation.reports.index import INDEX_CSV, INDEX_JSON
+from groundstation.results.files import MANIFEST, SUMMARY
 
-FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, STUDY_MARK = "manifest.json", "index.json", ".groundstation-study"
+FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, STUDY_MARK = MANIFEST, INDEX_JSON, ".groundstation-study"
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ def collect(paths: Sequence[Path], out: Path | None = None) -> tuple[Input, ...]
 
 def is_ours(folder: Path) -> bool:
     """Whether groundstation made the folder: a flight folder or an OUT."""
-    names = {FLIGHT_FOLDER_MARK, "summary.json"}, {OUT_FOLDER_MARK, "index.csv"}, {STUDY_MARK}
+    names = {FLIGHT_FOLDER_MARK, SUMMARY}, {OUT_FOLDER_MARK, INDEX_CSV}, {STUDY_MARK}
     try:
         return any(all((folder / name).is_file() for name in marks) for marks in names)
     except OSError:
