@@ -1,0 +1,135 @@
+"""Answer of the forecast mode (system 2): how good a forecast of the INS errors is, replayed on the flight itself."""
+
+from dataclasses import dataclass, field
+
+from groundstation.results.figures import FigureData
+
+# Names of the contract, in the order they are shown; titles for people.
+METHODS: dict[str, str] = {
+    "raw_ins": "raw INS, no correction",
+    "hold_velocity": "last velocity error held",
+    "schuler_fit": "bias and Schuler sine fitted",
+    "last_estimate": "last estimate of the filter",
+    "windows": "long-period windows (paper)",
+    "drift_windows": "windows of the drift alone",
+    "consistent_windows": "consistent windows",
+    "smoothed_start": "smoothed start",
+}
+HORIZONS_MIN = (1, 5, 10, 30, 60, 90, 120)
+
+
+@dataclass(frozen=True)
+class SkillRow:
+    """Radial position error built up since the start of the outage, one method, one horizon, over all starts.
+
+    ``coverage95`` is the share of the channel errors inside the forecast's own 95 % band, None for a method without
+    one; ``coverage95_model`` the same before the sigma is scaled to what the class and the flight's past show.
+    """
+
+    method: str
+    horizon_min: float
+    starts: int
+    rms_m: float
+    median_m: float
+    p95_m: float
+    coverage95: float | None
+    coverage95_model: float | None = None
+
+
+@dataclass(frozen=True)
+class GapRow:
+    """Replayed gaps with GNSS on both sides: root mean square over the gaps of the largest radial error in each."""
+
+    method: str
+    length_min: float
+    starts: int
+    max_error_rms_m: float
+    coverage95: float | None
+
+
+@dataclass(frozen=True)
+class PhaseRow:
+    """Replayed outages of one length that begin in one phase of flight, default method."""
+
+    phase: str
+    length_s: float
+    starts: int
+    rms_m: float
+    raw_rms_m: float
+
+
+@dataclass(frozen=True)
+class ClassicStart:
+    """One of the paper's four starts (1.5, 2, 2.5, 3 h): radial and east error at the end and at equal horizons."""
+
+    start_h: float
+    method: str
+    horizon_min: float
+    error_m: float
+    east_error_m: float
+
+
+@dataclass(frozen=True)
+class CalibrationRow:
+    """How honest the forecast's sigma is at one horizon: shares inside the 50, 68 and 95 % bands, and NEES.
+
+    ``nees`` is the mean normalised squared error of the position forecast (two degrees of freedom, divided by two, so 1
+    is honest), ``nees_low``, ``nees_high`` its 95 % limits from the number of independent starts.
+    ``scale`` is what the model's sigma was multiplied by (mean over the starts).
+    """
+
+    method: str
+    horizon_min: float
+    starts: int
+    independent_starts: int
+    inside50: float
+    inside68: float
+    inside95: float
+    nees: float
+    nees_low: float
+    nees_high: float
+    scale: float
+
+
+@dataclass(frozen=True)
+class CoupledRow:
+    """Gain of the coupled twelve-state model over two separate channels: 1 - RMS ratio, last estimate of both."""
+
+    horizon_min: float
+    rms_m: float
+    gain: float
+
+
+@dataclass(frozen=True)
+class ForecastResult:
+    """Forecast skill on one flight.
+
+    Parameters
+    ----------
+    default_method : str
+        The method the corrected trajectory and the fan use.
+    first_start_s, start_step_s : float
+        Starts of ``skill``: every ``start_step_s`` from ``first_start_s`` of flight time on.
+    is_calibrated : bool
+        Whether the log holds at least one Schuler period before the first outage; ``calibration_reason`` says why not.
+    skill, gaps, phases, classic_starts, calibration, coupled
+        Tables; see the rows. ``skill`` of the short term (up to 10 min) and of the long term differ by horizon alone.
+    best_method : dict
+        Horizon in minutes (as text) to the method with the least RMS on this flight.
+    figures : tuple of FigureData
+        ``forecast_map``, ``forecast_fan``, ``forecast_classic``.
+    """
+
+    default_method: str
+    first_start_s: float
+    start_step_s: float
+    is_calibrated: bool
+    calibration_reason: str
+    skill: tuple[SkillRow, ...]
+    gaps: tuple[GapRow, ...] = ()
+    phases: tuple[PhaseRow, ...] = ()
+    classic_starts: tuple[ClassicStart, ...] = ()
+    calibration: tuple[CalibrationRow, ...] = ()
+    coupled: tuple[CoupledRow, ...] = ()
+    best_method: dict[str, str] = field(default_factory=dict)
+    figures: tuple[FigureData, ...] = ()
