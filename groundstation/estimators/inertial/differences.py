@@ -1,0 +1,231 @@
+"""From the tables of a flight to what the filter is given: INS minus GNSS, with what could not be believed left out."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from groundstation.base.angles import wrap_180
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.findings import Finding
+from groundstation.base.geodesy import curvature_radii_m, on_earth
+from groundstation.base.records import BoolArray, Int64Array, frozen
+from groundstation.base.signals import topics_of_kind
+from groundstation.base.units import NS_PER_S
+from groundstation.estimators.inertial import screening
+from groundstation.estimators.inertial.filter import Epochs
+from groundstation.estimators.inertial.model import FloatArray
+from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.tables.resample import join
+from groundstation.tables.table import Flight, Table
+
+POSITION_FIELDS = ("latitude_deg", "longitude_deg")
+VELOCITY_FIELDS = ("velocity_north_mps", "velocity_east_mps")
+UNUSED_MODES = ("align", "attitude")
+LONGEST_FLIGHT_S = 4.0e6  # 46 days: a clock that jumps by years must not fill the memory
+
+
+@dataclass(frozen=True)
+class Differences:
+    """INS minus GNSS on the epochs of the filter, and the motion of the INS there.
+
+    Parameters
+    ----------
+    ins_topic, gnss_topic : str
+    epochs : Epochs, n of them
+    latitude_deg, longitude_deg, altitude_m : ndarrays, shape (n,)
+        Of the INS; NaN where unknown.
+    velocity_mps : ndarray, shape (n, 2)
+        Of the INS, north and east.
+    aided_share : float
+        Share of the INS samples whose mode says that GNSS corrects them.
+    findings : tuple of Finding
+        What was left out, with place and count.
+    """
+
+    ins_topic: str
+    gnss_topic: str
+    epochs: Epochs
+    latitude_deg: FloatArray
+    longitude_deg: FloatArray
+    altitude_m: FloatArray
+    velocity_mps: FloatArray
+    aided_share: float
+    findings: tuple[Finding, ...]
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, np.ndarray):
+                object.__setattr__(self, item.name, frozen(value))
+
+
+def choose_pair(flight: Flight) -> tuple[str, str]:
+    """The INS and GNSS topics to compare: of each kind the first that has positions, else velocities.
+
+    Raises
+    ------
+    NotAssessableError
+        When one of them is missing, or they have nothing in common.
+    """
+    for names in (POSITION_FIELDS, VELOCITY_FIELDS):
+        found = [_first_with(flight, kind, names) for kind in ("ins", "gnss")]
+        if all(found):
+            return str(found[0]), str(found[1])
+    for kind, title in (("ins", "INS"), ("gnss", "GNSS")):
+        if not any(_first_with(flight, kind, names) for names in (POSITION_FIELDS, VELOCITY_FIELDS)):
+            raise NotAssessableError("inertial", f"no {title} position or velocity in the log")
+    raise NotAssessableError("inertial", "INS and GNSS have neither position nor velocity in common")
+
+
+def differences(flight: Flight, *, settings: InertialSettings) -> Differences:
+    """Compare INS and GNSS of a flight.
+
+    GNSS samples are averaged over ``epoch_interval_s`` after the INS has been interpolated to each of them; epochs with
+    INS alone stand in the gaps of GNSS.
+
+    Raises
+    ------
+    NotAssessableError
+        With the reason: no INS, no GNSS, or less GNSS than ``least_gnss_s``.
+    """
+    ins_topic, gnss_topic = choose_pair(flight)
+    ins, gnss = _navigating(flight[ins_topic]).unique_times(), flight[gnss_topic].unique_times()
+    if not len(ins):
+        raise NotAssessableError("inertial", f"{ins_topic} never left alignment")
+    findings = list(screening.unknown_values(flight, ins, gnss))
+    resets = screening.ins_resets(flight, ins, settings)
+    findings += resets.findings
+    motion = join(ins, gnss.time_ns, (*POSITION_FIELDS, *VELOCITY_FIELDS), largest_gap_s=settings.ins_gap_max_s)
+    position, velocity = _position_difference(motion, gnss, _altitude(gnss)), _velocity_difference(motion, gnss)
+    bad, found = screening.unbelieved(flight, gnss, motion, position, resets.time_ns, settings)
+    findings += found
+    position[bad], velocity[bad] = np.nan, np.nan
+    if not settings.use_position:
+        position[:] = np.nan
+    if not settings.use_velocity:
+        velocity[:] = np.nan
+    compared = np.isfinite(position).any(axis=1) | np.isfinite(velocity).any(axis=1)
+    time_s, columns = _binned(flight, ins, gnss.take(compared), position[compared], velocity[compared], settings)
+    known = np.isfinite(columns[:, :4]).any(axis=1)
+    gnss_seconds = float(known.sum()) * settings.epoch_interval_s
+    if gnss_seconds < settings.least_gnss_s:
+        raise NotAssessableError(
+            "inertial",
+            f"{gnss_seconds:.0f} s with INS and GNSS together",
+            f"at least {settings.least_gnss_s:.0f} s",
+        )
+    at = join(
+        ins,
+        flight.start_ns + np.round(time_s * NS_PER_S).astype(np.int64),
+        None,
+        largest_gap_s=max(settings.ins_gap_max_s, 2.0 * settings.epoch_interval_s),
+    )
+    latitude, longitude = on_earth(at.values("latitude_deg"), at.values("longitude_deg"))
+    ins_velocity = np.stack([at.values(name) for name in VELOCITY_FIELDS], axis=1)
+    epochs = Epochs(
+        time_s,
+        columns[:, 0:2],
+        columns[:, 2:4],
+        drag_per_s(latitude, _altitude(at), ins_velocity),
+        _reset_marks(flight, time_s, resets.time_ns),
+    )
+    return Differences(
+        *(ins_topic, gnss_topic, epochs, latitude, longitude, _altitude(at), ins_velocity),
+        aided_share=_aided_share(ins),
+        findings=tuple(findings),
+    )
+
+
+def drag_per_s(latitude_deg: FloatArray, altitude_m: FloatArray, velocity_mps: FloatArray) -> FloatArray:
+    """Rates by which position errors in metres drag each other along while the aircraft flies, shape (n, 2, 2), 1/s.
+
+    The error east is that of longitude times the radius of the parallel: (error east)' = velocity error east +
+    tan(latitude) / R (velocity east x error north - velocity north x error east). Zero where the motion is unknown.
+    """
+    _, prime_vertical = curvature_radii_m(np.nan_to_num(latitude_deg))
+    slope = np.tan(np.deg2rad(np.clip(latitude_deg, -88.0, 88.0))) / (prime_vertical + np.nan_to_num(altitude_m))
+    out = np.zeros((len(latitude_deg), 2, 2))
+    out[:, 1, 0] = slope * velocity_mps[:, 1]
+    out[:, 1, 1] = -slope * velocity_mps[:, 0]
+    return np.nan_to_num(out)
+
+
+def _first_with(flight: Flight, kind: str, names: tuple[str, ...]) -> str | None:
+    return next((topic for topic in topics_of_kind(kind, flight.topics()) if flight[topic].has(*names)), None)
+
+
+def _navigating(ins: Table) -> Table:
+    """The samples in which the INS navigates: not while it aligns, not those it calls invalid."""
+    keep = ~np.isin(ins.text("mode"), UNUSED_MODES)
+    if "valid" in ins:
+        column = ins.columns["valid"]
+        keep &= np.asarray(column.values, dtype=bool) | ~column.mask
+    return ins if keep.all() else ins.take(keep)
+
+
+def _aided_share(ins: Table) -> float:
+    modes = ins.text("mode")
+    stated = modes != ""
+    return float(np.mean(modes[stated] == "gnss_aided")) if stated.any() else 0.0
+
+
+def _altitude(table: Table) -> FloatArray:
+    for name in ("altitude_ellipsoid_m", "altitude_msl_m"):
+        if table.has(name):
+            return np.nan_to_num(table.values(name))
+    return np.zeros(len(table))
+
+
+def _position_difference(motion: Table, gnss: Table, altitude_m: FloatArray) -> FloatArray:
+    """INS minus GNSS, metres north and east, shape (n, 2)."""
+    latitude, longitude = on_earth(gnss.values("latitude_deg"), gnss.values("longitude_deg"))
+    ins_latitude, ins_longitude = on_earth(motion.values("latitude_deg"), motion.values("longitude_deg"))
+    meridian, prime_vertical = curvature_radii_m(latitude)
+    north = np.deg2rad(ins_latitude - latitude) * (meridian + altitude_m)
+    parallel = (prime_vertical + altitude_m) * np.cos(np.deg2rad(latitude))
+    return np.stack([north, np.deg2rad(wrap_180(ins_longitude - longitude)) * parallel], axis=1)
+
+
+def _velocity_difference(motion: Table, gnss: Table) -> FloatArray:
+    return np.stack([motion.values(name) - gnss.values(name) for name in VELOCITY_FIELDS], axis=1)
+
+
+def _binned(
+    flight: Flight,
+    ins: Table,
+    gnss: Table,
+    position: FloatArray,
+    velocity: FloatArray,
+    settings: InertialSettings,
+) -> tuple[FloatArray, FloatArray]:
+    """Means over equal intervals of flight time: times (n,), and differences (n, 4) with NaN where GNSS is absent."""
+    interval = settings.epoch_interval_s
+    ins_s, gnss_s = flight.seconds(ins.time_ns), flight.seconds(gnss.time_ns)
+    last = max([*ins_s[-1:], *gnss_s[-1:], 0.0])
+    if last > LONGEST_FLIGHT_S:
+        raise NotAssessableError("inertial", f"a log of {last / 86400.0:.0f} days", "a flight")
+    # half an interval of offset: samples on whole intervals, with jitter either way, fall into one bin each
+    bins = [np.floor(part / interval + 0.5).astype(np.int64) for part in (ins_s, gnss_s)]
+    which = np.unique(np.concatenate(bins))
+    ins_mean = _mean_in(np.searchsorted(which, bins[0]), ins_s[:, None], len(which))[:, 0]
+    gnss_mean = _mean_in(np.searchsorted(which, bins[1]), np.column_stack([gnss_s, position, velocity]), len(which))
+    time_s = np.where(np.isfinite(gnss_mean[:, 0]), gnss_mean[:, 0], ins_mean)
+    return time_s, gnss_mean[:, 1:]
+
+
+def _mean_in(bin_of: Int64Array, values: FloatArray, bins: int) -> FloatArray:
+    known = np.isfinite(values)
+    out = np.full((bins, values.shape[1]), np.nan)
+    for column in range(values.shape[1]):
+        rows = known[:, column]
+        total = np.bincount(bin_of[rows], weights=values[rows, column], minlength=bins)
+        count = np.bincount(bin_of[rows], minlength=bins)
+        out[:, column] = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    return out
+
+
+def _reset_marks(flight: Flight, time_s: FloatArray, reset_ns: Int64Array) -> BoolArray:
+    marks = np.zeros(len(time_s), dtype=bool)
+    at = np.searchsorted(time_s, flight.seconds(reset_ns))
+    marks[at[at < len(time_s)]] = True
+    return marks

@@ -1,0 +1,237 @@
+"""Kalman filter and smoother of the two channels over one flight, on irregular epochs and across gaps."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.records import BoolArray, Int64Array, frozen
+from groundstation.estimators.inertial.model import SIZE, ChannelModel, FloatArray
+from groundstation.estimators.inertial.noise import InsNoise
+
+TIME_RESOLUTION_S = 1e-4  # intervals that agree to this share one transition
+MOST_TRANSITIONS = 4096  # distinct intervals kept exactly; jittered clocks are rounded more coarsely beyond
+STANDARD_GATE = 25.0  # squared sigmas
+
+
+@dataclass(frozen=True)
+class Epochs:
+    """What the filter is given: differences INS minus GNSS on one time axis, strictly increasing.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (n,)
+        Flight seconds.
+    position_m, velocity_mps : ndarrays, shape (n, c)
+        INS minus GNSS; channels north, east. NaN where there is no GNSS (or it is not believed).
+    drag_per_s : ndarray, shape (n, 2, 2)
+        Known rates by which the position error of channel i grows with that of channel j: metres north and east are
+        measured on a sphere, so that an error east shrinks as the aircraft flies to the pole.
+    is_reset : ndarray of bool, shape (n,)
+        The INS was reset between the epoch before and this one.
+    """
+
+    time_s: FloatArray
+    position_m: FloatArray
+    velocity_mps: FloatArray
+    drag_per_s: FloatArray
+    is_reset: BoolArray
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            object.__setattr__(self, item.name, frozen(getattr(self, item.name)))
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @classmethod
+    def plain(cls, time_s: FloatArray, position_m: FloatArray, velocity_mps: FloatArray) -> "Epochs":
+        """Epochs of an INS that was never reset, without the effect of the sphere."""
+        n = len(time_s)
+        return cls(time_s, position_m, velocity_mps, np.zeros((n, 2, 2)), np.zeros(n, dtype=bool))
+
+    @property
+    def interval_s(self) -> float:
+        """Median interval of the epochs, seconds; 1 for fewer than two."""
+        return float(np.median(np.diff(self.time_s))) if len(self) > 1 else 1.0
+
+    @property
+    def has_gnss(self) -> BoolArray:
+        """Where position or velocity was compared in at least one channel, shape (n,)."""
+        return np.asarray(np.isfinite(self.position_m).any(axis=1) | np.isfinite(self.velocity_mps).any(axis=1))
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Transitions between epochs: ``index`` (n,) into ``transitions`` and ``noises`` (m, 6, 6)."""
+
+    index: Int64Array
+    transitions: FloatArray
+    noises: FloatArray
+
+
+@dataclass(frozen=True)
+class FilterRun:
+    """The filter's history. n epochs, c channels; measurement axis: position, velocity.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n, 6, c)
+        Estimates after each epoch (forecast where GNSS was absent).
+    P : ndarray, shape (g, n, 6, 6)
+        Covariance, one for both channels (g = 1) or one each (g = 2, where GNSS gave the channels apart).
+    innovation : ndarray, shape (n, 2, c)
+        Measured minus predicted, NaN where absent.
+    innovation_variance : ndarray, shape (n, 2, c)
+    used : ndarray of int8, shape (n, 2, c)
+        Rejected -1, absent 0, used 1.
+    gain : ndarray, shape (g, n, 2, 6)
+    """
+
+    epochs: Epochs
+    model: ChannelModel
+    noise: InsNoise
+    steps: Steps
+    x: FloatArray
+    P: FloatArray
+    innovation: FloatArray
+    innovation_variance: FloatArray
+    used: NDArray[np.int8]
+    gain: FloatArray
+
+    def covariance(self, channel: int) -> FloatArray:
+        """Covariance of a channel, shape (n, 6, 6)."""
+        return np.asarray(self.P[min(channel, len(self.P) - 1)])
+
+    def sigma(self, channel: int) -> FloatArray:
+        """Standard deviations of a channel's states, shape (n, 6)."""
+        return np.asarray(np.sqrt(np.maximum(np.einsum("nii->ni", self.covariance(channel)), 0.0)))
+
+
+def steps_between(time_s: FloatArray, model: ChannelModel, noise: InsNoise) -> Steps:
+    """Transition and noise of every interval; intervals equal to 0.1 ms share one."""
+    interval = np.diff(time_s, prepend=time_s[:1])
+    resolution = TIME_RESOLUTION_S
+    rounded = np.round(interval / resolution).astype(np.int64)
+    while len(np.unique(rounded)) > MOST_TRANSITIONS:
+        resolution *= 10.0
+        rounded = np.round(interval / resolution).astype(np.int64)
+    distinct, index = np.unique(rounded, return_inverse=True)
+    seconds, density = distinct * resolution, noise.densities()
+    return Steps(
+        index.astype(np.int64),
+        np.stack([model.transition_over(float(part)) for part in seconds]),
+        np.stack([model.process_noise_over(float(part), density) for part in seconds]),
+    )
+
+
+def run_filter(epochs: Epochs, model: ChannelModel, noise: InsNoise, *, gate: float = STANDARD_GATE) -> FilterRun:
+    """Estimate the errors of both channels; where GNSS is absent the states are forecast.
+
+    Parameters
+    ----------
+    epochs : Epochs, n >= 1
+    model : ChannelModel
+    noise : InsNoise
+    gate : float
+        Innovations with a larger squared ratio to their variance are rejected and counted.
+
+    Returns
+    -------
+    FilterRun
+
+    Source: Neusypin et al., 2003; covariance update in Joseph's form (Bierman, 1977).
+    """
+    steps = steps_between(epochs.time_s, model, noise)
+    channels = epochs.position_m.shape[1]
+    z = np.stack([epochs.position_m, epochs.velocity_mps], axis=1)
+    together = bool((np.isfinite(z) == np.isfinite(z[:, :, :1])).all())
+    groups = [list(range(channels))] if together else [[channel] for channel in range(channels)]
+    drag = epochs.drag_per_s * np.diff(epochs.time_s, prepend=epochs.time_s[:1])[:, None, None]
+    parts = [_run_group(z[:, :, group], drag, epochs, steps, noise, gate) for group in groups]
+    x, P, gain, innovation, variance, used = (list(part) for part in zip(*parts, strict=True))
+    spread = [np.repeat(item[:, :, None], len(group), axis=2) for item, group in zip(variance, groups, strict=True)]
+    marks = [np.repeat(item[:, :, None], len(group), axis=2) for item, group in zip(used, groups, strict=True)]
+    return FilterRun(
+        epochs=epochs,
+        model=model,
+        noise=noise,
+        steps=steps,
+        x=np.concatenate(x, axis=2),
+        P=np.stack(P),
+        innovation=np.concatenate(innovation, axis=2),
+        innovation_variance=np.concatenate(spread, axis=2),
+        used=np.concatenate(marks, axis=2),
+        gain=np.stack(gain),
+    )
+
+
+def _run_group(
+    z: FloatArray, drag: FloatArray, epochs: Epochs, steps: Steps, noise: InsNoise, gate: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, NDArray[np.int8]]:
+    from groundstation.estimators.inertial import kernels
+
+    n, _, channels = z.shape
+    x, P, K = np.empty((n, SIZE, channels)), np.empty((n, SIZE, SIZE)), np.empty((n, 2, SIZE))
+    y, S, used = np.empty((n, 2, channels)), np.empty((n, 2)), np.zeros((n, 2), dtype=np.int8)
+    variances = noise.initial_variances()
+    R = np.tile(noise.gnss.variances(epochs.interval_s), (n, 1))
+    reset = np.where(epochs.is_reset[:, None], variances[:2], 0.0)
+    kernels.run_filter(
+        steps.index,
+        steps.transitions,
+        steps.noises,
+        np.ascontiguousarray(z),
+        drag,
+        reset,
+        np.zeros((SIZE, channels)),
+        np.diag(variances),
+        R,
+        gate,
+        x,
+        P,
+        K,
+        y,
+        S,
+        used,
+    )
+    return x, P, K, y, S, used
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """Smoothed states (n, 6, c) and their variances (n, 6, c), NaN outside the interval asked for."""
+
+    x: FloatArray
+    variance: FloatArray
+
+
+def smooth(run: FilterRun, first: int = 0, last: int | None = None) -> Smoothed:
+    """Smooth epochs ``first`` to ``last`` (both included) with the data up to ``last``.
+
+    Source: Rauch, Tung, Striebel, 1965, in the form of Bryson and Frazier (Bierman, 1973).
+    """
+    from groundstation.estimators.inertial import kernels
+
+    n, _, channels = run.x.shape
+    last = n - 1 if last is None else last
+    x, variance = np.full((n, SIZE, channels), np.nan), np.full((n, SIZE, channels), np.nan)
+    groups = [list(range(channels))] if len(run.P) == 1 else [[channel] for channel in range(channels)]
+    for which, group in enumerate(groups):
+        part, spread = np.full((n, SIZE, len(group)), np.nan), np.full((n, SIZE), np.nan)
+        kernels.run_smoother(
+            run.steps.index,
+            run.steps.transitions,
+            np.ascontiguousarray(run.x[:, :, group]),
+            run.P[which],
+            run.gain[which],
+            np.ascontiguousarray(run.innovation[:, :, group]),
+            np.ascontiguousarray(run.innovation_variance[:, :, group[0]]),
+            np.ascontiguousarray(run.used[:, :, group[0]]),
+            first,
+            last,
+            part,
+            spread,
+        )
+        x[:, :, group], variance[:, :, group] = part, spread[:, :, None]
+    return Smoothed(x, variance)

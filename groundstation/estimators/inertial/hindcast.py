@@ -1,0 +1,120 @@
+"""The forecast replayed: started at many moments of a flight, against what GNSS showed later."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.base.records import Int64Array
+from groundstation.estimators.inertial.filter import Epochs, FilterRun
+from groundstation.estimators.inertial.model import FloatArray
+from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.estimators.inertial.starts import start_states
+
+NEAREST_S = 1.0  # a forecast is compared with an epoch no further away than this
+
+
+@dataclass(frozen=True)
+class Hindcast:
+    """Forecasts of some methods from some starts at some leads.
+
+    Parameters
+    ----------
+    at : ndarray of int, shape (s,)
+        Epochs of the starts.
+    start_s : ndarray, shape (s,)
+    lead_s : ndarray, shape (l,)
+    forecast_m : mapping of method to ndarray, shape (s, l, c)
+        Position error forecast to build up since the start.
+    actual_m : ndarray, shape (s, l, c)
+        What GNSS showed to build up; NaN where it was absent at the start or at the lead.
+    """
+
+    at: Int64Array
+    start_s: FloatArray
+    lead_s: FloatArray
+    forecast_m: dict[str, FloatArray]
+    actual_m: FloatArray
+
+    def error_m(self, method: str) -> FloatArray:
+        """Forecast minus actual per channel, shape (s, l, c)."""
+        return self.forecast_m[method] - self.actual_m
+
+    def radial_m(self, method: str) -> FloatArray:
+        """Length of the error, shape (s, l)."""
+        return np.asarray(np.sqrt(np.sum(np.square(self.error_m(method)), axis=2)))
+
+
+def start_epochs(epochs: Epochs, first_s: float, step_s: float) -> Int64Array:
+    """Epochs with GNSS at or just after ``first_s``, ``first_s + step_s`` ... , as indices."""
+    if not len(epochs):
+        return np.zeros(0, dtype=np.int64)
+    wanted = np.arange(first_s, epochs.time_s[-1], step_s)
+    at = np.searchsorted(epochs.time_s, wanted - 1e-6)
+    near = np.abs(epochs.time_s[np.minimum(at, len(epochs) - 1)] - wanted) <= NEAREST_S
+    at = np.unique(at[near])
+    return np.asarray(at[np.isfinite(epochs.position_m[at]).all(axis=1)], dtype=np.int64)
+
+
+def hindcast(
+    run: FilterRun, at: Int64Array, lead_s: FloatArray, methods: Sequence[str], settings: InertialSettings
+) -> Hindcast:
+    """Forecast from epochs ``at`` with every method.
+
+    Parameters
+    ----------
+    run : FilterRun
+    at : ndarray of int, shape (s,)
+    lead_s : ndarray, shape (l,)
+        Equal steps from the first: k times ``lead_s[0]``.
+    """
+    epochs = run.epochs
+    start_s = epochs.time_s[at]
+    lead_step = float(lead_s[0]) if len(lead_s) else settings.forecast_step_s
+    every = max(1, round(lead_step / settings.forecast_step_s))
+    step_s = lead_step / every
+    drag = _drag_along(epochs, start_s, step_s, every * len(lead_s))
+    known = np.nan_to_num(epochs.position_m[at])
+    forecasts = {
+        method: _forecast(run, method, start_states(method, run, at, settings), drag, known, step_s, every, len(lead_s))
+        for method in methods
+    }
+    return Hindcast(at, start_s, np.asarray(lead_s), forecasts, built_up(epochs, at, lead_s))
+
+
+def built_up(epochs: Epochs, at: Int64Array, lead_s: FloatArray) -> FloatArray:
+    """Position error that built up from each start to each lead as GNSS showed it, shape (s, l, c), NaN unknown."""
+    when = epochs.time_s[at][:, None] + np.asarray(lead_s)[None, :]
+    after = np.minimum(np.searchsorted(epochs.time_s, when - 1e-6), len(epochs) - 1)
+    before = np.maximum(after - 1, 0)
+    is_before = np.abs(epochs.time_s[before] - when) < np.abs(epochs.time_s[after] - when)
+    nearest = np.where(is_before, before, after)
+    near = np.abs(epochs.time_s[nearest] - when) <= NEAREST_S
+    change = epochs.position_m[nearest] - epochs.position_m[at][:, None]
+    return np.where(near[:, :, None], change, np.nan)
+
+
+def _forecast(
+    run: FilterRun,
+    method: str,
+    states: FloatArray,
+    drag: FloatArray,
+    known: FloatArray,
+    step_s: float,
+    every: int,
+    leads: int,
+) -> FloatArray:
+    from groundstation.estimators.inertial import kernels
+
+    out = np.zeros((len(states), leads, states.shape[2]))
+    if method != "raw_ins" and leads:
+        phi, is_held = run.model.transition_over(step_s), method == "hold_velocity"
+        kernels.run_forecast(np.ascontiguousarray(states), phi, is_held, drag, known, every, out)
+    return out
+
+
+def _drag_along(epochs: Epochs, start_s: FloatArray, step_s: float, steps: int) -> FloatArray:
+    """Known drag of each forecast step, shape (s, steps, 2, 2): the INS itself knows where it flies."""
+    when = start_s[:, None] + (np.arange(steps) + 0.5)[None, :] * step_s
+    nearest = np.minimum(np.searchsorted(epochs.time_s, when), len(epochs) - 1)
+    return np.ascontiguousarray(epochs.drag_per_s[nearest] * step_s)

@@ -1,0 +1,188 @@
+"""Noise parameters per INS class: what the filter believes of the gyros, of GNSS and of the start. TOML in classes/."""
+
+import math
+import tomllib
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+from groundstation.base.errors import SettingsError
+from groundstation.base.toml_settings import number, settings_from
+from groundstation.estimators.inertial.model import FloatArray
+
+RADPS_PER_DPH = math.pi / 180.0 / 3600.0
+RADPS2_PER_DPHPH = RADPS_PER_DPH / 3600.0
+S_PER_H = 3600.0
+DEFAULT_CLASS = "navigation"
+
+
+@dataclass(frozen=True)
+class GnssNoise:
+    """GNSS error as the filter takes it: white plus a part correlated over time.
+
+    The correlated part is not modelled by a state: the measurement variance is inflated to white^2 + 2 tau / T
+    sigma^2 (T the interval of the epochs), the white noise with the same power at low frequencies, where the INS errors
+    are. With ``is_inflated`` false the variance is white^2 + sigma^2, as if every sample told something new.
+    """
+
+    position_white_m: float = number(3.0, 0.0, 10_000.0)
+    position_correlated_m: float = number(3.0, 0.0, 10_000.0)
+    position_correlation_s: float = number(300.0, 0.0, 100_000.0)
+    velocity_white_mps: float = number(0.05, 0.0, 100.0)
+    velocity_correlated_mps: float = number(0.03, 0.0, 100.0)
+    velocity_correlation_s: float = number(60.0, 0.0, 100_000.0)
+    is_inflated: bool = True
+
+    def variances(self, interval_s: float) -> tuple[float, float]:
+        """Variances of position and velocity, m^2 and m^2/s^2, for epochs ``interval_s`` apart."""
+        return (
+            _variance(
+                self.position_white_m,
+                self.position_correlated_m,
+                self.position_correlation_s if self.is_inflated else 0.0,
+                interval_s,
+            ),
+            _variance(
+                self.velocity_white_mps,
+                self.velocity_correlated_mps,
+                self.velocity_correlation_s if self.is_inflated else 0.0,
+                interval_s,
+            ),
+        )
+
+
+def _variance(white: float, correlated: float, correlation_s: float, interval_s: float) -> float:
+    return white**2 + correlated**2 * max(1.0, 2.0 * correlation_s / interval_s)
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What the filter's forecast sigma must be multiplied by at each horizon, and how sure that is.
+
+    ``scale`` belongs to ``horizon_min``; found on simulated flights of the class. ``flights`` is the weight it has
+    against the outages replayed in the past of the flight at hand: so many independent ones.
+    """
+
+    horizon_min: tuple[float, ...] = (1.0, 5.0, 10.0, 30.0, 60.0, 90.0, 120.0)
+    scale: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+    flights: float = number(5.0, 0.1, 1000.0)
+
+    def __post_init__(self) -> None:
+        if len(self.scale) != len(self.horizon_min) or not self.scale:
+            raise SettingsError(
+                "scale", f"{len(self.scale)} numbers", f"one for each of {len(self.horizon_min)} horizons"
+            )
+        if any(low >= high for low, high in zip(self.horizon_min, self.horizon_min[1:], strict=False)):
+            raise SettingsError("horizon_min", str(list(self.horizon_min)), "growing numbers")
+        if min(self.scale) <= 0.0:
+            raise SettingsError("scale", f"{min(self.scale):g}", "positive numbers")
+
+    def at(self, lead_s: FloatArray) -> FloatArray:
+        """Scale at other lead times (linear in the logarithm of the lead, held beyond the ends)."""
+        lead_min = np.maximum(np.asarray(lead_s, dtype=np.float64) / 60.0, 1e-3)
+        return np.asarray(np.interp(np.log(lead_min), np.log(self.horizon_min), self.scale))
+
+
+@dataclass(frozen=True)
+class InsNoise:
+    """Noise parameters of an INS class. Initial sigmas, then what the white noises add per square root of time.
+
+    ``random_drift_dph`` and ``random_drift_correlation_s`` are the stationary sigma and correlation time (1 / beta) of
+    the random drift. ``azimuth_deg`` is the initial azimuth sigma of the coupled model.
+    """
+
+    name: str = DEFAULT_CLASS
+    title: str = ""
+    position_m: float = number(30.0, 0.0, 1e6)
+    velocity_mps: float = number(1.0, 0.0, 1e3)
+    tilt_rad: float = number(2e-4, 0.0, 1.0)
+    drift_dph: float = number(0.01, 0.0, 1e5)
+    drift_rate_dphph: float = number(0.001, 0.0, 1e5)
+    random_drift_dph: float = number(0.003, 0.0, 1e5)
+    random_drift_correlation_s: float = number(3600.0, 1.0, 1e9)
+    azimuth_deg: float = number(0.1, 0.0, 180.0)
+    velocity_walk_mps_per_sqrt_s: float = number(3e-3, 0.0, 100.0)
+    tilt_walk_deg_per_sqrt_h: float = number(0.002, 0.0, 100.0)
+    drift_walk_dph_per_sqrt_h: float = number(0.0, 0.0, 1e5)
+    drift_rate_walk_dphph_per_sqrt_h: float = number(0.0, 0.0, 1e5)
+    gnss: GnssNoise = field(default_factory=GnssNoise)
+    calibration: Calibration = field(default_factory=Calibration)
+
+    @property
+    def beta_per_s(self) -> float:
+        """Inverse correlation time of the random drift."""
+        return 1.0 / self.random_drift_correlation_s
+
+    def initial_variances(self) -> FloatArray:
+        """Variances at the start, shape (6,), SI units."""
+        sigmas = (
+            self.position_m,
+            self.velocity_mps,
+            self.tilt_rad,
+            self.drift_dph * RADPS_PER_DPH,
+            self.drift_rate_dphph * RADPS2_PER_DPHPH,
+            self.random_drift_dph * RADPS_PER_DPH,
+        )
+        return np.asarray(np.square(np.array(sigmas)))
+
+    def densities(self) -> FloatArray:
+        """Power spectral densities that enter the states, shape (6,), SI units squared per second."""
+        return np.array(
+            [
+                0.0,
+                self.velocity_walk_mps_per_sqrt_s**2,
+                math.radians(self.tilt_walk_deg_per_sqrt_h) ** 2 / S_PER_H,
+                (self.drift_walk_dph_per_sqrt_h * RADPS_PER_DPH) ** 2 / S_PER_H,
+                (self.drift_rate_walk_dphph_per_sqrt_h * RADPS2_PER_DPHPH) ** 2 / S_PER_H,
+                2.0 * self.beta_per_s * (self.random_drift_dph * RADPS_PER_DPH) ** 2,
+            ]
+        )
+
+
+def class_names() -> tuple[str, ...]:
+    """Names of the shipped INS classes.
+
+    Examples
+    --------
+    >>> "navigation" in class_names()
+    True
+    """
+    return tuple(sorted(Path(item.name).stem for item in _shipped().iterdir() if item.name.endswith(".toml")))
+
+
+def load_class(name: str) -> InsNoise:
+    """Noise parameters of a shipped class, or of a file ``*.toml`` of the user.
+
+    Raises
+    ------
+    SettingsError
+        For an unknown name, and for a file with a wrong key or value.
+
+    Examples
+    --------
+    >>> load_class("navigation").name
+    'navigation'
+    """
+    if name.endswith(".toml"):
+        path = Path(name)
+        where, stem = path.name, path.stem
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise SettingsError(where, f"an INS class file that cannot be read ({error})") from error
+    elif name in class_names():
+        where, stem = f"{name}.toml", name
+        text = (_shipped() / where).read_text(encoding="utf-8")
+    else:
+        raise SettingsError("ins_class", repr(name), f"a file *.toml or one of {', '.join(class_names())}")
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError(where, f"text that is not TOML ({error})") from error
+    return settings_from(InsNoise, {"name": stem} | table, where)
+
+
+def _shipped() -> resources.abc.Traversable:
+    return resources.files("groundstation.estimators.inertial") / "classes"
