@@ -102,6 +102,40 @@ def test_a_flipped_id_costs_its_own_record_alone(tmp_path: Path) -> None:
         assert intact <= set(places.tolist()), other
 
 
+def test_an_intact_record_between_damaged_headers_is_kept(tmp_path: Path) -> None:
+    """Any one bit in the header before it and any one in that behind it, be it with a time or without."""
+    log = DataFlash()
+    log.define(1, "ATT", "QccC", "TimeUS,Roll,Pitch,Yaw")
+    log.define(9, "OLD", "Bf", "Name,Value")  # an id that a flipped bit makes of ATT's
+    for at in range(6):
+        log.write("ATT", 10**6 + at, at, 0, 0)
+        log.write("OLD", at, 1.5)
+    starts, path = log.starts(), tmp_path / "between.BIN"
+    for middle in (8, 9):
+        for before in range(24):
+            for behind in range(24):
+                data = bytearray(log.content)
+                for record, bit in ((middle - 1, before), (middle + 1, behind)):
+                    data[starts[record] + bit // 8] ^= 1 << bit % 8
+                path.write_bytes(data)
+                places = scanned(path)[0].tolist()
+                assert starts[middle] in places, (middle, before, behind)
+                assert set(starts[:-1]) - {starts[middle - 1], starts[middle + 1]} <= set(places)
+
+
+def test_a_wrong_time_costs_no_record_behind_it(tmp_path: Path) -> None:
+    log = DataFlash()
+    log.define(1, "ATT", "IccC", "TimeMS,Roll,Pitch,Yaw")
+    for at in range(12):
+        log.write("ATT", 60_000 + at, at, 0, 0)
+    starts, data, path = log.starts(), bytearray(log.content), tmp_path / "time.BIN"
+    data[starts[4] + 4] ^= 0x40  # 16 s late, then two intact records between two damaged ones
+    data[starts[5] + 1] ^= 0x02
+    data[starts[8] + 2] ^= 0x10
+    path.write_bytes(data)
+    assert set(starts[:-1]) - {starts[5], starts[8]} <= set(scanned(path)[0].tolist())
+
+
 def test_lost_and_foreign_bytes_are_placed_and_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = flight_log()
     starts, content = log.starts(), log.content

@@ -111,3 +111,15 @@ def test_packed_unknown_content_is_named_by_what_it_is(tmp_path: Path) -> None:
     (tmp_path / "log").write_bytes(b"\x1f\x8b\x08" + zlib.compress(b"x"))
     with pytest.raises(UnreadableLogError):
         registry.identify(tmp_path / "log")
+
+
+def test_a_log_that_is_read_twice_is_decompressed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from groundstation.pipeline import log
+    from groundstation.readers import source
+
+    calls: list[int] = []
+    monkeypatch.setattr(source, "expand", lambda *given: calls.append(1) or compressed.expand(*given))
+    monkeypatch.setattr(log, "REPLAY_LIMIT_BYTES", 10)
+    (tmp_path / "a").write_bytes(gzip.compress(FLAT.encode()))
+    items = log.open_log(tmp_path / "a").replay()
+    assert summary(list(items)) == summary(list(items)) and calls == [1]

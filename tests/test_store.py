@@ -1,5 +1,6 @@
 """The store gives back what was written, whatever is present, and the same input gives the same bytes."""
 
+import errno
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -268,6 +269,21 @@ def test_nothing_is_left_of_a_failed_write(tmp_path: Path) -> None:
         raise ZeroDivisionError
     assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
     assert target.read_bytes() == b"before"
+
+
+def test_a_disk_that_fills_while_chunks_are_written_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> bytes:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("groundstation.store.writer.message_index", full)  # in the thread that compresses and writes
+    with (
+        pytest.raises(GroundstationError, match="No space left"),
+        StoreWriter(tmp_path / "a.mcap", StoreInfo()) as writer,
+    ):
+        writer.write(batch_of("ins"))
+    assert not list(tmp_path.iterdir())
 
 
 def test_unwritable_place_is_one_line(tmp_path: Path) -> None:

@@ -339,6 +339,20 @@ def test_arming_makes_events(tmp_path: Path) -> None:
     assert found.times_us("event") == [T0_US, T0_US + 2, T0_US + 4]
 
 
+def test_flight_modes_make_events_and_changed_meanings_stay_numbers(tmp_path: Path) -> None:
+    log = (
+        UlogWriter()
+        .flags()
+        .format("vehicle_status:uint64_t timestamp;uint8_t nav_state;")
+        .subscribe(0, "vehicle_status")
+    )
+    for row, state in enumerate((4, 4, 17, 7, 7, 5)):
+        log.row(0, "QB", T0_US + row, state)
+    found = read(tmp_path, log)
+    assert found.values("event", "name") == ["mode AUTO_LOITER", "mode AUTO_TAKEOFF", "mode 7", "mode AUTO_RTL"]
+    assert found.times_us("event") == [T0_US, T0_US + 2, T0_US + 3, T0_US + 5]
+
+
 def test_times_that_are_none(tmp_path: Path) -> None:
     log = UlogWriter().flags().format(BARO).subscribe(0, "vehicle_air_data")
     for time_us in (0, T0_US, 2**63, 2**64 - 1):

@@ -110,6 +110,30 @@ def test_an_intact_record_between_two_damaged_ones_is_kept(tmp_path: Path) -> No
     assert [end - start for start, end in spans_of(damages_of(items))] == [29, 29]
 
 
+def test_a_false_message_of_an_unknown_type_swallows_nothing(tmp_path: Path) -> None:
+    """A flipped type and size make a long message of a type that a later version may define, ending at a true one."""
+    log = small_flight(400)
+    rows = [start for start in log.starts if log.data[start + 2] == ord("D")]
+    first, behind = rows[100], rows[500]
+    for kind in (ord("T"), ord("d"), ord("D")):
+        data = bytearray(log.data)
+        data[first : first + 3] = struct.pack("<HB", behind - first - 3, kind)
+        if kind == ord("D"):
+            data[first + 3 : first + 5] = b"\xff\x7f"  # a topic that nobody subscribed
+        items = items_of(tmp_path / "x.ulg", bytes(data))
+        assert len(times_us(items, RAW[0])) + len(times_us(items, RAW[1])) == len(rows) - 1
+
+
+def test_a_short_body_is_no_format(tmp_path: Path) -> None:
+    """``01 00 F :`` inside a record, the next one being damaged, is no definition that ends it."""
+    log = small_flight(40)
+    rows = [start for start in log.starts if log.data[start + 2] == ord("D")]
+    log.data[rows[20] + 5 : rows[20] + 9] = b"\x01\x00F:"
+    log.data[rows[21] + 1] ^= 0x40
+    items = items_of(tmp_path / "x.ulg", bytes(log.data))
+    assert len(times_us(items, RAW[0])) + len(times_us(items, RAW[1])) == len(rows) - 1
+
+
 def test_a_damaged_size_of_a_text_swallows_nothing(tmp_path: Path) -> None:
     log = small_flight(16)
     text = next(start for start in log.starts if log.data[start + 2] == ord("L"))

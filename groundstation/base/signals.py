@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+EVENT_SEPARATOR = ", "  # between the names of events that one record tells of
+
 Kind = Literal["double", "bool", "text"]
 
 

@@ -129,11 +129,14 @@ class Clock:
 
         Records without a time of their own must be among those the survey saw.
         """
-        segment = np.searchsorted(self.starts, record_index, side="right") - 1
-        time = device_time_ns.values + self.offsets_ns[np.maximum(segment, 0)]
+        if len(self.starts) == 1:
+            time = device_time_ns.values + self.offsets_ns[0]
+        else:
+            segment = np.searchsorted(self.starts, record_index, side="right") - 1
+            time = device_time_ns.values + self.offsets_ns[np.maximum(segment, 0)]
         if not len(self.placed_index) or not len(record_index):
             return np.asarray(time, dtype=np.int64)
-        if (np.diff(record_index) <= 0).any():
+        if (record_index[1:] <= record_index[:-1]).any():
             at = np.minimum(np.searchsorted(self.placed_index, record_index), len(self.placed_index) - 1)
             return np.where(self.placed_index[at] == record_index, self.placed_ns[at], time)
         low, high = np.searchsorted(self.placed_index, (record_index[0], record_index[-1] + 1))
@@ -214,7 +217,9 @@ def estimate_clock(
     array([ 4,  5,  6,  7,  8,  9, 10])
     """
     timed = device_time_ns.mask
-    index, time = record_index[timed], device_time_ns.values[timed]
+    index, time = record_index, device_time_ns.values
+    if not timed.all():
+        index, time = index[timed], time[timed]
     if not len(time):
         return Clock(missing_times=len(record_index))
     found = _Steps(index, time, settings or ClockSettings())
@@ -228,8 +233,8 @@ def estimate_clock(
     placed_index = np.concatenate((record_index[~timed], index[found.implausible]))
     placed_index.sort()
     placed = interpolated(placed_index, index[nodes], own[nodes], found.period_per_record_ns)
-    everyone = np.concatenate((own[believed], placed))
-    zero = zero_of(int(everyone.min()), int(everyone.max()), utc_of_zero_ns)
+    times = [part for part in (own if believed.all() else own[believed], placed) if len(part)]
+    zero = zero_of(min(int(part.min()) for part in times), max(int(part.max()) for part in times), utc_of_zero_ns)
     return Clock(
         is_absolute=zero.is_absolute,
         period_ns=found.period_ns,
@@ -268,6 +273,31 @@ def zero_of(earliest_ns: int, latest_ns: int, utc_of_zero_ns: int | None) -> Zer
     return Zero(False, max(0, -earliest_ns))
 
 
+def middle_of(steps: Int64Array) -> float:
+    """Median of steps, 0 of none: by a sort, as the selection of ``np.median`` is slow on steps that keep repeating.
+
+    Examples
+    --------
+    >>> middle_of(np.array([5, 1, 4, 2])), middle_of(np.array([], dtype=int))
+    (3.0, 0.0)
+    """
+    return quantile(np.sort(steps), 0.5) if len(steps) else 0.0
+
+
+def quantile(ordered: Int64Array, share: float) -> float:
+    """Value below which a share of ordered integers lies, between two of them by proportion.
+
+    Examples
+    --------
+    >>> quantile(np.array([1, 2, 4, 5]), 0.5), quantile(np.array([1, 2, 4, 5]), 1.0)
+    (3.0, 5.0)
+    """
+    at = share * (len(ordered) - 1)
+    low = int(at)
+    below, above = int(ordered[low]), int(ordered[min(low + 1, len(ordered) - 1)])
+    return below + (at - low) * (above - below)
+
+
 class _Steps:
     """Clock steps and stray rows among the timed records (positions here count timed records only)."""
 
@@ -278,8 +308,8 @@ class _Steps:
         self.steps: list[tuple[int, int]] = []  # first record after, last sound record before
         changes = np.diff(time)
         ahead = changes[changes > 0]
-        self.period_ns = int(np.median(ahead)) if len(ahead) else 0
-        self._spacing = float(np.median(np.diff(index))) if len(index) > 1 else 1.0
+        self.period_ns = int(middle_of(ahead))
+        self._spacing = middle_of(np.diff(index)) if len(index) > 1 else 1.0
         self._forward_ns = round(settings.forward_step_s * NS_PER_S)
         backward = int((changes < 0).sum())
         self.is_unordered = backward > max(2.0, settings.unordered_share * len(time))

@@ -6,7 +6,6 @@ newest value of every topic with the time at which it was published, minutes bef
 their time at all. Such records are placed where they stand in the log.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,7 +13,7 @@ import numpy as np
 
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import Clock, interpolated, zero_of
+from groundstation.integrity.clock import Clock, interpolated, middle_of, zero_of
 
 FROZEN_SHARE, FROZEN_LEAST_RECORDS = 0.9, 10
 
@@ -35,16 +34,15 @@ class CountingSettings:
     run_records: int = 50
 
 
-def is_frozen(time_ns: Int64Array) -> bool:
+def is_frozen(times: int, repeats: int) -> bool:
     """Whether a topic repeats one time again and again instead of telling when its values were true.
 
     Examples
     --------
-    >>> is_frozen(np.full(20, 7)), is_frozen(np.arange(20))
+    >>> is_frozen(20, repeats=19), is_frozen(20, repeats=0)
     (True, False)
     """
-    repeats = int((np.diff(time_ns) == 0).sum())
-    return len(time_ns) >= FROZEN_LEAST_RECORDS and repeats >= FROZEN_SHARE * (len(time_ns) - 1)
+    return times >= FROZEN_LEAST_RECORDS and repeats >= FROZEN_SHARE * (times - 1)
 
 
 def estimate_counting_clock(
@@ -89,21 +87,22 @@ def estimate_counting_clock(
         return Clock(missing_times=len(record_index))
     tolerance_ns = round(settings.tolerance_s * NS_PER_S)
     judged = _judged(time, tolerance_ns, settings.run_records)
-    believed = ~(judged.stale | judged.ahead)
+    doubted = judged.stale | judged.ahead
     is_wanted = ~usable
-    is_wanted[np.flatnonzero(usable)[~believed]] = True
+    if doubted.any():
+        is_wanted[np.flatnonzero(usable)[doubted]] = True
+        index, time = index[~doubted], time[~doubted]
     wanted = np.flatnonzero(is_wanted)
-    placed = interpolated(record_index[wanted], index[believed], time[believed], 0.0)
+    placed = interpolated(record_index[wanted], index, time, 0.0)
     fits = (frozen & has_time)[wanted] & (np.abs(device_time_ns.values[wanted] - placed) <= tolerance_ns)
     frozen_stale = int((frozen & has_time).sum() - fits.sum())
     wanted, placed = record_index[wanted[~fits]], placed[~fits]
-    zero = zero_of(int(time[believed].min()), int(time[believed].max()), utc_of_zero_ns)
-    late = believed & (np.maximum.accumulate(np.where(believed, time, time[believed].min())) - time > tolerance_ns)
-    ahead = np.diff(time[believed])
-    ahead = ahead[ahead > 0]
+    zero = zero_of(int(time.min()), int(time.max()), utc_of_zero_ns)
+    late = np.maximum.accumulate(time) - time > tolerance_ns
+    steps = np.diff(time)
     return Clock(
         is_absolute=zero.is_absolute,
-        period_ns=int(np.median(ahead)) if len(ahead) else 0,
+        period_ns=int(middle_of(steps[steps > 0])),
         starts=record_index[:1],
         offsets_ns=np.array([zero.ns], dtype=np.int64),
         placed_index=wanted,
@@ -111,7 +110,7 @@ def estimate_counting_clock(
         missing_times=int((~has_time).sum()),
         implausible_times=int(judged.ahead.sum()),
         stale_times=int(judged.stale.sum()) + frozen_stale,
-        stray_rows=int(late.sum()),
+        stray_rows=int(np.count_nonzero(late)),
         stray_index=index[late],
         is_unordered=bool(late.any()),
         shift_ns=0 if zero.is_absolute else zero.ns,
@@ -145,12 +144,3 @@ def _judged(time: Int64Array, tolerance_ns: int, run_records: int) -> _Judged:
     stale = ~is_long & (first < np.minimum(before_ns, after_ns) - tolerance_ns)
     ahead = ~is_long & (last > np.maximum(before_ns, after_ns) + tolerance_ns) & ~stale
     return _Judged(np.repeat(stale, lengths), np.repeat(ahead, lengths))
-
-
-def frozen_records(record_index: Int64Array, topics: Iterable[tuple[Int64Array, Int64Array, BoolArray]]) -> BoolArray:
-    """Which of ``record_index`` belong to a frozen topic; ``topics`` are (places, times, presence of the times)."""
-    frozen = np.zeros(len(record_index), dtype=bool)
-    for index, time, mask in topics:
-        if is_frozen(time[mask]):
-            frozen[np.searchsorted(record_index, index)] = True
-    return frozen

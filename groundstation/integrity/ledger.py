@@ -1,14 +1,14 @@
 """The integrity ledger: what a log holds, topic by topic, and what is odd about it. Figures only, no judgement."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from groundstation.base.records import Damage, Int64Array, Remark, frozen
 from groundstation.base.signals import kind_of
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import Clock
+from groundstation.integrity.clock import Clock, quantile
 
 GAPS_LISTED = 100
 SPORADIC_KINDS = ("event", "onboard")  # written when something happens: a pause in them is no gap
@@ -184,14 +184,15 @@ def gaps_of(topic: str, time_ns: Int64Array, *, settings: LedgerSettings | None 
     >>> gaps.start_ns.tolist(), gaps.length_s.tolist()
     ([2000000000], [7.0])
     """
-    settings = settings or LedgerSettings()
-    steps = np.diff(time_ns)
-    ahead = steps[steps > 0]
-    if not len(ahead) or _is_sporadic(topic, ahead):
+    return _gaps(topic, time_ns, _rhythm(topic, time_ns), settings or LedgerSettings())
+
+
+def _gaps(topic: str, time_ns: Int64Array, rhythm: "_Rhythm", settings: LedgerSettings) -> Gaps:
+    if not rhythm.is_regular:
         return Gaps(topic, np.zeros(0, dtype=np.int64), np.zeros(0))
-    longest_ns = max(settings.gap_periods * _typical_ns(ahead), settings.gap_min_s * NS_PER_S)
-    before = np.flatnonzero(steps > longest_ns)
-    return Gaps(topic, time_ns[before], steps[before] / NS_PER_S)
+    longest_ns = max(settings.gap_periods * rhythm.typical_ns, settings.gap_min_s * NS_PER_S)
+    before = np.flatnonzero(rhythm.steps_ns > longest_ns)
+    return Gaps(topic, time_ns[before], rhythm.steps_ns[before] / NS_PER_S)
 
 
 def topic_ledger(
@@ -204,45 +205,53 @@ def topic_ledger(
     settings: LedgerSettings,
 ) -> TopicLedger:
     """Ledger of one topic from its corrected times in order, shape (n,), n at least 1."""
-    steps = np.diff(time_ns)
-    ahead = steps[steps > 0]
+    rhythm = _rhythm(topic, time_ns)
     span_ns = int(time_ns[-1] - time_ns[0])
-    period_ns = _typical_ns(ahead) if len(ahead) else 0.0
-    is_regular = period_ns > 0.0 and not _is_sporadic(topic, ahead)
+    period_ns, ahead = rhythm.typical_ns, rhythm.ahead
     return TopicLedger(
         topic,
         rows=len(time_ns),
         first_ns=int(time_ns[0]),
         last_ns=int(time_ns[-1]),
         nominal_rate_hz=NS_PER_S / period_ns if period_ns else None,
-        actual_rate_hz=len(ahead) * NS_PER_S / span_ns if period_ns else None,
-        coverage=min(1.0, (len(ahead) + 1) / (span_ns / period_ns + 1.0)) if is_regular else None,
-        duplicates=int((steps == 0).sum()),
+        actual_rate_hz=ahead * NS_PER_S / span_ns if period_ns else None,
+        coverage=min(1.0, (ahead + 1) / (span_ns / period_ns + 1.0)) if rhythm.is_regular else None,
+        duplicates=len(rhythm.steps_ns) - ahead,
         backward_steps=backward_steps,
         stray_rows=stray_rows,
-        gaps=gaps_of(topic, time_ns, settings=settings),
+        gaps=_gaps(topic, time_ns, rhythm, settings),
         fields=fields,
     )
 
 
-def _is_sporadic(topic: str, steps_ns: Int64Array) -> bool:
+class _Rhythm(NamedTuple):
+    """How a topic's times follow each other: steps, how many lead ahead, their median, whether it is a period.
+
+    A topic that is written when something happens has none.
+    """
+
+    steps_ns: Int64Array
+    ahead: int
+    typical_ns: float
+    is_regular: bool
+
+
+def _rhythm(topic: str, time_ns: Int64Array) -> _Rhythm:
+    """The rhythm of a topic, from its corrected times in order."""
+    steps = np.diff(time_ns)
+    ahead = steps[steps > 0]
+    if not len(ahead):
+        return _Rhythm(steps, 0, 0.0, False)
+    some = np.sort(ahead[:: len(ahead) // MOST_STEPS | 1])  # odd: two steps in turn are both met
+    typical_ns = quantile(some, 0.5)
+    return _Rhythm(steps, len(ahead), typical_ns, not _is_sporadic(topic, len(ahead), typical_ns, quantile(some, 0.8)))
+
+
+def _is_sporadic(topic: str, steps: int, usual_ns: float, long_ns: float) -> bool:
     """Whether a topic is written when something happens: by its kind, or, of a raw one, by steps of every length."""
     if kind_of(topic) != "raw":
         return kind_of(topic) in SPORADIC_KINDS
-    if len(steps_ns) < FEWEST_STEPS:
-        return True
-    usual_ns, long_ns = np.percentile(_some(steps_ns), (50.0, 80.0))
-    return bool(long_ns > UNEVEN * usual_ns)
-
-
-def _typical_ns(steps_ns: Int64Array) -> float:
-    """Median of steps."""
-    return float(np.median(_some(steps_ns)))
-
-
-def _some(steps_ns: Int64Array) -> Int64Array:
-    """An evenly spread part of steps when they are very many: a median takes most of a survey's time else."""
-    return steps_ns[:: len(steps_ns) // MOST_STEPS | 1]  # odd: two steps in turn are both met
+    return steps < FEWEST_STEPS or long_ns > UNEVEN * usual_ns
 
 
 def _rounded(value: float | None, digits: int) -> float | None:

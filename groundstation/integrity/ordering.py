@@ -31,13 +31,13 @@ def corrected(items: Iterable[Item], clock: Clock) -> Iterator[RecordBatch]:
             continue
         batch = clock.correct(item)
         topic, lateness = batch.topic, clock.lateness_ns.get(item.topic, 0)
-        if topic in held:
-            batch = joined([held.pop(topic), batch])
-        time = _times(batch)
-        reached[topic] = max(reached.get(topic, int(time.max())), int(time.max()))
         if lateness:
-            batch = batch.take(np.argsort(time, kind="stable"))
-            ready = int(np.searchsorted(_times(batch), reached[topic] - lateness, side="right"))
+            if topic in held:
+                batch = joined([held.pop(topic), batch])
+            batch = _ordered(batch)
+            time = _times(batch)
+            reached[topic] = max(reached.get(topic, int(time[-1])), int(time[-1]))
+            ready = int(np.searchsorted(time, reached[topic] - lateness, side="right"))
             if ready < len(batch):
                 held[topic] = batch.take(slice(ready, None))
                 batch = batch.take(slice(0, ready))
@@ -49,6 +49,11 @@ def corrected(items: Iterable[Item], clock: Clock) -> Iterator[RecordBatch]:
 def _times(batch: RecordBatch) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     assert batch.time_ns is not None, "a corrected batch has times"
     return batch.time_ns
+
+
+def _ordered(batch: RecordBatch) -> RecordBatch:
+    time = _times(batch)
+    return batch.take(np.argsort(time, kind="stable")) if (time[1:] < time[:-1]).any() else batch
 
 
 def _bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
@@ -64,8 +69,8 @@ def joined(batches: Sequence[RecordBatch]) -> RecordBatch:
     return RecordBatch(
         batches[0].topic,
         np.concatenate([batch.record_index for batch in batches]),
-        _joined_columns([batch.device_time_ns for batch in batches]),
-        {name: _joined_columns([_column_of(batch, name, batches) for batch in batches]) for name in names},
+        joined_columns([batch.device_time_ns for batch in batches]),
+        {name: joined_columns([_column_of(batch, name, batches) for batch in batches]) for name in names},
         np.concatenate([_times(batch) for batch in batches]),
         np.concatenate([time for time in validity if time is not None]) if has_validity else None,
     )
@@ -79,7 +84,8 @@ def _column_of(batch: RecordBatch, name: str, batches: Sequence[RecordBatch]) ->
     return Column(np.zeros(len(batch), dtype=kind), np.zeros(len(batch), dtype=bool))
 
 
-def _joined_columns(columns: Sequence[Column]) -> Column:
+def joined_columns(columns: Sequence[Column]) -> Column:
+    """One column of several, in the order given."""
     present: BoolArray | None = None
     if any(column.present is not None for column in columns):
         present = np.concatenate([column.mask for column in columns])

@@ -1,12 +1,11 @@
 """One pass over a log: its header, clock model and ledger.
 
-Kept are 17 bytes a record for each set of topics that are sampled together, nothing else.
+Kept are 12 bytes a record for each set of topics that are sampled together, beyond 16 MiB in a temporary file.
 """
 
-from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,9 +20,13 @@ from groundstation.base.records import (
     Remark,
 )
 from groundstation.base.signals import field_of
+from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import Clock, ClockSettings, estimate_clock
-from groundstation.integrity.counting import estimate_counting_clock, frozen_records
+from groundstation.integrity.counting import CountingSettings, estimate_counting_clock
 from groundstation.integrity.ledger import FieldLedger, Gaps, Ledger, LedgerSettings, TopicLedger, topic_ledger
+from groundstation.integrity.ordering import joined_columns
+from groundstation.integrity.places import Kept, Places
+from groundstation.integrity.thinning import Thinner
 
 
 @dataclass(frozen=True)
@@ -71,20 +74,19 @@ class _FieldTally:
     first_out_of_range: int | None = None
 
     def add(self, column: Column, record_index: Int64Array) -> None:
-        mask = column.present
-        self.present += len(column) if mask is None else int(mask.sum())
-        if column.values.dtype.kind != "f":
+        values, mask = column.values, column.present
+        self.present += len(column) if mask is None else int(np.count_nonzero(mask))
+        if values.dtype.kind != "f":
             return
-        values = column.values
         nan = np.isnan(values)
-        outside = (values < self.low) | (values > self.high)
-        if self.is_known:
-            outside |= np.isinf(values)
+        self.nan += int(np.count_nonzero(nan if mask is None else nan & mask))
+        if not self.is_known:
+            return
+        outside = (values < self.low) | (values > self.high) | np.isinf(values)
         if mask is not None:
-            nan, outside = nan & mask, outside & mask
-        self.nan += int(nan.sum())
+            outside &= mask
         if outside.any():
-            self.out_of_range += int(outside.sum())
+            self.out_of_range += int(np.count_nonzero(outside))
             if self.first_out_of_range is None:
                 self.first_out_of_range = int(record_index[np.argmax(outside)])
 
@@ -105,79 +107,58 @@ def _tally_fields(fields: dict[str, _FieldTally], batch: RecordBatch) -> None:
         tally.add(column, batch.record_index)
 
 
-@dataclass(frozen=True, eq=False)
-class _Piece:
-    """Places and device times of one batch; topics that are sampled together share it."""
-
-    index: Int64Array
-    time: Int64Array
-    mask: BoolArray
-
-    def holds(self, batch: RecordBatch) -> bool:
-        """Whether it is the places and times of this batch."""
-        return (
-            np.array_equal(self.index, batch.record_index)
-            and np.array_equal(self.time, batch.device_time_ns.values)
-            and np.array_equal(self.mask, batch.device_time_ns.mask)
-        )
-
-
-class _Pieces:
-    """Makes pieces, the same one for batches with the same places and times, and joins them."""
-
-    def __init__(self) -> None:
-        self._recent: deque[_Piece] = deque(maxlen=8)
-        self._joined: dict[tuple[int, ...], _Piece] = {}
-
-    def of(self, batch: RecordBatch) -> _Piece:
-        """The piece of a batch."""
-        for piece in self._recent:
-            if piece.holds(batch):
-                return piece
-        device = batch.device_time_ns
-        piece = _Piece(np.array(batch.record_index), np.array(device.values, dtype=np.int64), np.array(device.mask))
-        self._recent.append(piece)
-        return piece
-
-    def joined(self, pieces: list[_Piece]) -> _Piece:
-        """One piece of several; the same one for topics that share them all."""
-        key = tuple(id(piece) for piece in pieces)
-        if key not in self._joined:
-            self._joined[key] = _Piece(
-                np.concatenate([piece.index for piece in pieces]),
-                np.concatenate([piece.time for piece in pieces]),
-                np.concatenate([piece.mask for piece in pieces]),
-            )
-        return self._joined[key]
-
-
 @dataclass
 class _TopicTally:
     """Times and counts of one topic, growing batch by batch."""
 
     topic: str
-    pieces: list[_Piece] = field(default_factory=list)
+    pieces: list[Kept] = field(default_factory=list)
     fields: dict[str, _FieldTally] = field(default_factory=dict)
 
-    def add(self, batch: RecordBatch, piece: _Piece) -> None:
+    def add(self, batch: RecordBatch, piece: Kept) -> None:
         """Count one more batch."""
         self.pieces.append(piece)
         _tally_fields(self.fields, batch)
 
-    def ledger(self, whole: _Piece, clock: Clock, settings: LedgerSettings) -> tuple[TopicLedger, int]:
-        """The topic's ledger and the lateness of its records, nanoseconds."""
-        time = clock.time_ns(whole.index, Column(whole.time))
-        lateness = int((np.maximum.accumulate(time) - time).max())
-        timed = whole.time[whole.mask]
-        ledger = topic_ledger(
+    def ledger(self, order: "_Order", settings: LedgerSettings) -> TopicLedger:
+        """The topic's ledger."""
+        fields = tuple(tally.ledger(name) for name, tally in self.fields.items())
+        return topic_ledger(
             self.topic,
-            np.sort(time, kind="stable") if lateness else time,
-            backward_steps=int((np.diff(timed) < 0).sum()),
-            stray_rows=int(np.isin(whole.index, clock.stray_index).sum()) if len(clock.stray_index) else 0,
-            fields=tuple(tally.ledger(name) for name, tally in self.fields.items()),
+            order.time_ns,
+            backward_steps=order.backward_steps,
+            stray_rows=order.stray_rows,
+            fields=fields,
             settings=settings,
         )
-        return ledger, lateness
+
+
+class _Order(NamedTuple):
+    """Corrected times of a topic in order, and how far it was from it: lateness in nanoseconds, counts."""
+
+    time_ns: Int64Array
+    lateness_ns: int
+    backward_steps: int
+    stray_rows: int
+
+
+def _order_of(places: Places, pieces: Sequence[Kept], clock: Clock) -> _Order:
+    """The order of the records of some pieces, taken piece by piece."""
+    time_ns = np.empty(sum(kept.count for kept in pieces), dtype=np.int64)
+    at = backward = stray = 0
+    before = np.zeros(0, dtype=np.int64)
+    for kept in pieces:
+        piece = places.piece(kept)
+        time_ns[at : at + kept.count] = clock.time_ns(piece.index, piece.time)
+        timed = np.concatenate((before, piece.timed))
+        backward += int(np.count_nonzero(timed[1:] < timed[:-1]))
+        stray += int(np.isin(piece.index, clock.stray_index).sum()) if len(clock.stray_index) else 0
+        at, before = at + kept.count, timed[-1:]
+    lateness = 0
+    if (time_ns[1:] < time_ns[:-1]).any():
+        lateness = int((np.maximum.accumulate(time_ns) - time_ns).max())
+        time_ns.sort(kind="stable")
+    return _Order(time_ns, lateness, backward, stray)
 
 
 def survey(
@@ -202,34 +183,69 @@ def survey(
     damages: list[Damage] = []
     remarks: list[Remark] = []
     tallies: dict[str, _TopicTally] = {}
-    pieces = _Pieces()
+    places = Places()
     for item in items:
         if isinstance(item, RecordBatch):
             if len(item):
-                tallies.setdefault(item.topic, _TopicTally(item.topic)).add(item, pieces.of(item))
+                tallies.setdefault(item.topic, _TopicTally(item.topic)).add(item, places.of(item))
         elif isinstance(item, Damage):
             damages.append(item)
         elif isinstance(item, Remark):
             remarks.append(item)
         else:
             header = item
-    joined = {topic: pieces.joined(tallies[topic].pieces) for topic in sorted(tallies)}
-    clock = _clock_of(header, joined.values(), clock_settings)
+    clock = _clock_of(header, places, [tallies[topic].pieces for topic in sorted(tallies)], clock_settings)
     settings = ledger_settings or LedgerSettings()
-    named = joined.items() if clock.has_times else ()
-    results = [tallies[topic].ledger(whole, clock, settings) for topic, whole in named]
+    results = _ledgers(places, tallies.values(), clock, settings) if clock.has_times else []
     topics = tuple(ledger for ledger, _lateness in results)
     clock = replace(clock, lateness_ns={ledger.topic: lateness for ledger, lateness in results})
     return Survey(header, clock, Ledger(topics, clock, tuple(damages), tuple(remarks), settings))
 
 
-def _clock_of(header: LogHeader, pieces: Iterable[_Piece], settings: ClockSettings | None) -> Clock:
+def _ledgers(
+    places: Places, tallies: Iterable[_TopicTally], clock: Clock, settings: LedgerSettings
+) -> list[tuple[TopicLedger, int]]:
+    """Ledgers and latenesses of all topics in alphabetical order; topics that are sampled together share theirs."""
+    together: dict[tuple[int, ...], list[_TopicTally]] = {}
+    for tally in tallies:
+        together.setdefault(tuple(kept.number for kept in tally.pieces), []).append(tally)
+    results = []
+    for several in together.values():
+        order = _order_of(places, several[0].pieces, clock)
+        results += [(tally.ledger(order, settings), order.lateness_ns) for tally in several]
+    return sorted(results, key=lambda result: result[0].topic)
+
+
+def _clock_of(
+    header: LogHeader, places: Places, topics: Sequence[Sequence[Kept]], settings: ClockSettings | None
+) -> Clock:
     """The model of the log's clock, of the kind that its reader names."""
-    index, time = _all_records(pieces)
-    if not header.has_counting_clock:
-        return estimate_clock(index, time, header.utc_of_zero_ns, settings=settings)
-    frozen = frozen_records(index, ((piece.index, piece.time, piece.mask) for piece in pieces))
-    return estimate_counting_clock(index, time, frozen, header.utc_of_zero_ns)
+    if header.has_counting_clock:
+        return _counting_clock(header, places, topics)
+    index, time = places.in_one(topics)
+    return estimate_clock(index, time, header.utc_of_zero_ns, settings=settings)
+
+
+def _counting_clock(header: LogHeader, places: Places, topics: Sequence[Sequence[Kept]]) -> Clock:
+    """The model of a counting clock; of a long log only the records that have a say are laid together."""
+    settings = CountingSettings()
+    thinner = Thinner(round(settings.tolerance_s * NS_PER_S), settings.run_records)
+    windows: list[tuple[Int64Array, Column, BoolArray]] = []
+    for index, time, frozen in places.in_order(topics):
+        if not places.is_long:
+            return estimate_counting_clock(index, time, frozen, header.utc_of_zero_ns, settings=settings)
+        kept = thinner.kept(time.values, time.mask & ~frozen)
+        windows.append((index[kept], time.take(kept), frozen[kept]))
+    if not windows:
+        return Clock()
+    clock = estimate_counting_clock(
+        np.concatenate([index for index, _time, _frozen in windows]),
+        joined_columns([time for _index, time, _frozen in windows]),
+        np.concatenate([frozen for _index, _time, frozen in windows]),
+        header.utc_of_zero_ns,
+        settings=settings,
+    )
+    return replace(clock, period_ns=thinner.period_ns) if clock.has_times else clock
 
 
 class Census:
@@ -263,36 +279,3 @@ class Census:
             )
             found[topic] = ledger.to_dict(self._clock)
         return found
-
-
-def _all_records(pieces: Iterable[_Piece]) -> tuple[Int64Array, Column]:
-    """Places and device times of all records of a log, each place once, in order."""
-    distinct = list({id(piece): piece for piece in pieces}.values())
-    if not distinct:
-        return np.zeros(0, dtype=np.int64), Column(np.zeros(0, dtype=np.int64))
-    largest = max(distinct, key=lambda piece: len(piece.index))
-    if all(_contains(largest.index, piece.index) for piece in distinct):
-        return largest.index, Column(largest.time, largest.mask)
-    return _united(distinct)
-
-
-def _united(pieces: list[_Piece]) -> tuple[Int64Array, Column]:
-    """Records of all pieces in order of their places, each place once."""
-    start, end = min(int(piece.index[0]) for piece in pieces), max(int(piece.index[-1]) for piece in pieces) + 1
-    if end - start <= 4 * sum(len(piece.index) for piece in pieces):  # places without many holes need no sorting
-        seen, mask = np.zeros(end - start, dtype=bool), np.zeros(end - start, dtype=bool)
-        time = np.zeros(end - start, dtype=np.int64)
-        for piece in reversed(pieces):
-            at = piece.index - start
-            seen[at], time[at], mask[at] = True, piece.time, piece.mask
-        places = np.flatnonzero(seen)
-        return places + start, Column(time[places], mask[places])
-    index, first = np.unique(np.concatenate([piece.index for piece in pieces]), return_index=True)
-    time = np.concatenate([piece.time for piece in pieces])[first]
-    return index, Column(time, np.concatenate([piece.mask for piece in pieces])[first])
-
-
-def _contains(whole: Int64Array, part: Int64Array) -> bool:
-    """Whether every element of ``part`` occurs in ``whole``, both increasing."""
-    at = np.minimum(np.searchsorted(whole, part), len(whole) - 1)
-    return bool((whole[at] == part).all())

@@ -11,7 +11,7 @@ from groundstation.base.errors import UnreadableLogError
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.records import Damage, RecordBatch, Remark
 from groundstation.integrity.survey import Census
-from groundstation.pipeline.log import Log, Replay
+from groundstation.pipeline.log import Log
 from groundstation.store.info import StoreInfo
 
 
@@ -44,7 +44,7 @@ def _convert_recorded(log: Log, target: Path) -> Converted:
     from groundstation.integrity.survey import survey
     from groundstation.store.writer import StoreWriter
 
-    items = Replay(log.items)
+    items = log.replay()
     found = survey(items)
     if not found.ledger.topics:
         raise UnreadableLogError(log.path.name, "no record that could be read", "", "`info` tells what the file is")

@@ -59,9 +59,8 @@ def describe(path: Path, profile: Path | None = None) -> Description:
 def _recorded(log: Log) -> Description:
     from groundstation.integrity.ledger_findings import ledger_findings
     from groundstation.integrity.survey import survey
-    from groundstation.pipeline.log import Replay
 
-    items = Replay(log.items)
+    items = log.replay()
     found = survey(items)
     fields: dict[str, dict[str, None]] = {}
     for item in items:

@@ -2,14 +2,19 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Item, RecordBatch
 from groundstation.pipeline.identity import sha256_of
 from groundstation.results.flight import Source
 
-REPLAY_LIMIT_BYTES = 256 * 1024 * 1024
+if TYPE_CHECKING:
+    from groundstation.readers.source import Source as LogFile
+
+REPLAY_LIMIT_BYTES = 96 << 20  # an hour of CSV at 100 Hz is kept; the peak of a conversion has this part in it
 
 
 @dataclass(frozen=True)
@@ -32,7 +37,18 @@ class Log:
             return read(self.path)
         from groundstation.readers.registry import read as read_log
 
-        return read_log(self.path, self.profile)
+        return read_log(self._file, self.profile)
+
+    def replay(self) -> "Replay":
+        """The items for two passes; of a file that is larger than what may be kept, nothing is."""
+        return Replay(self.items, REPLAY_LIMIT_BYTES if self.source.size_bytes <= REPLAY_LIMIT_BYTES else 0)
+
+    @cached_property
+    def _file(self) -> "LogFile":
+        """The file as readers see it: a compressed one is decompressed once, however often it is read."""
+        from groundstation.readers.source import Source as LogFile
+
+        return LogFile(self.path)
 
 
 def open_log(path: Path, profile: Path | None = None) -> Log:
@@ -82,7 +98,7 @@ class Replay:
         for item in self._read():
             size += _size_bytes(item)
             if size > self._limit_bytes:
-                kept = None
+                kept = None  # it is read again: the peak does not grow with the log
             if kept is not None:
                 kept.append(item)
             yield item

@@ -103,12 +103,13 @@ def identify(path: str | Path, profile: Path | None = None) -> Claim:
     return _claim(Source(Path(path)), profile)[0]
 
 
-def read(path: str | Path, profile: Path | None = None) -> Iterator[Item]:
+def read(path: str | Path | Source, profile: Path | None = None) -> Iterator[Item]:
     """Iterate over the items of a file, with the reader that claims it.
 
-    Raises at once as :func:`identify` does, not at the first item. Parameters as there.
+    Raises at once as :func:`identify` does, not at the first item. Parameters as there; a :class:`Source` that is read
+    again is not decompressed again.
     """
-    source = Source(Path(path))
+    source = path if isinstance(path, Source) else Source(Path(path))
     claim, troubles = _claim(source, profile)
     reader = _readers()[claim.reader]
     if reader is csv_profile:

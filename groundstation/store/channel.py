@@ -70,9 +70,11 @@ class ChannelWriter:
         """Take in a batch; full chunks are emitted."""
         time_ns = self._checked_times(batch)
         row_bytes = 64 + sum(2 + _width(column.values.dtype) for column in batch.columns.values())
+        publish_ns = time_ns if batch.validity_time_ns is None else batch.validity_time_ns
+        slots = self.slots(batch)
         for rows in _pieces(time_ns, row_bytes):
             self._close_at_boundary(int(time_ns[rows.start]))
-            self._append(batch.take(rows), time_ns[rows])
+            self._append(time_ns[rows], publish_ns[rows], [slot.take(rows) for slot in slots])
             if self._bytes >= CHUNK_BYTES * 7 // 8:
                 self.flush()
 
@@ -82,9 +84,8 @@ class ChannelWriter:
         if before // span != time_ns // span:
             self.flush()
 
-    def _append(self, piece: RecordBatch, time_ns: Int64Array) -> None:
-        publish = time_ns if piece.validity_time_ns is None else piece.validity_time_ns
-        buffer, starts = encode(self.id, self.count, time_ns, publish, self.slots(piece))
+    def _append(self, time_ns: Int64Array, publish_ns: Int64Array, slots: list[Slot]) -> None:
+        buffer, starts = encode(self.id, self.count, time_ns, publish_ns, slots)
         self._buffers.append(buffer)
         self._times.append(time_ns)
         self._starts.append(starts + self._bytes)

@@ -136,6 +136,13 @@ class ChunkHead:
     data_at: int
 
 
+def chunk_head(start_time: int, end_time: int, uncompressed_size: int, crc: int, data_length: int) -> bytes:
+    """What stands before a chunk's zstd data (mcap.records would copy the data twice)."""
+    tail = b"zstd" + struct.pack("<Q", data_length)
+    length = _CHUNK_HEAD.size + len(tail) + data_length - RECORD_PREFIX
+    return _CHUNK_HEAD.pack(Opcode.CHUNK, length, start_time, end_time, uncompressed_size, crc, 4) + tail
+
+
 def read_chunk_head(data: bytes, *, need_lengths: bool = True) -> ChunkHead | None:
     """Head of the chunk record at the start of ``data``; None when it contradicts itself.
 

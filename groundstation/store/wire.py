@@ -8,7 +8,7 @@ gathered from, places that are computed first.
 Sources: protobuf encoding, https://protobuf.dev/programming-guides/encoding; MCAP, https://mcap.dev/spec.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -34,6 +34,9 @@ HEAD = np.dtype(
 MESSAGE_OPCODE = 5
 MAX_TEXT_BYTES = 64 << 20  # of the matrix in which texts of one piece are laid side by side
 RECORD_PREFIX = 9  # opcode and length, which the length does not count
+ROWS_ALIKE, MAX_PARTIAL = 512, 60  # rows with the same fields that are worth a matrix; fields that some rows lack
+
+Block = tuple[slice | NDArray[np.intp], bytes, ByteArray]  # rows, the bytes before each value, the values as (k, width)
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,20 @@ class Slot:
     present: BoolArray | None = None
     lengths: NDArray[Any] | None = None
 
-    def blocks(self) -> Iterator[tuple[NDArray[np.intp] | slice, bytes, ByteArray]]:
+    @property
+    def has_many_widths(self) -> bool:
+        """Whether the texts that are present differ in length."""
+        if self.lengths is None:
+            return False
+        lengths = self.lengths if self.present is None else self.lengths[self.present]
+        return len(lengths) > 0 and bool(lengths.min() != lengths.max())
+
+    def take(self, rows: slice | NDArray[np.intp]) -> "Slot":
+        """The slot of some rows."""
+        present, lengths = (None if array is None else array[rows] for array in (self.present, self.lengths))
+        return Slot(self.prefix, self.values[rows], present, lengths)
+
+    def blocks(self) -> Iterator[Block]:
         """Rows whose bytes have one width: their positions, the bytes before each value, the values as (k, width)."""
         rows: slice | NDArray[np.intp] = slice(None)
         if self.present is not None and not self.present.all():
@@ -118,41 +134,76 @@ def encode(
         Where each record starts in the buffer.
     """
     count = len(log_time)
-    blocks = [block for slot in slots for block in slot.blocks()]
-    head = np.zeros(count, HEAD)
-    head["opcode"] = MESSAGE_OPCODE
-    head["channel_id"] = channel_id
-    head["sequence"] = (first_sequence + np.arange(count)) & 0xFFFF_FFFF
-    head["log_time"] = log_time
-    head["publish_time"] = publish_time
+    groups = _alike(slots, count)
+    parts = [] if groups is None else [(rows, _blocks(of_rows)) for rows, of_rows in groups]
+    blocks = _blocks(slots) if groups is None else []
     sizes = np.full(count, HEAD.itemsize, np.int64)
     for rows, prefix, values in blocks:
         sizes[rows] += len(prefix) + values.shape[1]
-    head["length"] = sizes - RECORD_PREFIX
+    for rows, of_rows in parts:
+        sizes[rows] += sum(len(prefix) + values.shape[1] for _, prefix, values in of_rows)
     starts = np.cumsum(sizes) - sizes
-    blocks.insert(0, (slice(None), b"", head.view(np.uint8).reshape(count, HEAD.itemsize)))
-    uniform = all(isinstance(rows, slice) for rows, _, _ in blocks)
-    return (_lay_out(blocks, count) if uniform else _scatter(blocks, sizes, starts)), starts
+    head = (  # in the order of HEAD
+        Slot(bytes([MESSAGE_OPCODE]), sizes - RECORD_PREFIX),
+        Slot(channel_id.to_bytes(2, "little"), np.arange(first_sequence, first_sequence + count).astype("<u4")),
+        Slot(b"", log_time),
+        Slot(b"", publish_time),
+    )
+    if groups is None:
+        return _scatter(_blocks(head) + blocks, sizes, starts), starts
+    if len(parts) == 1:
+        return _lay_out(_blocks(head) + parts[0][1]).reshape(-1), starts
+    out = np.empty(int(sizes.sum()), np.uint8)
+    for rows, of_rows in parts:
+        matrix = _lay_out(_blocks([slot.take(rows) for slot in head]) + of_rows)
+        record = np.dtype(f"V{matrix.shape[1]}")
+        at_any_byte(out, record)[starts[rows]] = matrix.view(record)[:, 0]
+    return out, starts
 
 
-def _lay_out(blocks: Sequence[tuple[Any, bytes, ByteArray]], count: int) -> ByteArray:
-    """Records that all have the same fields: one matrix, filled by columns over a copy of the constant bytes."""
+def _blocks(slots: Iterable[Slot]) -> list[Block]:
+    return [block for slot in slots for block in slot.blocks()]
+
+
+def _alike(slots: Sequence[Slot], count: int) -> list[tuple[slice | NDArray[np.intp], list[Slot]]] | None:
+    """Rows in groups that have the same fields present, and the slots of those; None where few are alike."""
+    pattern, partial = np.zeros(count, np.int64), 0
+    for slot in slots:
+        if slot.present is not None and not slot.present.all():
+            pattern, partial = pattern * 2 + slot.present, partial + 1
+        if partial > MAX_PARTIAL or slot.has_many_widths:
+            return None
+    if not partial:
+        return [(slice(None), list(slots))]
+    patterns = np.unique(pattern).tolist()
+    if len(patterns) * ROWS_ALIKE > count:
+        return None
+    groups: list[tuple[slice | NDArray[np.intp], list[Slot]]] = []
+    for one in patterns:
+        rows = np.flatnonzero(pattern == one)
+        known = [slot for slot in slots if slot.present is None or slot.present[rows[0]]]
+        groups.append((rows, [slot.take(rows) for slot in known]))
+    return groups
+
+
+def _lay_out(blocks: Sequence[Block]) -> ByteArray:
+    """Records that all have the same fields, shape (n, size): filled by columns over a copy of the constant bytes."""
     template = b"".join(prefix + bytes(values.shape[1]) for _, prefix, values in blocks)
-    matrix = np.empty((count, len(template)), np.uint8)
+    matrix = np.empty((len(blocks[0][2]), len(template)), np.uint8)
     matrix[:] = np.frombuffer(template, np.uint8)
     at = 0
     for _, prefix, values in blocks:
         at += len(prefix)
         width = values.shape[1]
-        if width == 8:  # one 64-bit move per value
-            matrix[:, at : at + 8].view(np.uint64)[:, 0] = values.view(np.uint64)[:, 0]
+        if width in (4, 8):  # one move per value
+            matrix[:, at : at + width].view(f"u{width}")[:, 0] = values.view(f"u{width}")[:, 0]
         else:
             matrix[:, at : at + width] = values
         at += width
-    return matrix.reshape(-1)
+    return matrix
 
 
-def _scatter(blocks: Sequence[tuple[Any, bytes, ByteArray]], sizes: Int64Array, starts: Int64Array) -> ByteArray:
+def _scatter(blocks: Sequence[Block], sizes: Int64Array, starts: Int64Array) -> ByteArray:
     """Records of mixed fields: every block's bytes go to the next free place of its rows."""
     out = np.empty(int(sizes.sum()), np.uint8)
     free = starts.copy()

@@ -52,14 +52,16 @@ class Block:
     def groups(self) -> Iterator[tuple[Definition, Int64Array]]:
         """Each type that occurs and which of the block's records (numbered from 0) are of it, increasing."""
         order = np.argsort(self.types, kind="stable")
-        ends = np.cumsum(np.bincount(self.types, minlength=256))
-        for type_id in np.unique(self.types).tolist():
-            yield self.definitions[type_id], order[ends[type_id - 1] if type_id else 0 : ends[type_id]]
+        counts = np.bincount(self.types)
+        ends = np.cumsum(counts)
+        for type_id in np.flatnonzero(counts).tolist():
+            yield self.definitions[type_id], order[ends[type_id] - counts[type_id] : ends[type_id]]
 
     def records(self, definition: Definition, which: Int64Array) -> NDArray[Any]:
         """Records of one type as a structured array, shape (n,), copied from the block."""
-        windows = np.lib.stride_tricks.sliding_window_view(self.data, definition.length)
-        return windows[self.offsets[which]].view(definition.dtype)[:, 0]
+        length = definition.length
+        at_any_byte = np.ndarray((len(self.data) - length + 1,), f"V{length}", self.data.data, strides=(1,))
+        return at_any_byte[self.offsets[which]].view(definition.dtype)
 
 
 @dataclass
@@ -137,11 +139,8 @@ class Scanner:
     def __iter__(self) -> Iterator[Block]:
         data = np.zeros(0, dtype=np.uint8)
         with self._source.open() as stream:
-            is_last = False
-            while not is_last:
-                read = self._read(stream)
-                is_last = len(read) < BLOCK_BYTES
-                data = np.concatenate((data, np.frombuffer(read, dtype=np.uint8)))
+            while True:
+                data, is_last = self._longer(data, stream)
                 yield from self._blocks(data, is_last)
                 if is_last:
                     break
@@ -152,9 +151,13 @@ class Scanner:
                     self._state[scan.SKIP_START] -= done
         self._finish(data)
 
-    def _read(self, stream: BinaryIO) -> bytes:
+    def _longer(self, data: NDArray[np.uint8], stream: BinaryIO) -> tuple[NDArray[np.uint8], bool]:
+        """The data with the next block of the file behind it, and whether that was the last."""
+        whole = np.empty(len(data) + BLOCK_BYTES, dtype=np.uint8)
+        whole[: len(data)] = data
         try:
-            return stream.read(BLOCK_BYTES)
+            count = stream.readinto(whole[len(data) :])  # type: ignore[attr-defined]
+            return whole[: len(data) + count], count < BLOCK_BYTES
         except OSError as error:  # a failing disk or network share
             raise UnreadableLogError(
                 self._source.name, f"no more data ({error.strerror})", "", "copy it again"

@@ -2,10 +2,8 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Int64Array, RecordBatch
@@ -110,7 +108,10 @@ class Mapper:
         return columns_of
 
     def _with_mode(self, rows: Rows, columns: dict[str, Column]) -> dict[str, Column]:
-        return {**columns, "mode": Column(np.full(len(rows), self._choices.mode))} if columns else {}
+        return {**columns, "mode": self._mode(rows, None)} if columns else {}
+
+    def _mode(self, rows: Rows, present: BoolArray | None) -> Column:
+        return Column(np.broadcast_to(self._choices.mode, len(rows)), present)
 
     def _attitude(self, topic: str, rows: Rows) -> dict[str, Column]:
         values = self._values(topic, rows, (*rules.ATTITUDE, self._choices.yaw))
@@ -140,7 +141,7 @@ class Mapper:
                 used = self._choices.primary_core.at(rows.record_index, before=0) == core
             columns = {name: Column(column, used) for name, column in values.items()}
             if is_solution and columns:
-                columns["mode"] = Column(np.full(len(rows), self._choices.mode), used)
+                columns["mode"] = self._mode(rows, used)
             return columns
 
         return columns_of
@@ -214,29 +215,27 @@ def _with_samples(rows: Rows, columns: dict[str, Column]) -> _Part:
 
 def _merged(topic: str, parts: list[_Part]) -> RecordBatch:
     """One batch of several parts, in the order of the file; a field is absent in the rows of the parts without it."""
-    index = _joined([part.rows.record_index for part in parts], np.int64)
-    time_ns = _joined([part.rows.time_ns.values for part in parts], np.int64)
-    timed = _joined([part.rows.time_ns.mask for part in parts], np.bool_)
+    if not parts:
+        return RecordBatch(topic, np.zeros(0, dtype=np.int64), Column(np.zeros(0, dtype=np.int64)), {})
+    index = np.concatenate([part.rows.record_index for part in parts])
     order = np.argsort(index, kind="stable")
+    places = np.empty_like(order)
+    places[order] = np.arange(len(order))
+    places_of = np.split(places, np.cumsum([len(part.rows) for part in parts])[:-1])
     columns = {}
     for name in dict.fromkeys(name for part in parts for name in part.columns):
-        columns[name] = _column([part.columns.get(name) for part in parts], [len(part.rows) for part in parts], order)
-    time = Column(time_ns[order], None if timed.all() else timed[order])
+        known = [(at, part.columns[name]) for at, part in zip(places_of, parts, strict=True) if name in part.columns]
+        columns[name] = _column(known, len(index))
+    time = _column([(at, part.rows.time_ns) for at, part in zip(places_of, parts, strict=True)], len(index))
     return RecordBatch(topic, index[order], time, columns)
 
 
-def _column(pieces: list[Column | None], lengths: list[int], order: Int64Array) -> Column:
-    known = [piece for piece in pieces if piece is not None]
-    kind = np.result_type(*(piece.values.dtype for piece in known))
-    filler = np.full(1, np.nan) if kind.kind == "f" else known[0].values[:1]  # one text throughout is one run to write
-    values: list[NDArray[Any]] = []
-    present: list[BoolArray] = []
-    for piece, length in zip(pieces, lengths, strict=True):
-        values.append(np.broadcast_to(filler, length) if piece is None else piece.values)
-        present.append(np.zeros(length, dtype=bool) if piece is None else piece.mask)
-    mask = np.concatenate(present)[order]
-    return Column(np.concatenate(values)[order], None if mask.all() else mask)
-
-
-def _joined(arrays: list[NDArray[Any]], kind: Any) -> NDArray[Any]:
-    return np.concatenate(arrays) if arrays else np.zeros(0, dtype=kind)
+def _column(pieces: list[tuple[Int64Array, Column]], rows: int) -> Column:
+    """One column of several pieces that stand at given places."""
+    kind = np.result_type(*(piece.values.dtype for _at, piece in pieces))
+    filler = np.nan if kind.kind == "f" else pieces[0][1].values[0]  # one text throughout is one run to write
+    values, present = np.full(rows, filler, dtype=kind), np.zeros(rows, dtype=bool)
+    for at, piece in pieces:
+        values[at] = piece.values
+        present[at] = True if piece.present is None else piece.present
+    return Column(values, None if present.all() else present)

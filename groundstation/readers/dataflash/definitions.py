@@ -5,6 +5,7 @@ Source: ArduPilot, libraries/AP_Logger/README.md ("Format Types", "Units", "Mult
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
@@ -144,6 +145,7 @@ def fmt_definition() -> Definition:
     return parse(FMT_ID, FMT_BYTES, "FMT", "BBnNZ", ["Type", "Length", "Name", "Format", "Columns"])
 
 
+@lru_cache(maxsize=256)  # both passes over a log meet the same ones
 def parse_fmt(payload: bytes) -> Definition | None:
     """Definition that the payload of a FMT record gives; None when no record could have such a length."""
     type_id, length, name, characters, labels = np.frombuffer(payload, FMT_DTYPE, 1)[0].item()

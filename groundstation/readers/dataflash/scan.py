@@ -4,8 +4,8 @@ A record is ``A3 95 id`` and as many bytes as the id's definition says; there is
 another each is believed if two magic bytes stand where it ends. Where they do not, either this record is false (a
 damaged id gave it a wrong length) or the next one is damaged: it is false if a credible record begins inside it. (A
 wrong length may also swallow whole records and end well: their times betray them.) After
-a damaged span a record is credible if two more follow it, or if its own time or the next one's is near that of the
-last good record: so an intact record between two damaged ones is kept.
+a damaged span a record is credible if it ends at the header of another, which may have one flipped bit, or if its time
+is near that of the last good record: so an intact record between two damaged ones is kept.
 """
 
 from typing import Any
@@ -60,23 +60,29 @@ def _is_near(data: Any, at: int, time_kind: Any, last_us: int) -> bool:
 
 
 @compiled
+def _is_header(data: Any, at: int, lengths: Any) -> bool:
+    """Whether three bytes begin a record of a known type, or would with one bit flipped back."""
+    if at + 3 > len(data):
+        return False
+    first, second, type_id = int(data[at]) ^ 0xA3, int(data[at + 1]) ^ 0x95, int(data[at + 2])
+    if first == 0 and second == 0:
+        known = int(lengths[type_id])
+        for bit in range(8):
+            known += int(lengths[type_id ^ (1 << bit)])
+        return known > 0
+    flipped = first | second << 8
+    return flipped & (flipped - 1) == 0 and int(lengths[type_id]) > 0
+
+
+@compiled
 def _is_credible(data: Any, at: int, lengths: Any, time_kind: Any, last_us: int) -> bool:
     """Whether a record that begins at a place among doubtful bytes is one: see the module's first lines."""
     length = _length_at(data, at, lengths)
     if length == 0 or at + length > len(data):
         return False
-    if _is_near(data, at, time_kind, last_us):
+    if at + length == len(data) or _is_header(data, at + length, lengths):
         return True
-    for _ in range(2):
-        at += length
-        if at == len(data):
-            return True
-        length = _length_at(data, at, lengths)
-        if length == 0:
-            return False
-        if at + length <= len(data) and _is_near(data, at, time_kind, last_us):
-            return True
-    return True
+    return _is_near(data, at, time_kind, last_us)
 
 
 @compiled
@@ -92,6 +98,15 @@ def _is_swallowed(data: Any, at: int, end: int, lengths: Any, time_kind: Any, la
 
 
 @compiled
+def _may_hold_record(data: Any, start: int, end: int) -> bool:
+    """Whether the first byte of magic stands in a stretch: no branches, so that many bytes are compared at once."""
+    found = np.uint8(0)
+    for at in range(np.uint64(start), np.uint64(end)):
+        found |= np.uint8(data[at] == np.uint8(0xA3))
+    return bool(found)
+
+
+@compiled
 def _is_false(data: Any, at: int, length: int, lengths: Any, time_kind: Any, last_us: int) -> bool:
     """Whether a record is false, its id being damaged: another record begins inside it.
 
@@ -99,6 +114,8 @@ def _is_false(data: Any, at: int, length: int, lengths: Any, time_kind: Any, las
     payload that looks like that by chance is not to be met.
     """
     end = at + length
+    if not _may_hold_record(data, at + 3, end):
+        return False
     ends_well = end + 2 > len(data) or (data[end] == 0xA3 and data[end + 1] == 0x95)
     for inside in range(at + 3, end - 1 if ends_well else end):
         if data[inside] == 0xA3 and data[inside + 1] == 0x95:

@@ -6,6 +6,7 @@ needs is taken. Units and senses are those of the message definitions (PX4-Autop
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -325,6 +326,29 @@ ROLES: tuple[Role, ...] = (
             ),
         ),
     ),
+)
+MODES = ("vehicle_status", "nav_state")
+# PX4 msg/VehicleStatus.msg NAVIGATION_STATE_*: those that kept their meaning from 1.4 on; others stay numbers.
+MODE_NAMES: Mapping[int, str] = MappingProxyType(
+    {
+        0: "MANUAL",
+        1: "ALTCTL",
+        2: "POSCTL",
+        3: "AUTO_MISSION",
+        4: "AUTO_LOITER",
+        5: "AUTO_RTL",
+        10: "ACRO",
+        12: "DESCEND",
+        13: "TERMINATION",
+        14: "OFFBOARD",
+        15: "STAB",
+        17: "AUTO_TAKEOFF",
+        18: "AUTO_LAND",
+        19: "AUTO_FOLLOW_TARGET",
+        20: "AUTO_PRECLAND",
+        21: "ORBIT",
+        22: "AUTO_VTOL_TAKEOFF",
+    }
 )
 ARMING: tuple[tuple[str, str, int], ...] = (("vehicle_status", "arming_state", 2), ("actuator_armed", "armed", 1))
 UTC_SOURCES = ("vehicle_gps_position", "sensor_gps", "vehicle_global_position")

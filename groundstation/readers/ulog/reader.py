@@ -19,9 +19,10 @@ from groundstation.base.records import (
     RecordBatch,
     Remark,
 )
+from groundstation.base.signals import EVENT_SEPARATOR
 from groundstation.readers.source import Source
 from groundstation.readers.ulog.blocks import NOT_SUBSCRIBED, Topic, Walk
-from groundstation.readers.ulog.canonical import Rows
+from groundstation.readers.ulog.canonical import MODE_NAMES, MODES, Rows
 from groundstation.readers.ulog.formats import TIMESTAMP
 from groundstation.readers.ulog.survey import Overview, overview
 from groundstation.readers.ulog.texts import MAX_TIME_US, TextTopics, device_time
@@ -147,6 +148,7 @@ class _CanonicalTopics:
         self._found = found
         self._parts: dict[str, list[_Part]] = {}
         self._armed: bool | None = None
+        self._flight_mode: float | None = None
         self._mode = "gnss_aided" if found.has_gnss else "attitude"
 
     def take(self, topic: Topic, index: Int64Array, time: Column, rows: NDArray[Any]) -> None:
@@ -164,6 +166,18 @@ class _CanonicalTopics:
                 self._parts.setdefault(name, []).append(part)
         if self._found.arming and topic.instance == 0 and topic.name == self._found.arming[0]:
             self._note_arming(index, time, values)
+        if topic.instance == 0 and topic.name == MODES[0] and MODES[1] in values:
+            self._note_mode(index, time, values[MODES[1]])
+
+    def _note_mode(self, index: Int64Array, time: Column, modes: NDArray[Any]) -> None:
+        """Changes of the flight mode as events, the first mode among them."""
+        changed = np.concatenate(([modes[0] != self._flight_mode], modes[1:] != modes[:-1]))
+        self._flight_mode = float(modes[-1])
+        if changed.any():
+            names = np.array([f"mode {MODE_NAMES.get(mode) or format(mode, 'g')}" for mode in modes[changed].tolist()])
+            self._parts.setdefault("event", []).append(
+                _Part(index[changed], time.take(changed), {"name": Column(names)})
+            )
 
     def _note_arming(self, index: Int64Array, time: Column, values: Rows) -> None:
         """Changes between armed and disarmed as events, the first state among them."""
@@ -185,7 +199,8 @@ class _CanonicalTopics:
         """Batches of what was taken since the last call."""
         parts, self._parts = self._parts, {}
         for topic, several in parts.items():
-            yield from _bounded(_merged(topic, several))
+            batch = _merged(topic, several)
+            yield from _bounded(_one_row_each(batch) if topic == "event" else batch)
 
     def remarks(self) -> Iterator[Remark]:
         """What serves as what."""
@@ -240,6 +255,16 @@ def _merged(topic: str, parts: list[_Part]) -> RecordBatch:
                 values[rows], present[rows] = column.values, column.mask
         columns[name] = Column(values[order], present[order])
     return RecordBatch(topic, index[order], time, columns)
+
+
+def _one_row_each(events: RecordBatch) -> RecordBatch:
+    """Events of one message as one row, their names joined: a message may both arm and change the mode."""
+    first = np.flatnonzero(np.diff(events.record_index, prepend=-1) > 0)
+    if len(first) == len(events):
+        return events
+    names = np.split(events.columns["name"].values, first[1:])
+    joined = Column(np.array([EVENT_SEPARATOR.join(part.tolist()) for part in names]))
+    return RecordBatch(events.topic, events.record_index[first], events.device_time_ns.take(first), {"name": joined})
 
 
 def _bounded(batch: RecordBatch) -> Iterator[RecordBatch]:

@@ -5,7 +5,7 @@ checked is strong for most messages: a data message must have a known id and the
 texts, the sync message is eleven fixed bytes. Such a message is believed by itself, so that an intact one between two
 damaged ones is kept. One with little to check is believed when a strong one follows within four. Texts, and data with
 padding that may be left out, have a size that nothing confirms: where no message follows, one that begins inside tells
-that the size is damaged.
+that the size is damaged. A message of an unknown type or topic is none if two of known topics stand inside it.
 """
 
 from typing import Any
@@ -19,6 +19,7 @@ HEADER = 3
 MAX_MESSAGE = HEADER + 0xFFFF
 LOOKAHEAD = 6 * MAX_MESSAGE  # bytes that must follow the message that is judged: itself, four more, and a header
 LOOKED_AT = 256  # characters of a text or a name: bounds the work that a file made of letters causes
+SWALLOWED_AT = 512  # bytes of a message of unknown type or topic in which others are looked for: bounds it, too
 NOT_SUBSCRIBED = -1  # of a message id, as its largest size
 
 DATA, SYNC = 0x44, 0x53
@@ -79,14 +80,14 @@ def _is_keyed(data: Any, start: int, end: int) -> bool:
 
 @compiled
 def _is_format(data: Any, start: int, end: int) -> bool:
-    """Whether a body is a name, a colon, and printable characters with no further colon."""
+    """Whether a body is a name that is not empty, a colon, and printable characters with no further colon."""
     colons = 0
     for at in range(start, end):
         byte = data[at]
         colons += byte == 0x3A
         if byte < 0x20 or byte > 0x7E or colons > 1 or (colons == 0 and at - start > LOOKED_AT):
             return False
-    return colons == 1
+    return colons == 1 and data[start] != 0x3A
 
 
 @compiled
@@ -112,6 +113,21 @@ def _is_sync(data: Any, start: int) -> Any:
 
 
 @compiled
+def _swallows(data: Any, start: int, stop: int, least: Any, most: Any) -> bool:
+    """Whether two data messages of known ids and sizes, one behind the other, begin early in a stretch."""
+    for at in range(start, min(stop - 10, start + SWALLOWED_AT)):
+        place, found = at, 0
+        while found < 2 and place + 5 <= stop and data[place + 2] == 0x44:
+            size, message_id = _u16(data, place), _u16(data, place + 3)
+            if not least[message_id] <= size - 2 <= most[message_id]:
+                break
+            place, found = place + 3 + size, found + 1
+        if found == 2 and place <= stop:
+            return True
+    return False
+
+
+@compiled
 def _strength(data: Any, at: int, end: int, least: Any, most: Any) -> int:
     """How much speaks for a whole message at a place: NONE, WEAK or STRONG."""
     if at + 3 > end:
@@ -126,7 +142,7 @@ def _strength(data: Any, at: int, end: int, least: Any, most: Any) -> int:
             return NONE
         message_id = _u16(data, start)
         if most[message_id] < 0:
-            return WEAK
+            return NONE if _swallows(data, start, stop, least, most) else WEAK
         return STRONG if least[message_id] <= size - 2 <= most[message_id] else NONE
     if kind == 0x53:  # S: sync
         return STRONG if size == 8 and _is_sync(data, start) else NONE
@@ -144,7 +160,9 @@ def _strength(data: Any, at: int, end: int, least: Any, most: Any) -> int:
         return STRONG if _is_logged_text(data, start, stop, start + 3) else NONE
     if kind == 0x4F or kind == 0x52:  # O, R: dropout, unsubscription
         return WEAK if size == 2 else NONE
-    return WEAK if 0x21 <= kind <= 0x7E else NONE  # a type that a later version may define
+    if not 0x21 <= kind <= 0x7E or _swallows(data, start, stop, least, most):
+        return NONE
+    return WEAK  # a type that a later version may define
 
 
 @compiled

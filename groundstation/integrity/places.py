@@ -1,0 +1,210 @@
+"""Places and device times of a log's records: kept compactly, and beyond a size in a temporary file.
+
+A survey needs them twice more: for the clock, in the order of the log, and for the ledger, topic by topic. Neither
+needs all at once.
+"""
+
+import tempfile
+from collections import deque
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from groundstation.base.errors import GroundstationError
+from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
+from groundstation.integrity.counting import is_frozen
+from groundstation.integrity.ordering import joined_columns
+
+MEMORY_BYTES = 16 << 20  # more than that goes to a file
+WINDOW_RECORDS = 500_000  # at least so many records of all topics are laid in order at a time
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Places and device times of one batch, or of all of a topic; topics that are sampled together share it."""
+
+    index: Int64Array
+    time: Column
+
+    @property
+    def timed(self) -> Int64Array:
+        """The times that are there, in the order of the places."""
+        return self.time.values if self.time.present is None else self.time.values[self.time.present]
+
+    def holds(self, batch: RecordBatch) -> bool:
+        """Whether it is the places and times of this batch."""
+        device = batch.device_time_ns
+        return (
+            np.array_equal(self.index, batch.record_index)
+            and np.array_equal(self.time.values, device.values)
+            and (self.time.present is device.present or np.array_equal(self.time.mask, device.mask))
+        )
+
+
+@dataclass(frozen=True)
+class Kept:
+    """Where a piece is kept, and what is asked of it without a look at it.
+
+    Parameters
+    ----------
+    number : int
+    at : int
+        Byte of the file.
+    count : int
+    first, last : int
+        Its places lie between these.
+    is_near : bool
+        Places fit 32 bits when counted from the first.
+    is_timed : bool
+        Every record has a time.
+    times : tuple of int
+        First and last time, how many there are, and how many repeat the one before; empty when there is none.
+    """
+
+    number: int
+    at: int
+    count: int
+    first: int
+    last: int
+    is_near: bool
+    is_timed: bool
+    times: tuple[int, ...]
+
+
+class Places:
+    """Keeps pieces, once for batches with the same places and times, and gives them back.
+
+    Attributes
+    ----------
+    records : int
+        How many are kept.
+    """
+
+    def __init__(self) -> None:
+        self._file: Any = tempfile.SpooledTemporaryFile(max_size=MEMORY_BYTES)  # noqa: SIM115 -- lives as long as this
+        self._end = 0
+        self._count = self.records = 0
+        self._recent: deque[tuple[Piece, Kept]] = deque(maxlen=8)
+
+    @property
+    def is_long(self) -> bool:
+        """Whether there may be several windows."""
+        return self.records > WINDOW_RECORDS
+
+    def of(self, batch: RecordBatch) -> Kept:
+        """Keep the piece of a batch."""
+        for piece, kept in self._recent:
+            if piece.holds(batch):
+                return kept
+        device = batch.device_time_ns
+        present = None if device.present is None else np.array(device.present)
+        piece = Piece(np.array(batch.record_index), Column(np.array(device.values, dtype=np.int64), present))
+        self._recent.append((piece, self._keep(piece)))
+        return self._recent[-1][1]
+
+    def _keep(self, piece: Piece) -> Kept:
+        index, timed = piece.index, piece.timed
+        first, last = int(index.min()), int(index.max())
+        is_near, is_timed = last - first < 1 << 32, len(timed) == len(index)
+        parts = [(index - first).astype(np.uint32) if is_near else index - first, piece.time.values]
+        parts += [] if is_timed else [piece.time.mask]
+        times = (int(timed[0]), int(timed[-1]), len(timed), _repeats(timed)) if len(timed) else ()
+        kept = Kept(self._count, self._end, len(index), first, last, is_near, is_timed, times)
+        try:
+            self._file.seek(self._end)
+            for part in parts:
+                self._file.write(part.tobytes())
+                self._end += part.nbytes
+        except OSError as error:
+            folder, reason = tempfile.gettempdir(), error.strerror or type(error).__name__
+            raise GroundstationError(folder, f"no temporary file ({reason})", "", "make room, or set TMPDIR") from error
+        self._count += 1
+        self.records += len(index)
+        return kept
+
+    def piece(self, kept: Kept) -> Piece:
+        """A piece as it was."""
+        self._file.seek(kept.at)
+        index = self._array(np.uint32 if kept.is_near else np.int64, kept.count).astype(np.int64) + kept.first
+        time = self._array(np.int64, kept.count)
+        return Piece(index, Column(time, None if kept.is_timed else self._array(np.bool_, kept.count)))
+
+    def _array(self, dtype: Any, count: int) -> Any:
+        return np.frombuffer(self._file.read(count * np.dtype(dtype).itemsize), dtype)
+
+    def in_order(self, topics: Iterable[Sequence[Kept]]) -> Iterator[tuple[Int64Array, Column, BoolArray]]:
+        """Places, device times and frozenness of all records in the order of the log, each place once, in windows.
+
+        Where topics tell different times of a place, the topic that is named first is believed.
+        """
+        topics = list(topics)
+        frozen = {kept.number for several in topics if _is_frozen(several) for kept in several}
+        for window in _windows({kept.number: kept for several in topics for kept in several}.values()):
+            pieces = [self.piece(kept) for kept in window]
+            index, time = _united(pieces)
+            is_frozen_here = np.zeros(len(index), dtype=bool)
+            for kept, piece in zip(window, pieces, strict=True):
+                if kept.number in frozen:
+                    is_frozen_here[np.searchsorted(index, piece.index)] = True
+            yield index, time, is_frozen_here
+
+    def in_one(self, topics: Iterable[Sequence[Kept]]) -> tuple[Int64Array, Column]:
+        """Places and device times of all records in the order of the log, each place once."""
+        index, time = np.empty(self.records, dtype=np.int64), np.empty(self.records, dtype=np.int64)
+        timed = np.empty(self.records, dtype=bool)
+        count = 0
+        for window_index, window_time, _frozen in self.in_order(topics):
+            rows = slice(count, count + len(window_index))
+            index[rows], time[rows], timed[rows] = window_index, window_time.values, window_time.mask
+            count = rows.stop
+        return index[:count], Column(time[:count], timed[:count])
+
+
+def _repeats(times: Int64Array) -> int:
+    return int(np.count_nonzero(times[1:] == times[:-1]))
+
+
+def _is_frozen(several: Sequence[Kept]) -> bool:
+    """Whether the times of a topic are."""
+    timed = [kept.times for kept in several if kept.times]
+    count = sum(times[2] for times in timed)
+    repeats = sum(times[3] for times in timed)
+    repeats += sum(before[1] == after[0] for before, after in pairwise(timed))
+    return is_frozen(count, repeats)
+
+
+def _windows(pieces: Collection[Kept]) -> Iterator[list[Kept]]:
+    """Pieces of one stretch of the log after another, none of which reaches into the next; each in the order given."""
+    rank = {kept.number: at for at, kept in enumerate(pieces)}
+    window: list[Kept] = []
+    count, reached = 0, -1
+    for kept in sorted(pieces, key=lambda kept: kept.first):
+        if count >= WINDOW_RECORDS and kept.first > reached:
+            yield sorted(window, key=lambda kept: rank[kept.number])
+            window, count = [], 0
+        window.append(kept)
+        count, reached = count + kept.count, max(reached, kept.last)
+    if window:
+        yield sorted(window, key=lambda kept: rank[kept.number])
+
+
+def _united(pieces: list[Piece]) -> tuple[Int64Array, Column]:
+    """Records of all pieces in order of their places, each place once."""
+    if len(pieces) == 1:
+        return pieces[0].index, pieces[0].time
+    start, end = min(int(piece.index[0]) for piece in pieces), max(int(piece.index[-1]) for piece in pieces) + 1
+    if end - start <= 4 * sum(len(piece.index) for piece in pieces):  # places without many holes need no sorting
+        seen, timed = np.zeros(end - start, dtype=bool), np.zeros(end - start, dtype=bool)
+        time = np.zeros(end - start, dtype=np.int64)
+        for piece in reversed(pieces):
+            at = piece.index - start
+            seen[at], time[at], timed[at] = True, piece.time.values, piece.time.mask
+        if seen.all():
+            return np.arange(start, end), Column(time, timed)
+        places = np.flatnonzero(seen)
+        return places + start, Column(time[places], timed[places])
+    index, first = np.unique(np.concatenate([piece.index for piece in pieces]), return_index=True)
+    return index, joined_columns([piece.time for piece in pieces]).take(first)

@@ -1,0 +1,82 @@
+"""Records of a counting clock that say nothing new: a clock that is estimated without them is the same.
+
+A long log has millions of records, each within the tolerance of the one before. Kept are those that
+:func:`groundstation.integrity.counting.estimate_counting_clock` has to see: without a time or frozen, their neighbours,
+the ends of runs and as much of each run as makes it a long one, late ones, and of all others those at which time enters
+or leaves a stretch of half the tolerance, so that runs hold together.
+"""
+
+import numpy as np
+
+from groundstation.base.records import BoolArray, Int64Array
+
+
+class Thinner:
+    """Thins the windows of a log, which come in its order.
+
+    Parameters
+    ----------
+    tolerance_ns, run_records : int
+        As the clock's settings have them.
+    """
+
+    def __init__(self, tolerance_ns: int, run_records: int) -> None:
+        self._tolerance_ns, self._run_records = tolerance_ns, run_records
+        self._latest_ns: int | None = None
+        self._steps: list[tuple[Int64Array, Int64Array]] = []
+
+    def kept(self, time_ns: Int64Array, usable: BoolArray) -> BoolArray:
+        """Which records of a window are needed, shape (n,); ``usable`` are those with a time that is not frozen."""
+        places = np.flatnonzero(usable)
+        if not len(places):
+            return np.ones(len(usable), dtype=bool)
+        time = time_ns[places]
+        steps = np.diff(time)
+        kept = self._of_runs(time, steps)
+        stretch = time // (self._tolerance_ns // 2)
+        enters = stretch[1:] != stretch[:-1]
+        kept[1:] |= enters
+        kept[:-1] |= enters
+        beside = np.searchsorted(places, np.flatnonzero(~usable))
+        kept[np.minimum(beside, len(places) - 1)] = kept[np.maximum(beside - 1, 0)] = True
+        self._steps.append(np.unique(steps[steps > 0], return_counts=True))
+        wanted = ~usable
+        wanted[places] = kept
+        return wanted
+
+    @property
+    def period_ns(self) -> int:
+        """Median of the steps ahead between usable records of the windows that were thinned, 0 of none."""
+        steps, counts = (np.concatenate(parts) for parts in zip(*self._steps, strict=True))
+        order = np.argsort(steps, kind="stable")
+        reached = np.cumsum(counts[order])
+        if not len(reached):
+            return 0
+        middle = np.searchsorted(reached, ((reached[-1] - 1) // 2, reached[-1] // 2), side="right")
+        return int(steps[order[middle]].sum()) // 2
+
+    def _of_runs(self, time: Int64Array, steps: Int64Array) -> BoolArray:
+        """Beginnings of runs, both ends of the window, and what is late."""
+        starts = np.concatenate(([0], np.flatnonzero(np.abs(steps) > self._tolerance_ns) + 1))
+        lengths = np.diff(starts, append=len(time))
+        kept: BoolArray = np.arange(len(time)) - np.repeat(starts, lengths) < self._run_records
+        kept[-self._run_records :] = True
+        seen = np.where(np.repeat(self._ahead(time, starts, lengths), lengths), time.min(), time)
+        if self._latest_ns is not None:
+            seen[0] = max(int(seen[0]), self._latest_ns)
+        latest = np.maximum.accumulate(seen)
+        self._latest_ns = int(latest[-1])
+        kept |= latest - time > self._tolerance_ns
+        return kept
+
+    def _ahead(self, time: Int64Array, starts: Int64Array, lengths: Int64Array) -> BoolArray:
+        """Short runs that are later than the long ones around them allow: they make nothing late."""
+        long = np.flatnonzero(lengths >= self._run_records)
+        after = np.searchsorted(long, np.arange(len(starts)))
+        is_between = (after > 0) & (after < len(long)) & (lengths < self._run_records)
+        if not is_between.any():
+            return is_between
+        last = time[starts + lengths - 1]
+        before_ns, after_ns = last[long[np.maximum(after - 1, 0)]], time[starts][long[np.minimum(after, len(long) - 1)]]
+        ahead: BoolArray = is_between & (last > np.maximum(before_ns, after_ns) + self._tolerance_ns)
+        return ahead
