@@ -7,9 +7,9 @@ import pytest
 
 from groundstation.base.angles import FloatArray, direction_of, wrap_180
 from groundstation.simulation.flight import scenario_truth, simulate
+from groundstation.simulation.flight_errors import EARTH_RADIUS_M, SCHULER_RADPS, schuler_error
 from groundstation.simulation.readings import quantised
 from groundstation.simulation.scenario import InsSettings, load_scenario
-from groundstation.simulation.sensors import EARTH_RADIUS_M, SCHULER_RADPS, schuler_error
 from groundstation.tables.table import Flight
 from tests.simulated_flights import FLIGHT_LEGS, TAXI_LEGS, quiet, scenario
 

@@ -9,9 +9,11 @@ from typing import ClassVar, TypeAlias
 
 import numpy as np
 
+from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.errors import SettingsError
+from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.records import BoolArray, Column, Int64Array
-from groundstation.base.toml_settings import required_number
+from groundstation.base.toml_settings import number, required_number
 from groundstation.base.units import NS_PER_S
 from groundstation.tables.table import Flight, Table
 
@@ -75,7 +77,57 @@ class MissingChannel:
     field: str = ""
 
 
-Fault: TypeAlias = Dropout | Duplicate | BackwardStep | Stuck | NotANumber | MissingChannel
+@dataclass(frozen=True)
+class Frozen:
+    """A device repeats its last sample, all numbers of it, while the aircraft moves on."""
+
+    kind: ClassVar[str] = "frozen"
+    topic: str
+    from_s: float = required_number(0.0)
+    to_s: float = required_number(0.0)
+
+
+@dataclass(frozen=True)
+class Jump:
+    """The position that a device gives is displaced for a while."""
+
+    kind: ClassVar[str] = "jump"
+    topic: str
+    from_s: float = required_number(0.0)
+    to_s: float = required_number(0.0)
+    north_m: float = number(0.0, -1e6, 1e6)
+    east_m: float = number(0.0, -1e6, 1e6)
+
+
+@dataclass(frozen=True)
+class Reset:
+    """The errors of a navigator step at a log time and stay so: position, and velocity with the position it adds up to.
+
+    The Schuler oscillation that such a step starts is left out: 4 % of the added position in 10 min.
+    """
+
+    kind: ClassVar[str] = "reset"
+    topic: str
+    at_s: float = required_number(0.0)
+    north_m: float = number(0.0, -1e6, 1e6)
+    east_m: float = number(0.0, -1e6, 1e6)
+    north_mps: float = number(0.0, -1e3, 1e3)
+    east_mps: float = number(0.0, -1e3, 1e3)
+
+
+@dataclass(frozen=True)
+class Jitter:
+    """The recorder stamps a topic's samples up to ``spread_s`` early or late, evenly distributed: rows of their own."""
+
+    kind: ClassVar[str] = "jitter"
+    topic: str
+    spread_s: float = required_number(0.0, 10.0)
+    seed: int = number(1, 0)
+
+
+Fault: TypeAlias = (
+    Dropout | Duplicate | BackwardStep | Stuck | NotANumber | MissingChannel | Frozen | Jump | Reset | Jitter
+)
 
 
 def apply_faults(flight: Flight, faults: Iterable[Fault]) -> Flight:
@@ -99,6 +151,12 @@ def apply_faults(flight: Flight, faults: Iterable[Fault]) -> Flight:
                 flight = _step_back(flight, fault)
             case Stuck() | NotANumber():
                 flight = _spoil(flight, fault)
+            case Frozen():
+                flight = _freeze(flight, fault)
+            case Jump() | Reset():
+                flight = _displace(flight, fault)
+            case Jitter():
+                flight = _jitter(flight, fault)
             case MissingChannel():
                 flight = _remove(flight, fault)
     return _renumbered(flight)
@@ -125,6 +183,18 @@ def describe(fault: Fault) -> str:
             return f"{fault.topic}.{fault.field} is NaN from {fault.from_s:g} to {fault.to_s:g} s"
         case MissingChannel():
             return f"{'.'.join(filter(None, (fault.topic, fault.field)))} was not recorded"
+        case Frozen():
+            return f"{fault.topic} repeats one sample from {fault.from_s:g} to {fault.to_s:g} s"
+        case Jump():
+            place = f"{fault.north_m:g} m north, {fault.east_m:g} m east"
+            return f"{fault.topic} position off by {place} from {fault.from_s:g} to {fault.to_s:g} s"
+        case Reset():
+            steps = (
+                f"{fault.north_m:g} m north, {fault.east_m:g} m east, {fault.north_mps:g} and {fault.east_mps:g} m/s"
+            )
+            return f"{fault.topic} errors step by {steps} at {fault.at_s:g} s"
+        case Jitter():
+            return f"times of {fault.topic} scatter by up to {fault.spread_s:g} s"
 
 
 def _inside(flight: Flight, table: Table, from_s: float, to_s: float) -> BoolArray:
@@ -184,6 +254,67 @@ def _spoil(flight: Flight, fault: Stuck | NotANumber) -> Flight:
         values[inside] = values[np.flatnonzero(inside)[0]]
     columns = dict(table.columns) | {fault.field: Column(values, column.present)}
     return replace(flight, tables=dict(flight.tables) | {fault.topic: replace(table, columns=columns)})
+
+
+def _freeze(flight: Flight, fault: Frozen) -> Flight:
+    table = _table_of(flight, fault, fault.topic)
+    inside = _inside(flight, table, fault.from_s, fault.to_s)
+    row = np.arange(len(table))
+    if inside.any():
+        row[inside] = np.flatnonzero(inside)[0]
+    columns = {name: column.take(row) for name, column in table.columns.items()}
+    return replace(flight, tables=dict(flight.tables) | {fault.topic: replace(table, columns=columns)})
+
+
+def _displace(flight: Flight, fault: Jump | Reset) -> Flight:
+    table = _table_of(flight, fault, fault.topic, "latitude_deg")
+    _table_of(flight, fault, fault.topic, "longitude_deg")
+    time_s = (table.time_ns - flight.start_ns) / NS_PER_S
+    added: dict[str, FloatArray] = {}
+    if isinstance(fault, Jump):
+        inside = _inside(flight, table, fault.from_s, fault.to_s)
+        north, east = inside * fault.north_m, inside * fault.east_m
+    else:
+        since, after = np.maximum(time_s - fault.at_s, 0.0), time_s >= fault.at_s
+        north, east = after * fault.north_m + since * fault.north_mps, after * fault.east_m + since * fault.east_mps
+        for name, step in (("velocity_north_mps", fault.north_mps), ("velocity_east_mps", fault.east_mps)):
+            if step:
+                _table_of(flight, fault, fault.topic, name)
+                added[name] = np.asarray(after * step, dtype=np.float64)
+    latitude, altitude = table.values("latitude_deg"), np.zeros(len(table))
+    if "altitude_ellipsoid_m" in table:
+        altitude = table.values("altitude_ellipsoid_m")
+    meridian, prime_vertical = curvature_radii_m(latitude)
+    parallel = (prime_vertical + altitude) * np.cos(np.deg2rad(latitude))
+    added["latitude_deg"] = np.asarray(np.rad2deg(north / (meridian + altitude)))
+    added["longitude_deg"] = np.asarray(np.rad2deg(east / parallel))
+    columns = dict(table.columns)
+    for name, change in added.items():
+        moved = columns[name].values + change
+        columns[name] = Column(wrap_180(moved) if name == "longitude_deg" else moved, columns[name].present)
+    return replace(flight, tables=dict(flight.tables) | {fault.topic: replace(table, columns=columns)})
+
+
+def _jitter(flight: Flight, fault: Jitter) -> Flight:
+    """Move the recorder's times of one topic; its samples leave the rows they shared with other topics."""
+    table = _table_of(flight, fault, fault.topic)
+    closest_s = float(np.min(np.diff(table.time_ns), initial=10**18)) / NS_PER_S
+    if 2.0 * fault.spread_s >= closest_s:
+        found, expected = f"{fault.spread_s:g} s", f"less than half of the {closest_s:g} s between two samples"
+        raise SettingsError("fault jitter, key spread_s", found, expected)
+    spread_ns = round(fault.spread_s * NS_PER_S)
+    shift = np.random.default_rng(fault.seed).integers(-spread_ns, spread_ns, len(table), endpoint=True)
+    device = Column(np.maximum(table.device_time_ns.values + shift, 0), table.device_time_ns.present)
+    tables = dict(flight.tables) | {fault.topic: replace(table, device_time_ns=device)}
+    keys = []
+    for topic, item in tables.items():
+        moves = topic == fault.topic
+        order = item.time_ns + (shift if moves else 0)
+        keys.append(np.stack([order, item.record_index, np.full(len(item), moves)], axis=1))
+    _, place = np.unique(np.concatenate(keys), axis=0, return_inverse=True)
+    parts = np.split(place.ravel().astype(np.int64), np.cumsum([len(key) for key in keys])[:-1])
+    renumbered = zip(tables.items(), parts, strict=True)
+    return replace(flight, tables={topic: replace(item, record_index=part) for (topic, item), part in renumbered})
 
 
 def _remove(flight: Flight, fault: MissingChannel) -> Flight:

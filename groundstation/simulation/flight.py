@@ -7,10 +7,12 @@ from types import MappingProxyType
 import numpy as np
 
 from groundstation.base.records import Column, Int64Array
+from groundstation.base.units import NS_PER_S
 from groundstation.simulation.faults import apply_faults
+from groundstation.simulation.flight_errors import flight_errors
 from groundstation.simulation.magnetometer import magnetometer_readings
 from groundstation.simulation.onboard import onboard_readings
-from groundstation.simulation.readings import Readings, generator
+from groundstation.simulation.readings import Readings, every, generator
 from groundstation.simulation.scenario import Scenario
 from groundstation.simulation.sensors import (
     air_readings,
@@ -92,17 +94,24 @@ def scenario_truth(simulated: Simulated) -> dict[str, float]:
     """What an analysis of the flight should find: true values by name, degrees and metres.
 
     ``heading_error_deg`` is INS heading minus nose at log second 0 (azimuth error + mounting); ``taxi_difference_deg``
-    what heading minus track shows there on straights (sideslip added); ``drift_deg_per_h`` its drift.
+    what heading minus track shows there on straights (sideslip added); ``drift_deg_per_h`` its drift, the mean one
+    where the errors are those of an INS class.
     """
     scenario = simulated.scenario
     ins, gnss = scenario.ins, scenario.gnss
+    azimuth_deg, drift_dph = ins.azimuth_error_deg, ins.azimuth_drift_dph
+    if ins.error_model == "full":
+        motion = simulated.trajectory.at(every(simulated.trajectory, ins.rate_hz))
+        heading = flight_errors(motion, ins, scenario.seed).heading_deg
+        azimuth_deg = float(heading[0]) - ins.boresight_deg
+        drift_dph = float(heading[-1] - heading[0]) / max(float(np.ptp(motion.time_ns)) / NS_PER_S / 3600.0, 1e-9)
     return {
-        "azimuth_error_deg": ins.azimuth_error_deg,
+        "azimuth_error_deg": azimuth_deg,
         "boresight_deg": ins.boresight_deg,
         "sideslip_deg": scenario.ground.sideslip_deg,
-        "heading_error_deg": ins.azimuth_error_deg + ins.boresight_deg,
-        "taxi_difference_deg": ins.azimuth_error_deg + ins.boresight_deg + scenario.ground.sideslip_deg,
-        "drift_deg_per_h": ins.azimuth_drift_dph,
+        "heading_error_deg": azimuth_deg + ins.boresight_deg,
+        "taxi_difference_deg": azimuth_deg + ins.boresight_deg + scenario.ground.sideslip_deg,
+        "drift_deg_per_h": drift_dph,
         "parking_heading_deg": scenario.parking_heading_deg,
         "reference_heading_deg": scenario.reference_heading_deg,
         "antenna_forward_m": gnss.antenna_forward_m,
@@ -113,7 +122,7 @@ def scenario_truth(simulated: Simulated) -> dict[str, float]:
 
 def _all_readings(scenario: Scenario, trajectory: Trajectory) -> list[Readings]:
     seed = scenario.seed
-    ins = ins_readings(trajectory, scenario.ins, generator(seed, "ins"))
+    ins = ins_readings(trajectory, scenario.ins, generator(seed, "ins"), seed)
     gnss = gnss_readings(trajectory, scenario.gnss, generator(seed, "gnss"))
     readings = [
         ins.only(scenario.ins.fields),

@@ -4,12 +4,13 @@ On the ground the state is ground speed along the track; in the air it is airspe
 velocity, so that a turn at constant bank is one in the air mass and the wind adds to the ground velocity.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, TypeAlias
 
 import numpy as np
 
 from groundstation.base.errors import SettingsError
+from groundstation.base.geodesy import SEMI_MAJOR_M, curvature_radii_m
 from groundstation.base.toml_settings import number, required_number
 from groundstation.base.units import MPS2_PER_G
 
@@ -19,6 +20,7 @@ AIR_ACCELERATION_MPS2 = 1.0
 GROUND_TURN_RAMP_S = 2.0
 BANK_RAMP_S = 5.0
 CLIMB_RAMP_S = 8.0
+GREAT_CIRCLE_PIECE_S = 60.0  # the turn rate of a great circle is followed linearly within: 1e-4 deg
 
 
 @dataclass(frozen=True)
@@ -60,12 +62,16 @@ class TakeOff:
 
 @dataclass(frozen=True)
 class Fly:
-    """Fly straight for a time; airspeed and climb rate change smoothly at the start (0 keeps level)."""
+    """Fly straight for a time; airspeed and climb rate change smoothly at the start (0 keeps level).
+
+    Straight is along the rhumb line, or with ``great_circle`` along the great circle that starts with the heading.
+    """
 
     kind: ClassVar[str] = "fly"
     duration_s: float = required_number(0.0)
     airspeed_mps: float = required_number(20.0, 400.0)
     climb_rate_mps: float = number(0.0, -40.0, 40.0)
+    great_circle: bool = False
 
 
 @dataclass(frozen=True)
@@ -117,7 +123,10 @@ class Piece:
 
 @dataclass(frozen=True)
 class MotionState:
-    """Where the aircraft stands between two pieces: speed and direction over the ground, or through the air."""
+    """Where the aircraft stands between two pieces: speed and direction over the ground, or through the air.
+
+    The latitude is good to some kilometres: it serves the turn rate of great circles alone.
+    """
 
     step_s: float
     speed_mps: float
@@ -125,6 +134,30 @@ class MotionState:
     altitude_m: float
     climb_rate_mps: float = 0.0
     airborne: bool = False
+    latitude_deg: float = 0.0
+    wind_mps: tuple[float, float] = (0.0, 0.0)
+
+    def after(self, piece: Piece, turn_rate_dps: float) -> "MotionState":
+        """The state at the end of a piece that starts with a turn rate."""
+        time, rate = piece.duration_s, turn_rate_dps
+        mean_mps = 0.5 * (self.speed_mps + piece.speed_mps)
+        middle_rad = np.deg2rad(self.direction_deg + 0.125 * time * (3.0 * rate + piece.turn_rate_dps))
+        north_mps = mean_mps * float(np.cos(middle_rad)) + (self.wind_mps[0] if self.airborne else 0.0)
+        return replace(
+            self,
+            speed_mps=piece.speed_mps,
+            direction_deg=self.direction_deg + 0.5 * time * (rate + piece.turn_rate_dps),
+            altitude_m=self.altitude_m + 0.5 * time * (self.climb_rate_mps + piece.climb_rate_mps),
+            climb_rate_mps=piece.climb_rate_mps,
+            latitude_deg=self.latitude_deg + float(np.rad2deg(north_mps * time / SEMI_MAJOR_M)),
+        )
+
+    def great_circle_rate_dps(self) -> float:
+        """Turn rate that keeps to the great circle: east velocity x tan(latitude) / (N + h)."""
+        _meridian, normal = curvature_radii_m(self.latitude_deg)
+        east_mps = self.speed_mps * np.sin(np.deg2rad(self.direction_deg)) + self.wind_mps[1]
+        radius_m = float(normal) + self.altitude_m
+        return float(np.rad2deg(east_mps * np.tan(np.deg2rad(self.latitude_deg)) / radius_m))
 
     def whole_steps(self, duration_s: float) -> float:
         """Round a duration up to whole steps."""
@@ -156,6 +189,8 @@ def pieces_of(leg: Leg, state: MotionState, place: str) -> tuple[Piece, ...]:
         case Fly():
             ramp_s = state.whole_steps(_air_ramp_s(state, leg.airspeed_mps))
             hold_s = state.whole_steps(max(leg.duration_s - ramp_s, 0.0))
+            if leg.great_circle:
+                return _great_circle(leg, ramp_s, hold_s, state)
             return tuple(
                 Piece(duration, leg.airspeed_mps, 0.0, leg.climb_rate_mps, True) for duration in (ramp_s, hold_s)
             )
@@ -196,6 +231,18 @@ def _turn(angle_deg: float, rate_dps: float, ramp_s: float, speed_mps: float, st
     rate = angle_deg / (hold_s + ramp_s)  # each ramp contributes half its length at full rate
     rates_and_times = ((rate, ramp_s), (rate, hold_s), (0.0, ramp_s))
     return tuple(Piece(time, speed_mps, rate, 0.0, state.airborne) for rate, time in rates_and_times)
+
+
+def _great_circle(leg: Fly, ramp_s: float, hold_s: float, state: MotionState) -> tuple[Piece, ...]:
+    """Change of speed, then short pieces that take up the turn rate of the great circle, then none again."""
+    pieces, rate = [Piece(ramp_s, leg.airspeed_mps, 0.0, leg.climb_rate_mps, True)], 0.0
+    state = state.after(pieces[0], rate)
+    length_s = state.whole_steps(GREAT_CIRCLE_PIECE_S)
+    while hold_s > 2.0 * length_s:
+        piece = Piece(length_s, leg.airspeed_mps, state.great_circle_rate_dps(), leg.climb_rate_mps, True)
+        state, rate, hold_s = state.after(piece, rate), piece.turn_rate_dps, hold_s - length_s
+        pieces.append(piece)
+    return (*pieces, Piece(state.whole_steps(hold_s), leg.airspeed_mps, 0.0, leg.climb_rate_mps, True))
 
 
 def _take_off(leg: TakeOff, state: MotionState) -> tuple[Piece, ...]:

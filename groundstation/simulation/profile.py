@@ -78,7 +78,14 @@ def plan(scenario: Scenario) -> Profile:
         place = f"{scenario.name}, key internal_rate_hz"
         raise SettingsError(place, f"{scenario.internal_rate_hz:g} Hz", "a whole number of nanoseconds a step")
     heading_deg = scenario.parking_heading_deg - scenario.ground.sideslip_deg
-    state = MotionState(step_ns / NS_PER_S, 0.0, heading_deg, scenario.airport.altitude_ellipsoid_m)
+    state = MotionState(
+        step_s=step_ns / NS_PER_S,
+        speed_mps=0.0,
+        direction_deg=heading_deg,
+        altitude_m=scenario.airport.altitude_ellipsoid_m,
+        latitude_deg=scenario.airport.latitude_deg,
+        wind_mps=(scenario.wind.north_mps, scenario.wind.east_mps),
+    )
     planned: list[tuple[MotionState, Piece, float]] = []
     for number, leg in enumerate(scenario.legs):
         place = f"{scenario.name}, key legs[{number}]"
@@ -95,14 +102,7 @@ def _fly(
     """Append pieces with the state and turn rate at their start; every leg ends with a turn rate of zero."""
     for piece in pieces:
         planned.append((state, piece, turn_rate_dps))
-        time = piece.duration_s
-        state = replace(
-            state,
-            speed_mps=piece.speed_mps,
-            direction_deg=state.direction_deg + 0.5 * time * (turn_rate_dps + piece.turn_rate_dps),
-            altitude_m=state.altitude_m + 0.5 * time * (state.climb_rate_mps + piece.climb_rate_mps),
-            climb_rate_mps=piece.climb_rate_mps,
-        )
+        state = state.after(piece, turn_rate_dps)
         turn_rate_dps = piece.turn_rate_dps
     return state
 

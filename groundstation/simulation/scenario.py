@@ -13,6 +13,7 @@ from groundstation.base.signals import TOPICS, field_of
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.toml_settings import number, required_number, settings_from
 from groundstation.simulation.faults import Fault
+from groundstation.simulation.ins_class import ins_class_names
 from groundstation.simulation.legs import Leg
 
 Vector = tuple[float, float, float]
@@ -70,9 +71,14 @@ class InsSettings:
 
     ``boresight_deg`` is a mounting error: the unit's forward axis to the right of the aircraft's. ``tilt_arcsec`` is
     positive where it makes the velocity error fall (design of system 2), ``drift_dph`` likewise.
+    ``error_model`` "schuler" is the closed solution of the figures given here; "full" draws all errors from
+    ``ins_class`` and propagates them along the flight: azimuth, velocity, tilt, drift and position given here are then
+    not read, mounting and noise are.
     """
 
     rate_hz: float = number(50.0, 0.01, 1000.0)
+    error_model: Literal["schuler", "full"] = "schuler"
+    ins_class: str = "navigation"
     azimuth_error_deg: float = number(1.0, -180.0, 180.0)
     azimuth_drift_dph: float = number(0.05, -600.0, 600.0)
     boresight_deg: float = number(0.0, -10.0, 10.0)
@@ -329,6 +335,9 @@ def scenario_from_table(table: dict[str, Any], name: str, where: str) -> Scenari
             if field_of(topic, name) is None:
                 names = ", ".join(item.name for item in TOPICS[topic])
                 raise SettingsError(f"{where}, key {topic}.fields", repr(name), f"some of {names}")
+    if scenario.ins.error_model == "full" and scenario.ins.ins_class not in ins_class_names():
+        found, expected = repr(scenario.ins.ins_class), f"one of {', '.join(ins_class_names())}"
+        raise SettingsError(f"{where}, key ins.ins_class", found, expected)
     _check_intervals(scenario.gnss.outages, f"{where}, key gnss.outages")
     _check_intervals(scenario.gnss.low_integrity, f"{where}, key gnss.low_integrity")
     _check_intervals([fault for fault in scenario.faults if hasattr(fault, "to_s")], f"{where}, key faults")

@@ -9,7 +9,8 @@ import numpy as np
 from groundstation.base.angles import FloatArray, direction_of, wrap_180
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.records import BoolArray, Column, Int64Array
-from groundstation.base.units import MPS2_PER_G, NS_PER_S
+from groundstation.base.units import NS_PER_S
+from groundstation.simulation.flight_errors import flight_errors
 from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.readings import Readings, every, quantised, quantised_heading
 from groundstation.simulation.scenario import (
@@ -25,8 +26,6 @@ from groundstation.simulation.scenario import (
 )
 from groundstation.simulation.trajectory import Trajectory
 
-EARTH_RADIUS_M = 6_371_009.0  # mean radius (IUGG), which gives the Schuler period its 84.4 min
-SCHULER_RADPS = float(np.sqrt(MPS2_PER_G / EARTH_RADIUS_M))
 TRUTH_RESOLUTION = {"deg": 1e-9, "heading": 1e-6, "mps": 1e-6, "m": 1e-4, "dps": 1e-6}
 
 
@@ -39,25 +38,26 @@ def truth_readings(trajectory: Trajectory, settings: TruthSettings) -> Readings:
     )
 
 
-def ins_readings(trajectory: Trajectory, settings: InsSettings, rng: np.random.Generator) -> Readings:
-    """INS at the reference point: azimuth error + drift + noise, Schuler errors in the horizontal channels."""
+def ins_readings(trajectory: Trajectory, settings: InsSettings, rng: np.random.Generator, seed: int = 0) -> Readings:
+    """INS at the reference point: errors of its error model (``seed`` draws those of a class) + noise of its output."""
     motion = trajectory.at(every(trajectory, settings.rate_hz))
     n = len(motion)
     noise = rng.standard_normal((7, n))
     time_s = motion.time_ns / NS_PER_S
-    north, east = (schuler_error(time_s, settings, channel) for channel in (0, 1))
+    errors = flight_errors(motion, settings, seed)
+    (north_m, east_m), (north_mps, east_mps) = errors.position_m, errors.velocity_mps
     meridian, prime_vertical = curvature_radii_m(motion.latitude_deg)
     east_radius = (prime_vertical + motion.altitude_m) * np.cos(np.deg2rad(motion.latitude_deg))
     values = {name: getattr(motion, name) for name in Trajectory.__dataclass_fields__} | {
-        "latitude_deg": motion.latitude_deg + np.rad2deg(north[0] / (meridian + motion.altitude_m)),
-        "longitude_deg": wrap_180(motion.longitude_deg + np.rad2deg(east[0] / east_radius)),
-        "velocity_north_mps": motion.velocity_north_mps + north[1] + settings.velocity_noise_mps * noise[0],
-        "velocity_east_mps": motion.velocity_east_mps + east[1] + settings.velocity_noise_mps * noise[1],
+        "latitude_deg": motion.latitude_deg + np.rad2deg(north_m / (meridian + motion.altitude_m)),
+        "longitude_deg": wrap_180(motion.longitude_deg + np.rad2deg(east_m / east_radius)),
+        "velocity_north_mps": motion.velocity_north_mps + north_mps + settings.velocity_noise_mps * noise[0],
+        "velocity_east_mps": motion.velocity_east_mps + east_mps + settings.velocity_noise_mps * noise[1],
         "velocity_down_mps": motion.velocity_down_mps + settings.velocity_noise_mps * noise[2],
-        "roll_deg": motion.roll_deg + settings.attitude_noise_deg * noise[3],
-        "pitch_deg": motion.pitch_deg + settings.attitude_noise_deg * noise[4],
+        "roll_deg": motion.roll_deg + errors.roll_deg + settings.attitude_noise_deg * noise[3],
+        "pitch_deg": motion.pitch_deg + errors.pitch_deg + settings.attitude_noise_deg * noise[4],
     }
-    heading = motion.heading_deg + heading_error_deg(time_s, settings) + settings.heading_noise_deg * noise[5]
+    heading = motion.heading_deg + errors.heading_deg + settings.heading_noise_deg * noise[5]
     readings = _motion_readings(
         "ins",
         Trajectory(**values),
@@ -75,34 +75,6 @@ def ins_readings(trajectory: Trajectory, settings: InsSettings, rng: np.random.G
         "valid": Column(aligned),
     }
     return Readings("ins", readings.time_ns, columns, readings.resolution)
-
-
-def heading_error_deg(time_s: FloatArray, settings: InsSettings) -> FloatArray:
-    """INS heading minus nose heading without noise: azimuth error, its drift, mounting. Degrees, shape as the time."""
-    drift = settings.azimuth_drift_dph / 3600.0
-    return np.asarray(settings.azimuth_error_deg + settings.boresight_deg + drift * time_s)
-
-
-def schuler_error(time_s: FloatArray, settings: InsSettings, channel: int) -> tuple[FloatArray, FloatArray]:
-    """Position (m) and velocity (m/s) error of one horizontal channel (0 north, 1 east) under a constant drift.
-
-    Closed solution of dp' = dv, dv' = -g phi, phi' = dv / R + drift, the model of system 2 without its slow states.
-    Ignored: coupling of the channels, curvature of the path. Source: Titterton and Weston, Strapdown Inertial
-    Navigation Technology, 2nd ed. 2004, section 12.3.
-    """
-    speed, rate, radius = settings.velocity_error_mps[channel], SCHULER_RADPS, EARTH_RADIUS_M
-    tilt_rad = np.deg2rad(settings.tilt_arcsec[channel] / 3600.0)
-    drift_radps = np.deg2rad(settings.drift_dph[channel] / 3600.0)
-    phase = rate * time_s
-    swing = 1.0 - np.cos(phase)
-    velocity = speed * np.cos(phase) - radius * rate * tilt_rad * np.sin(phase) - radius * drift_radps * swing
-    position = (
-        settings.position_error_m[channel]
-        + speed * np.sin(phase) / rate
-        - radius * tilt_rad * swing
-        - radius * drift_radps * (time_s - np.sin(phase) / rate)
-    )
-    return np.asarray(position), np.asarray(velocity)
 
 
 def gnss_readings(trajectory: Trajectory, settings: GnssSettings, rng: np.random.Generator) -> Readings:
