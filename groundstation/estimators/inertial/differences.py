@@ -60,24 +60,27 @@ class Differences:
 
 
 def choose_pair(flight: Flight) -> tuple[str, str]:
-    """The INS and GNSS topics to compare: of each kind the first that has positions, else velocities.
+    """The INS and GNSS topics to compare: of each kind the first that has positions.
 
     Raises
     ------
     NotAssessableError
-        When one of them is missing, or they have nothing in common.
+        When one of them is missing.
     """
-    for names in (POSITION_FIELDS, VELOCITY_FIELDS):
-        found = [_first_with(flight, kind, names) for kind in ("ins", "gnss")]
-        if all(found):
-            return str(found[0]), str(found[1])
+    found: dict[str, str] = {}
     for kind, title in (("ins", "INS"), ("gnss", "GNSS")):
-        if not any(_first_with(flight, kind, names) for names in (POSITION_FIELDS, VELOCITY_FIELDS)):
-            raise NotAssessableError("inertial", f"no {title} position or velocity in the log")
-    raise NotAssessableError("inertial", "INS and GNSS have neither position nor velocity in common")
+        topic = next(
+            (name for name in topics_of_kind(kind, flight.topics()) if flight[name].has(*POSITION_FIELDS)), None
+        )
+        if topic is None:
+            raise NotAssessableError("inertial", f"no {title} position in the log")
+        found[kind] = topic
+    return found["ins"], found["gnss"]
 
 
-def differences(flight: Flight, *, settings: InertialSettings) -> Differences:
+def differences(
+    flight: Flight, *, settings: InertialSettings, excluded_s: tuple[tuple[float, float], ...] = ()
+) -> Differences:
     """Compare INS and GNSS of a flight.
 
     GNSS samples are averaged over ``epoch_interval_s`` after the INS has been interpolated to each of them; epochs with
@@ -97,6 +100,10 @@ def differences(flight: Flight, *, settings: InertialSettings) -> Differences:
     findings += resets.findings
     motion = join(ins, gnss.time_ns, (*POSITION_FIELDS, *VELOCITY_FIELDS), largest_gap_s=settings.ins_gap_max_s)
     position, velocity = _position_difference(motion, gnss, _altitude(gnss)), _velocity_difference(motion, gnss)
+    gnss_s = flight.seconds(gnss.time_ns)
+    for start_s, end_s in excluded_s:
+        position[(gnss_s >= start_s) & (gnss_s <= end_s)] = np.nan
+        velocity[(gnss_s >= start_s) & (gnss_s <= end_s)] = np.nan
     bad, found = screening.unbelieved(flight, gnss, motion, position, resets.time_ns, settings)
     findings += found
     position[bad], velocity[bad] = np.nan, np.nan
@@ -148,10 +155,6 @@ def drag_per_s(latitude_deg: FloatArray, altitude_m: FloatArray, velocity_mps: F
     out[:, 1, 0] = slope * velocity_mps[:, 1]
     out[:, 1, 1] = -slope * velocity_mps[:, 0]
     return np.nan_to_num(out)
-
-
-def _first_with(flight: Flight, kind: str, names: tuple[str, ...]) -> str | None:
-    return next((topic for topic in topics_of_kind(kind, flight.topics()) if flight[topic].has(*names)), None)
 
 
 def _navigating(ins: Table) -> Table:

@@ -12,6 +12,7 @@ from groundstation.estimators.inertial.noise import InsNoise
 TIME_RESOLUTION_S = 1e-4  # intervals that agree to this share one transition
 MOST_TRANSITIONS = 4096  # distinct intervals kept exactly; jittered clocks are rounded more coarsely beyond
 STANDARD_GATE = 25.0  # squared sigmas
+RESET_POSITION_M, RESET_VELOCITY_MPS = 2e4, 20.0  # what a reset of the INS may change; tilt and drift are kept
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,22 @@ class Steps:
 
 
 @dataclass(frozen=True)
+class Initial:
+    """States (6, c) and covariances (g, 6, 6) before the first epoch, g = 1 where the channels share one."""
+
+    x: FloatArray
+    P: FloatArray
+
+    def of(self, group: list[int]) -> FloatArray:
+        """States of some channels."""
+        return np.ascontiguousarray(self.x[:, group])
+
+    def covariance(self, channel: int) -> FloatArray:
+        """Covariance of a channel."""
+        return np.ascontiguousarray(self.P[min(channel, len(self.P) - 1)])
+
+
+@dataclass(frozen=True)
 class FilterRun:
     """The filter's history. n epochs, c channels; measurement axis: position, velocity.
 
@@ -125,7 +142,14 @@ def steps_between(time_s: FloatArray, model: ChannelModel, noise: InsNoise) -> S
     )
 
 
-def run_filter(epochs: Epochs, model: ChannelModel, noise: InsNoise, *, gate: float = STANDARD_GATE) -> FilterRun:
+def run_filter(
+    epochs: Epochs,
+    model: ChannelModel,
+    noise: InsNoise,
+    *,
+    gate: float = STANDARD_GATE,
+    initial: Initial | None = None,
+) -> FilterRun:
     """Estimate the errors of both channels; where GNSS is absent the states are forecast.
 
     Parameters
@@ -135,6 +159,8 @@ def run_filter(epochs: Epochs, model: ChannelModel, noise: InsNoise, *, gate: fl
     noise : InsNoise
     gate : float
         Innovations with a larger squared ratio to their variance are rejected and counted.
+    initial : Initial, optional
+        Where an earlier run left off; default: nothing is known but the class.
 
     Returns
     -------
@@ -148,7 +174,11 @@ def run_filter(epochs: Epochs, model: ChannelModel, noise: InsNoise, *, gate: fl
     together = bool((np.isfinite(z) == np.isfinite(z[:, :, :1])).all())
     groups = [list(range(channels))] if together else [[channel] for channel in range(channels)]
     drag = epochs.drag_per_s * np.diff(epochs.time_s, prepend=epochs.time_s[:1])[:, None, None]
-    parts = [_run_group(z[:, :, group], drag, epochs, steps, noise, gate) for group in groups]
+    first = initial or Initial(np.zeros((SIZE, channels)), np.diag(noise.initial_variances())[None])
+    parts = [
+        _run_group(z[:, :, group], drag, epochs, steps, noise, gate, first.of(group), first.covariance(group[0]))
+        for group in groups
+    ]
     x, P, gain, innovation, variance, used = (list(part) for part in zip(*parts, strict=True))
     spread = [np.repeat(item[:, :, None], len(group), axis=2) for item, group in zip(variance, groups, strict=True)]
     marks = [np.repeat(item[:, :, None], len(group), axis=2) for item, group in zip(used, groups, strict=True)]
@@ -167,16 +197,22 @@ def run_filter(epochs: Epochs, model: ChannelModel, noise: InsNoise, *, gate: fl
 
 
 def _run_group(
-    z: FloatArray, drag: FloatArray, epochs: Epochs, steps: Steps, noise: InsNoise, gate: float
+    z: FloatArray,
+    drag: FloatArray,
+    epochs: Epochs,
+    steps: Steps,
+    noise: InsNoise,
+    gate: float,
+    x0: FloatArray,
+    P0: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, NDArray[np.int8]]:
     from groundstation.estimators.inertial import kernels
 
     n, _, channels = z.shape
     x, P, K = np.empty((n, SIZE, channels)), np.empty((n, SIZE, SIZE)), np.empty((n, 2, SIZE))
     y, S, used = np.empty((n, 2, channels)), np.empty((n, 2)), np.zeros((n, 2), dtype=np.int8)
-    variances = noise.initial_variances()
     R = np.tile(noise.gnss.variances(epochs.interval_s), (n, 1))
-    reset = np.where(epochs.is_reset[:, None], variances[:2], 0.0)
+    reset = np.where(epochs.is_reset[:, None], np.square([RESET_POSITION_M, RESET_VELOCITY_MPS]), 0.0)
     kernels.run_filter(
         steps.index,
         steps.transitions,
@@ -184,8 +220,8 @@ def _run_group(
         np.ascontiguousarray(z),
         drag,
         reset,
-        np.zeros((SIZE, channels)),
-        np.diag(variances),
+        x0,
+        P0,
         R,
         gate,
         x,

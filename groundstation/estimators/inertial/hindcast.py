@@ -36,6 +36,11 @@ class Hindcast:
     forecast_m: dict[str, FloatArray]
     actual_m: FloatArray
 
+    def of(self, rows: slice) -> "Hindcast":
+        """The starts that ``rows`` selects."""
+        forecasts = {method: values[rows] for method, values in self.forecast_m.items()}
+        return Hindcast(self.at[rows], self.start_s[rows], self.lead_s, forecasts, self.actual_m[rows])
+
     def error_m(self, method: str) -> FloatArray:
         """Forecast minus actual per channel, shape (s, l, c)."""
         return self.forecast_m[method] - self.actual_m
@@ -80,6 +85,11 @@ def hindcast(
         for method in methods
     }
     return Hindcast(at, start_s, np.asarray(lead_s), forecasts, built_up(epochs, at, lead_s))
+
+
+def leads_of(step_s: float, longest_s: float) -> FloatArray:
+    """Leads in equal steps up to the longest (the last one whole step below it, at least one)."""
+    return step_s * np.arange(1, max(1, int(longest_s / step_s + 1e-6)) + 1, dtype=np.float64)
 
 
 def built_up(epochs: Epochs, at: Int64Array, lead_s: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ import numpy as np
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import number, settings_from
 from groundstation.estimators.inertial.model import FloatArray
+from groundstation.estimators.inertial.settings import InertialSettings
 
 RADPS_PER_DPH = math.pi / 180.0 / 3600.0
 RADPS2_PER_DPHPH = RADPS_PER_DPH / 3600.0
@@ -61,13 +62,13 @@ def _variance(white: float, correlated: float, correlation_s: float, interval_s:
 class Calibration:
     """What the filter's forecast sigma must be multiplied by at each horizon, and how sure that is.
 
-    ``scale`` belongs to ``horizon_min``; found on simulated flights of the class. ``flights`` is the weight it has
-    against the outages replayed in the past of the flight at hand: so many independent ones.
+    ``scale`` belongs to ``horizon_min``; found on simulated flights of the class. ``weight`` is what it counts against
+    the outages replayed in the past of the flight at hand: so many independent ones.
     """
 
     horizon_min: tuple[float, ...] = (1.0, 5.0, 10.0, 30.0, 60.0, 90.0, 120.0)
     scale: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
-    flights: float = number(5.0, 0.1, 1000.0)
+    weight: float = number(5.0, 0.1, 1000.0)
 
     def __post_init__(self) -> None:
         if len(self.scale) != len(self.horizon_min) or not self.scale:
@@ -172,8 +173,8 @@ def load_class(name: str) -> InsNoise:
             text = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise SettingsError(where, f"an INS class file that cannot be read ({error})") from error
-    elif name in class_names():
-        where, stem = f"{name}.toml", name
+    elif name.lower() in class_names():
+        where, stem = f"{name.lower()}.toml", name.lower()
         text = (_shipped() / where).read_text(encoding="utf-8")
     else:
         raise SettingsError("ins_class", repr(name), f"a file *.toml or one of {', '.join(class_names())}")
@@ -182,6 +183,21 @@ def load_class(name: str) -> InsNoise:
     except tomllib.TOMLDecodeError as error:
         raise SettingsError(where, f"text that is not TOML ({error})") from error
     return settings_from(InsNoise, {"name": stem} | table, where)
+
+
+def choose_class(settings: InertialSettings, aircraft_class: str = "") -> tuple[InsNoise, str]:
+    """Noise parameters: the settings' class, else the aircraft file's, else navigation; and who chose them.
+
+    Raises
+    ------
+    SettingsError
+        For a class that does not exist.
+    """
+    if settings.ins_class != "auto":
+        return load_class(settings.ins_class), "settings"
+    if aircraft_class:
+        return load_class(aircraft_class), "aircraft file"
+    return load_class(DEFAULT_CLASS), "default"
 
 
 def _shipped() -> resources.abc.Traversable:

@@ -30,8 +30,7 @@ class InertialSettings:
     jump_m: float = number(100.0, 1.0)  # a step of position that the velocity does not explain
     frozen_s: float = number(5.0, 0.0)  # a position that repeats for so long while moving
     frozen_speed_mps: float = number(20.0, 0.0)
-    aided_radial_m: float = number(60.0, 0.0)  # an INS that stays so near GNSS for aided_least_s has never drifted
-    aided_least_s: float = number(600.0, 0.0)
+    aided_radial_m: float = number(30.0, 0.0)  # an INS whose minute means stay so near GNSS has never drifted
     # Forecast
     default_method: str = "drift_windows"
     tilt_window_s: float = number(700.0, 1.0)

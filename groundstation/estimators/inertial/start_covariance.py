@@ -6,6 +6,8 @@ the model allows follows from E[x^(s) x^(t)'] = (Pi(s) - P(s)) Phi(t, s)' for s 
 true state without any data. d holds the lag of a window behind the true oscillation, which P alone knows nothing of.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from groundstation.base.records import Int64Array
@@ -119,19 +121,35 @@ def covariance_without_data(run: FilterRun) -> FloatArray:
     """Covariance Pi of the true states at every epoch had nothing been measured, shape (n, 6, 6)."""
     nothing = np.full((len(run.epochs), 1), np.nan)
     blind = Epochs.plain(run.epochs.time_s, nothing, nothing)
-    return run_filter(blind, run.model, run.noise).P[0]
+    return np.asarray(run_filter(blind, run.model, run.noise).P[0])
 
 
-def lead_variance(run: FilterRun, covariance: FloatArray, lead_s: FloatArray) -> FloatArray:
-    """Variance of the position error forecast to build up, per start and lead, m^2, shape (s, l).
+@dataclass(frozen=True)
+class LeadGrowth:
+    """What the model makes of a start at each lead: ``rows`` (l, 6) of Phi, and ``added_m2`` (l,) by noise."""
+
+    rows: FloatArray
+    added_m2: FloatArray
+
+    def variance(self, covariance: FloatArray) -> FloatArray:
+        """Variance of the position error forecast to build up from starts (s, 6, 6), m^2, shape (s, l)."""
+        return np.asarray(np.einsum("la,sab,lb->sl", self.rows, covariance, self.rows, optimize=True) + self.added_m2)
+
+
+def lead_growth(run: FilterRun, lead_s: FloatArray) -> LeadGrowth:
+    """Growth of a forecast's error over leads in equal steps from the first.
 
     What GNSS itself errs at both ends is in it, for it is against GNSS that a forecast is judged.
     """
-    density, gnss = run.noise.densities(), run.noise.gnss
-    rows = np.stack([run.model.transition_over(float(lead))[POSITION] for lead in lead_s]) if len(lead_s) else None
-    if rows is None:
-        return np.zeros((len(covariance), 0))
-    added = np.array([run.model.process_noise_over(float(lead), density)[POSITION, POSITION] for lead in lead_s])
+    gnss = run.noise.gnss
+    rows, added = np.zeros((len(lead_s), SIZE)), np.zeros(len(lead_s))
+    if len(lead_s):
+        phi = run.model.transition_over(float(lead_s[0]))
+        once = run.model.process_noise_over(float(lead_s[0]), run.noise.densities())
+        carried, noise = np.eye(SIZE), np.zeros((SIZE, SIZE))
+        for lead in range(len(lead_s)):
+            carried, noise = phi @ carried, phi @ noise @ phi.T + once
+            rows[lead], added[lead] = carried[POSITION], noise[POSITION, POSITION]
     decay = np.exp(-np.asarray(lead_s) / max(gnss.position_correlation_s, 1e-9))
     ends = 2.0 * (gnss.position_white_m**2 + gnss.position_correlated_m**2 * (1.0 - decay))
-    return np.asarray(np.einsum("la,sab,lb->sl", rows, covariance, rows, optimize=True) + added + ends)
+    return LeadGrowth(rows, added + ends)

@@ -1,0 +1,336 @@
+"""The coupled north-east model: both channels, azimuth, Earth and craft rate; its gain over the two separate channels.
+
+Signs: error = INS - truth. With the phi-angle (computed attitude = (I - [phi x]) n_from_b) the north tilt is -phi_E,
+the east tilt +phi_N - positive where the velocity error falls - and the heading error -phi_D.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.geodesy import EARTH_RATE_RADPS, SEMI_MAJOR_M, curvature_radii_m
+from groundstation.base.records import Int64Array, frozen
+from groundstation.estimators.inertial.differences import Differences
+from groundstation.estimators.inertial.filter import Epochs
+from groundstation.estimators.inertial.hindcast import Hindcast
+from groundstation.estimators.inertial.model import (
+    GRAVITY_ECCENTRICITY_SQUARED,
+    GRAVITY_EQUATOR_MPS2,
+    GRAVITY_POLE_FACTOR,
+    FloatArray,
+)
+from groundstation.estimators.inertial.noise import InsNoise
+from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.results.forecast import HORIZONS_MIN, CoupledRow
+
+# The six states of each channel (model.STATES), then the azimuth error and its constant drift.
+NORTH, EAST = 0, 6
+AZIMUTH, AZIMUTH_DRIFT = 12, 13
+SIZE = 14
+CHANNELS = np.array([[0, 1, 2, 3, 4, 5], [6, 7, 8, 9, 10, 11]])
+_PN, _VN, _TN, _DN, _SN, _RN, _PE, _VE, _TE, _DE, _SE, _RE = range(12)
+LATITUDE_MAX_DEG = 88.0  # beyond, north is no axis for an error model
+ACCELERATION_MAX_MPS2 = 50.0  # a faster change of the INS velocity is a reset of it
+
+# Pattern of the matrix: (row, column) of every entry that is not always zero, in the order of _values.
+PATTERN = (
+    *((_PN, _VN), (_PE, _VE), (_PE, _PN), (_PE, _PE)),
+    *((_VN, _TN), (_VN, AZIMUTH), (_VN, _VE), (_VN, _PN)),
+    *((_VE, _TE), (_VE, AZIMUTH), (_VE, _VN), (_VE, _VE), (_VE, _PN)),
+    *((_TN, _VN), (_TN, _TE), (_TN, AZIMUTH), (_TN, _DN), (_TN, _RN)),
+    *((_TE, _VE), (_TE, _TN), (_TE, AZIMUTH), (_TE, _PN), (_TE, _DE), (_TE, _RE)),
+    *((AZIMUTH, _TN), (AZIMUTH, _TE), (AZIMUTH, _PN), (AZIMUTH, _VE), (AZIMUTH, AZIMUTH_DRIFT)),
+    *((_DN, _SN), (_DE, _SE), (_RN, _RN), (_RE, _RE)),
+)
+ROWS = np.array([row for row, _ in PATTERN], dtype=np.int64)
+COLUMNS = np.array([column for _, column in PATTERN], dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class CraftMotion:
+    """Motion of the craft over m intervals, as its INS knows it: the means of each interval.
+
+    Parameters
+    ----------
+    latitude_deg, altitude_m : ndarrays, shape (m,)
+    velocity_mps, acceleration_mps2 : ndarrays, shape (m, 2)
+        Over the ground, north and east; the acceleration is change of velocity over the interval.
+    """
+
+    latitude_deg: FloatArray
+    altitude_m: FloatArray
+    velocity_mps: FloatArray
+    acceleration_mps2: FloatArray
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            object.__setattr__(self, item.name, frozen(np.asarray(getattr(self, item.name), dtype=np.float64)))
+
+    @classmethod
+    def between(cls, differences: Differences, time_s: FloatArray) -> "CraftMotion":
+        """The motion between neighbouring times, m of them, from the INS alone; m - 1 intervals.
+
+        Held where the INS is silent, at rest on the equator where it never spoke.
+        """
+        latitude, altitude, north, east = (
+            _interpolated(differences.epochs.time_s, column, time_s)
+            for column in (differences.latitude_deg, differences.altitude_m, *differences.velocity_mps.T)
+        )
+        velocity = np.stack([north, east], axis=1)
+        seconds = np.diff(time_s)[:, None]
+        acceleration = np.diff(velocity, axis=0) / np.where(seconds > 0.0, seconds, np.inf)
+        is_step = (np.abs(acceleration) > ACCELERATION_MAX_MPS2).any(axis=1)
+        acceleration[is_step] = 0.0
+        mean = [0.5 * (part[1:] + part[:-1]) for part in (latitude, altitude, velocity)]
+        return cls(mean[0], mean[1], mean[2], acceleration)
+
+    def specific_force_mps2(self) -> FloatArray:
+        """Specific force north, east and down, shape (m, 3), m/s^2; vertical motion is left out.
+
+        f = acceleration + (2 Earth rate + craft rate) x velocity - gravity.
+        """
+        earth_north, earth_down, craft_north, craft_east, craft_down = _rates_radps(self)
+        north, east = self.velocity_mps.T
+        down_rate = 2.0 * earth_down + craft_down
+        gravity = _gravity_mps2(self.latitude_deg, self.altitude_m)
+        return np.stack(
+            [
+                self.acceleration_mps2[:, 0] - down_rate * east,
+                self.acceleration_mps2[:, 1] + down_rate * north,
+                (2.0 * earth_north + craft_north) * east - craft_east * north - gravity,
+            ],
+            axis=1,
+        )
+
+
+@dataclass(frozen=True)
+class CoupledRun:
+    """History of the coupled filter over n epochs.
+
+    Parameters
+    ----------
+    x, sigma : ndarrays, shape (n, 14)
+        States after each epoch (north channel, east channel, azimuth error rad, its drift rad/s) and their sigmas.
+    innovation, innovation_variance : ndarrays, shape (n, 2, 2)
+        Measured minus predicted (position, velocity; north, east), NaN where absent.
+    used : ndarray of int8, shape (n, 2, 2)
+        Rejected -1, absent 0, used 1.
+    """
+
+    differences: Differences
+    noise: InsNoise
+    x: FloatArray
+    sigma: FloatArray
+    innovation: FloatArray
+    innovation_variance: FloatArray
+    used: NDArray[np.int8]
+
+    def __post_init__(self) -> None:
+        for name in ("x", "sigma", "innovation", "innovation_variance", "used"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    @property
+    def epochs(self) -> Epochs:
+        """The epochs it ran over."""
+        return self.differences.epochs
+
+
+def coupled_values(motion: CraftMotion, beta_per_s: float) -> FloatArray:
+    """Entries of A (x' = A x) over each interval, in the order of :data:`PATTERN`, shape (m, 33).
+
+    Velocity error' = -phi x f - (2 Earth rate + craft rate) x velocity error - (2 error of the Earth rate + error of
+    the craft rate) x velocity; phi' = -(Earth rate + craft rate) x phi + error of both - gyro error, where the errors
+    of the rates come from the errors of latitude and velocity. Left out: vertical motion and its errors, the change of
+    gravity with the position error.
+
+    Source: Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed. 2004, section 12.3, equations 12.28
+    and 12.37 onwards; Groves, Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems, 2nd ed.
+    2013, section 14.2.4 (attitude error of opposite sign).
+    """
+    meridian, normal = _radii_m(motion)
+    earth_north, earth_down, craft_north, craft_east, craft_down = _rates_radps(motion)
+    latitude_rad = _latitude_rad(motion)
+    slope, cosine = np.tan(latitude_rad) / normal, np.cos(latitude_rad)
+    north, east = motion.velocity_mps.T
+    force_north, force_east, force_down = motion.specific_force_mps2().T
+    coriolis_down = 2.0 * earth_down + craft_down
+    # what an error of latitude does to the down rates, with the sign turned
+    convergence = east / (normal * cosine**2)
+    one = np.ones_like(north)
+    columns = (
+        *(one, one, slope * east, -slope * north),
+        *(force_down, -force_east, coriolis_down - slope * east),
+        -east * (2.0 * earth_north + convergence) / meridian,
+        *(force_down, force_north, -coriolis_down, slope * north),
+        north * (2.0 * earth_north + convergence) / meridian,
+        *(1.0 / meridian, earth_down + craft_down, earth_north + craft_north, one, one),
+        *(1.0 / normal, -(earth_down + craft_down), craft_east, earth_down / meridian, one, one),
+        *(-(earth_north + craft_north), -craft_east, (earth_north + convergence) / meridian, slope, one),
+        *(one, one, -beta_per_s * one, -beta_per_s * one),
+    )
+    return np.ascontiguousarray(np.stack(columns, axis=1))
+
+
+def coupled_matrix(motion: CraftMotion, beta_per_s: float) -> FloatArray:
+    """A of x' = A x over each interval, shape (m, 14, 14), SI units; see :func:`coupled_values`."""
+    values = coupled_values(motion, beta_per_s)
+    out = np.zeros((len(values), SIZE, SIZE))
+    out[:, ROWS, COLUMNS] = values
+    return out
+
+
+def run_coupled(differences: Differences, noise: InsNoise, settings: InertialSettings) -> CoupledRun:
+    """Estimate the errors of both channels and the azimuth together; where GNSS is absent they are forecast.
+
+    The noise of a horizontal channel is the class's; the azimuth starts with ``azimuth_deg``, its gyro with the
+    constant drift of the class, and walks like a tilt. An azimuth sigma of zero leaves two coupled channels of six.
+    """
+    from groundstation.estimators.inertial import coupled_kernels as kernels
+
+    epochs = differences.epochs
+    n = len(epochs)
+    interval = np.diff(epochs.time_s, prepend=epochs.time_s[:1])
+    z = np.ascontiguousarray(np.stack([epochs.position_m, epochs.velocity_mps], axis=1))
+    values = np.zeros((n, len(PATTERN)))
+    values[1:] = coupled_values(CraftMotion.between(differences, epochs.time_s), noise.beta_per_s)
+    covariance, densities = _noise_of(noise, differences)
+    reset = np.where(epochs.is_reset[:, None], noise.initial_variances()[:2], 0.0)
+    x, variance = np.empty((n, SIZE)), np.empty((n, SIZE))
+    y, S, used = np.empty((n, 2, 2)), np.empty((n, 2, 2)), np.zeros((n, 2, 2), dtype=np.int8)
+    kernels.run_coupled_filter(
+        interval,
+        ROWS,
+        COLUMNS,
+        values,
+        densities,
+        z,
+        reset,
+        covariance,
+        np.array(noise.gnss.variances(epochs.interval_s)),
+        settings.gate_sigmas**2,
+        x,
+        variance,
+        y,
+        S,
+        used,
+    )
+    return CoupledRun(differences, noise, x, np.sqrt(np.maximum(variance, 0.0)), y, S, used)
+
+
+def hindcast_coupled(run: CoupledRun, at: Int64Array, lead_s: FloatArray, settings: InertialSettings) -> FloatArray:
+    """Forecast from the last estimate at epochs ``at``, along the INS's own motion.
+
+    Parameters
+    ----------
+    run : CoupledRun
+    at : ndarray of int, shape (s,)
+    lead_s : ndarray, shape (l,)
+        Equal steps from the first: k times ``lead_s[0]``.
+
+    Returns
+    -------
+    ndarray, shape (s, l, 2)
+        Position error forecast to build up since the start, metres: as ``Hindcast.forecast_m``.
+    """
+    from groundstation.estimators.inertial import coupled_kernels as kernels
+
+    out = np.zeros((len(at), len(lead_s), 2))
+    if not len(lead_s):
+        return out
+    every = max(1, round(float(lead_s[0]) / min(settings.forecast_step_s, kernels.LONGEST_STEP_S)))
+    step_s = float(lead_s[0]) / every
+    elapsed = np.arange(every * len(lead_s) + 1) * step_s
+    known = np.nan_to_num(run.epochs.position_m[at])
+    for index, epoch in enumerate(at):
+        motion = CraftMotion.between(run.differences, run.epochs.time_s[epoch] + elapsed)
+        values = coupled_values(motion, run.noise.beta_per_s)
+        kernels.run_coupled_forecast(run.x[epoch], known[index], ROWS, COLUMNS, values, step_s, every, out[index])
+    return out
+
+
+def coupled_rows(
+    run: CoupledRun,
+    separate: Hindcast,
+    settings: InertialSettings,
+    *,
+    horizons_min: Sequence[float] = HORIZONS_MIN,
+    method: str = "last_estimate",
+) -> tuple[CoupledRow, ...]:
+    """Gain of the coupled model over the separate channels: same starts, same horizons, last estimate of both.
+
+    Parameters
+    ----------
+    separate : Hindcast
+        With ``method``; horizons that are none of its leads are left out, and those without a start.
+
+    Returns
+    -------
+    tuple of CoupledRow
+        ``gain`` is 1 - RMS ratio of the radial error: positive where coupling helps.
+    """
+    forecast = hindcast_coupled(run, separate.at, separate.lead_s, settings)
+    coupled = np.sqrt(np.sum(np.square(forecast - separate.actual_m), axis=2))
+    apart = separate.radial_m(method)
+    rows = []
+    for horizon in horizons_min:
+        lead = np.flatnonzero(np.abs(separate.lead_s - 60.0 * horizon) < 0.5)
+        if not lead.size:
+            continue
+        errors = np.stack([part[:, lead[0]] for part in (coupled, apart)])
+        known = np.isfinite(errors).all(axis=0)
+        if known.any():
+            ours, theirs = np.sqrt(np.mean(np.square(errors[:, known]), axis=1))
+            rows.append(CoupledRow(float(horizon), float(ours), float(1.0 - ours / theirs) if theirs > 0.0 else 0.0))
+    return tuple(rows)
+
+
+def _noise_of(noise: InsNoise, differences: Differences) -> tuple[FloatArray, FloatArray]:
+    """Covariance at the start, shape (14, 14), and densities (14,).
+
+    Alignment on the ground turns the azimuth until the north channel feels no drift (gyrocompassing): it is the sum of
+    north drift and azimuth x Earth rate that has the class's drift sigma, not the drift alone.
+
+    Source: Titterton and Weston 2004, section 10.3.
+    """
+    initial, density = noise.initial_variances(), noise.densities()
+    azimuth = np.deg2rad(noise.azimuth_deg) ** 2
+    drift, walk = (initial[3], density[2]) if azimuth > 0.0 else (0.0, 0.0)
+    balance = np.eye(SIZE)
+    latitude = differences.latitude_deg[np.isfinite(differences.latitude_deg)]
+    if latitude.size:
+        balance[_DN, AZIMUTH] = -EARTH_RATE_RADPS * np.cos(np.deg2rad(latitude[0]))
+    covariance = balance @ np.diag([*initial, *initial, azimuth, drift]) @ balance.T
+    return covariance, np.array([*density, *density, walk, 0.0])
+
+
+def _latitude_rad(motion: CraftMotion) -> FloatArray:
+    return np.deg2rad(np.clip(motion.latitude_deg, -LATITUDE_MAX_DEG, LATITUDE_MAX_DEG))
+
+
+def _radii_m(motion: CraftMotion) -> tuple[FloatArray, FloatArray]:
+    meridian, prime_vertical = curvature_radii_m(motion.latitude_deg)
+    return meridian + motion.altitude_m, prime_vertical + motion.altitude_m
+
+
+def _rates_radps(motion: CraftMotion) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Earth rate north and down, craft rate (transport rate) north, east and down, each (m,)."""
+    latitude_rad = _latitude_rad(motion)
+    meridian, normal = _radii_m(motion)
+    north, east = motion.velocity_mps.T
+    earth = (EARTH_RATE_RADPS * np.cos(latitude_rad), -EARTH_RATE_RADPS * np.sin(latitude_rad))
+    return *earth, east / normal, -north / meridian, -east * np.tan(latitude_rad) / normal
+
+
+def _gravity_mps2(latitude_deg: FloatArray, altitude_m: FloatArray) -> FloatArray:
+    """Normal gravity along a flight: :func:`model.normal_gravity_mps2` of arrays."""
+    sine_squared = np.sin(np.deg2rad(latitude_deg)) ** 2
+    at_zero = GRAVITY_EQUATOR_MPS2 * (1.0 + GRAVITY_POLE_FACTOR * sine_squared)
+    at_zero /= np.sqrt(1.0 - GRAVITY_ECCENTRICITY_SQUARED * sine_squared)
+    return np.asarray(at_zero * (1.0 - 2.0 * altitude_m / SEMI_MAJOR_M))
+
+
+def _interpolated(time_s: FloatArray, values: FloatArray, at_s: FloatArray) -> FloatArray:
+    known = np.isfinite(values)
+    return np.interp(at_s, time_s[known], values[known]) if known.any() else np.zeros(len(at_s))

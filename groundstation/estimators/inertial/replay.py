@@ -1,0 +1,87 @@
+"""When outages are replayed: from which moment of a flight, how far ahead, and whether the log allows a calibration."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.base.records import Int64Array
+from groundstation.estimators.inertial.filter import FilterRun
+from groundstation.estimators.inertial.hindcast import leads_of, start_epochs
+from groundstation.estimators.inertial.model import FloatArray
+from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.results.forecast import HORIZONS_MIN
+
+LEAD_STEP_S = 60.0
+LEAST_STARTS = 3  # a horizon with fewer is not shown
+LEAST_PAST_S = 300.0
+PAST_FROM_S = 1800.0  # outages replayed from here on tell how honest the sigma of later ones is
+SHORT_SHARE = 0.4  # of a flight too short for the settings' first start
+MOST_STEPS_OF_MAP = 100
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Starts of the replayed outages and the horizons that fit.
+
+    Parameters
+    ----------
+    first_start_s, step_s : float
+        Flight time of the first start; distance of the starts.
+    at : ndarray of int, shape (s,)
+        Epochs of the starts, those before ``first_start_s`` among them that only calibrate.
+    horizons_min : tuple of float
+        Of the contract, as far as at least :data:`LEAST_STARTS` starts allow.
+    lead_s : ndarray, shape (l,)
+        Every minute up to the longest horizon.
+    is_calibrated : bool
+    reason : str
+        Why not.
+    """
+
+    first_start_s: float
+    step_s: float
+    at: Int64Array
+    horizons_min: tuple[float, ...]
+    lead_s: FloatArray
+    is_calibrated: bool
+    reason: str
+
+
+def plan_replay(run: FilterRun, settings: InertialSettings) -> Plan:
+    """Choose the starts: the settings' where the flight is long enough, else from 40 % of it on and closer together."""
+    time_s = run.epochs.time_s[run.epochs.has_gnss]
+    begin, end = (float(time_s[0]), float(time_s[-1])) if len(time_s) else (0.0, 0.0)
+    first, step = settings.first_start_s, settings.start_step_s
+    schuler_s = 60.0 * run.model.schuler_period_min
+    reason = ""
+    if first + 2.0 * step + 60.0 * HORIZONS_MIN[2] > end:
+        first = begin + max(LEAST_PAST_S, SHORT_SHARE * (end - begin))
+        step = min(step, max(10.0, (end - first) / 20.0))
+    if first - begin < schuler_s:
+        reason = (
+            f"only {max(first - begin, 0.0) / 60.0:.0f} min of GNSS before the first replayed outage, less than one "
+            f"Schuler period ({run.model.schuler_period_min:.1f} min): the sigma is the class's alone"
+        )
+    past = int(max(first - begin - PAST_FROM_S, 0.0) / step)
+    at = start_epochs(run.epochs, first - past * step, step)
+    starts_s = run.epochs.time_s[at]
+    starts_s = starts_s[starts_s >= first - 1e-6]
+    horizons = tuple(
+        float(horizon) for horizon in HORIZONS_MIN if np.sum(starts_s + 60.0 * horizon <= end + 1.0) >= LEAST_STARTS
+    )
+    longest = max(horizons, default=0.0)
+    lead_s = leads_of(LEAD_STEP_S, 60.0 * longest)
+    return Plan(first, step, at, horizons, lead_s, not reason, reason)
+
+
+def map_grid(run: FilterRun, settings: InertialSettings) -> tuple[Int64Array, FloatArray]:
+    """Starts (epochs) and leads of the map of errors: the whole flight, thinned to a picture's size."""
+    time_s = run.epochs.time_s
+    span = float(time_s[-1] - time_s[0])
+    step = max(settings.map_step_s, _whole(span / MOST_STEPS_OF_MAP, settings.map_step_s))
+    lead = max(LEAD_STEP_S, _whole(span / MOST_STEPS_OF_MAP, LEAD_STEP_S))
+    return start_epochs(run.epochs, float(time_s[0]) + step, step), leads_of(lead, span)
+
+
+def _whole(value: float, unit: float) -> float:
+    return float(np.ceil(value / unit) * unit)

@@ -1,0 +1,169 @@
+"""How good a replayed forecast was, and how honest its sigma: tables over starts, by method and horizon."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.base.records import BoolArray
+from groundstation.estimators.inertial.filter import FilterRun
+from groundstation.estimators.inertial.hindcast import Hindcast
+from groundstation.estimators.inertial.model import FloatArray
+from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.estimators.inertial.start_covariance import WITH_COVARIANCE, lead_growth, start_covariance
+from groundstation.results.forecast import CalibrationRow, SkillRow
+
+QUANTILES = {50: 0.6744897501960817, 68: 0.9944578832097532, 95: 1.959963984540054}  # of the normal, two-sided
+# Chosen by the logarithmic score on simulated flights, straight, manoeuvring and Norilsk to Moscow
+MEMORY_S = 1200.0  # errors of outages that start nearer than this to each other are not independent
+INHERITED = 0.7  # share of what is seen at one horizon that is expected at the next longer one
+BOUND = 0.95
+
+
+@dataclass(frozen=True)
+class Claimed:
+    """What a method says of its own error: sigma per start, lead and channel, by the model and as scaled.
+
+    Parameters
+    ----------
+    model_m, scaled_m : ndarrays, shape (s, l, c)
+        ``scaled_m`` is ``model_m`` times what the class and the flight's own past before the start show.
+    scale : ndarray, shape (s, l)
+    """
+
+    model_m: FloatArray
+    scaled_m: FloatArray
+    scale: FloatArray
+
+    def of(self, rows: slice) -> "Claimed":
+        """The starts that ``rows`` selects."""
+        return Claimed(self.model_m[rows], self.scaled_m[rows], self.scale[rows])
+
+
+def claimed_sigma(method: str, run: FilterRun, replay: Hindcast, settings: InertialSettings) -> Claimed | None:
+    """Sigma of a method's forecast, None for a method that has none.
+
+    The scale of a start comes from the class (so many flights' worth) and from those replayed outages that were over
+    before the start: nothing later is used.
+    """
+    if method not in WITH_COVARIANCE:
+        return None
+    channels = replay.actual_m.shape[2]
+    growth = lead_growth(run, replay.lead_s)
+    variance = [
+        growth.variance(start_covariance(method, run, replay.at, channel, settings)) for channel in range(len(run.P))
+    ]
+    model = np.sqrt(np.stack([variance[min(channel, len(variance) - 1)] for channel in range(channels)], axis=2))
+    scale = _scale(np.square(replay.error_m(method) / model), replay, run)
+    return Claimed(model, model * scale[:, :, None], scale)
+
+
+def _scale(ratio: FloatArray, replay: Hindcast, run: FilterRun) -> FloatArray:
+    """Root of the mean squared ratio of error to sigma, class and past together, shape (s, l).
+
+    Found at the class's horizons, from the shortest on: what the past of a flight shows of short outages is expected,
+    in part, of longer ones, for which it has seen fewer or none. Between them it is interpolated.
+    """
+    calibration = run.noise.calibration
+    nodes = [(lead, 60.0 * horizon) for lead, horizon in _leads(replay, calibration.horizon_min)]
+    if not nodes:
+        return np.broadcast_to(calibration.at(replay.lead_s), ratio.shape[:2]).copy()
+    factor, squares = np.ones(len(ratio)), []
+    for lead, seconds in nodes:
+        class_square = float(calibration.at(np.array([seconds]))[0]) ** 2
+        mean, weight = _past_mean(ratio[:, lead], replay.start_s, seconds)
+        expected = 1.0 + INHERITED * (factor - 1.0)
+        factor = (calibration.weight * expected + weight * mean / class_square) / (calibration.weight + weight)
+        squares.append(factor * class_square)
+    at = np.log([seconds for _, seconds in nodes])
+    scales, leads = np.sqrt(np.stack(squares, axis=1)), np.log(replay.lead_s)
+    return np.stack([np.interp(leads, at, row) for row in scales])
+
+
+def _past_mean(ratio: FloatArray, start_s: FloatArray, lead_s: float) -> tuple[FloatArray, FloatArray]:
+    """For every start the mean squared ratio over outages that were over by then, and how many independent ones."""
+    known = np.isfinite(ratio).all(axis=1)
+    square = np.where(known, np.nan_to_num(ratio).mean(axis=1), 0.0)
+    over = np.searchsorted(start_s, start_s - lead_s + 1e-6, side="right")
+    number = np.concatenate([[0], np.cumsum(known)])[over]
+    mean = np.concatenate([[0.0], np.cumsum(square)])[over] / np.maximum(number, 1)
+    span = np.where(number > 0, start_s[np.maximum(over - 1, 0)] - start_s[:1], 0.0)
+    return mean, np.where(number > 0, 1.0 + span / max(lead_s, MEMORY_S), 0.0)
+
+
+def skill_rows(
+    replay: Hindcast, claimed: dict[str, Claimed | None], horizons_min: Sequence[float], first_start_s: float = 0.0
+) -> tuple[SkillRow, ...]:
+    """Radial error built up, per method and horizon, over the starts from ``first_start_s`` whose horizon fits."""
+    rows, judged = [], replay.start_s >= first_start_s - 1e-6
+    for method in replay.forecast_m:
+        radial, error, sigma = replay.radial_m(method), replay.error_m(method), claimed.get(method)
+        for lead, horizon in _leads(replay, horizons_min):
+            known = judged & np.isfinite(radial[:, lead])
+            errors = radial[known, lead]
+            if errors.size:
+                rows.append(
+                    SkillRow(
+                        method,
+                        float(horizon),
+                        int(errors.size),
+                        rms_m=float(np.sqrt(np.mean(errors**2))),
+                        median_m=float(np.median(errors)),
+                        p95_m=float(np.quantile(errors, BOUND)),
+                        coverage95=_coverage(error[known, lead], sigma.scaled_m[known, lead], 95) if sigma else None,
+                        coverage95_model=_coverage(error[known, lead], sigma.model_m[known, lead], 95)
+                        if sigma
+                        else None,
+                    )
+                )
+    return tuple(rows)
+
+
+def calibration_rows(
+    replay: Hindcast, claimed: dict[str, Claimed | None], horizons_min: Sequence[float], first_start_s: float = 0.0
+) -> tuple[CalibrationRow, ...]:
+    """Coverage of the bands and NEES with chi-square limits from the number of independent starts."""
+    from scipy.stats import chi2
+
+    rows = []
+    for method, sigma in claimed.items():
+        if sigma is None:
+            continue
+        error = replay.error_m(method)
+        for lead, horizon in _leads(replay, horizons_min):
+            known = (replay.start_s >= first_start_s - 1e-6) & np.isfinite(error[:, lead]).all(axis=1)
+            if not known.any():
+                continue
+            starts_s = replay.start_s[known]
+            independent = 1 + int((starts_s[-1] - starts_s[0]) / max(horizon * 60.0, MEMORY_S))
+            channels = error.shape[2]
+            freedom = channels * independent
+            inside = {level: _coverage(error[known, lead], sigma.scaled_m[known, lead], level) for level in QUANTILES}
+            rows.append(
+                CalibrationRow(
+                    method,
+                    float(horizon),
+                    int(known.sum()),
+                    independent,
+                    inside50=inside[50],
+                    inside68=inside[68],
+                    inside95=inside[95],
+                    nees=float(np.mean(np.square(error[known, lead] / sigma.scaled_m[known, lead]))),
+                    nees_low=float(chi2.ppf(0.5 - 0.5 * BOUND, freedom) / freedom),
+                    nees_high=float(chi2.ppf(0.5 + 0.5 * BOUND, freedom) / freedom),
+                    scale=float(np.mean(sigma.scale[known, lead])),
+                )
+            )
+    return tuple(rows)
+
+
+def _coverage(error: FloatArray, sigma: FloatArray, level: int) -> float:
+    known: BoolArray = np.isfinite(error)
+    return float(np.mean(np.abs(error[known]) <= QUANTILES[level] * sigma[known])) if known.any() else float("nan")
+
+
+def _leads(replay: Hindcast, horizons_min: Sequence[float]) -> list[tuple[int, float]]:
+    """Index of the lead of each horizon that was replayed."""
+    minutes = replay.lead_s / 60.0
+    found = [(int(np.argmin(np.abs(minutes - horizon))), float(horizon)) for horizon in horizons_min if len(minutes)]
+    return [(lead, horizon) for lead, horizon in found if abs(minutes[lead] - horizon) < 1e-6]

@@ -1,0 +1,169 @@
+"""System 2 on what goes wrong in the air: a finding with place and count each, and no silent nonsense."""
+
+import numpy as np
+import pytest
+
+from groundstation.base.errors import NotAssessableError
+from groundstation.estimators.inertial.estimate import Estimation, estimate_ins_errors
+from groundstation.estimators.inertial.forecast import assess_forecast
+from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.tables.table import Flight
+from tests.inertial_flights import batch_of, changed, flight_of, table_of, with_table, without_rows
+
+DURATION_S = 7200.0
+ONE_SIGMA = 1.0
+SAME_M = 1.0  # what a handful of missing samples may move an estimate by
+
+
+@pytest.fixture(scope="module")
+def flight() -> Flight:
+    return flight_of(batch_of(duration_s=DURATION_S))
+
+
+@pytest.fixture(scope="module")
+def clean(flight: Flight) -> Estimation:
+    return estimate_ins_errors(flight)
+
+
+def codes(found: Estimation) -> dict[str, int | None]:
+    return {finding.code: finding.count for finding in found.findings}
+
+
+def final_m(found: Estimation) -> np.ndarray:
+    return found.run.x[-1, 0]
+
+
+def test_a_clean_flight_has_no_findings(clean: Estimation) -> None:
+    assert clean.findings == ()
+    assert clean.result.kind == "unaided"
+    assert clean.result.outages == ()
+
+
+def test_gnss_never_present(flight: Flight) -> None:
+    with pytest.raises(NotAssessableError, match="no GNSS position"):
+        estimate_ins_errors(Flight(tables={"ins": flight["ins"]}))
+
+
+def test_gnss_for_a_minute_only(flight: Flight) -> None:
+    short = without_rows(flight, "gnss", flight.time_s("gnss") < 60.0)
+    with pytest.raises(NotAssessableError, match="60 s with INS and GNSS together"):
+        estimate_ins_errors(short)
+
+
+def test_gnss_lost_for_good_is_an_outage_that_never_ends(flight: Flight) -> None:
+    found = estimate_ins_errors(without_rows(flight, "gnss", flight.time_s("gnss") < 3600.0))
+    (outage,) = found.result.outages
+    assert outage.length_s == pytest.approx(DURATION_S - 3599.0)
+    assert outage.jump_m is None
+    assert codes(found)["inertial.outage"] is None
+
+
+def test_frozen_gnss_is_left_out(flight: Flight, clean: Estimation) -> None:
+    time_s = flight.time_s("gnss")
+    frozen = (time_s > 4000.0) & (time_s < 4300.0)
+    held = {
+        name: np.where(frozen, flight["gnss"].values(name)[time_s == 4000.0], flight["gnss"].values(name))
+        for name in ("latitude_deg", "longitude_deg", "velocity_north_mps", "velocity_east_mps")
+    }
+    found = estimate_ins_errors(changed(flight, "gnss", **held))
+    assert codes(found)["inertial.gnss_frozen"] == frozen.sum()
+    assert np.abs(final_m(found) - final_m(clean)).max() < SAME_M
+
+
+def test_gnss_that_jumps_by_kilometres_is_left_out_and_counted(flight: Flight, clean: Estimation) -> None:
+    time_s = flight.time_s("gnss")
+    away = (time_s > 3000.0) & (time_s < 3120.0)
+    found = estimate_ins_errors(
+        changed(flight, "gnss", latitude_deg=flight["gnss"].values("latitude_deg") + np.where(away, 0.05, 0.0))
+    )
+    assert codes(found)["inertial.gnss_jump"] == away.sum()
+    moved = np.abs(found.run.x - clean.run.x)[int(3120.0) :, :2].max(axis=0)
+    assert (moved < ONE_SIGMA * clean.run.sigma(0)[3120:, :2].max(axis=0)[:, None]).all()
+
+
+def test_one_outlier_of_a_kilometre_moves_nothing_and_is_listed(flight: Flight, clean: Estimation) -> None:
+    values = np.array(flight["gnss"].values("longitude_deg"))
+    values[5000] += 0.015
+    found = estimate_ins_errors(changed(flight, "gnss", longitude_deg=values))
+    assert codes(found)["inertial.gnss_jump"] == 1
+    ratio = np.abs(found.run.x - clean.run.x)[:, :, 1] / clean.run.sigma(1)
+    assert ratio.max() < ONE_SIGMA
+
+
+def test_an_outlier_below_the_jump_limit_is_gated_and_counted(flight: Flight) -> None:
+    settings = InertialSettings(jump_m=5000.0)
+    values = np.array(flight["gnss"].values("longitude_deg"))
+    values[5000] += 0.015
+    found = estimate_ins_errors(changed(flight, "gnss", longitude_deg=values), settings=settings)
+    assert codes(found)["inertial.outlier"] == 1
+
+
+def test_an_ins_reset_in_flight_is_found_and_opens_the_position_again(flight: Flight) -> None:
+    time_s = flight.time_s("ins")
+    after = time_s >= 4000.0
+    reset = changed(flight, "ins", longitude_deg=flight["ins"].values("longitude_deg") + np.where(after, 0.05, 0.0))
+    found = estimate_ins_errors(reset)
+    assert codes(found)["inertial.ins_reset"] == 1
+    assert "inertial.gnss_jump" not in codes(found)
+    assert "4000" in next(finding.place for finding in found.findings if finding.code == "inertial.ins_reset")
+    measured = found.compared.epochs.position_m
+    jump_m = 2000.0
+    away = np.abs(found.run.x[:, 0] - measured).max(axis=1)
+    assert away[4010:].max() < 0.03 * jump_m  # the new position is taken over at once, but for the receiver's colour
+    assert away[5000:].max() < 30.0
+
+
+def test_different_rates_with_jitter_give_the_same_estimate(flight: Flight, clean: Estimation) -> None:
+    rng = np.random.default_rng(3)
+    gnss, keep = flight["gnss"], np.arange(0, len(flight["gnss"]), 4)
+    jitter_s = rng.uniform(-0.2, 0.2, len(keep))
+    names = ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m", "velocity_north_mps", "velocity_east_mps")
+    time_s = flight.time_s("gnss")
+    when = np.clip(time_s[keep] + jitter_s, 0.0, time_s[-1])
+    moved = {name: np.interp(when, time_s, gnss.values(name)) for name in names}
+    found = estimate_ins_errors(with_table(flight, table_of("gnss", when, moved)))
+    assert found.findings == ()
+    assert np.abs(final_m(found) - final_m(clean)).max() < 5.0  # m: a quarter of the samples
+
+
+def test_a_gap_of_an_hour_is_crossed_with_the_exact_exponential(flight: Flight) -> None:
+    gap = (3000.0, 6600.0)
+    keep = {topic: (flight.time_s(topic) <= gap[0]) | (flight.time_s(topic) >= gap[1]) for topic in ("ins", "gnss")}
+    found = estimate_ins_errors(without_rows(without_rows(flight, "ins", keep["ins"]), "gnss", keep["gnss"]))
+    (outage,) = found.result.outages
+    assert outage.length_s == pytest.approx(3600.0)
+    assert outage.jump_m is not None and outage.sigma_m is not None
+    assert outage.jump_m < 3.0 * outage.sigma_m
+    assert np.isfinite(found.run.x).all()
+
+
+def test_nan_in_one_channel_is_told_and_the_other_is_as_it_was(flight: Flight, clean: Estimation) -> None:
+    values = np.array(flight["gnss"].values("velocity_east_mps"))
+    values[2000:2500] = np.nan
+    found = estimate_ins_errors(changed(flight, "gnss", velocity_east_mps=values))
+    assert codes(found)["inertial.unknown"] == 500
+    rounding_m = 1e-6
+    assert np.abs(found.run.x[:, 0, 0] - clean.run.x[:, 0, 0]).max() < rounding_m
+    assert np.isfinite(found.run.x).all()
+
+
+def test_an_ins_that_never_drifts_has_no_forecast(flight: Flight) -> None:
+    gnss = flight["gnss"]
+    follows = {name: gnss.values(name) + 1e-6 for name in ("latitude_deg", "longitude_deg")}
+    found = estimate_ins_errors(changed(flight, "ins", **follows))
+    assert found.result.kind == "gnss_aided"
+    assert "inertial.gnss_aided" in codes(found)
+    with pytest.raises(NotAssessableError, match="means nothing"):
+        assess_forecast(found, settings=InertialSettings())
+
+
+def test_excluded_intervals_are_not_compared(flight: Flight) -> None:
+    found = estimate_ins_errors(flight, excluded_s=((1000.0, 1500.0),))
+    (outage,) = found.result.outages
+    assert (outage.start_s, outage.end_s) == (999.0, 1501.0)
+
+
+def test_one_sample(flight: Flight) -> None:
+    single = without_rows(without_rows(flight, "ins", np.arange(1)), "gnss", np.arange(1))
+    with pytest.raises(NotAssessableError, match="1 s with INS and GNSS together"):
+        estimate_ins_errors(single)
