@@ -180,6 +180,13 @@ def general_figures() -> tuple[FigureData, ...]:
             end_s=[900.0, 960.0, 1201.0, 1230.0, 3000.0],
             state=["good", "gdop > 2", "good", "no GNSS", "good"],
         ),
+        figure(
+            "state_lanes",
+            lane=["mode", "mode", "arming", "weight on wheels", "weight on wheels"],
+            start_s=[0.0, 900.0, 0.0, 0.0, 960.0],
+            end_s=[900.0, 3000.0, 3000.0, 960.0, 3000.0],
+            state=["MANUAL", "AUTO", "armed", "on the ground", "in the air"],
+        ),
     )
 
 

@@ -22,6 +22,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.heading import Gate
+from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import MANIFEST, example, figure, heading_result
 
 LARGEST_REPORT_BYTES = 1_500_000  # mailed and opened on old machines
@@ -105,7 +106,7 @@ def test_links_to_tables_exist(tmp_path: Path) -> None:
 
 def test_every_figure_has_title_caption_and_text_for_those_who_cannot_see_it(full: str) -> None:
     page = Page(full)
-    assert page.tags.count("figure") == page.tags.count("figcaption") == 10
+    assert page.tags.count("figure") == page.tags.count("figcaption") == 11
     described = [value for _, name, value in page.attributes if name == "aria-label" and value]
     assert len(described) >= 10
     assert page.tags.count("title") == 1 and page.tags.count("h1") == 1
@@ -181,7 +182,7 @@ def test_flight_without_heading_says_why_and_shows_the_rest(tmp_path: Path) -> N
     page = Page(report(tmp_path, example(None, not_assessable=reasons)))
     front = page.text[: page.text.index("1 Heading correction")]
     assert "Heading correction: not assessable" in front and "No GNSS velocity in the log." in front
-    assert page.tags.count("figure") == 3
+    assert page.tags.count("figure") == 4
     assert "Signature" not in page.text
 
 
@@ -204,6 +205,7 @@ def hostile_results() -> FlightResults:
         FigureData("ledger", {**ledger.columns, "topic": topics}, {}),
         figure("phases", start_s=[0.0], end_s=[10.0], phase=[HOSTILE]),
         figure("gnss_lanes", start_s=[0.0], end_s=[10.0], state=[HOSTILE]),
+        figure("state_lanes", lane=["mode"], start_s=[0.0], end_s=[10.0], state=[HOSTILE]),
         figure("gaps", topic=[HOSTILE], start_s=[1.0], length_s=[2.0]),
         next(item for item in example().figures if item.name == "overview"),
     )
@@ -338,8 +340,34 @@ def test_findings_stand_gravest_first(tmp_path: Path) -> None:
     assert "1 fail · 1 warn · 1 info" in text
 
 
+def test_remarks_on_raw_topics_are_one_line_and_the_losses_a_table(tmp_path: Path) -> None:
+    remarks = [Finding("info", "values.nan", f"raw.t.f{n}: NaN", "raw.t", "", 2) for n in range(50)]
+    findings = (*remarks, Finding("warn", "data.truncated", "cut", "", "byte 9", 1))
+    damage = {"kind": "truncated", "what": "bytes of a record", "topic": "", "place": "byte 9", "count": 7}
+    remark = {"code": "derived", "text": "told as a finding", "topic": "ins"}
+    ledger = {"damages": [{**damage, "loses_data": True}], "remarks": [remark]}
+    text = Page(report(tmp_path / "lost", example(None, findings=findings, ledger=ledger))).text
+    assert "50 fields of raw topics hold NaN as the device wrote it: t 100 values.nan" in text
+    assert "summary.json lists all 51" in text and "raw.t.f7" not in text
+    assert "truncated bytes of a record byte 9 7 yes" in text and "told as a finding" not in text
+    clean = Page(report(tmp_path / "whole", example(None, ledger={"damages": []}))).text
+    assert "No damage was found in the log" in clean
+
+
+def test_modes_and_states_stand_in_a_figure(full: str) -> None:
+    assert "Modes and states" in full and "ground contact by its weight on wheels" in full
+
+
+def test_a_log_without_taxi_says_what_the_method_needs(tmp_path: Path) -> None:
+    reason = "no straight taxi: of 986 epochs above 6 m/s before lift-off: not proven ground 986"
+    text = Page(report(tmp_path, example(None, not_assessable=(NotAssessable("heading", reason),)))).text
+    front = text[: text.index("1 Heading correction")]
+    assert "ground contact not proven for 986. The method needs a straight run on the ground" in front
+
+
 def test_every_chapter_has_its_own_anchor(tmp_path: Path) -> None:
-    save(tmp_path, example(heading_result()), MANIFEST)
+    results = example(heading_result(), inertial=inertial_result(), forecast=forecast_result())
+    save(tmp_path, results, MANIFEST)
     saved = load(tmp_path)
     sections = [build(saved) for build in CHAPTERS]
     assert len({section.key for section in sections if section}) == len(CHAPTERS)

@@ -114,7 +114,12 @@ def test_numbers_are_rounded_by_their_unit_without_minus_zero() -> None:
 
 @pytest.mark.parametrize(
     ("name", "places"),
-    [("latitude_deg", 7), ("error_deg", 4), ("time_s", 3), ("density_per_deg", 4), ("samples", 6), ("lever_arm_m", 3)],
+    [
+        *(("latitude_deg", 7), ("error_deg", 4), ("time_s", 3), ("density_per_deg", 4), ("samples", 6)),
+        *(("lever_arm_m", 3), ("drift_windows_rms_m", 3), ("east_tilt_arcsec", 3), ("horizon_min", 3)),
+        *(("north_drift_sigma_dph", 6), ("east_drift_rate_dphph", 6), ("start_h", 4)),
+        ("radial_error_rate_95_nmiph", 4),
+    ],
 )
 def test_digits_follow_the_name(name: str, places: int) -> None:
     assert digits_of(name) == places

@@ -9,10 +9,13 @@ import jsonschema
 import pytest
 
 from groundstation.base.findings import Finding
+from groundstation.results import forecast as outlook
 from groundstation.results import heading as answers
+from groundstation.results import inertial as errors
 from groundstation.results.files import json_text
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.summary import SCHEMA_VERSION, summary_of
+from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import example, heading_result
 
 SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
@@ -38,6 +41,31 @@ def least_heading() -> answers.HeadingResult:
     )
 
 
+def system_2(inertial: errors.InertialResult | None, forecast: outlook.ForecastResult | None) -> FlightResults:
+    return example(None, inertial=inertial, forecast=forecast)
+
+
+def least_inertial() -> errors.InertialResult:
+    """INS errors with everything optional absent and every estimate unknown."""
+    unknown = float("nan")
+    states = tuple(
+        errors.StateEstimate(state.name, state.title, state.unit, unknown, unknown, unknown, None)
+        for state in inertial_result().channels[0].states
+    )
+    channels = tuple(
+        errors.ChannelResult(name, states, unknown, None, None, unknown, 0, 0, None, None) for name in ("north", "east")
+    )
+    azimuth = errors.AzimuthEstimate(False, None, None, 0, unknown, "no turn")
+    return errors.InertialResult(
+        *("ins", "gnss", "navigation", "default", "unaided", "", "first_order", 0, 0.0, channels),
+        *(None, None, None, None, (errors.RealOutage(0.0, 1.0, 1.0, None, None),), azimuth),
+    )
+
+
+def least_forecast() -> outlook.ForecastResult:
+    return outlook.ForecastResult("last_estimate", float("nan"), 300.0, False, "short", ())
+
+
 def test_schema_is_a_schema() -> None:
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     assert SCHEMA["properties"]["schema_version"]["const"] == SCHEMA_VERSION
@@ -45,8 +73,13 @@ def test_schema_is_a_schema() -> None:
 
 @pytest.mark.parametrize(
     "results",
-    [example(heading_result()), example(least_heading()), example(None), bare(), example(None, start_utc_ns=None)],
-    ids=["full", "least heading", "no heading", "bare", "no time"],
+    [
+        *(example(heading_result()), example(least_heading()), example(None), bare(), example(None, start_utc_ns=None)),
+        system_2(inertial_result(), forecast_result()),
+        system_2(least_inertial(), least_forecast()),
+        system_2(inertial_result(), None),
+    ],
+    ids=["full", "least heading", "no heading", "bare", "no time", "system 2", "least of system 2", "no forecast"],
 )
 def test_summaries_obey_the_schema(results: FlightResults) -> None:
     VALIDATOR.validate(written(results))
@@ -61,6 +94,17 @@ def test_summaries_obey_the_schema(results: FlightResults) -> None:
         ("segment", answers.TaxiSegment),
         ("runway", answers.RunwayCheck),
         ("onboard", answers.OnboardComparison),
+        ("channel", errors.ChannelResult),
+        ("state", errors.StateEstimate),
+        ("outage", errors.RealOutage),
+        ("azimuth", errors.AzimuthEstimate),
+        ("forecast", outlook.ForecastResult),
+        ("skill", outlook.SkillRow),
+        ("gap", outlook.GapRow),
+        ("phase_outage", outlook.PhaseRow),
+        ("classic_start", outlook.ClassicStart),
+        ("calibration", outlook.CalibrationRow),
+        ("coupled", outlook.CoupledRow),
         ("finding", Finding),
         ("not_assessable", NotAssessable),
         ("source", Source),
@@ -71,6 +115,19 @@ def test_schema_and_dataclasses_list_the_same_keys(definition: str, dataclass: t
     names = [field.name for field in fields(dataclass) if field.name != "figures"]
     assert list(listed["properties"]) == names
     assert sorted(listed["required"]) == sorted(names) and listed["additionalProperties"] is False
+
+
+def test_channels_of_the_ins_errors_stand_under_their_names() -> None:
+    names = [field.name for field in fields(errors.InertialResult) if field.name != "figures"]
+    place = names.index("channels")
+    expected = [*names[:place], "north", "east", *names[place + 1 :]]
+    listed = SCHEMA["$defs"]["inertial"]
+    assert list(listed["properties"]) == expected and sorted(listed["required"]) == sorted(expected)
+    assert list(written(system_2(inertial_result(), None))["results"]["inertial"]) == expected
+
+
+def test_methods_of_the_schema_are_those_of_the_forecast() -> None:
+    assert SCHEMA["$defs"]["method"]["enum"] == list(outlook.METHODS)
 
 
 def test_top_level_keys_stand_in_the_order_of_the_contract() -> None:
@@ -85,6 +142,11 @@ def test_contract_keys_are_required() -> None:
         *("parking_heading_deg", "reference_residual_arcmin", "onboard"),
     }
     assert promised <= set(SCHEMA["$defs"]["heading"]["required"])
+    skill = {"method", "horizon_min", "starts", "rms_m", "median_m", "p95_m", "coverage95"}
+    assert skill <= set(SCHEMA["$defs"]["skill"]["required"])
+    gaps = {"method", "length_min", "starts", "max_error_rms_m", "coverage95"}
+    assert gaps <= set(SCHEMA["$defs"]["gap"]["required"])
+    assert {"skill", "gaps", "classic_starts", "default_method"} <= set(SCHEMA["$defs"]["forecast"]["required"])
 
 
 @pytest.mark.parametrize(
@@ -103,6 +165,28 @@ def test_contract_keys_are_required() -> None:
 def test_schema_refuses_what_is_wrong(path: tuple[str, ...], value: object) -> None:
     document = written(example(heading_result()))
     place: Any = document
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    assert not VALIDATOR.is_valid(document)
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("inertial", "kind"), "good"),
+        (("inertial", "north"), None),
+        (("inertial", "channels"), []),
+        (("inertial", "east", "share_inside95"), 1.2),
+        (("forecast", "default_method"), "best"),
+        (("forecast", "skill", 0, "method"), "best"),
+        (("forecast", "gaps", 0, "method"), "windows"),
+        (("forecast", "best_method"), {"10": "best"}),
+    ],
+)
+def test_schema_refuses_what_is_wrong_in_system_2(path: tuple[Any, ...], value: object) -> None:
+    document = written(system_2(inertial_result(), forecast_result()))
+    place: Any = document["results"]
     for key in path[:-1]:
         place = place[key]
     place[path[-1]] = value

@@ -190,6 +190,48 @@ def test_a_text_too_busy_for_a_lane_is_named(tmp_path: Path) -> None:
     assert "not shown: event\\.name" in Contents(tmp_path / "a.rrd").text("/raw/about")
 
 
+def test_lists_are_tables_and_the_clock_of_a_topic_is_not_drawn(tmp_path: Path) -> None:
+    seconds = np.arange(20.0, 120.0, 1.0)
+    parameters = table("raw.PARM", np.zeros(50), Name=np.array([f"P_{n}" for n in range(50)]), Value=np.arange(50.0))
+    attitude = table(
+        "raw.ATT", seconds, TimeUS=(seconds * 1e6).astype(np.int64), accel_m_s=seconds, Flags=np.arange(100) % 7
+    )
+    clock = Column((seconds * 1e9).astype(np.int64))
+    tables = {"raw.PARM": parameters, "raw.ATT": replace(attitude, device_time_ns=clock)}
+    logged = Flight(tables, {}, START_NS, True, "a.BIN")
+    write_recording(tmp_path / "a.rrd", logged, _bare_results(logged))
+    contents = Contents(tmp_path / "a.rrd")
+    text = contents.text("/raw/raw.PARM/states")
+    assert "| P\\_7 | 7 |" in text and "50 rows" in text
+    drawn = {entity for entity in contents.batches if entity.startswith("/raw/raw.")}
+    assert drawn == {"/raw/raw.ATT/accel_m", "/raw/raw.ATT/Flags"}
+
+
+def test_a_state_is_held_over_rows_of_other_sources(tmp_path: Path) -> None:
+    seconds = np.arange(0.0, 100.0, 0.5)
+    is_own = np.arange(200) % 4 == 0
+    mode = np.where(seconds < 50.0, "align", "nav")
+    ins = table("ins", seconds, roll_deg=Column(seconds, ~is_own), mode=Column(mode, is_own))
+    logged = Flight({"ins": ins}, {}, START_NS, True, "a.ulg")
+    write_recording(tmp_path / "a.rrd", logged, _bare_results(logged))
+    changes = Contents(tmp_path / "a.rrd").batches["/raw/ins/states/mode"]
+    assert sum(batch.num_rows for batch in changes) == 2
+
+
+def test_rare_records_of_a_raw_topic_are_joined(tmp_path: Path) -> None:
+    seconds = np.cumsum(np.where(np.arange(40) % 2, 30.0, 0.1))
+    logged = Flight({"raw.command": table("raw.command", seconds, command=seconds)}, {}, START_NS, True, "a.ulg")
+    gaps = FigureData(
+        "gaps",
+        {"topic": np.full(40, "raw.command"), "start_s": seconds, "length_s": np.full(40, 30.0)},
+        {},
+    )
+    write_recording(tmp_path / "a.rrd", logged, replace(_bare_results(logged), figures=(gaps,)))
+    contents = Contents(tmp_path / "a.rrd")
+    assert np.isfinite(contents.scalars("/raw/raw.command/command")[1]).all()
+    assert "/log/gaps" not in contents.batches  # raw gaps are findings and lanes
+
+
 def test_growing_density_stands_below_an_axis_that_stands_still(contents: Contents) -> None:
     def heights(batch: pa.RecordBatch) -> float:
         return max(max(row[0]["buffer"]) for row in batch.column("BarChart:values").to_pylist())

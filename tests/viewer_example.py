@@ -11,6 +11,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.heading import Gate, HeadingResult, OnboardComparison, Standstill, TaxiSegment
 from groundstation.tables.table import Flight, Table
+from tests.inertial_example import forecast_result, inertial_result
 
 START_NS = iso_to_utc_ns("2026-05-04T06:00:00Z")[0]
 ERROR_DEG = 1.23
@@ -285,6 +286,7 @@ def make_results(
 ) -> FlightResults:
     """Results of the example, with or without a heading answer."""
     heading = heading_figures(flight) if with_heading else ()
+    inertial, forecast = inertial_result(flight.duration_s), forecast_result(flight.duration_s)
     missing = () if with_heading else (NotAssessable("heading", "no GNSS velocity in the log"),)
     return FlightResults(
         flight_id=flight_id,
@@ -303,5 +305,7 @@ def make_results(
         ),
         not_assessable=missing,
         heading=heading_result(heading) if with_heading else None,
-        figures=(*pipeline_figures(flight), *heading),
+        inertial=inertial,
+        forecast=forecast,
+        figures=(*pipeline_figures(flight), *heading, *inertial.figures, *forecast.figures),
     )

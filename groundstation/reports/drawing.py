@@ -162,13 +162,13 @@ def place(figure: Any, left: float, bottom: float, right: float, top: float, **o
     return figure.add_axes((left / width, bottom / height, (right - left) / width, (top - bottom) / height), **options)
 
 
-def time_axis(axes: Any, low: float, high: float, title: bool = True) -> None:
-    """Scale the horizontal axis as flight time, written as minutes and seconds at round steps."""
+def time_axis(axes: Any, low: float, high: float, title: bool = True, most: int = 9) -> None:
+    """Scale the horizontal axis as flight time, written as minutes and seconds at ``most`` round steps."""
     from matplotlib.ticker import FixedLocator, FuncFormatter
 
     low, high = (low, high) if high > low else (low - 1.0, low + 1.0)
     steps = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 28800, 86400)
-    step = next((step for step in steps if (high - low) / step <= 9), 604800)
+    step = next((step for step in steps if (high - low) / step <= most), 604800)
     first = int(np.ceil(low / step))
     ticks = [step * count for count in range(first, first + 12) if step * count <= high]
     axes.set_xlim(low, high)

@@ -26,6 +26,8 @@ COLUMNS = (
         "drift_deg_per_h",
     ),
     *("parking_heading_deg", "reference_residual_arcmin", "onboard_error_deg", "onboard_difference_deg"),
+    *("ins_kind", "radial_error_rate_50_nmiph", "radial_error_rate_95_nmiph"),
+    *("forecast_method", "forecast_30min_rms_m", "forecast_60min_rms_m", "forecast_120min_rms_m"),
     *("findings_fail", "findings_warn", "findings_info", "not_assessable", "reason"),
     *("source", "sha256", "summary", "report", "recording", "mcap"),
 )
@@ -49,6 +51,8 @@ def index_row(saved: SavedFlight) -> dict[str, Any]:
     A link is null when the flight folder lacks the file at the time of the call.
     """
     flight, heading = mapping(saved.summary, "flight"), heading_of(saved)
+    results = mapping(saved.summary, "results")
+    inertial, forecast = mapping(results, "inertial"), mapping(results, "forecast")
     source, onboard = mapping(flight, "source"), mapping(heading, "onboard")
     low, high = _pair(heading.get("confidence95_deg"))
     flight_id = str(flight.get("id", ""))
@@ -69,6 +73,10 @@ def index_row(saved: SavedFlight) -> dict[str, Any]:
         confidence95_high_deg=high,
         onboard_error_deg=onboard.get("heading_error_deg"),
         onboard_difference_deg=onboard.get("difference_error_deg"),
+        ins_kind=inertial.get("kind"),
+        **{name: inertial.get(name) for name in ("radial_error_rate_50_nmiph", "radial_error_rate_95_nmiph")},
+        forecast_method=forecast.get("default_method"),
+        **{f"forecast_{horizon}min_rms_m": _forecast_rms(forecast, horizon) for horizon in (30, 60, 120)},
         **{f"findings_{severity}": findings.count(severity) for severity in SEVERITIES},
         not_assessable=[
             f"{entry.get('analysis', '')}: {entry.get('reason', '')}"
@@ -79,6 +87,12 @@ def index_row(saved: SavedFlight) -> dict[str, Any]:
         # The folder is named by the flight id once the run is finished; until then it may bear another name.
         **{key: f"{flight_id}/{name}" if (saved.folder / name).exists() else None for key, name in files.items()},
     )
+
+
+def _forecast_rms(forecast: Mapping[str, Any], horizon_min: float) -> Any:
+    """RMS of the shipped method at a horizon, None where it was not replayed."""
+    rows = (row for row in objects(forecast, "skill") if row.get("method") == forecast.get("default_method"))
+    return next((row.get("rms_m") for row in rows if row.get("horizon_min") == horizon_min), None)
 
 
 def failed_row(source: str, state: str, reason: str) -> dict[str, Any]:

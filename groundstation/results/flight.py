@@ -6,7 +6,9 @@ from typing import Any, Literal
 
 from groundstation.base.findings import Finding
 from groundstation.results.figures import FigureData
+from groundstation.results.forecast import ForecastResult
 from groundstation.results.heading import HeadingResult
+from groundstation.results.inertial import InertialResult
 
 Status = Literal["ok", "degraded", "failed"]
 
@@ -49,8 +51,10 @@ class FlightResults:
         As written to summary.json.
     findings, not_assessable : tuples
     heading : HeadingResult, optional
+    inertial : InertialResult, optional
+    forecast : ForecastResult, optional
     figures : tuple of FigureData
-        Arrays behind every figure, those of the heading among them.
+        Arrays behind every figure, those of the analyses among them.
     """
 
     flight_id: str
@@ -65,6 +69,8 @@ class FlightResults:
     findings: tuple[Finding, ...] = ()
     not_assessable: tuple[NotAssessable, ...] = ()
     heading: HeadingResult | None = None
+    inertial: InertialResult | None = None
+    forecast: ForecastResult | None = None
     figures: tuple[FigureData, ...] = ()
 
     def figure(self, name: str) -> FigureData | None:

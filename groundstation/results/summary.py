@@ -10,7 +10,7 @@ import numpy as np
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
-from groundstation.results.heading import HeadingResult
+from groundstation.results.inertial import InertialResult
 
 SCHEMA_VERSION = 1
 
@@ -32,7 +32,13 @@ DIGITS_BY_UNIT: Mapping[str, int] = {
     "mps": 4,
     "m": 3,
     "s": 3,
+    "min": 3,
+    "h": 4,
     "hz": 4,
+    "arcsec": 3,
+    "dph": 6,
+    "dphph": 6,
+    "nmiph": 4,
 }
 
 
@@ -43,6 +49,8 @@ def digits_of(name: str) -> int:
     --------
     >>> digits_of("error_deg"), digits_of("ground_speed_mps"), digits_of("drift_deg_per_h"), digits_of("share")
     (4, 4, 2, 6)
+    >>> digits_of("north_drift_sigma_dph"), digits_of("radial_error_rate_50_nmiph"), digits_of("horizon_min")
+    (6, 4, 3)
     """
     if name in DIGITS_BY_NAME:
         return DIGITS_BY_NAME[name]
@@ -82,9 +90,18 @@ def _is_figures(value: Any) -> bool:
     return isinstance(value, tuple) and bool(value) and isinstance(value[0], FigureData)
 
 
-def _heading(result: HeadingResult) -> dict[str, Any]:
+def _answer(result: Any) -> dict[str, Any]:
+    """An analysis as plain values; its arrays have files of their own."""
     out: dict[str, Any] = plain(result)
     out.pop("figures", None)
+    return out
+
+
+def _inertial(result: InertialResult) -> dict[str, Any]:
+    """The INS errors, each channel an object under its own name in place of ``channels``."""
+    out: dict[str, Any] = {}
+    for key, value in _answer(result).items():
+        out |= {channel["name"]: channel for channel in value} if key == "channels" else {key: value}
     return out
 
 
@@ -109,7 +126,13 @@ def summary_of(results: FlightResults) -> dict[str, Any]:
         "source": results.source,
         "metadata": dict(sorted(results.metadata.items())),
     }
-    answers = {} if results.heading is None else {"heading": _heading(results.heading)}
+    answers: dict[str, Any] = {}
+    if results.heading is not None:
+        answers["heading"] = _answer(results.heading)
+    if results.inertial is not None:
+        answers["inertial"] = _inertial(results.inertial)
+    if results.forecast is not None:
+        answers["forecast"] = _answer(results.forecast)
     return {
         "schema_version": SCHEMA_VERSION,
         "flight": plain(flight),

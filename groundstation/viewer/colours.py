@@ -23,6 +23,7 @@ VERMILION: Final = _rgb(0xE0661A)
 PINK: Final = _rgb(0xCC79A7)
 GREY: Final = _rgb(0x8C8C8C)
 DIM: Final = _rgb(0x5A5A5A)
+YELLOW_GREEN: Final = _rgb(0xA3C14A)
 
 # Meanings. A quantity keeps its colour on every tab.
 INS, GNSS, ANSWER, LIMIT, HONEST, PAPER = SKY, ORANGE, GREEN, VERMILION, PINK, YELLOW
@@ -58,6 +59,13 @@ GATES: Final[dict[str, Colour]] = {
     "excluded": PINK,
     "outlier": VERMILION,
 }
+STATES: Final[dict[str, Colour]] = {
+    "armed": VERMILION,
+    "disarmed": GREY,
+    "on the ground": BLUE,
+    "in the air": SKY,
+}
+FILTER_STATES: Final[dict[str, Colour]] = {"GNSS used": GREEN, "forecast": ORANGE, "GNSS not used": GREY}
 DATA_STATES: Final[dict[str, Colour]] = {"data": GREEN, "gap": VERMILION}
 LIGHT: Final = _rgb(0xB0B0B0)
 FLAGS: Final[dict[str, Colour]] = {"yes": GREEN, "no": GREY}

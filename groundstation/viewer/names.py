@@ -1,5 +1,6 @@
 """Names an operator reads, and entity paths no log can break: whatever a file calls its columns, both stay legible."""
 
+import re
 import unicodedata
 from collections.abc import Iterable
 
@@ -14,6 +15,10 @@ UNITS: dict[str, str] = {
     "dps": "deg/s",
     "deg": "deg",
     "arcmin": "arcmin",
+    "arcsec": "arcsec",
+    "dphph": "deg/h per h",
+    "dph": "deg/h",
+    "nmiph": "nmi/h",
     "nt": "nT",
     "m2": "m²",
     "m": "m",
@@ -108,6 +113,31 @@ def label(field: str) -> str:
     """
     name, unit = split_unit(field)
     return f"{words(name)}, {unit}" if unit else words(name)
+
+
+def source_label(name: str) -> str:
+    """Name of a topic or field that is not ours: as the source spells it, for that is the name people search for.
+
+    Examples
+    --------
+    >>> source_label("sensor_accel.1"), source_label("s_variance_m_s")
+    ('sensor_accel.1', 's_variance_m_s')
+    """
+    return clean_text(name)
+
+
+def natural_order(name: str) -> tuple[tuple[str, int], ...]:
+    """Sort key that reads numbers as numbers and letters without case.
+
+    Examples
+    --------
+    >>> sorted(["ins.10", "IMU", "ins.2", "ins"], key=natural_order)
+    ['IMU', 'ins', 'ins.2', 'ins.10']
+    """
+    parts = re.split(r"([0-9]+)", name.casefold())
+    return tuple(
+        (parts[place], int((parts[place + 1 : place + 2] or ["-1"])[0][:18])) for place in range(0, len(parts), 2)
+    )
 
 
 def topic_label(topic: str) -> str:

@@ -16,7 +16,9 @@ from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.recorder import FLIGHT_TIME, Recorder
+from groundstation.viewer.tabs.forecast import forecast
 from groundstation.viewer.tabs.heading import heading
+from groundstation.viewer.tabs.inertial import inertial
 from groundstation.viewer.tabs.log import log
 from groundstation.viewer.tabs.overview import overview
 from groundstation.viewer.tabs.quality import quality
@@ -102,6 +104,8 @@ def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResul
         overview(recorder, results),
         quality(recorder, flight, results),
         heading(recorder, results),
+        inertial(recorder, results),
+        forecast(recorder, results),
         raw(recorder, flight, results),
         log(recorder, flight, results),
     )

@@ -7,11 +7,13 @@ to :data:`CHAPTERS`.
 from collections.abc import Callable
 
 from groundstation.reports.parts import Section
-from groundstation.reports.sections import findings, heading, overview, provenance, quality
+from groundstation.reports.sections import findings, forecast, heading, inertial, overview, provenance, quality
 from groundstation.results.files import SavedFlight
 
 CHAPTERS: tuple[Callable[[SavedFlight], Section | None], ...] = (
     heading.build,
+    inertial.build,
+    forecast.build,
     overview.build,
     quality.build,
     findings.build,

@@ -1,9 +1,15 @@
 """Chapter: what a user must know about the flight, gravest first, and what could not be assessed."""
 
+from collections.abc import Mapping
+from typing import Any
+
+from groundstation.base.findings import Finding
 from groundstation.reports.parts import Cell, Grid, Head, Mark, Note, Part, Section
 from groundstation.reports.sections.saved import objects
-from groundstation.reports.wording import number
+from groundstation.reports.wording import is_number, number
+from groundstation.results.explain import explained
 from groundstation.results.files import SavedFlight
+from groundstation.results.noticed import grouped
 
 MOST_FINDINGS = 200
 MARKS = {"fail": Mark("bad", "fail"), "warn": Mark("warn", "warn"), "info": Mark("plain", "info")}
@@ -14,7 +20,7 @@ def build(saved: SavedFlight) -> Section:
     """Build the chapter; no findings is an answer too."""
     parts: list[Part] = [_findings(saved) or Note("No findings.", "good")]
     rows = [
-        (str(entry.get("analysis", "")), str(entry.get("reason", "")))
+        (str(entry.get("analysis", "")), explained(str(entry.get("analysis", "")), str(entry.get("reason", ""))))
         for entry in objects(saved.summary, "not_assessable")
     ]
     if rows:
@@ -23,22 +29,25 @@ def build(saved: SavedFlight) -> Section:
 
 
 def _findings(saved: SavedFlight) -> Grid | None:
-    found = sorted(objects(saved.summary, "findings"), key=lambda item: GRAVITY.get(str(item.get("severity")), 0))
+    every = [_finding(item) for item in objects(saved.summary, "findings")]
+    found = sorted(grouped(every), key=lambda item: GRAVITY.get(item.severity, 0))
     rows: list[tuple[Cell, ...]] = []
     for item in found[:MOST_FINDINGS]:
-        severity = str(item.get("severity"))
-        count = item.get("count")
-        where = " · ".join(str(item.get(key)) for key in ("topic", "place") if item.get(key))
-        rows.append(
-            (
-                MARKS.get(severity, Mark("bad", severity)),
-                str(item.get("text", "")),
-                where,
-                "" if count is None else number(count, 0),
-                str(item.get("code", "")),
-            )
-        )
+        where = " · ".join(text for text in (item.topic, item.place) if text)
+        count = "" if item.count is None else number(item.count, 0)
+        mark = MARKS.get(item.severity, Mark("bad", item.severity))
+        rows.append((mark, item.text, where, count, item.code))
     heads = (Head("Severity"), Head("Finding"), Head("Where"), Head("Count", True), Head("Code"))
     more = len(found) - len(rows)
     caption = f"{more} more in summary.json." if more else ""
+    if len(found) < len(every):
+        caption = f"Remarks on raw topics are joined by kind; summary.json lists all {len(every)}. {caption}".strip()
     return Grid("Findings", heads, rows, caption) if rows else None
+
+
+def _finding(item: Mapping[str, Any]) -> Finding:
+    """A saved finding; whatever a key holds, it is shown."""
+    severity: Any = str(item.get("severity"))
+    code, text, topic, place = (str(item.get(key) or "") for key in ("code", "text", "topic", "place"))
+    count = item.get("count")
+    return Finding(severity, code, text, topic, place, int(count) if is_number(count) else None)

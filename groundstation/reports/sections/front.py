@@ -10,6 +10,7 @@ from groundstation.reports.wording import ABSENT, clock, interval, is_number, nu
 from groundstation.results.files import SavedFlight
 
 PUBLISHED_LIMIT_ARCMIN = 20.0
+FORECAST_MIN = 60.0  # the horizon the forecast is judged by at a glance
 
 STATUS: dict[str, Mark] = {
     "ok": Mark("good", "ok"),
@@ -78,7 +79,7 @@ def build(saved: SavedFlight) -> Front:
             verdict=Mark("unknown", "Not assessable"),
             headline="Heading correction: not assessable",
             sentences=(_sentence(reason),),
-            figures=(),
+            figures=_of_the_ins(saved),
             to_sign=False,
         )
     tone, word = VERDICTS.get(str(heading.get("verdict")), ("unknown", str(heading.get("verdict"))))
@@ -89,7 +90,7 @@ def build(saved: SavedFlight) -> Front:
         sentences=tuple(
             filter(None, (_sentence(typeset(str(heading.get("verdict_reason") or ""))), _in_words(heading)))
         ),
-        figures=_figures(heading),
+        figures=(*_figures(heading), *_of_the_ins(saved)),
         to_sign=heading.get("verdict") == "accept",
     )
 
@@ -159,4 +160,26 @@ def _figures(heading: Mapping[str, Any]) -> tuple[tuple[str, str, str], ...]:
         )
     else:
         figures.append(("Against the reference", ABSENT, "no reference heading in log or site file"))
+    return tuple(figures)
+
+
+def _of_the_ins(saved: SavedFlight) -> tuple[tuple[str, str, str], ...]:
+    """Drift of the INS and error of the forecast after an hour; nothing where they say nothing."""
+    inertial, forecast = (mapping(saved.summary, "results", name) for name in ("inertial", "forecast"))
+    if inertial.get("kind") != "unaided":
+        return ()
+    rates = [inertial.get(f"radial_error_rate_{share}_nmiph") for share in (50, 95)]
+    figures = []
+    if is_number(rates[0]):
+        remark = f"median of the radial error; 95 % below {number(rates[1], 2, 'nmi/h')}"
+        figures.append(("INS drift", number(rates[0], 2, "nmi/h"), remark))
+    errors = {
+        row.get("method"): row.get("rms_m")
+        for row in objects(forecast, "skill")
+        if row.get("horizon_min") == FORECAST_MIN
+    }
+    shipped = errors.get(forecast.get("default_method"))
+    if is_number(shipped):
+        remark = f"RMS; raw INS {number(errors.get('raw_ins'), 0, 'm')}"
+        figures.append((f"Forecast, {FORECAST_MIN:g} min", number(shipped, 0, "m"), remark))
     return tuple(figures)

@@ -9,16 +9,20 @@ from groundstation.base.geodesy import north_east_m
 from groundstation.reports import drawing as d
 from groundstation.reports.parts import Drawing, Section
 from groundstation.reports.sections.saved import heading_of, numbers, objects, texts
-from groundstation.reports.wording import is_number, number
+from groundstation.reports.wording import is_number, number, words
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight
 
+SMALLEST_TAXI_M = 10.0  # less is no taxi worth enlarging: a receiver at rest, or a start by hand
+SMALLEST_MAP_M = 2.0  # side of the map of an aircraft that did not move
+MOST_MODES = 12
+STATE_COLOURS = {"armed": "#b3261e", "on the ground": "#3a86c8"}
 GNSS_COLOURS = {"good": d.USED, "integrity lost": "#b3261e", "no GNSS": "#b3261e"}
 
 
 def build(saved: SavedFlight) -> Section | None:
     """Build the chapter, None when the flight has no overview."""
-    parts = tuple(drawing for drawing in (track_map(saved), profile(saved)) if drawing is not None)
+    parts = tuple(drawing for drawing in (track_map(saved), profile(saved), states(saved)) if drawing is not None)
     lead = "Where the aircraft was and what it did, from the logged navigation data."
     return Section("overview", "Overview of the flight", lead, parts) if parts else None
 
@@ -36,7 +40,8 @@ def track_map(saved: SavedFlight) -> Drawing | None:
     north, east = north_east_m(latitude, longitude, *origin)
     used = _used_rows(numbers(data, "time_s"), objects(heading_of(saved), "segments"))
     taxi = _taxi_rows(numbers(data, "time_s"), objects(heading_of(saved), "segments"), saved.figure("phases"))
-    zoom = bool(np.isfinite(north[taxi]).any()) and _extent(north, east) > 2.0 * _extent(north[taxi], east[taxi])
+    on_ground = _extent(north[taxi], east[taxi])
+    zoom = on_ground > SMALLEST_TAXI_M and _extent(north, east) > 2.0 * on_ground
 
     def paint(figure: Any) -> None:
         right = 86.0 if zoom else 174.0
@@ -87,9 +92,10 @@ def _map(axes: Any, north: Any, east: Any, used: Any, title: str) -> None:
     axes.plot(
         [east[first]], [north[first]], "o", color=d.INK, markersize=5, markerfacecolor="white", markeredgewidth=1.2
     )
-    if _extent(north, east) == 0.0:
-        axes.set_xlim(east[first] - 1, east[first] + 1)
-        axes.set_ylim(north[first] - 1, north[first] + 1)
+    if _extent(north, east) * (1000.0 if kilometres else 1.0) < SMALLEST_MAP_M:  # scatter of a receiver at rest
+        half = 0.5 * SMALLEST_MAP_M
+        axes.update_datalim([(east[first] - half, north[first] - half), (east[first] + half, north[first] + half)])
+        axes.autoscale_view()
     axes.set_xlabel(f"east, {unit}")
     axes.set_ylabel(f"north, {unit}")
     axes.set_title(title)
@@ -102,6 +108,8 @@ def profile(saved: SavedFlight) -> Drawing | None:
         return None
     phases, gnss = saved.figure("phases"), saved.figure("gnss_lanes")
     time = numbers(data, "time_s")
+    altitude = "altitude_m" if np.isfinite(numbers(data, "altitude_m")).any() else "pressure_altitude_m"
+    altitude = altitude if altitude in data.columns else "altitude_m"
     times = d.finite(time)
     low, high = (float(times.min()), float(times.max())) if times.size else (0.0, 1.0)
     states = (
@@ -113,7 +121,7 @@ def profile(saved: SavedFlight) -> Drawing | None:
         base = 12.0 + lane_mm
         upper, lower = d.place(figure, 27, base + 35, 174, base + 66), d.place(figure, 27, base, 174, base + 31)
         for axes, column, text, colour in (
-            (upper, "altitude_m", "altitude, m", d.INS),
+            (upper, altitude, f"{words(altitude.removesuffix('_m'))}, m", d.INS),
             (lower, "ground_speed_mps", "ground speed, m/s", d.GNSS),
         ):
             if phases is not None:
@@ -141,3 +149,33 @@ def profile(saved: SavedFlight) -> Drawing | None:
     )
     alt = "Altitude and ground speed over flight time with phases shaded."
     return Drawing("Altitude, speed and phases", caption, alt, d.draw("profile", 12 + lane_mm + 74, paint), names)
+
+
+def states(saved: SavedFlight) -> Drawing | None:
+    """Flight modes, arming and ground contact as the log tells them, a row for each state; None when it tells none."""
+    data = saved.figure("state_lanes")
+    if data is None:
+        return None
+    lane, state = texts(data, "lane"), texts(data, "state")
+    start, end = numbers(data, "start_s"), numbers(data, "end_s")
+    named = np.where(lane == "mode", np.char.add("mode ", state), state)
+    shown = ~np.isin(state, ("disarmed", "in the air", ""))  # what is not drawn is the opposite
+    modes = list(dict.fromkeys(named[shown & (lane == "mode")].tolist()))
+    rows = [*dict.fromkeys(named[shown & (lane != "mode")].tolist()), *modes[:MOST_MODES]]
+    times = d.finite(numbers(saved.figure("overview") or data, "time_s"), start, end)
+    if not rows or not times.size:
+        return None
+    height = 14.0 + 4.6 * len(rows)
+    colours = dict.fromkeys(rows, d.INS) | STATE_COLOURS
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 37, 12, 174, height - 2)
+        d.lanes(axes, start[shown], end[shown], named[shown], rows, colours)
+        d.time_axis(axes, min(float(times.min()), 0.0), float(times.max()))
+
+    flags = [name for name in dict.fromkeys(lane.tolist()) if name not in ("mode", "arming")]
+    caption = "What the log itself says of flight mode and arming"
+    caption += f"; ground contact by its {', '.join(flags)}." if flags else "."
+    caption += f" {len(modes) - MOST_MODES} more modes in the table." if len(modes) > MOST_MODES else ""
+    alt = "Strips of flight mode, arming and ground contact over flight time."
+    return Drawing("Modes and states", caption, alt, d.draw("states", height, paint), ("state_lanes",))

@@ -7,14 +7,15 @@ import numpy as np
 
 from groundstation.reports import drawing as d
 from groundstation.reports.parts import Drawing, Facts, Grid, Head, Note, Section
-from groundstation.reports.sections.saved import mapping, numbers, texts
-from groundstation.reports.wording import any_value, named_quantity, number, number_with_unit, significant
+from groundstation.reports.sections.saved import mapping, numbers, objects, texts
+from groundstation.reports.wording import any_value, named_quantity, number, number_with_unit, significant, words
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight
 
 MOST_TOPICS = 60
 MOST_LANES = 24
 MOST_ENTRIES = 20
+MOST_DAMAGES = 60
 
 
 def build(saved: SavedFlight) -> Section:
@@ -23,6 +24,7 @@ def build(saved: SavedFlight) -> Section:
         _ledger(saved),
         _gaps(saved),
         _nested(saved, "clock", "Clock model"),
+        _damages(saved),
         _nested(saved, "ledger", "Ledger of the log"),
     )
     shown = tuple(part for part in parts if part is not None)
@@ -109,10 +111,29 @@ def _gap_marks(axes: Any, gaps: FigureData, rows: Any, place: int, least: float)
 
 
 def _nested(saved: SavedFlight, key: str, title: str) -> Facts | None:
-    told_above = {"topics"}  # the table of topics
+    told_above = {"topics", "damages", "remarks"}  # the tables of topics and losses; remarks are findings
     document = {name: value for name, value in mapping(saved.summary, key).items() if name not in told_above}
     pairs = [(name, value, "") for name, value in _flat(document)]
     return Facts(title, pairs) if pairs else None
+
+
+def _damages(saved: SavedFlight) -> Grid | Note:
+    damages = objects(mapping(saved.summary, "ledger"), "damages")
+    if not damages:
+        return Note("No damage was found in the log: nothing lost, nothing unreadable.", "good")
+    rows = [
+        (
+            words(str(item.get("kind") or "")),
+            str(item.get("what") or ""),
+            " · ".join(str(item.get(key)) for key in ("topic", "place") if item.get(key)),
+            number(item.get("count"), 0),
+            "yes" if item.get("loses_data") else "no",
+        )
+        for item in damages[:MOST_DAMAGES]
+    ]
+    heads = (Head("Kind"), Head("What"), Head("Where"), Head("Count", True), Head("Data lost"))
+    more = len(damages) - len(rows)
+    return Grid("Damage to the log", heads, rows, f"{more} more in summary.json." if more else "")
 
 
 def _flat(document: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.results.explain import explained
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight
 
@@ -49,9 +50,9 @@ def texts(figure: FigureData, name: str) -> NDArray[np.str_]:
 
 
 def not_assessable_reason(saved: SavedFlight, analysis: str) -> str:
-    """Why an analysis could not be carried out; empty when nothing is said about it."""
+    """Why an analysis could not be carried out, in plain words; empty when nothing is said about it."""
     entries = objects(saved.summary, "not_assessable")
-    return next(
+    reason = next(
         (
             str(entry.get("reason", ""))
             for entry in entries
@@ -59,3 +60,4 @@ def not_assessable_reason(saved: SavedFlight, analysis: str) -> str:
         ),
         "",
     )
+    return explained(analysis, reason)

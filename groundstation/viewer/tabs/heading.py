@@ -3,6 +3,7 @@
 import numpy as np
 import rerun.blueprint as rrb
 
+from groundstation.results.explain import explained
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.viewer import colours
@@ -21,7 +22,7 @@ MARGIN, SMALLEST_MARGIN_DEG = 0.15, 0.05
 
 def heading(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the heading tab; None when the flight was not assessed and no reason is known."""
-    reasons = [entry.reason for entry in results.not_assessable if entry.analysis == "heading"]
+    reasons = [explained("heading", entry.reason) for entry in results.not_assessable if entry.analysis == "heading"]
     if results.heading is None and not reasons:
         return None
     recorder.document("heading/verdict", verdict_text(results.heading, reasons))

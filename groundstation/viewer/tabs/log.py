@@ -6,10 +6,11 @@ import numpy as np
 import rerun.blueprint as rrb
 
 from groundstation.base.findings import Finding
-from groundstation.base.signals import topics_of_kind
+from groundstation.base.signals import RAW_PREFIX, topics_of_kind
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.results.flight import FlightResults
+from groundstation.results.noticed import grouped
 from groundstation.tables.table import Flight
 from groundstation.viewer.names import topic_label
 from groundstation.viewer.recorder import Recorder
@@ -33,9 +34,14 @@ def log(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Conta
 def _findings(recorder: Recorder, flight: Flight, results: FlightResults) -> None:
     entries = [
         (place_s(finding.place, flight), f"{finding.text}{_tail(finding)} [{finding.code}]", finding.severity)
-        for finding in results.findings
+        for finding in grouped(results.findings)
     ]
-    entries += [(0.0, f"not assessed: {entry.analysis}: {entry.reason}", "info") for entry in results.not_assessable]
+    told = " ".join(finding.text for finding in results.findings)
+    entries += [
+        (0.0, f"not assessed: {entry.analysis}: {entry.reason}", "info")
+        for entry in results.not_assessable
+        if entry.reason not in told
+    ]
     if not entries:
         entries = [(0.0, "no findings", "info")]
     entries.sort(key=lambda entry: entry[0])
@@ -79,8 +85,12 @@ def _gaps(recorder: Recorder, results: FlightResults) -> None:
     if gaps is None:
         return
     start, length = numbers(gaps, "start_s"), numbers(gaps, "length_s")
-    rows = np.sort(np.argsort(-length, kind="stable")[:MAX_GAPS])
+    # One drop-out hits everything: a hundred raw topics would only repeat it. Theirs are findings and lanes.
+    ours = np.flatnonzero([not topic.startswith(RAW_PREFIX) for topic in gaps["topic"].tolist()])
+    rows = np.sort(ours[np.argsort(-length[ours], kind="stable")[:MAX_GAPS]])
+    if not rows.size:
+        return
     texts = [f"gap of {length[row]:.3f} s in {gaps['topic'][row]}" for row in rows]
     if len(rows) < len(gaps):
-        texts[0] += f" (the longest {MAX_GAPS} of {len(gaps)} gaps are listed)"
+        texts[0] += f" ({len(rows)} of {len(gaps)} gaps are listed here; the tab Data quality shows every one)"
     recorder.texts("log/gaps", recorder.time_ns(start[rows]), texts, ["info"] * len(texts))

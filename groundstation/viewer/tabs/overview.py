@@ -6,16 +6,21 @@ import numpy as np
 import rerun.blueprint as rrb
 
 from groundstation.base.timescales import duration_text, utc_ns_to_iso
+from groundstation.results.explain import explained
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour
 from groundstation.viewer.markdown import markdown_text, table
+from groundstation.viewer.names import path_parts
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import gap_after, wraps_after
 from groundstation.viewer.tabs.track import track
 from groundstation.viewer.tabs.verdict import to_type
 from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
+
+LANE_SHARE = 0.35  # height of a lane, of that of a plot
+MARGIN_DEG = 10.0  # beyond 0 and 360: a nose that points north would be drawn on the frame
 
 
 def overview(recorder: Recorder, results: FlightResults) -> rrb.Container:
@@ -25,14 +30,17 @@ def overview(recorder: Recorder, results: FlightResults) -> rrb.Container:
     figure = figure_of(results, "overview", "time_s")
     ground = None if figure is None else track(recorder, results, figure)
     left = summary if ground is None else rrb.Vertical(contents=[ground, summary], row_shares=[2.0, 1.0])
-    right = [] if figure is None else _plots(recorder, figure)
+    right: list[rrb.View] = [] if figure is None else _plots(recorder, figure)
+    shares = [1.0] * len(right)
     lane_paths = [
         *log_lane(recorder, results, "phases", "phase", "flight/phase", colours.PHASES),
         *log_lane(recorder, results, "gnss_lanes", "state", "flight/GNSS", colours.GNSS_STATES),
     ]
+    lane_paths += _state_lanes(recorder, results)
     if lane_paths:
-        right.append(lanes("Flight phase and GNSS", lane_paths))
-    columns = [left, *([rrb.Vertical(contents=right)] if right else [])]
+        right.append(lanes("Flight phase, states and GNSS", lane_paths))
+        shares.append(max(1.0, LANE_SHARE * len(lane_paths)))
+    columns = [left, *([rrb.Vertical(contents=right, row_shares=shares)] if right else [])]
     return rrb.Horizontal(contents=columns, name="Overview")
 
 
@@ -49,10 +57,27 @@ def log_lane(
     return [path]
 
 
+def _state_lanes(recorder: Recorder, results: FlightResults) -> list[str]:
+    """Log flight mode, arming and ground contact, a lane each; the paths logged."""
+    figure = figure_of(results, "state_lanes", "lane", "start_s", "end_s", "state")
+    if figure is None:
+        return []
+    names = figure["lane"].astype(np.str_)
+    found = list(dict.fromkeys(names.tolist()))
+    paths = [f"flight/{part}" for part in path_parts(["phase", "GNSS", *found])[2:]]
+    for lane, path in zip(found, paths, strict=True):
+        rows = names == lane
+        states = figure["state"].astype(np.str_)[rows]
+        start, end = numbers(figure, "start_s")[rows], numbers(figure, "end_s")[rows]
+        recorder.spans(path, start, end, states, colours.STATES)
+    return paths
+
+
 def _plots(recorder: Recorder, figure: FigureData) -> list[rrb.View]:
     views: list[rrb.View] = []
     for column, name, line in (
         ("altitude_m", "Altitude, m", Line("altitude, m", colours.INS)),
+        ("pressure_altitude_m", "Pressure altitude, m", Line("pressure altitude, m", colours.INS)),
         ("ground_speed_mps", "Ground speed, m/s", Line("ground speed, m/s", colours.GNSS)),
     ):
         if column in figure.columns and np.isfinite(numbers(figure, column)).any():
@@ -66,7 +91,7 @@ def _plots(recorder: Recorder, figure: FigureData) -> list[rrb.View]:
     ]
     paths = [path for column, path, line in directions if _direction(recorder, figure, column, path, line)]
     if paths:
-        views.append(plot("INS heading and GNSS track, deg", paths, axis_range=(0.0, 360.0)))
+        views.append(plot("INS heading and GNSS track, deg", paths, axis_range=(-MARGIN_DEG, 360.0 + MARGIN_DEG)))
     return views
 
 
@@ -94,5 +119,10 @@ def _summary(results: FlightResults) -> str:
     heading = results.heading
     if heading is not None:
         rows.append(["heading", f"**{heading.verdict}**: {to_type(heading)}"])
-    rows += [[markdown_text(entry.analysis), markdown_text(entry.reason)] for entry in results.not_assessable]
-    return table(["flight", markdown_text(results.flight_id)], [row for row in rows if row[1]])
+    facts = table(["flight", markdown_text(results.flight_id)], [row for row in rows if row[1]])
+    # Cells do not wrap: reasons stand below.
+    reasons = [
+        f"**{markdown_text(entry.analysis)}: not assessable.** {markdown_text(explained(entry.analysis, entry.reason))}"
+        for entry in results.not_assessable
+    ]
+    return "\n\n".join([facts, *reasons])

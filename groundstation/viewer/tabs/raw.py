@@ -1,4 +1,7 @@
-"""Raw: every numeric field of every topic by family, every text and flag as a lane; long topics thinned, saying so."""
+"""Raw: every numeric field of every topic by family, every text and flag as a lane; long topics thinned, saying so.
+
+Topics that are no series (parameters, definitions, single records: most rows at one instant) are tables.
+"""
 
 import re
 from dataclasses import dataclass
@@ -12,19 +15,32 @@ from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer import colours
 from groundstation.viewer.markdown import markdown_text, table
-from groundstation.viewer.names import label, path_parts, split_unit, topic_label, words
+from groundstation.viewer.names import (
+    clean_text,
+    label,
+    natural_order,
+    path_parts,
+    source_label,
+    split_unit,
+    topic_label,
+    words,
+)
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, covers_gap, gap_after, rows_that_fit, runs, thin, wraps_after
 from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
 
 SCALARS = 1_200_000  # numbers in this tab: about 25 MB, an hour at 100 Hz
-COLUMNS_OF_VIEWS = 2
+VIEWS_OF_A_COLUMN, FEWEST_COLUMNS, MOST_COLUMNS = 6, 2, 4  # more views in a column are too low to be read
 CIRCULAR = ("heading", "track")
 STATES = "states"  # part of the path of every lane: no family may have it
 MAX_VIEWS = 24  # of one topic; the fields of the families beyond share the last one
 MAX_TOPICS = 300  # with a page: the SDK never returns from sending a layout of some 5000 views
 MAX_ALL_VIEWS = 2_000  # where many topics have many families, each topic has fewer views
 MAX_LANE_ROWS = 5_000  # a lane with more changes is no lane
+MAX_LIST_ROWS, MAX_LIST_COLUMNS, MAX_CELL = 2_000, 40, 120  # of a table; what is beyond is told
+TICKS_NS = (1, 1_000, 1_000_000, 1_000_000_000)  # units in which devices count their time
+CLOCK_NS = 200_000_000  # a field that follows the time of its rows this closely only repeats it
+ALONE = 0.1  # share of rows without a neighbour above which a raw topic has no rate, and no gaps either
 _AXES = re.compile(r"(_(north|east|down|x|y|z|w|forward|right|roll|pitch|xx|xy|xz|yy|yz|zz)|\[?\d+\]?)$")
 
 
@@ -48,6 +64,8 @@ class Family:
     def title(self) -> str:
         """Title of the view, with the unit."""
         topic = _title(self.topic)
+        if self.topic.startswith(RAW_PREFIX):  # units only as the source spells them
+            return f"{topic} {source_label(self.fields[0] if len(self.fields) == 1 else self.name)}"
         if len(self.fields) == 1:
             return f"{topic} {label(self.fields[0])}"
         unit = split_unit(self.fields[0])[1]
@@ -61,7 +79,11 @@ def raw(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Conta
     topics, without_page = filled[:MAX_TOPICS], filled[MAX_TOPICS:]
     most_views = min(MAX_VIEWS, max(MAX_ALL_VIEWS // max(len(topics), 1), 1))
     families: dict[str, list[Family]] = {}
+    listed = {topic for topic in topics if is_list(flight[topic])}
     for topic in topics:
+        if topic in listed:
+            families[topic] = []
+            continue
         starts = np.zeros(0) if gaps is None else numbers(gaps, "start_s")[gaps["topic"] == topic]
         families[topic] = _families(flight[topic], recorder.time_ns(starts))
     everyone = [family for own in families.values() for family in own]
@@ -72,12 +94,19 @@ def raw(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Conta
     other: list[rrb.Container] = []
     for topic, part in zip(topics, path_parts(topics), strict=True):
         base = f"raw/{part}"
+        page: rrb.Container
+        if topic in listed:
+            recorder.document(f"{base}/{STATES}", _list(flight[topic]))
+            kept[topic] = len(flight[topic])
+            page = rrb.Vertical(contents=[document(_title(topic), f"{base}/{STATES}")], name=_title(topic))
+            (other if topic.startswith(RAW_PREFIX) else canonical).append(page)
+            continue
         kept[topic], views = _log_families(recorder, base, families[topic], limit, most_views)
         pictures, too_busy = _lanes(recorder, base, flight[topic])
         views += pictures
         left_out += [f"{topic}.{field}" for field in too_busy]
         if views:
-            page = rrb.Grid(contents=views, grid_columns=min(COLUMNS_OF_VIEWS, len(views)), name=_title(topic))
+            page = rrb.Grid(contents=views, grid_columns=columns_of(len(views)), name=_title(topic))
             (other if topic.startswith(RAW_PREFIX) else canonical).append(page)
     pages = [*canonical, *([rrb.Tabs(contents=other, name="other topics")] if other else [])]
     if not pages and not left_out:
@@ -87,14 +116,61 @@ def raw(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Conta
     return rrb.Tabs(contents=pages, name="Raw", active_tab=0)
 
 
-def _reading_order(topic: str) -> tuple[int, int, str]:
+def _reading_order(topic: str) -> tuple[int, tuple[tuple[str, int], ...]]:
     kinds = list(TOPICS)
     kind = kind_of(topic)
-    return kinds.index(kind) if kind in kinds else len(kinds), len(topic), topic
+    return kinds.index(kind) if kind in kinds else len(kinds), natural_order(topic)
 
 
 def _title(topic: str) -> str:
-    return topic_label(topic.removeprefix(RAW_PREFIX))
+    return source_label(topic.removeprefix(RAW_PREFIX)) if topic.startswith(RAW_PREFIX) else topic_label(topic)
+
+
+def is_list(table_of_topic: Table) -> bool:
+    """Whether a raw topic is a list rather than a series: half of its rows or more at one instant."""
+    if not table_of_topic.topic.startswith(RAW_PREFIX):
+        return False
+    times, counts = np.unique(table_of_topic.time_ns, return_counts=True)
+    return len(times) == 1 or bool(2 * counts.max() >= len(table_of_topic) and counts.max() > 2)
+
+
+def _list(table_of_topic: Table) -> str:
+    """Rows of a list as a table; one row alone stands upright."""
+    rows = table_of_topic.take(slice(0, MAX_LIST_ROWS))
+    names = [name for name, column in rows.columns.items() if column.mask.any()]
+    shown = names[:MAX_LIST_COLUMNS] if len(rows) > 1 else names
+    cells = [_cells(rows.columns[name]) for name in shown]
+    heads = [markdown_text(source_label(name)) for name in shown]
+    if len(rows) == 1:
+        text = table(["field", "value"], [[head, column[0]] for head, column in zip(heads, cells, strict=True)])
+    else:
+        text = table(heads, [list(row) for row in zip(*cells, strict=True)])
+    told = [f"{len(table_of_topic)} rows, most of them of one time: a list, not a series."]
+    if len(rows) < len(table_of_topic) or len(shown) < len(names):
+        told.append(f"Shown: {len(rows)} rows, {len(shown)} of {len(names)} fields.")
+    return "\n\n".join([" ".join(told) if len(table_of_topic) > 1 else "One record.", text])
+
+
+def _cells(column: Column) -> list[str]:
+    values = np.where(column.values, "yes", "no") if column.values.dtype.kind == "b" else column.values
+    texts = [f"{value:.7g}" if isinstance(value, float) else str(value) for value in values.tolist()]
+    return [
+        markdown_text(clean_text(text, MAX_CELL)) if known else ""
+        for text, known in zip(texts, column.mask.tolist(), strict=True)
+    ]
+
+
+def repeats_the_time(table_of_topic: Table, field: str) -> bool:
+    """Whether a field of a raw topic is the clock of its own rows: drawn, it would be a ramp on every page."""
+    column = table_of_topic.columns[field]
+    if not table_of_topic.topic.startswith(RAW_PREFIX) or len(column) < 3 or column.values.dtype.kind not in "iu":
+        return False
+    device = table_of_topic.device_time_ns
+    known = column.mask & device.mask
+    if not known.any() or device.values[known].min() < 10 * CLOCK_NS:  # so early any small number would pass
+        return False
+    values, time_ns = column.values[known].astype(np.float64), device.values[known].astype(np.float64)
+    return any(bool((np.abs(values * tick - time_ns) <= CLOCK_NS).all()) for tick in TICKS_NS)
 
 
 def family_of(topic: str, field: str) -> str:
@@ -126,6 +202,8 @@ def _families(table_of_topic: Table, gap_starts_ns: Int64Array) -> list[Family]:
     for field, column in table_of_topic.columns.items():
         if column.values.dtype.kind not in "fiu" or not len(column) or not column.mask.any():
             continue
+        if repeats_the_time(table_of_topic, field):
+            continue
         presence = b"" if column.present is None else np.packbits(column.present).tobytes()
         key = (family_of(table_of_topic.topic, field), split_unit(field)[1], presence)
         groups.setdefault(key, []).append(field)
@@ -136,11 +214,31 @@ def _families(table_of_topic: Table, gap_starts_ns: Int64Array) -> list[Family]:
         time_ns = table_of_topic.time_ns[mask]
         values = np.column_stack([np.asarray(table_of_topic.columns[field].values, float)[mask] for field in fields])
         if presence not in breaks_of:
-            breaks_of[presence] = gap_after(time_ns) | covers_gap(time_ns, gap_starts_ns)
+            breaks = gap_after(time_ns) | covers_gap(time_ns, gap_starts_ns)
+            breaks_of[presence] = (
+                breaks & (not _isolates(breaks)) if table_of_topic.topic.startswith(RAW_PREFIX) else breaks
+            )
         title = name if len(fields) > 1 else split_unit(fields[0])[0]
         breaks = breaks_of[presence]
         found.append(Family(table_of_topic.topic, title, tuple(fields), time_ns, values, breaks, name in CIRCULAR))
     return found
+
+
+def _isolates(breaks: BoolArray) -> bool:
+    """Whether breaks leave many rows alone: a line of one point is not drawn, and what comes so rarely has no gaps."""
+    edges = np.concatenate([[True], breaks, [True]])
+    return bool(np.count_nonzero(edges[1:] & edges[:-1]) > ALONE * (len(breaks) + 1))
+
+
+def columns_of(views: int) -> int:
+    """Columns of a page with so many views.
+
+    Examples
+    --------
+    >>> [columns_of(views) for views in (1, 2, 12, 13, 24)]
+    [1, 2, 2, 3, 4]
+    """
+    return min(views, max(FEWEST_COLUMNS, min(-(-views // VIEWS_OF_A_COLUMN), MOST_COLUMNS)))
 
 
 def _log_families(
@@ -150,8 +248,9 @@ def _log_families(
     paths = [f"{base}/{part}" for part in path_parts([STATES, *(family.name for family in families)])[1:]]
     most = 0
     for family, path in zip(families, paths, strict=True):
+        name_of = source_label if family.topic.startswith(RAW_PREFIX) else label
         lines = [
-            Line(label(field), colour)
+            Line(name_of(field), colour)
             for field, colour in zip(family.fields, colours.for_series(len(family.fields)), strict=True)
         ]
         rows = thin(family.values, family.breaks, limit)
@@ -174,20 +273,27 @@ def _lanes(recorder: Recorder, base: str, table_of_topic: Table) -> tuple[list[r
     fields = [name for name, column in table_of_topic.columns.items() if column.values.dtype.kind in "Ub"]
     paths, too_busy = [], []
     for field, part in zip(fields, path_parts(fields), strict=True):
-        states = _states(table_of_topic.columns[field])
+        time_ns, states = _held(table_of_topic.time_ns, table_of_topic.columns[field])
         changes = runs(states)
         if len(changes) > MAX_LANE_ROWS:
             too_busy.append(field)
         elif (states != "").any():
             path = f"{base}/{STATES}/{part}"
-            recorder.lane(path, table_of_topic.time_ns[changes], states[changes].tolist(), colours.FLAGS)
+            recorder.lane(path, time_ns[changes], states[changes].tolist(), colours.FLAGS)
             paths.append(path)
     return [lanes(f"{_title(table_of_topic.topic)} states", paths)] if paths else [], too_busy
 
 
-def _states(column: Column) -> np.ndarray:
+def _held(time_ns: Int64Array, column: Column) -> tuple[Int64Array, np.ndarray]:
+    """Times and states of the rows that have the field, each held until the next one; empty behind a gap's last row.
+
+    Rows of other sources lie between them: they end no state.
+    """
+    rows = np.flatnonzero(column.mask)
     values = np.where(column.values, "yes", "no") if column.values.dtype.kind == "b" else column.values
-    return np.where(column.mask, values, "")
+    times, states = time_ns[rows], values[rows].astype(np.str_)
+    ends = np.flatnonzero(gap_after(times)) if column.present is not None else np.zeros(0, dtype=np.intp)
+    return np.insert(times, ends + 1, times[ends] + 1), np.insert(states, ends + 1, "")
 
 
 def _about(
@@ -206,7 +312,8 @@ def _about(
         "# What is shown here",
         "Long topics are thinned for the screen: of every stretch the rows with the lowest and the highest value "
         "of each series are kept, and both sides of each gap. No value is altered. The MCAP beside this recording "
-        "holds every row.",
+        "holds every row. Fields that only repeat the time of their row are not drawn; topics that are lists "
+        "(parameters, definitions, single records) are tables.",
         table(["topic", "rows", "numeric fields", "shown"], rows),
     ]
     if left_out:

@@ -1,4 +1,4 @@
-"""The track from above: a plan in kilometres that asks nobody for anything, and a map for who wants one.
+"""The track from above: a plan in metres or kilometres that asks nobody for anything, and a map for who wants one.
 
 Rerun's map fetches tiles over the network for the very place flown over, whatever the provider. The plan is therefore
 what opens; the map is behind its own tab, and a hidden tab fetches nothing.
@@ -22,6 +22,7 @@ LINE, MARK, GRID_LINE = 1.6, 5.0, 0.5  # widths and radii in points of the scree
 TILE_PIXELS, MAP_PIXELS, MAX_ZOOM = 256.0, 500.0, 18.0
 GRID_LINES = 6  # about so many across the longer side
 MARGIN = 0.08  # of the longer side, around the track
+LARGEST_IN_M = 3000.0  # a plan no larger is labelled in metres, as in the report
 SMALLEST_M = 20.0  # side of the plan of an aircraft that never moved
 
 
@@ -75,7 +76,8 @@ def _plan(
         "plan/now", recorder.indexes(rows), rr.Points2D.columns(positions=points[known].astype(np.float32))
     )
     bounds = rrb.VisualBounds2D(x_range=[low[0], high[0]], y_range=[low[1], high[1]])
-    name = "Track by flight phase, km east and north of the first position"
+    unit = grid_unit(float((high - low).max()))[0]
+    name = f"Track by flight phase, {unit} east and north of the first position"
     return rrb.Spatial2DView(name=name, origin="/plan", visual_bounds=bounds)
 
 
@@ -97,16 +99,28 @@ def grid_step_m(side_m: float) -> float:
     return float(decade * min((1.0, 2.0, 5.0, 10.0), key=lambda factor: abs(factor * decade - side_m / GRID_LINES)))
 
 
+def grid_unit(side_m: float) -> tuple[str, float]:
+    """Unit of the grid's labels and its length in metres, for a plan that is ``side_m`` across.
+
+    Examples
+    --------
+    >>> grid_unit(12_000.0), grid_unit(150.0)
+    (('km', 1000.0), ('m', 1.0))
+    """
+    return ("km", 1000.0) if side_m > LARGEST_IN_M else ("m", 1.0)
+
+
 def _grid(low: FloatArray, high: FloatArray) -> rr.LineStrips2D:
     """Lines of equal distance east and north; the label of each stands in its middle."""
-    step = grid_step_m(float((high - low).max()))
+    side = float((high - low).max())
+    step, (unit, metres) = grid_step_m(side), grid_unit(side)
     strips, labels = [], []
     for axis, names in ((0, ("E", "W")), (1, ("S", "N"))):
         for place in np.arange(np.ceil(low[axis] / step), np.floor(high[axis] / step) + 1) * step:
             line = np.array([low, high])
             line[:, axis] = place
             strips.append(line)
-            labels.append(f"{abs(place) / 1000.0:g} km {names[int(place < 0)] if place else ''}".strip())
+            labels.append(f"{abs(place) / metres:.6g} {unit} {names[int(place < 0)] if place else ''}".strip())
     return rr.LineStrips2D(
         strips,
         colors=[colours.DIM] * len(strips),

@@ -1,0 +1,189 @@
+"""Figures of the forecast: growth by horizon, calibration, the hindcast map, the paper's four starts."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.reports import drawing as d
+from groundstation.reports.parts import Drawing
+from groundstation.reports.sections.inertial_figures import has_values, plain_log
+from groundstation.reports.sections.saved import numbers
+from groundstation.reports.wording import is_number, number
+from groundstation.results.figures import FigureData
+from groundstation.results.files import SavedFlight
+from groundstation.results.forecast import METHODS
+
+OTHERS = ("#e69f00", "#56b4e9", "#8a2be2", "#7a6a00", "#cc79a7", "#a9b1ba", "#d55e00")
+MAP_CELLS = 90  # along each side: finer is not seen on paper and makes the page heavy
+LEVELS = 12
+MAP_QUANTILE = 0.98  # the scale of colour ends there: a few bad starts would darken the rest
+CHANNELS_INSIDE = (("inside50", 0.50), ("inside68", 0.68), ("inside95", 0.95))
+
+
+def growth(saved: SavedFlight, default: str) -> Drawing | None:
+    """RMS error by horizon, a line for each method, the shipped one thick; logarithmic axes."""
+    data = saved.figure("forecast_growth")
+    known = [] if data is None else [name for name in METHODS if has_values(data, f"{name}_rms_m")]
+    if data is None or not known or not has_values(data, "horizon_min"):
+        return None
+    horizon = numbers(data, "horizon_min")
+    colours = dict(zip((name for name in METHODS if name not in ("raw_ins", default)), OTHERS, strict=False))
+    colours |= {"raw_ins": d.INS, default: d.USED}
+    ordered = sorted(known, key=lambda name: -_last(numbers(data, f"{name}_rms_m")))
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 18, 12, 112, 82)
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        for name in ordered:
+            text = f"{METHODS[name]}{' (shipped)' if name == default else ''}"
+            values = numbers(data, f"{name}_rms_m")
+            width, order = (2.6, 4) if name == default else (1.0, 2)
+            values = np.where(values > 0.0, values, np.nan)
+            d.line(axes, horizon, values, colours[name], width, label=d.label(text), zorder=order)
+        sigma = numbers(data, "sigma_m")
+        if np.isfinite(sigma).any():
+            d.line(axes, horizon, sigma, d.INK, 1.0, linestyle=(0, (2, 2)), label="σ claimed (shipped)")
+        plain_log(axes.xaxis)
+        plain_log(axes.yaxis)
+        axes.set_xlabel("horizon, min without GNSS")
+        axes.set_ylabel("RMS radial error, m")
+        axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), labelspacing=0.7)
+
+    caption = (
+        "Error built up since the start, root mean square over all starts. About one Schuler period (84 min) ahead a "
+        "mainly oscillating error has come round, and the raw INS looks good for a moment."
+    )
+    alt = "RMS error against horizon for each forecast method, logarithmic axes."
+    return Drawing("How the error grows", caption, alt, d.draw("growth", 90, paint), ("forecast_growth",))
+
+
+def _last(values: NDArray[np.float64]) -> float:
+    known = d.finite(values)
+    return float(known[-1]) if known.size else 0.0
+
+
+def calibration(rows: Sequence[Mapping[str, Any]], default: str) -> Drawing | None:
+    """Shares inside the 50, 68 and 95 % bands by horizon, and NEES with its limits, of the shipped method."""
+    mine = [row for row in rows if row.get("method") == default and is_number(row.get("horizon_min"))]
+    if not mine:
+        return None
+    mine.sort(key=lambda row: float(row["horizon_min"]))
+    columns = {name: np.array([_number(row.get(name)) for row in mine]) for name in mine[0] if name != "method"}
+    horizon = columns["horizon_min"]
+
+    def paint(figure: Any) -> None:
+        left, right = d.place(figure, 18, 12, 86, 56), d.place(figure, 106, 12, 174, 56)
+        for (name, nominal), colour in zip(CHANNELS_INSIDE, (d.INS, d.GNSS, d.USED), strict=True):
+            if name in columns:
+                left.plot(horizon, 100.0 * columns[name], "o-", color=colour, markersize=3.0, linewidth=1.0)
+                d.limit_line(left, 100.0 * nominal, f"{100.0 * nominal:.0f} % wanted", colour=colour)
+        left.set_ylim(0.0, 105.0)
+        left.set_ylabel("errors inside the band, %")
+        left.set_title("Bands of 50, 68 and 95 %")
+        if {"nees", "nees_low", "nees_high"} <= set(columns):
+            low, high = columns["nees_low"], columns["nees_high"]
+            right.fill_between(horizon, low, high, color=d.USED, alpha=0.18, linewidth=0, label="95 % limits")
+            right.plot(horizon, columns["nees"], "o-", color=d.INK, markersize=3.0, linewidth=1.0, label="NEES")
+            right.axhline(1.0, color=d.FAINT, linewidth=0.6)
+            right.set_ylim(bottom=0.0)
+            d.legend_above(right)
+        right.set_ylabel("NEES, 1 is honest")
+        for axes in (left, right):
+            axes.set_xlabel("horizon, min without GNSS")
+
+    caption = (
+        "Left: how many errors the claimed bands held; on the dashed lines they are honest, below too narrow. Right: "
+        "squared error over claimed variance; above the shaded limits the forecast is surer than it may be."
+    )
+    alt = "Coverage of the claimed bands and NEES by horizon."
+    return Drawing("Calibration of the shipped method", caption, alt, d.draw("calibration", 64, paint))
+
+
+def _number(value: Any) -> float:
+    return float(value) if is_number(value) else float("nan")
+
+
+def hindcast_map(saved: SavedFlight, default: str) -> Drawing | None:
+    """Radial error by start and horizon, the shipped method beside the raw INS, on one scale of colour."""
+    data = saved.figure("forecast_map")
+    if data is None:
+        return None
+    names = [name for name in dict.fromkeys((default, "raw_ins")) if has_values(data, f"{name}_m")]
+    starts, horizons = (np.unique(d.finite(numbers(data, name))) for name in ("start_s", "horizon_min"))
+    if not names or min(len(starts), len(horizons)) < 2 or len(starts) * len(horizons) != len(data):
+        return None
+    rows, columns = d.thin(len(starts), MAP_CELLS), d.thin(len(horizons), MAP_CELLS)
+    cubes = [numbers(data, f"{name}_m").reshape(len(starts), len(horizons))[np.ix_(rows, columns)].T for name in names]
+    hours, minutes = starts[rows] / 3600.0, horizons[columns]
+    top = float(np.quantile(d.finite(*cubes), MAP_QUANTILE))
+
+    def paint(figure: Any) -> None:
+        from matplotlib.ticker import MaxNLocator
+
+        levels = MaxNLocator(LEVELS).tick_values(0.0, max(top, 1.0))
+        drawn = None
+        for place, (name, cells) in enumerate(zip(names, cubes, strict=True)):
+            axes = d.place(figure, 16 + 72 * place, 12, 80 + 72 * place, 66)
+            axes.grid(visible=False)
+            drawn = axes.contourf(hours, minutes, np.ma.masked_invalid(cells), levels, cmap="viridis", extend="max")
+            axes.set_title(METHODS.get(name, name))
+            axes.set_xlabel("start, h of flight time")
+            axes.set_ylabel("horizon, min without GNSS" if place == 0 else "")
+        bar = figure.colorbar(drawn, cax=d.place(figure, 157, 12, 161, 66))
+        bar.set_label("radial error, m")
+
+    caption = (
+        f"Forecast started at {number(len(starts), 0)} moments of the flight: radial error by start and horizon, both "
+        "maps on one scale, its top shared by the worst 2 %. White: beyond the end of the flight, or no GNSS."
+    )
+    alt = "Maps of the forecast error by start and horizon for the shipped method and the raw INS."
+    return Drawing("Hindcast map", caption, alt, d.draw("map-hindcast", 74, paint), ("forecast_map",))
+
+
+def classic(saved: SavedFlight) -> Drawing | None:
+    """The paper's figure 2: east error after each of four starts, measured, forecast without and with windows."""
+    data = saved.figure("forecast_classic")
+    if data is None or not has_values(data, "start_s", "time_s", "measured_east_m"):
+        return None
+    starts = np.unique(d.finite(numbers(data, "start_s")))[:4]
+
+    def paint(figure: Any) -> None:
+        for place, start in enumerate(starts.tolist()):
+            left, bottom = 18.0 + 86.0 * (place % 2), 12.0 + 52.0 * (1 - place // 2)
+            axes = d.place(figure, left, bottom, left + 70, bottom + 38)
+            _paint_start(axes, data, start)
+            axes.set_title(f"start at {start / 3600.0:g} h")
+            if place % 2 == 0:
+                axes.set_ylabel("east position error, m")
+            if place >= len(starts) - 2:
+                axes.set_xlabel("flight time, h")
+            if place == 0:
+                handles, texts = axes.get_legend_handles_labels()
+                figure.legend(handles, texts, loc="upper center", ncols=4, borderpad=0.1, columnspacing=1.6)
+
+    caption = (
+        "Figure 2 of the paper on this flight: forecast switched on 1.5, 2, 2.5 and 3 h after the start. Compare "
+        "panels at equal times after their start: what is left of the flight shrinks."
+    )
+    alt = "Four panels: measured east error and its forecasts with and without windows."
+    return Drawing("The paper's four starts", caption, alt, d.draw("classic", 114, paint), ("forecast_classic",))
+
+
+def _paint_start(axes: Any, data: FigureData, start: float) -> None:
+    rows = numbers(data, "start_s") == start
+    hours = numbers(data, "time_s")[rows] / 3600.0
+    for column, text, colour, width in (
+        ("measured_east_m", "measured (INS − GNSS)", d.INK, 1.4),
+        ("last_estimate_east_m", "forecast without windows", d.GNSS, 1.0),
+        ("windows_east_m", "forecast with windows", d.INS, 1.0),
+        ("default_east_m", "shipped method", d.USED, 1.4),
+    ):
+        values = numbers(data, column)[rows]
+        if np.isfinite(values).any():
+            d.line(axes, hours, values, colour, width, 1000, label=text)
+    judged = d.finite(np.where(np.isfinite(numbers(data, "measured_east_m")[rows]), hours, np.nan))
+    if judged.size > 1:
+        axes.set_xlim(*d.padded(float(judged.min()), float(judged.max()), 0.03))

@@ -1,0 +1,223 @@
+"""Figures of the INS errors: each state with its band, innovations, observability, and the track before and after."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.reports import drawing as d
+from groundstation.reports.parts import Drawing
+from groundstation.reports.sections.saved import flags, numbers
+from groundstation.results.figures import FigureData
+from groundstation.results.files import SavedFlight
+
+CHANNELS = ("north", "east")
+BAND = 1.96  # half width of a 95 % band in sigmas
+BAND_QUANTILES = (10.0, 90.0)  # the band of the first minutes and of long outages may leave the axis
+SUFFIXES = {"position": "m", "velocity": "mps", "tilt": "arcsec", "drift": "dph"}
+UNITS = {"position": "m", "velocity": "m/s", "tilt": "arcsec", "drift": "°/h"}
+STATES = {
+    "position": "position",
+    "velocity": "velocity",
+    "tilt": "tilt",
+    "drift": "constant drift",
+    "drift_rate": "drift rate",
+    "random_drift": "random drift",
+}
+OUTAGE = "#fbe9c6"
+MOST, MOST_DOTS = 500, 800  # points of a line and dots: more cannot be told apart on paper
+
+
+def state(saved: SavedFlight, name: str) -> Drawing | None:
+    """Position or velocity error of both channels: measured, estimated, smoothed, with the 95 % band."""
+    data = saved.figure("inertial_states")
+    if data is None or not has_values(data, *(f"{channel}_{name}_{SUFFIXES[name]}" for channel in CHANNELS)):
+        return None
+    low, high = span(data)
+
+    def paint(figure: Any) -> None:
+        upper, lower = d.place(figure, 18, 58, 174, 98), d.place(figure, 18, 12, 174, 52)
+        for axes, channel in ((upper, "north"), (lower, "east")):
+            _outages(axes, data)
+            _paint_state(axes, data, channel, name)
+            axes.set_ylabel(f"{channel} {name} error, {UNITS[name]}")
+            d.time_axis(axes, low, high, title=axes is lower)
+        d.legend_above(upper)
+
+    caption = (
+        "Grey: INS − GNSS as measured; green: estimate of the filter; black: smoothed with the data on both sides "
+        "(RTS); shaded: estimate ± 1.96 σ. Yellow ground: no GNSS, the filter forecasts."
+    )
+    alt = f"North and east {name} error over flight time with the estimate and its band."
+    svg = d.draw(f"inertial-{name}", 106, paint)
+    return Drawing(f"{name.capitalize()} error of the INS", caption, alt, svg, ("inertial_states",))
+
+
+def tilt_and_drift(saved: SavedFlight) -> Drawing | None:
+    """Platform tilt and constant gyro drift of both channels with their bands."""
+    data = saved.figure("inertial_states")
+    names = ("tilt", "drift")
+    if data is None or not has_values(data, *(f"{c}_{name}_{SUFFIXES[name]}" for c in CHANNELS for name in names)):
+        return None
+    low, high = span(data)
+
+    def paint(figure: Any) -> None:
+        for row, name in enumerate(names):
+            bottom = 12.0 + 46.0 * (1 - row)
+            for column, channel in enumerate(CHANNELS):
+                axes = d.place(figure, 18 + 90 * column, bottom, 84 + 90 * column, bottom + 38)
+                _outages(axes, data)
+                _paint_state(axes, data, channel, name)
+                axes.set_ylabel(f"{channel} {STATES[name]}, {UNITS[name]}")
+                d.time_axis(axes, low, high, title=row == 1, most=5)
+                if row == 0 and column == 1:
+                    d.legend_above(axes)
+
+    caption = (
+        "States GNSS does not measure: what the filter infers of them. A band that does not shrink means that the "
+        "flight does not show the state."
+    )
+    alt = "Platform tilt and gyro drift of both channels over flight time with 95 % bands."
+    svg = d.draw("inertial-tilt", 104, paint)
+    return Drawing("Platform tilt and gyro drift", caption, alt, svg, ("inertial_states",))
+
+
+def _paint_state(axes: Any, data: FigureData, channel: str, name: str) -> None:
+    column = f"{channel}_{name}_{SUFFIXES[name]}"
+    time, estimate = numbers(data, "time_s"), numbers(data, column)
+    measured, smoothed = numbers(data, f"measured_{column}"), numbers(data, f"smoothed_{column}")
+    half = BAND * numbers(data, f"{channel}_{name}_sigma_{SUFFIXES[name]}")
+    keep = d.thin(len(time), MOST)
+    if np.isfinite(half).any():
+        low, high = (estimate - half)[keep], (estimate + half)[keep]
+        axes.fill_between(time[keep], low, high, color=d.USED, alpha=0.2, linewidth=0, label="95 % band")
+    if np.isfinite(measured).any():
+        d.dots(axes, time, measured, d.UNUSED, 1.6, MOST_DOTS, zorder=1.5, label="INS − GNSS")
+    if np.isfinite(smoothed).any():
+        d.line(axes, time, smoothed, d.INK, 0.8, MOST, zorder=3, label="smoothed (RTS)")
+    d.line(axes, time, estimate, d.USED, 1.1, MOST, zorder=2.5, label="estimate")
+    shown = d.finite(estimate, measured)
+    if shown.size:
+        edges = [d.finite(estimate - half), d.finite(estimate + half)]
+        ends = [float(end) for edge in edges if edge.size for end in np.percentile(edge, BAND_QUANTILES)]
+        axes.set_ylim(*d.padded(min(float(shown.min()), *ends), max(float(shown.max()), *ends), 0.08))
+
+
+def has_values(data: FigureData, *columns: str) -> bool:
+    """Whether each of the columns has a finite value."""
+    return all(bool(np.isfinite(numbers(data, column)).any()) for column in columns)
+
+
+def span(data: FigureData) -> tuple[float, float]:
+    """First and last flight time of a figure."""
+    times = d.finite(numbers(data, "time_s"))
+    return (float(times.min()), float(times.max())) if times.size else (0.0, 1.0)
+
+
+def _outages(axes: Any, data: FigureData) -> None:
+    """Ground the times at which the filter forecast."""
+    gone, time = flags(data, "is_forecast"), numbers(data, "time_s")
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], gone.astype(np.int8), [0]])))
+    for start, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        axes.axvspan(time[start], time[min(end, len(time) - 1)], color=OUTAGE, linewidth=0, zorder=0)
+
+
+def radial(saved: SavedFlight) -> Drawing | None:
+    """Radial error of the track as flown by the INS and as corrected, on a logarithmic axis."""
+    data = saved.figure("inertial_track")
+    if data is None or not has_values(data, "ins_error_m", "corrected_error_m"):
+        return None
+    low, high = span(data)
+    states = saved.figure("inertial_states")
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 18, 12, 174, 58)
+        axes.set_yscale("log")
+        if states is not None:
+            _outages(axes, states)
+        for column, text, colour in (
+            ("ins_error_m", "INS", d.INS),
+            ("corrected_error_m", "corrected: INS − estimated or forecast error", d.USED),
+        ):
+            values = numbers(data, column)
+            d.line(axes, numbers(data, "time_s"), np.where(values > 0.0, values, np.nan), colour, 1.0, label=text)
+        plain_log(axes.yaxis, (1.0,))
+        axes.set_ylabel("radial error against GNSS, m")
+        d.time_axis(axes, low, high)
+        d.legend_above(axes)
+
+    caption = (
+        "Distance from the GNSS position. While GNSS is there the corrected track follows it as far as the filter "
+        "trusts it; on yellow ground nothing was there to compare with."
+    )
+    alt = "Radial position error of the INS and of the corrected track over flight time, logarithmic axis."
+    svg = d.draw("inertial-radial", 66, paint)
+    return Drawing("Track error before and after correction", caption, alt, svg, ("inertial_track",))
+
+
+def plain_log(axis: Any, marks: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
+    """Write the ticks of a logarithmic axis as plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
+
+    axis.set_major_locator(LogLocator(10.0, subs=marks, numticks=20))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(NullLocator())
+    axis.set_minor_formatter(NullFormatter())
+
+
+def innovations(saved: SavedFlight) -> Drawing | None:
+    """Innovations over their sigma, with the limits that 95 % should keep."""
+    data = saved.figure("inertial_states")
+    if data is None or not has_values(data, *(f"{channel}_normalised_innovation" for channel in CHANNELS)):
+        return None
+    low, high = span(data)
+
+    def paint(figure: Any) -> None:
+        for channel, bottom in (("north", 46.0), ("east", 12.0)):
+            axes = d.place(figure, 18, bottom, 174, bottom + 28)
+            values = numbers(data, f"{channel}_normalised_innovation")
+            d.dots(axes, numbers(data, "time_s"), values, d.INS, 1.6, MOST_DOTS, zorder=2)
+            for limit, text in ((BAND, "+1.96"), (-BAND, "−1.96")):
+                d.limit_line(axes, limit, text)
+            axes.set_ylim(*_symmetric(values))
+            axes.set_ylabel(f"{channel} innovation, σ")
+            d.time_axis(axes, low, high, title=channel == "east")
+
+    caption = (
+        "Innovation (measured − predicted position) over its own σ. If the noise model is right, 95 % lie between the "
+        "dashed lines and nothing slow is seen; waves mean slow GNSS errors or an INS the model does not know."
+    )
+    alt = "Normalised innovations of both channels over flight time with limits at 1.96."
+    svg = d.draw("inertial-innovations", 80, paint)
+    return Drawing("Innovations", caption, alt, svg, ("inertial_states",))
+
+
+def _symmetric(values: NDArray[np.float64]) -> tuple[float, float]:
+    largest = float(np.abs(d.finite(values)).max(initial=1.3 * BAND))
+    return -1.1 * min(largest, 8.0), 1.1 * min(largest, 8.0)
+
+
+def observability(saved: SavedFlight) -> Drawing | None:
+    """How well each state is seen as the flight goes on."""
+    data = saved.figure("inertial_observability")
+    if data is None or not any(has_values(data, f"north_{name}") for name in STATES):
+        return None
+    low, high = span(data)
+
+    def paint(figure: Any) -> None:
+        for place, channel in enumerate(CHANNELS):
+            axes = d.place(figure, 18 + 66 * place, 12, 76 + 66 * place, 50)
+            for (name, text), colour in zip(STATES.items(), d.SERIES, strict=False):
+                values = numbers(data, f"{channel}_{name}")
+                d.line(axes, numbers(data, "time_s"), values, colour, 1.1, MOST, label=text)
+            axes.set_ylim(-0.03, 1.03)
+            axes.set_title(channel)
+            axes.set_ylabel("observability" if place == 0 else "")
+            d.time_axis(axes, low, high, most=4)
+            if place == 1:
+                axes.legend(loc="center left", bbox_to_anchor=(1.03, 0.5))
+
+    caption = "1 − σ/σ without GNSS, for each state: 0 means the flight says nothing of it, 1 that it is known."
+    alt = "Observability of the six states of both channels over flight time."
+    svg = d.draw("inertial-observability", 58, paint)
+    return Drawing("Observability", caption, alt, svg, ("inertial_observability",))

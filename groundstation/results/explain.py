@@ -1,0 +1,23 @@
+"""Reasons why an analysis could not run, for readers who do not know the method."""
+
+NO_GROUND_RUN = ("ground speed never above", "no straight taxi", "no GNSS epoch with ground contact proven")
+WHAT_HEADING_NEEDS = (
+    "The method needs a straight run on the ground at taxi speed, where the nose points along the motion, with ground "
+    "contact proven; this log has none, or hardly any"
+)
+
+
+def explained(analysis: str, reason: str) -> str:
+    """The reason as it stands, and behind it, where the aircraft did not taxi, what the method would have needed.
+
+    Examples
+    --------
+    >>> explained("heading", "no INS heading in the log")
+    'no INS heading in the log'
+    >>> explained("heading", "no straight taxi: of 9 epochs above 6 m/s before lift-off: not proven ground 9")[:91]
+    'no straight taxi: of 9 epochs above 6 m/s before lift-off: ground contact not proven for 9.'
+    """
+    if analysis != "heading" or not reason.startswith(NO_GROUND_RUN):
+        return reason
+    told = reason.replace("not proven ground ", "ground contact not proven for ")
+    return f"{told}. {WHAT_HEADING_NEEDS}"

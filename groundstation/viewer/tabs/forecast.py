@@ -1,0 +1,208 @@
+"""Forecast: what the filter would have said had GNSS been lost, beside what GNSS later showed, and how good it is."""
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from groundstation.base.timescales import duration_text
+from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults
+from groundstation.results.forecast import METHODS, ForecastResult
+from groundstation.viewer import colours
+from groundstation.viewer.chart import Axis, Chart
+from groundstation.viewer.names import words
+from groundstation.viewer.recorder import Line, Recorder
+from groundstation.viewer.series import FloatArray
+from groundstation.viewer.tabs.forecast_text import forecast_text
+from groundstation.viewer.views import document, figure_of, numbers, plot
+
+BAND = 1.96  # half width of a 95 % band in sigmas
+THIN, BOLD = 0.8, 1.8
+MARGIN = 1.08
+FAN_HEIGHT, GROWTH_HEIGHT = 140.0, 115.0
+SHOWN = Line("GNSS showed", colours.GNSS, BOLD)
+FORECAST = Line("forecast", colours.ANSWER, BOLD)
+CLAIMED = Line("± 1.96 σ", colours.HONEST, THIN)
+
+
+def forecast(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
+    """Log the forecast tab; None when the flight was not assessed and no reason is known."""
+    reasons = [entry.reason for entry in results.not_assessable if entry.analysis == "forecast"]
+    answer = results.forecast
+    if answer is None and not reasons:
+        return None
+    is_aided = results.inertial is not None and results.inertial.kind == "gnss_aided"
+    recorder.document("forecast/answer", forecast_text(answer, reasons, is_aided=is_aided))
+    text = document("How far a forecast can be trusted", "forecast/answer")
+    rows: list[rrb.Container] = []
+    fan = _fan(recorder, results)
+    if fan:
+        rows.append(rrb.Horizontal(contents=fan))
+    pictures = [*_growth(recorder, results, answer), *_map(recorder, results, answer)]
+    if pictures:
+        rows.append(rrb.Horizontal(contents=pictures))
+    if not rows:
+        return rrb.Horizontal(contents=[text], name="Forecast")
+    left: list[rrb.View | rrb.Container] = [*rows]
+    states = figure_of(results, "inertial_states", "time_s", "north_position_m", "east_position_m")
+    if states is not None:  # somewhere to drag the playhead along
+        paths = [f"inertial/{channel}/position" for channel in ("north", "east")]
+        left.append(plot("INS position error, north and east, m: drag the playhead here", paths, legend=False))
+    shares = [3.0] * len(rows) + [1.0] * (len(left) - len(rows))
+    column = rrb.Vertical(contents=left, row_shares=shares)
+    return rrb.Horizontal(contents=[column, text], column_shares=[2.1, 1.0], name="Forecast")
+
+
+# ---------------------------------------------------------------------------------------------------- fan
+
+
+def _fan(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
+    """Log the forecast from each start at its time: the latest start at the playhead is the one shown."""
+    names = [f"{column}_m" for channel in ("north", "east") for column in (channel, f"actual_{channel}")]
+    sigmas = [f"{channel}_sigma_m" for channel in ("north", "east")]
+    fan = figure_of(results, "forecast_fan", "start_s", "lead_s", *names, *sigmas)
+    if fan is None or not np.isfinite(numbers(fan, "lead_s")).any():
+        return []
+    minutes = numbers(fan, "lead_s") / 60.0
+    x = Axis("lead, min", 0.0, max(float(np.nanmax(minutes)), 1.0))
+    views: list[rrb.View] = []
+    for channel in ("north", "east"):
+        expected, actual = numbers(fan, f"{channel}_m"), numbers(fan, f"actual_{channel}_m")
+        half = BAND * numbers(fan, f"{channel}_sigma_m")
+        size = _largest(expected, actual, np.abs(expected) + half)
+        axis = Axis(f"{channel.capitalize()} error, m,", -size, size)
+        chart = Chart(recorder, f"forecast/fan_{channel}", x, axis, FAN_HEIGHT)
+        chart.legend([FORECAST, CLAIMED, SHOWN])
+        curves = [(expected - half, CLAIMED), (expected + half, CLAIMED), (expected, FORECAST), (actual, SHOWN)]
+        _starts(chart, fan, minutes, curves)
+        views.append(chart.view())
+    return [*views, _radial(recorder, fan, minutes, x)]
+
+
+def _radial(recorder: Recorder, fan: FigureData, minutes: FloatArray, x: Axis) -> rrb.View:
+    """Distance between forecast and GNSS, what the forecast claimed, and the error of the INS without it."""
+    east, north = ((numbers(fan, f"actual_{c}_m"), numbers(fan, f"{c}_m")) for c in ("east", "north"))
+    raw, left = np.hypot(east[0], north[0]), np.hypot(east[0] - east[1], north[0] - north[1])
+    claim = np.hypot(numbers(fan, "east_sigma_m"), numbers(fan, "north_sigma_m"))
+    lines = (
+        (raw, Line("raw INS", colours.INS, BOLD)),
+        (claim, Line("radial σ claimed", colours.HONEST, THIN)),
+        (left, Line("left after forecast", colours.ANSWER, BOLD)),
+    )
+    axis = Axis("Radial error, m,", 0.0, _largest(raw, left, claim))
+    chart = Chart(recorder, "forecast/fan_radial", x, axis, FAN_HEIGHT)
+    chart.legend([line for _, line in lines])
+    _starts(chart, fan, minutes, list(lines))
+    return chart.view()
+
+
+def _clock(seconds: float) -> str:
+    return duration_text(float(round(seconds))).removesuffix(".0")
+
+
+def _largest(*values: FloatArray) -> float:
+    known = np.concatenate([one[np.isfinite(one)] for one in values])
+    return MARGIN * max(float(np.abs(known).max(initial=0.0)), 1.0)
+
+
+def _starts(chart: Chart, fan: FigureData, minutes: FloatArray, curves: list[tuple[FloatArray, Line]]) -> None:
+    starts = numbers(fan, "start_s")
+    each = np.unique(starts[np.isfinite(starts)])
+    if each.size and each[0] > 0.0:
+        first = _clock(float(each[0]))
+        chart.note("start", f"move the playhead past the first start, {first}", 0.0)
+    for start in each.tolist():
+        rows = starts == start
+        chart.curves("latest", [(minutes[rows], values[rows], line) for values, line in curves], start)
+        chart.note("start", f"GNSS taken away at {_clock(start)}", start)
+
+
+# ---------------------------------------------------------------------------------------------------- skill
+
+
+def _growth(recorder: Recorder, results: FlightResults, answer: ForecastResult | None) -> list[rrb.View]:
+    """RMS by horizon over methods, the shipped one bold; both axes logarithmic."""
+    growth = figure_of(results, "forecast_growth", "horizon_min")
+    if growth is None:
+        return []
+    horizon = numbers(growth, "horizon_min")
+    known = [name for name in METHODS if f"{name}_rms_m" in growth.columns]
+    curves = {name: numbers(growth, f"{name}_rms_m") for name in known}
+    values = np.concatenate([*curves.values(), horizon * np.nan])
+    values = values[np.isfinite(values) & (values > 0.0)]
+    times = horizon[np.isfinite(horizon) & (horizon > 0.0)]
+    if not values.size or not times.size:
+        return []
+    default = "" if answer is None else answer.default_method
+    x = Axis("horizon, min", float(times.min()) / MARGIN, float(times.max()) * MARGIN, True)
+    y = Axis("RMS radial error over all starts, m,", float(values.min()) / 1.3, float(values.max()) * 1.3, True)
+    chart = Chart(recorder, "forecast/growth", x, y, GROWTH_HEIGHT)
+    shades = method_colours(default)
+    drawn = [(horizon, curves[name], Line(name, shades[name], BOLD if name == default else THIN)) for name in known]
+    if "sigma_m" in growth.columns:
+        drawn.append((horizon, numbers(growth, "sigma_m"), CLAIMED))
+    chart.curves("methods", drawn)
+    names = [Line(words(name), shades[name], BOLD if name == default else THIN) for name in known]
+    if "sigma_m" in growth.columns:
+        names.append(Line("σ claimed", colours.HONEST, THIN))
+    chart.key(names)
+    return [chart.view()]
+
+
+def method_colours(default: str) -> dict[str, colours.Colour]:
+    """A colour for every method; the raw INS and the shipped one have those of their meaning.
+
+    Examples
+    --------
+    >>> shades = method_colours("windows")
+    >>> shades["windows"] == colours.ANSWER, shades["raw_ins"] == colours.INS, len(set(shades.values()))
+    (True, True, 8)
+    """
+    fixed = {"raw_ins": colours.INS, **({default: colours.ANSWER} if default in METHODS else {})}
+    spare = (
+        *(colours.GNSS, colours.PAPER, colours.LIMIT, colours.BLUE),
+        *(colours.GREY, colours.LIGHT, colours.YELLOW_GREEN, colours.ANSWER),
+    )
+    left = iter(colour for colour in spare if colour not in fixed.values())
+    return {name: fixed[name] if name in fixed else next(left) for name in METHODS}
+
+
+def _map(recorder: Recorder, results: FlightResults, answer: ForecastResult | None) -> list[rrb.View | rrb.Container]:
+    """The hindcast map, one tensor a method: radial error by start and horizon, all on one colour scale."""
+    figure = figure_of(results, "forecast_map", "start_s", "horizon_min")
+    if figure is None:
+        return []
+    starts, horizons = np.unique(numbers(figure, "start_s")), np.unique(numbers(figure, "horizon_min"))
+    shape = (len(starts), len(horizons))
+    known = [name for name in METHODS if f"{name}_m" in figure.columns]
+    if shape[0] * shape[1] != len(figure) or not known:
+        return []
+    cubes = {name: numbers(figure, f"{name}_m").reshape(shape) for name in known}
+    reference = cubes.get("raw_ins", cubes[known[0]])
+    top = float(np.nanmax(reference)) if np.isfinite(reference).any() else 1.0
+    default = "" if answer is None else answer.default_method
+    order = [name for name in (default, "raw_ins") if name in known]
+    views: list[rrb.View] = []
+    for name in [*order, *(name for name in known if name not in order)]:
+        path = f"forecast/map/{name}"
+        tensor = rr.Tensor(cubes[name].astype(np.float32), dim_names=("start", "horizon"), value_range=(0.0, top))
+        recorder.static(path, tensor)
+        views.append(_tensor(name, path))
+    span = f"{_clock(float(starts[0]))} … {_clock(float(starts[-1]))}"
+    title = (
+        f"Radial error, 0 (dark) … {top:.0f} m (bright). To the right: start, {span}; "
+        f"down: horizon, {horizons[0]:g} … {horizons[-1]:g} min. The dark corner lies beyond the end of the flight."
+    )
+    recorder.document("forecast/map_legend", title)
+    legend = document("Hindcast map", "forecast/map_legend")
+    return [rrb.Vertical(contents=[legend, rrb.Tabs(contents=views, active_tab=0)], row_shares=[1.0, 3.5])]
+
+
+def _tensor(name: str, path: str) -> rrb.TensorView:
+    return rrb.TensorView(
+        name=words(name),
+        origin=f"/{path}",
+        slice_selection=rrb.TensorSliceSelection(width=0, height=1),
+        scalar_mapping=rrb.TensorScalarMapping(colormap="turbo", mag_filter="nearest"),
+        view_fit="fill",
+    )

@@ -1,0 +1,150 @@
+"""Tabs of system 2 in the recording: values as they came, lines broken at NaN, forecasts at their start."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun as rr
+
+from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults, NotAssessable
+from groundstation.tables.table import Flight
+from groundstation.viewer.chart import Axis, Chart
+from groundstation.viewer.recorder import Line, Recorder
+from groundstation.viewer.recording import write_recording
+from groundstation.viewer.tabs.forecast_text import forecast_text
+from groundstation.viewer.tabs.inertial_text import inertial_text
+from tests.inertial_example import forecast_result, inertial_result
+from tests.test_viewer_recording import Contents
+from tests.viewer_example import START_NS, make_flight, make_results
+
+
+@pytest.fixture(scope="module")
+def flight() -> Flight:
+    return make_flight(240.0, 10.0)
+
+
+@pytest.fixture(scope="module")
+def results(flight: Flight) -> FlightResults:
+    return make_results(flight)
+
+
+@pytest.fixture(scope="module")
+def contents(flight: Flight, results: FlightResults, tmp_path_factory: pytest.TempPathFactory) -> Contents:
+    path = tmp_path_factory.mktemp("recording") / "flight.rrd"
+    write_recording(path, flight, results)
+    return Contents(path)
+
+
+def written(folder: Path, flight: Flight, results: FlightResults) -> Contents:
+    write_recording(folder / "a.rrd", flight, results)
+    return Contents(folder / "a.rrd")
+
+
+def test_states_are_those_of_the_results_with_their_band(contents: Contents, results: FlightResults) -> None:
+    states = results.figure("inertial_states")
+    assert states is not None
+    time_ns, values = contents.scalars("/inertial/east/tilt")
+    assert len(time_ns) == len(states)
+    estimate, sigma = states["east_tilt_arcsec"], states["east_tilt_sigma_arcsec"]
+    np.testing.assert_allclose(values, np.column_stack([estimate + 1.96 * sigma, estimate - 1.96 * sigma, estimate]))
+
+
+def test_nothing_is_measured_without_gnss(contents: Contents, results: FlightResults) -> None:
+    states = results.figure("inertial_states")
+    assert states is not None
+    measured = contents.scalars("/inertial/north/position")[1][:, 0]
+    assert (np.isnan(measured) == states["is_forecast"]).all()
+    lane = contents.batches["/inertial/filter"]
+    names = [row[0] for batch in lane for row in batch.column("StateChange:state").to_pylist()]
+    assert names == ["GNSS used", "forecast", "GNSS used", "forecast"]
+
+
+def test_each_forecast_stands_at_its_start(contents: Contents, results: FlightResults) -> None:
+    fan = results.figure("forecast_fan")
+    assert fan is not None
+    starts = np.unique(fan["start_s"])
+    for chart in ("north", "east", "radial"):
+        batches = contents.batches[f"/forecast/fan_{chart}/latest"]
+        times = np.sort(np.concatenate([np.asarray(batch.column("flight_time").cast("int64")) for batch in batches]))
+        np.testing.assert_allclose(times, np.rint(starts * 1e9), atol=1)
+
+
+def test_hindcast_map_is_a_tensor_with_named_dimensions(contents: Contents, results: FlightResults) -> None:
+    figure = results.figure("forecast_map")
+    assert figure is not None
+    batch = contents.fixed["/forecast/map/drift_windows"][0]
+    (tensor,) = batch.column("Tensor:data")[0].as_py()
+    assert tensor["names"] == ["start", "horizon"]
+    assert tensor["shape"] == [len(np.unique(figure["start_s"])), len(np.unique(figure["horizon_min"]))]
+
+
+def test_figures_asked_first_stand_in_the_panels(contents: Contents) -> None:
+    first = contents.text("/inertial/answer")
+    assert "# Unaided INS, 0.41 nmi/h (median)" in first and "1.32 nmi/h" in first and "0.87 m/s" in first
+    assert "+11.2 ± 1.5 arcsec" in first and "GNSS did not return" in first
+    skill = contents.text("/forecast/answer")
+    assert "| drift windows (shipped) | **24** |" in skill and "| starts | 43 |" in skill
+
+
+def test_an_aided_ins_is_told_in_both_panels(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
+    aided = replace(results, inertial=inertial_result(flight.duration_s, kind="gnss_aided"))
+    contents = written(tmp_path, flight, aided)
+    for entity in ("/inertial/answer", "/forecast/answer"):
+        assert contents.text(entity).startswith("# This INS is aided by GNSS: a forecast from it means nothing")
+
+
+def test_reasons_stand_in_place_of_results(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
+    reasons = (NotAssessable("inertial", "GNSS for a minute only"), NotAssessable("forecast", "too short"))
+    contents = written(tmp_path, flight, replace(results, inertial=None, forecast=None, not_assessable=reasons))
+    assert "GNSS for a minute only" in contents.text("/inertial/answer")
+    assert "too short" in contents.text("/forecast/answer")
+
+
+def test_without_results_and_reasons_there_are_no_tabs(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
+    figures = tuple(item for item in results.figures if not item.name.startswith(("inertial", "forecast")))
+    contents = written(tmp_path, flight, replace(results, inertial=None, forecast=None, figures=figures))
+    entities = [*contents.batches, *contents.fixed]
+    assert not [entity for entity in entities if entity.startswith(("/inertial", "/forecast"))]
+
+
+@pytest.mark.parametrize("kind", ["one row", "no row", "nan", "time alone", "none", "huge"])
+def test_a_recording_is_written_whatever_the_figures_lack(
+    tmp_path: Path, flight: Flight, results: FlightResults, kind: str
+) -> None:
+    def changed(item: FigureData) -> FigureData:
+        columns = dict(item.columns)
+        if kind == "time alone":
+            columns = dict(list(columns.items())[:1])
+        for name, values in columns.items():
+            if kind in ("one row", "no row"):
+                columns[name] = values[: int(kind == "one row")]
+            elif kind in ("nan", "huge") and values.dtype.kind == "f" and not name.endswith(("time_s", "start_s")):
+                columns[name] = np.full(len(values), np.nan if kind == "nan" else 1e300)
+        return FigureData(item.name, columns, item.digits)
+
+    assert results.inertial is not None and results.forecast is not None
+    names = {item.name for item in (*results.inertial.figures, *results.forecast.figures)}
+    figures = [changed(item) if item.name in names else item for item in results.figures]
+    shown = tuple(item for item in figures if kind != "none" or item.name not in names)
+    inertial, forecast = replace(results.inertial, figures=()), replace(results.forecast, figures=())
+    contents = written(tmp_path, flight, replace(results, inertial=inertial, forecast=forecast, figures=shown))
+    assert "nmi/h" in contents.text("/inertial/answer")
+
+
+def test_panels_hold_no_markup_of_a_log() -> None:
+    text = inertial_text(inertial_result(ins_topic="![x](http://y)", kind_reason="<b>|", ins_class_origin="a|b"))
+    assert "](" not in text and "<b>" not in text and "a\\|b" in text
+    text = forecast_text(forecast_result(is_calibrated=False, calibration_reason="<i>"))
+    assert "**Not calibrated**: \\<i\\>" in text
+
+
+def test_a_chart_scales_values_into_its_box(tmp_path: Path) -> None:
+    with rr.RecordingStream("a") as stream:
+        stream.save(tmp_path / "a.rrd")
+        chart = Chart(Recorder(stream, START_NS, True), "chart", Axis("x", 0.0, 10.0), Axis("y", 1.0, 100.0, True))
+        chart.curves("line", [(np.array([0.0, 5.0]), np.array([1.0, np.nan]), Line("a", (0, 0, 0, 255)))])
+        points = chart.points(np.array([0.0, 5.0, 10.0, 11.0]), np.array([1.0, 10.0, 100.0, 10.0]))
+    np.testing.assert_allclose(points[:3], [[0.0, 100.0], [80.0, 50.0], [160.0, 0.0]], atol=1e-9)
+    assert np.isnan(points[3, 0]), "outside of the axis"
