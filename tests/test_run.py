@@ -190,8 +190,9 @@ def test_convert_writes_one_file_or_a_folder(tmp_path: Path) -> None:
 )
 def test_a_taxi_that_never_reaches_the_speed_gate_is_not_assessable(tmp_path: Path, name: str) -> None:
     outcome = run_flight(Job(real_log(name), tmp_path, Configuration()))
-    (entry,) = load(Path(outcome.folder)).summary["not_assessable"]
-    assert entry["analysis"] == "heading" and "6" in entry["reason"] and "m/s" in entry["reason"]
+    entries = load(Path(outcome.folder)).summary["not_assessable"]
+    reasons = {entry["analysis"]: entry["reason"] for entry in entries}
+    assert "6" in reasons["heading"] and "m/s" in reasons["heading"]
 
 
 @pytest.mark.real_log

@@ -246,10 +246,10 @@ def simulate(
 @app.command()
 @answers_with_exit_code
 def study(
-    name: Annotated[Literal["heading"], typer.Argument(help="Which study.", metavar="NAME")],
+    name: Annotated[Literal["heading", "forecast"], typer.Argument(help="heading or forecast.", metavar="NAME")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the tables.", metavar="DIR")],
-    runs: Annotated[int, typer.Option("--runs", help="Simulated runs of each family.", min=10)] = 200,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the first family; the second has the next one.")] = 71,
+    runs: Annotated[int, typer.Option("--runs", help="Simulated runs of each family or case.", min=10)] = 200,
+    seed: Annotated[int, typer.Option("--seed", help="Seed; families and cases take those that follow from it.")] = 71,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,

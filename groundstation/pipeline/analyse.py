@@ -11,9 +11,12 @@ from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.toml_settings import settings_from
 from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings, Interval, SiteData
+from groundstation.estimators.inertial.noise import choose_class
+from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.pipeline import configuration as configured
 from groundstation.pipeline import overview
 from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.inertial import analyse_inertial
 from groundstation.pipeline.intervals import seconds_of
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
@@ -42,6 +45,7 @@ class UserSettings:
     """The user's tables as the dataclasses the estimators take."""
 
     heading: HeadingSettings
+    inertial: InertialSettings
     aircraft: AircraftData
     site: SiteData
 
@@ -54,11 +58,16 @@ def user_settings(configuration: Configuration) -> UserSettings:
     SettingsError
         For an unknown key or a value of the wrong kind.
     """
-    return UserSettings(
+    settings = UserSettings(
         settings_from(HeadingSettings, configuration.heading, configuration.file_of("heading"), "heading"),
+        settings_from(InertialSettings, configuration.inertial, configuration.file_of("inertial"), "inertial"),
         settings_from(AircraftData, configuration.aircraft, configuration.file_of("aircraft"), "aircraft"),
         settings_from(SiteData, configuration.site, configuration.file_of("site"), "site"),
     )
+    choose_class(
+        settings.inertial, settings.aircraft.ins_class
+    )  # a class that does not exist is found out before a run
+    return settings
 
 
 def analyse(flight: Flight, given: Given, configuration: Configuration) -> FlightResults:
@@ -74,7 +83,16 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     not_assessable: list[NotAssessable] = []
     phases = flight_phases(flight)
     heading = _heading_or_reason(flight, configuration, settings, findings, not_assessable)
-    figures = _figures(flight, given, settings, phases, heading)
+    inertial = analyse_inertial(
+        flight,
+        phases,
+        settings.inertial,
+        aircraft_class=settings.aircraft.ins_class,
+        excluded_s=_excluded(flight, configuration),
+    )
+    findings += inertial.findings
+    not_assessable += inertial.not_assessable
+    figures = (*_figures(flight, given, settings, phases, heading), *inertial.figures)
     if heading is not None:
         findings += heading_findings(heading)
         findings += _findings_of_what_was_set(flight, heading, configuration, settings)
@@ -91,6 +109,8 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
         findings=tuple(findings),
         not_assessable=tuple(not_assessable),
         heading=heading,
+        inertial=inertial.inertial,
+        forecast=inertial.forecast,
         figures=figures,
     )
 
@@ -166,6 +186,13 @@ def _intervals(flight: Flight, configuration: Configuration) -> tuple[Interval, 
     return tuple(Interval(start_s, end_s, use) for use, listed in uses for start_s, end_s in seconds_of(flight, listed))
 
 
+def _excluded(flight: Flight, configuration: Configuration) -> tuple[tuple[float, float], ...]:
+    try:
+        return tuple(seconds_of(flight, configuration.exclude))
+    except SettingsError:  # intervals in UTC for a flight without it: said with the heading
+        return ()
+
+
 def _status(given: Given, findings: list[Finding]) -> Status:
     if any(finding.severity == "fail" for finding in findings):
         return "failed"
@@ -185,6 +212,7 @@ def _figures(
         overview.overview(flight, true_heading_deg, ins_topic),
         overview.phase_figure(phases),
         overview.gnss_lanes(flight, settings.heading.geometry_max),
+        overview.state_lanes(flight),
         *overview.ledger_figures(flight, given.ledger),
     )
     return (*(figure for figure in general if figure is not None), *(heading.figures if heading else ()))

@@ -14,6 +14,19 @@ HEADING: dict[str, Any] = {
     "needs": "ins heading (true or magnetic), gnss velocities, proof of ground contact (weight on wheels, a landed "
     "flag or a standstill to start from), straight taxi above 6 m/s",
 }
+INERTIAL: dict[str, Any] = {
+    "kind": "analysis",
+    "name": "inertial",
+    "title": "INS errors estimated against GNSS, two channels of six states (Neusypin et al. 2003)",
+    "needs": "ins and gnss positions (velocities too where there are any), five minutes of both together",
+}
+FORECAST: dict[str, Any] = {
+    "kind": "analysis",
+    "name": "forecast",
+    "title": "forecast of the INS errors without GNSS, replayed all over the flight",
+    "needs": "what inertial needs, of an INS that GNSS does not correct; a calibration needs one Schuler period",
+}
+ANALYSES = (HEADING, INERTIAL, FORECAST)
 
 
 def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict[str, Any]]:
@@ -25,16 +38,19 @@ def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict
         When the log is missing or cannot be read.
     """
     if log is None:
-        return [HEADING, *_formats(), *_scenarios()]
-    return [_with_answer(HEADING, log, profile)]
+        return [*ANALYSES, *_formats(), *_scenarios(), *_studies()]
+    return _with_answers(log, profile)
 
 
-def _with_answer(entry: dict[str, Any], path: Path, profile: Path | None) -> dict[str, Any]:
+def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
+    """The analyses, each with whether it would run on a log and the reason why not."""
     from groundstation.base.errors import UsageError
     from groundstation.pipeline.analyse import estimate_heading, user_settings
     from groundstation.pipeline.convert import convert_log
     from groundstation.pipeline.flight import read_flight
+    from groundstation.pipeline.inertial import analyse_inertial
     from groundstation.pipeline.log import open_log
+    from groundstation.tables.phases import flight_phases
 
     if not path.exists():
         raise UsageError(str(path), "no such file")
@@ -42,11 +58,19 @@ def _with_answer(entry: dict[str, Any], path: Path, profile: Path | None) -> dic
         mcap = Path(folder) / "flight.mcap"
         flight = read_flight(mcap, convert_log(open_log(path, profile), mcap))
     configuration = Configuration()
+    settings, reasons = user_settings(configuration), {}
     try:
-        estimate_heading(flight, configuration, user_settings(configuration))
+        estimate_heading(flight, configuration, settings)
     except NotAssessableError as error:
-        return {**entry, "would_run": False, "reason": str(error)}
-    return {**entry, "would_run": True, "reason": ""}
+        reasons["heading"] = str(error).removeprefix("heading: ")
+    answers = analyse_inertial(flight, flight_phases(flight), settings.inertial)
+    reasons |= {lacking.analysis: lacking.reason for lacking in answers.not_assessable}
+    if "inertial" in reasons:
+        reasons["forecast"] = reasons["inertial"]
+    return [
+        {**entry, "would_run": entry["name"] not in reasons, "reason": reasons.get(entry["name"], "")}
+        for entry in ANALYSES
+    ]
 
 
 def _formats() -> list[dict[str, Any]]:
@@ -64,4 +88,13 @@ def _scenarios() -> list[dict[str, Any]]:
     return [
         {"kind": "scenario", "name": name, "title": load_scenario(name).title, "needs": "nothing"}
         for name in scenario_names()
+    ]
+
+
+def _studies() -> list[dict[str, Any]]:
+    from groundstation.pipeline.synthesis import STUDIES
+
+    return [
+        {"kind": "study", "name": name, "title": f"study: {title}", "needs": "nothing"}
+        for name, title in STUDIES.items()
     ]

@@ -9,7 +9,8 @@ from typing import Any
 
 from groundstation.base.errors import SettingsError
 
-SECTIONS = ("heading", "aircraft", "site", "exclude", "force")
+TABLES = ("heading", "inertial", "aircraft", "site")
+SECTIONS = (*TABLES, "exclude", "force")
 
 
 @dataclass(frozen=True)
@@ -25,10 +26,11 @@ class Interval:
 class Configuration:
     """Everything a user may set for a run, as read from TOML; plain values, so that it travels to worker processes.
 
-    ``heading``, ``aircraft`` and ``site`` are the tables as written; they become dataclasses where they are used.
+    ``heading``, ``inertial``, ``aircraft`` and ``site`` are the tables as written; they become dataclasses where used.
     """
 
     heading: Mapping[str, Any] = field(default_factory=dict)
+    inertial: Mapping[str, Any] = field(default_factory=dict)
     aircraft: Mapping[str, Any] = field(default_factory=dict)
     site: Mapping[str, Any] = field(default_factory=dict)
     exclude: tuple[Interval, ...] = ()
@@ -42,9 +44,7 @@ class Configuration:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for the manifest and the MCAP; only what the user set."""
-        document: dict[str, Any] = {
-            name: dict(getattr(self, name)) for name in ("heading", "aircraft", "site") if getattr(self, name)
-        }
+        document: dict[str, Any] = {name: dict(getattr(self, name)) for name in TABLES if getattr(self, name)}
         for name in ("exclude", "force"):
             intervals = [{"from": part.start, "to": part.end, "reason": part.reason} for part in getattr(self, name)]
             if intervals:
@@ -86,7 +86,7 @@ def load_configuration(
     """
     document = read_toml(config) if config else {}
     _refuse_unknown(document, SECTIONS, str(config))
-    files = {"heading": config, "aircraft": aircraft or config, "site": site or config}
+    files = {"heading": config, "inertial": config, "aircraft": aircraft or config, "site": site or config}
     for name, path in (("aircraft", aircraft), ("site", site)):
         if path:
             document[name] = read_toml(path)
@@ -94,11 +94,12 @@ def load_configuration(
         listed = read_toml(intervals)
         _refuse_unknown(listed, ("exclude", "force"), str(intervals))
         document.update(listed)
-    for name in ("heading", "aircraft", "site"):
+    for name in TABLES:
         if not isinstance(document.get(name, {}), dict):
             raise SettingsError(f"{config}, {name}", repr(document[name]), f"a table [{name}]")
     return Configuration(
         heading=document.get("heading", {}),
+        inertial=document.get("inertial", {}),
         aircraft=document.get("aircraft", {}),
         site=document.get("site", {}),
         exclude=_intervals(document.get("exclude", []), f"{intervals or config}, exclude"),

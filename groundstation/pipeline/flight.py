@@ -171,17 +171,39 @@ def _state(results: FlightResults, converted: Converted, fail_on: str) -> State:
 
 def sentence(results: FlightResults) -> str:
     """What was found, in one line."""
+    found = [text for text in (_heading_sentence(results), _inertial_sentence(results)) if text]
+    if found:
+        return "; ".join(found)
+    reasons = "; ".join(f"{entry.analysis}: {entry.reason}" for entry in results.not_assessable)
+    return f"not assessable: {reasons or 'no analysis applies'}"
+
+
+def _heading_sentence(results: FlightResults) -> str:
     heading = results.heading
     if heading is None:
-        reasons = "; ".join(entry.reason for entry in results.not_assessable) or "no analysis applies"
-        return f"not assessable: {reasons}"
+        return ""
     low, high = heading.confidence95_deg
     text = f"{heading.verdict}: heading error {heading.error_deg:+.3f} deg, 95 % {low:+.3f} to {high:+.3f}"
     if heading.correction_deg is not None:
-        text += f", enter {heading.correction_deg:+g} deg"
-    else:
-        text += f" ({heading.verdict_reason})"
-    return text
+        return f"{text}, enter {heading.correction_deg:+g} deg"
+    return f"{text} ({heading.verdict_reason})"
+
+
+def _inertial_sentence(results: FlightResults) -> str:
+    inertial, forecast = results.inertial, results.forecast
+    if inertial is None:
+        return ""
+    if inertial.kind == "gnss_aided":
+        return "INS corrected by GNSS already, no forecast"
+    parts = []
+    if inertial.radial_error_rate_50_nmiph is not None:
+        parts.append(f"{inertial.radial_error_rate_50_nmiph:.2f} nmi/h")
+    if forecast is not None:
+        shipped = [row for row in forecast.skill if row.method == forecast.default_method]
+        longest = max(shipped, key=lambda row: row.horizon_min, default=None)
+        if longest is not None:
+            parts.append(f"forecast {longest.rms_m:.0f} m after {longest.horizon_min:g} min")
+    return f"INS {', '.join(parts)}" if parts else "INS errors estimated"
 
 
 def place(partial: Path, target: Path) -> None:

@@ -1,4 +1,4 @@
-"""Arrays of the overview and data-quality figures: the flight thinned, its phases, the state of GNSS, the ledger."""
+"""Arrays of the overview and data-quality figures: the flight thinned, its phases and states, GNSS, the ledger."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -6,14 +6,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.signals import topics_of_kind
+from groundstation.base.records import Int64Array
+from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
 from groundstation.results.figures import FigureData
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight, Table
+from groundstation.tables.wheels import contact_of
 
 MAX_OVERVIEW_ROWS = 4000
 GAP_PERIODS = 5.0
 LARGEST_QUIET_GAP_S = 3.0
+NEAR_NS = 1_000_000_000  # a value this near in time stands for a row that lacks it
+MODE = "mode "  # what the names of events that change the flight mode begin with
 
 
 def first_of_kind(flight: Flight, kind: str, *fields: str) -> str | None:
@@ -69,21 +73,40 @@ def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_t
     base = gnss or first_of_kind(flight, "ins", "latitude_deg", "longitude_deg") or ins_topic
     if base is None or not len(flight[base]):
         return None
-    table = flight[base]
-    keep = np.unique(np.linspace(0, len(table) - 1, min(len(table), MAX_OVERVIEW_ROWS)).round().astype(int))
-    table = table.take(keep)
+    every = flight[base]
+    rows = np.arange(len(every)) if base == gnss else _rows_with_motion(every)
+    keep = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MAX_OVERVIEW_ROWS)).round().astype(int))
+    time_ns = every.time_ns[rows[keep]]
     columns = {
-        "time_s": flight.seconds(table.time_ns),
-        "latitude_deg": table.values("latitude_deg"),
-        "longitude_deg": table.values("longitude_deg"),
-        "altitude_m": _altitude(table),
-        "ground_speed_mps": ground_speed(table),
-        "heading_deg": _nearest_heading(flight, table, true_heading_deg, ins_topic),
-        "track_deg": _track(table),
+        "time_s": flight.seconds(time_ns),
+        "latitude_deg": every.values("latitude_deg")[rows[keep]],
+        "longitude_deg": every.values("longitude_deg")[rows[keep]],
+        "altitude_m": _at(every, _altitude(every), rows[keep]),
+        "ground_speed_mps": _at(every, ground_speed(every), rows[keep]),
+        "heading_deg": _nearest_heading(flight, time_ns, true_heading_deg, ins_topic),
+        "track_deg": _at(every, _track(every), rows[keep]),
     }
+    baro = first_of_kind(flight, "baro", "pressure_altitude_m")
+    if baro is not None and not np.isfinite(columns["altitude_m"]).any():
+        pressure_altitude = flight[baro].values("pressure_altitude_m")
+        columns["pressure_altitude_m"] = _nearest(flight[baro].time_ns, pressure_altitude, time_ns)
     columns = _break_at_gaps(columns, flight.duration_s / MAX_OVERVIEW_ROWS)
     digits = {"time_s": 2, "latitude_deg": 7, "longitude_deg": 7, "altitude_m": 1, "ground_speed_mps": 2}
-    return FigureData("overview", columns, {**digits, "heading_deg": 2, "track_deg": 2})
+    return FigureData("overview", columns, {**digits, "heading_deg": 2, "track_deg": 2, "pressure_altitude_m": 1})
+
+
+def _rows_with_motion(table: Table) -> NDArray[np.intp]:
+    """Rows to draw: with a position, else with a velocity, else all. A row may have the fields of one source alone."""
+    for names in (("latitude_deg", "longitude_deg"), ("velocity_north_mps", "velocity_east_mps")):
+        if table.has(*names):
+            return np.flatnonzero(table.columns[names[0]].mask & table.columns[names[1]].mask)
+    return np.arange(len(table))
+
+
+def _at(table: Table, values: NDArray[np.float64], rows: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Values of rows; where not one of these rows has any, they come from another source: the nearest in time."""
+    own = values[rows]
+    return own if np.isfinite(own).any() else _nearest(table.time_ns, values, table.time_ns[rows])
 
 
 def ground_speed(table: Table) -> NDArray[np.float64]:
@@ -108,18 +131,23 @@ def _track(table: Table) -> NDArray[np.float64]:
 
 
 def _nearest_heading(
-    flight: Flight, table: Table, true_heading_deg: NDArray[np.float64] | None, ins_topic: str | None
+    flight: Flight, time_ns: Int64Array, true_heading_deg: NDArray[np.float64] | None, ins_topic: str | None
 ) -> NDArray[np.float64]:
-    if true_heading_deg is None or ins_topic is None or not len(true_heading_deg):
-        return np.full(len(table), np.nan)
-    times = flight[ins_topic].time_ns
-    right = np.clip(np.searchsorted(times, table.time_ns), 1, max(len(times) - 1, 1)) if len(times) > 1 else None
-    if right is None:
-        return np.full(len(table), np.nan)
-    left = right - 1
-    nearest = np.where(table.time_ns - times[left] <= times[right] - table.time_ns, left, right)
-    is_near = np.abs(times[nearest] - table.time_ns) <= 1_000_000_000
-    return np.where(is_near, true_heading_deg[nearest], np.nan)
+    if true_heading_deg is None or ins_topic is None:
+        return np.full(len(time_ns), np.nan)
+    return _nearest(flight[ins_topic].time_ns, true_heading_deg, time_ns)
+
+
+def _nearest(times_ns: Int64Array, values: NDArray[np.float64], wanted_ns: Int64Array) -> NDArray[np.float64]:
+    """The known value nearest in time to each wanted time, NaN where none is near."""
+    known = np.flatnonzero(np.isfinite(values))
+    if not known.size:
+        return np.full(len(wanted_ns), np.nan)
+    times_ns, values = times_ns[known], values[known]
+    right = np.clip(np.searchsorted(times_ns, wanted_ns), 0, len(times_ns) - 1)
+    left = np.maximum(right - 1, 0)
+    nearest = np.where(np.abs(wanted_ns - times_ns[left]) < np.abs(times_ns[right] - wanted_ns), left, right)
+    return np.where(np.abs(times_ns[nearest] - wanted_ns) <= NEAR_NS, values[nearest], np.nan)
 
 
 def _break_at_gaps(columns: dict[str, NDArray[np.float64]], thinned_step_s: float) -> dict[str, NDArray[np.float64]]:
@@ -138,6 +166,43 @@ def phase_figure(phases: Phases) -> FigureData:
     """Phases of the flight as figure data."""
     columns: dict[str, NDArray[Any]] = {"start_s": phases.start_s, "end_s": phases.end_s, "phase": phases.phase}
     return FigureData("phases", columns, {"start_s": 1, "end_s": 1})
+
+
+def state_lanes(flight: Flight) -> FigureData | None:
+    """What the log says of flight mode, arming and ground contact: spans, ``lane``, ``start_s``, ``end_s``, ``state``.
+
+    Mode and arming are read off the events (``mode LOITER``, ``armed``, ``disarmed``), each holds until the next one.
+    The lane of ground contact is named after its source, a landed flag or weight on wheels.
+    """
+    events = [flight[topic] for topic in topics_of_kind("event", flight.topics()) if flight[topic].has("name")]
+    time_ns = np.concatenate([np.zeros(0, dtype=np.int64), *(table.time_ns for table in events)])
+    names = np.concatenate([np.zeros(0, dtype="U1"), *(table.text("name") for table in events)])
+    order = np.argsort(time_ns, kind="stable")
+    told = [
+        (when, name)
+        for when, row in zip(time_ns[order], names[order], strict=True)
+        for name in row.split(EVENT_SEPARATOR)
+    ]
+    time_ns, names = (
+        np.array([when for when, _ in told], dtype=np.int64),
+        np.array([name for _, name in told], dtype="U"),
+    )
+    is_mode, is_arming = np.char.startswith(names, MODE), np.isin(names, ("armed", "disarmed"))
+    lanes = [
+        ("mode", time_ns[is_mode], np.array([name.removeprefix(MODE) for name in names[is_mode].tolist()], dtype="U")),
+        ("arming", time_ns[is_arming], names[is_arming]),
+    ]
+    contact = contact_of(flight)
+    if contact is not None:
+        states = np.where(contact.on_ground, "on the ground", "in the air")
+        lanes.append((contact.name.partition(" (")[0], contact.time_ns, states))
+    spans = [(lane, runs_of(states, flight.seconds(times), flight.duration_s)) for lane, times, states in lanes]
+    if not any(len(runs) for _, runs in spans):
+        return None
+    columns: dict[str, NDArray[Any]] = {"lane": np.array([lane for lane, runs in spans for _ in range(len(runs))])}
+    for key in ("start_s", "end_s", "state"):
+        columns[key] = np.concatenate([runs[key] for _, runs in spans if len(runs)])
+    return FigureData("state_lanes", columns, {"start_s": 2, "end_s": 2})
 
 
 def ledger_figures(flight: Flight, ledger: Mapping[str, Any]) -> tuple[FigureData, ...]:

@@ -1,10 +1,20 @@
 """Simulated logs and Monte Carlo studies as files."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.inputs import STUDY_MARK
 from groundstation.pipeline.progress import Event, Listener
+
+if TYPE_CHECKING:
+    from groundstation.studies.page import StudyResult
+
+STUDIES = {
+    "heading": "heading correction before take-off: errors, coverage of the interval, the figures of the paper again",
+    "forecast": "forecast of INS errors: every method under true and false models, and how honest its sigma is",
+}
 
 
 def simulate_to(scenario: str, folder: Path, *, seed: int | None = None, force: bool = False) -> list[Path]:
@@ -30,20 +40,34 @@ def study_to(name: str, folder: Path, *, runs: int, seed: int, force: bool, list
     Raises
     ------
     UsageError
-        When the page is there already and ``force`` is not given.
+        When the page is there already and ``force`` is not given, or there is no such study.
     """
     from groundstation.results.files import csv_text, write_text
-    from groundstation.studies.heading import study_heading
+
+    study = _study(name)
 
     page = folder / f"{name}.md"
     if page.exists() and not force:
         raise UsageError(str(page), "a file that exists", "a new folder", "-f overwrites it")
     (folder / "tables").mkdir(parents=True, exist_ok=True)
     listen(Event("begin", total=1))
-    result = study_heading(runs=runs, seed=seed, progress=lambda text: listen(Event("stage", name, text)))
+    result = study(runs=runs, seed=seed, progress=lambda text: listen(Event("stage", name, text)))
     for table in result.tables:
         write_text(folder / "tables" / f"{table.name}.csv", csv_text(table))
     write_text(page, result.markdown)
     (folder / STUDY_MARK).touch()
     listen(Event("end", name, str(page)))
     return result.markdown
+
+
+def _study(name: str) -> "Callable[..., StudyResult]":
+    """The study's function; each imports its own estimators."""
+    if name == "heading":
+        from groundstation.studies.heading import study_heading
+
+        return study_heading
+    if name == "forecast":
+        from groundstation.studies.forecast import study_forecast
+
+        return study_forecast
+    raise UsageError("study", repr(name), f"one of {', '.join(STUDIES)}")

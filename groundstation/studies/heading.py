@@ -1,7 +1,5 @@
 """Monte Carlo behind the heading correction: accuracy, coverage, gates, and the figures of the paper again."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.results.figures import FigureData
@@ -16,17 +14,9 @@ from groundstation.studies.heading_family import (
     time_to_precision_table,
 )
 from groundstation.studies.heading_paper import arm_table, precision_table, quality_table, standstill_tables
+from groundstation.studies.page import StudyResult, markdown_table
 
 PAPER_RUNS = 2000  # realisations of the plain processes: the paper had more than 500 at standstill
-
-
-@dataclass(frozen=True)
-class StudyResult:
-    """What a study found: tables (arrays with units in their names) and a page of text."""
-
-    name: str
-    tables: tuple[FigureData, ...]
-    markdown: str
 
 
 def study_heading(runs: int = 200, seed: int = 71, progress: Progress | None = None) -> StudyResult:
@@ -115,19 +105,5 @@ def _page(tables: list[FigureData], families: tuple[tuple[Family, int], ...], ru
         title = next((text for key, text in TITLES.items() if table.name.startswith(key)), "")
         if title:
             family = next((f" (family {family})" for family, _seed in families if table.name.endswith(family)), "")
-            lines += ["", f"## {title}{family}", "", *_markdown(table)]
+            lines += ["", f"## {title}{family}", "", *markdown_table(table)]
     return "\n".join(lines) + "\n"
-
-
-def _markdown(table: FigureData) -> list[str]:
-    """A table as Markdown, numbers rounded to the digits of their columns."""
-
-    def cell(name: str, value: object) -> str:
-        if isinstance(value, float | np.floating):
-            return "" if np.isnan(value) else f"{value:.{table.digits.get(name, 2)}f}"
-        return str(value)
-
-    names = list(table.columns)
-    head = [name.replace("_", " ") for name in names]
-    rows = [[cell(name, table[name][row]) for name in names] for row in range(len(table))]
-    return [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(names), *rows)]

@@ -26,7 +26,7 @@ TITLES = {
     "velocity": "velocity error",
     "tilt": "platform tilt",
     "drift": "constant gyro drift",
-    "drift_rate": "its rate of change",
+    "drift_rate": "rate of the drift",
     "random_drift": "random gyro drift",
 }
 MINUTE_S, RATE_FROM_S = 60.0, 600.0
@@ -294,7 +294,7 @@ def _flat(settings: Any, before: str = "") -> dict[str, float | str | bool]:
         if is_dataclass(value):
             out |= _flat(value, f"{before}{item.name}.")
         elif isinstance(value, tuple):
-            out |= {f"{before}{item.name}.{index}": part for index, part in enumerate(value)}
+            out[f"{before}{item.name}"] = ", ".join(f"{part:g}" for part in value)
         else:
             out[f"{before}{item.name}"] = value
     return out

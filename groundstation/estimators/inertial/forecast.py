@@ -66,7 +66,7 @@ def assess_forecast(
     skill = skill_rows(replay, claimed, plan.horizons_min, plan.first_start_s)
     best = {
         f"{horizon:g}": min((row for row in skill if row.horizon_min == horizon), key=lambda row: row.rms_m).method
-        for horizon in plan.horizons_min
+        for horizon in sorted({row.horizon_min for row in skill})  # GNSS may be absent at every end of a horizon
     }
     classic, classic_figures = _classic(run, settings, take_off_s)
     since = slice(int(np.searchsorted(replay.start_s, plan.first_start_s - 1e-6)), None)

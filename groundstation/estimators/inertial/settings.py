@@ -32,7 +32,7 @@ class InertialSettings:
     frozen_speed_mps: float = number(20.0, 0.0)
     aided_radial_m: float = number(30.0, 0.0)  # an INS whose minute means stay so near GNSS has never drifted
     # Forecast
-    default_method: str = "drift_windows"
+    default_method: str = "last_estimate"
     tilt_window_s: float = number(700.0, 1.0)
     drift_window_s: float = number(2000.0, 1.0)
     drift_rate_window_s: float = number(2500.0, 1.0)

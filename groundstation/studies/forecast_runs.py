@@ -1,0 +1,186 @@
+"""The flights of the forecast study: each simulated, filtered and replayed; what is kept of it is small."""
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray
+from groundstation.base.records import frozen
+from groundstation.estimators.inertial.filter import Epochs, FilterRun, run_filter
+from groundstation.estimators.inertial.hindcast import Hindcast, built_up, hindcast
+from groundstation.estimators.inertial.replay import plan_replay
+from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.estimators.inertial.skill import QUANTILES, Claimed, claimed_sigma
+from groundstation.estimators.inertial.start_covariance import WITH_COVARIANCE
+from groundstation.results.forecast import METHODS
+from groundstation.simulation.inertial_family import ErrorBatch, simulate_family
+from groundstation.studies.forecast_cases import Case, epochs_of, model_of
+
+Progress = Callable[[str], None]
+
+METHOD_NAMES = tuple(METHODS)
+STUDY_HORIZONS_MIN = (10.0, 30.0, 60.0, 84.0, 120.0)
+CLASSIC_START_H = (1.5, 2.0, 2.5, 3.0)
+SETS_OF_STARTS = ("all", *(f"{hours:g} h" for hours in CLASSIC_START_H))
+LEVELS = tuple(QUANTILES)
+WORKERS = 2
+
+
+@dataclass(frozen=True)
+class Honesty:
+    """How the sigmas of one flight's forecasts came out; axes: method with a covariance, horizon.
+
+    Parameters
+    ----------
+    inside, inside_model : ndarrays, shape (5, h, 3)
+        Shares of the channel errors inside the 50, 68 and 95 % bands, over all starts: sigma scaled, and by the model.
+    nees, nees_model : ndarrays, shape (5, h)
+        Mean squared ratio of error to sigma over all starts and both channels.
+    first, first_model : ndarrays, shape (5, h)
+        Sum of the squared ratios over both channels from the first start alone: flights are independent, starts not.
+    """
+
+    inside: FloatArray
+    inside_model: FloatArray
+    nees: FloatArray
+    nees_model: FloatArray
+    first: FloatArray
+    first_model: FloatArray
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            object.__setattr__(self, item.name, frozen(getattr(self, item.name)))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One flight in one case.
+
+    Parameters
+    ----------
+    mean_square_m2 : ndarray, shape (8, 5, h)
+        Of the radial error built up, against the truth: method, set of starts (all; 1.5, 2, 2.5, 3 h), horizon; NaN
+        where the horizon ends after the flight.
+    rejected_share : float
+        Of the position measurements, by the gate.
+    honesty : Honesty, optional
+    """
+
+    mean_square_m2: FloatArray
+    rejected_share: float
+    honesty: Honesty | None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mean_square_m2", frozen(self.mean_square_m2))
+
+
+def run_cases(
+    cases: Sequence[Case], runs: int, calibrated_runs: int, settings: InertialSettings, progress: Progress | None = None
+) -> dict[str, tuple[Outcome, ...]]:
+    """Replay ``runs`` flights of every case; cases of one family and seed see the same flights.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+    runs : int
+    calibrated_runs : int
+        So many flights of each case look at the sigma too, which takes four times as long.
+    settings : InertialSettings
+    progress : callable, optional
+        Called with a line for each flight simulated.
+
+    Returns
+    -------
+    dict of case name to tuple of Outcome
+        In the order of the flights, whatever the number of threads.
+    """
+    flights: list[tuple[list[Case], int]] = []
+    for seed in dict.fromkeys(case.seed for case in cases):
+        flights += [([case for case in cases if case.seed == seed], run) for run in range(runs)]
+    outcomes: dict[str, list[Outcome]] = {case.name: [] for case in cases}
+
+    def fly(flight: tuple[list[Case], int]) -> list[Outcome]:
+        together, run = flight
+        return _fly(together, run, run < calibrated_runs, settings)
+
+    with ThreadPoolExecutor(min(WORKERS, os.cpu_count() or 1)) as pool:
+        for (together, run), found in zip(flights, pool.map(fly, flights), strict=True):
+            for case, outcome in zip(together, found, strict=True):
+                outcomes[case.name].append(outcome)
+            if progress:
+                progress(f"flight {run} of {', '.join(case.name for case in together)}")
+    return {name: tuple(several) for name, several in outcomes.items()}
+
+
+def _fly(cases: list[Case], run: int, is_calibrated: bool, settings: InertialSettings) -> list[Outcome]:
+    batch = simulate_family(cases[0].family, 1, cases[0].seed, first_run=run)
+    return [replay_flight(case, batch, 0, is_calibrated and case.is_calibrated, settings) for case in cases]
+
+
+def replay_flight(case: Case, batch: ErrorBatch, row: int, is_calibrated: bool, settings: InertialSettings) -> Outcome:
+    """Filter a flight of a batch and replay its outages with every method, judged by the truth."""
+    epochs = epochs_of(case, batch, row)
+    run = run_filter(epochs, model_of(case, batch, row), case.noise, gate=case.gate)
+    plan = plan_replay(run, settings)
+    replay = hindcast(run, plan.at, plan.lead_s, METHOD_NAMES, settings)
+    since = slice(int(np.searchsorted(replay.start_s, settings.first_start_s - 1e-6)), None)
+    truth = Epochs.plain(epochs.time_s, batch.position_error_m[row], batch.velocity_error_mps[row])
+    judged = replay.of(since)
+    judged = replace(judged, actual_m=built_up(truth, judged.at, judged.lead_s))
+    return Outcome(
+        mean_squares(judged),
+        float(np.mean(run.used[:, 0] < 0)),
+        _honesty(run, replay, since, settings) if is_calibrated else None,
+    )
+
+
+def mean_squares(replay: Hindcast) -> FloatArray:
+    """Mean square of the radial error over each set of starts: shape (methods, sets, horizons)."""
+    leads = leads_at(replay)
+    classic = [np.flatnonzero(np.abs(replay.start_s - 3600.0 * hours) < 1.0) for hours in CLASSIC_START_H]
+    out = np.full((len(METHOD_NAMES), len(SETS_OF_STARTS), len(leads)), np.nan)
+    for index, method in enumerate(METHOD_NAMES):
+        square = np.square(replay.radial_m(method)[:, leads])
+        for place, rows in enumerate((np.arange(len(square)), *classic)):
+            out[index, place] = _mean_known(square[rows])
+    return out
+
+
+def leads_at(replay: Hindcast) -> list[int]:
+    """Index of each horizon of the study among the leads."""
+    return [int(np.argmin(np.abs(replay.lead_s - 60.0 * horizon))) for horizon in STUDY_HORIZONS_MIN]
+
+
+def _honesty(run: FilterRun, replay: Hindcast, since: slice, settings: InertialSettings) -> Honesty:
+    """Errors over sigmas against what GNSS shows: its error at both ends belongs to the claim."""
+    leads = leads_at(replay)
+    parts: list[list[FloatArray]] = []
+    for method in WITH_COVARIANCE:
+        claimed = claimed_sigma(method, run, replay, settings)
+        assert isinstance(claimed, Claimed)
+        error = replay.error_m(method)[since][:, leads]
+        ratios = [np.square(error / sigma[since][:, leads]) for sigma in (claimed.scaled_m, claimed.model_m)]
+        parts.append(
+            [
+                *(np.stack([_share_inside(ratio, level) for level in LEVELS], axis=1) for ratio in ratios),
+                *(_mean_known(ratio.mean(axis=2)) for ratio in ratios),
+                *(ratio[0].sum(axis=1) for ratio in ratios),
+            ]
+        )
+    return Honesty(*(np.stack([method[item] for method in parts]) for item in range(len(fields(Honesty)))))
+
+
+def _share_inside(ratio: FloatArray, level: int) -> FloatArray:
+    """Share of the squared ratios (s, h, c) inside a band, per horizon."""
+    inside = np.where(np.isfinite(ratio), ratio <= QUANTILES[level] ** 2, np.nan)
+    return _mean_known(inside.mean(axis=2))
+
+
+def _mean_known(values: FloatArray) -> FloatArray:
+    """Mean over the first axis of what is known, NaN where nothing is."""
+    known = np.isfinite(values)
+    count = known.sum(axis=0)
+    return np.asarray(np.where(count > 0, np.where(known, values, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan))

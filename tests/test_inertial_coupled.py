@@ -1,0 +1,368 @@
+"""Coupled north-east model: its matrix against a strapdown mechanisation and the simulation, its filter, its gain."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
+from groundstation.estimators.inertial import coupled
+from groundstation.estimators.inertial.coupled import AZIMUTH, AZIMUTH_DRIFT, CHANNELS, EAST, NORTH, CraftMotion
+from groundstation.estimators.inertial.differences import Differences, drag_per_s
+from groundstation.estimators.inertial.filter import Epochs, run_filter
+from groundstation.estimators.inertial.hindcast import hindcast, start_epochs
+from groundstation.estimators.inertial.model import (
+    DRIFT,
+    POSITION,
+    RANDOM_DRIFT,
+    TILT,
+    VELOCITY,
+    ChannelModel,
+    FloatArray,
+    normal_gravity_mps2,
+)
+from groundstation.estimators.inertial.noise import GnssNoise, InsNoise
+from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.simulation.inertial_family import ErrorBatch, FamilySettings, simulate_family
+from groundstation.simulation.ins_errors import SensorErrors, TrueMotion, propagate
+
+TYPICAL = (100.0, 0.1, 1e-5, 5e-8, 1e-12, 5e-8)  # sizes of the six states, SI units
+SETTINGS = InertialSettings()
+LEADS_S: FloatArray = np.arange(1, 13, dtype=np.float64) * 600.0
+QUIET = GnssNoise(10.0, 0.0, 300.0, 1e-3, 0.0, 60.0)
+BETA = 1.0 / 3600.0
+LINEAR_SHARE = 5e-3  # gravity changes with the position error, and radii do, which the matrix leaves out
+RADII_SHARE = 2e-3  # the simulation leaves out that radii change with the latitude error
+LEFT_OUT_SHARE = 3e-4  # the same against the largest term of a row
+
+
+def craft(latitude_deg: float, velocity: tuple[float, float], acceleration: tuple[float, float]) -> CraftMotion:
+    return CraftMotion(np.array([latitude_deg]), np.array([10_000.0]), np.array([velocity]), np.array([acceleration]))
+
+
+def differences_of(motion: TrueMotion, position: FloatArray, velocity: FloatArray) -> Differences:
+    """Of one flight whose INS has these errors against GNSS."""
+    n = len(motion.time_s)
+    speed = np.stack([motion.velocity_north_mps[0], motion.velocity_east_mps[0]], axis=1)
+    latitude, altitude = motion.latitude_deg[0], motion.altitude_m[0]
+    drag = drag_per_s(latitude, altitude, speed)
+    epochs = Epochs(motion.time_s, position, velocity, drag, np.zeros(n, dtype=bool))
+    return Differences("ins", "gnss", epochs, latitude, np.zeros(n), altitude, speed, 0.0, ())
+
+
+def of_batch(batch: ErrorBatch, row: int = 0) -> Differences:
+    zero = np.zeros((1, len(batch.time_s)))
+    motion = TrueMotion(
+        time_s=batch.time_s,
+        latitude_deg=batch.latitude_deg[row],
+        altitude_m=batch.altitude_m[row],
+        velocity_north_mps=batch.velocity_north_mps[row],
+        velocity_east_mps=batch.velocity_east_mps[row],
+        velocity_down_mps=zero,
+        heading_deg=batch.heading_deg[row],
+        roll_deg=zero,
+    )
+    return differences_of(
+        motion,
+        batch.position_error_m[row] - batch.gnss_position_error_m[row],
+        batch.velocity_error_mps[row] - batch.gnss_velocity_error_mps[row],
+    )
+
+
+def straight(
+    seconds: float, latitude_deg: float, north: float, east: float, turn_at: float | None = None
+) -> TrueMotion:
+    """Level flight at constant speeds, the latitude exact for them to first order; a turn by 90 deg if asked for."""
+    time_s = np.arange(seconds + 1.0)
+    angle = np.zeros_like(time_s) if turn_at is None else np.clip((time_s - turn_at) / 60.0, 0.0, 1.0) * 0.5 * np.pi
+    v_north, v_east = north * np.cos(angle) - east * np.sin(angle), north * np.sin(angle) + east * np.cos(angle)
+    meridian, _ = curvature_radii_m(latitude_deg)
+    moved = np.concatenate([[0.0], np.cumsum(0.5 * (v_north[1:] + v_north[:-1]))])
+    zero = np.zeros_like(time_s)
+    return TrueMotion(
+        time_s=time_s,
+        latitude_deg=latitude_deg + np.rad2deg(moved / (float(meridian) + 10_000.0)),
+        altitude_m=zero + 10_000.0,
+        velocity_north_mps=v_north,
+        velocity_east_mps=v_east,
+        velocity_down_mps=zero,
+        heading_deg=zero,
+        roll_deg=zero,
+    )
+
+
+def drifting(motion: TrueMotion, north_dph: float, east_dph: float, azimuth_rad: float) -> SensorErrors:
+    """North-slaved sensors whose constant drifts are those of the channels."""
+    none = SensorErrors.none(1, len(motion.time_s))
+    gyro = np.array(none.gyro_radps)
+    gyro[..., 1], gyro[..., 0] = np.deg2rad(north_dph / 3600.0), -np.deg2rad(east_dph / 3600.0)
+    return replace(none, gyro_radps=gyro, azimuth_rad=np.array([azimuth_rad]))
+
+
+# The matrix
+
+
+def strapdown_rates(state: FloatArray, rate_ib: FloatArray, force_b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Nonlinear mechanisation at a fixed altitude: derivatives of [latitude rad, longitude rad, v_N, v_E], and of C.
+
+    ``state`` holds these four and then C (body to north-east-down) row by row. Source: Titterton and Weston 2004,
+    section 3.5.
+    """
+    latitude, north, east, C = state[0], state[2], state[3], state[4:].reshape(3, 3)
+    meridian, normal = (float(part) + 10_000.0 for part in curvature_radii_m(np.rad2deg(latitude)))
+    earth = EARTH_RATE_RADPS * np.array([np.cos(latitude), 0.0, -np.sin(latitude)])
+    transport = np.array([east / normal, -north / meridian, -east * np.tan(latitude) / normal])
+    gravity = np.array([0.0, 0.0, normal_gravity_mps2(np.rad2deg(latitude), 10_000.0)])
+    acceleration = C @ force_b - np.cross(2.0 * earth + transport, np.array([north, east, 0.0])) + gravity
+    moved = np.array([north / meridian, east / (normal * np.cos(latitude)), *acceleration[:2]])
+    return moved, C @ skew(rate_ib) - skew(earth + transport) @ C
+
+
+def skew(a: FloatArray) -> FloatArray:
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+def perturbed(truth: FloatArray, x: FloatArray) -> FloatArray:
+    """State of an INS with errors x: computed C = (I - [phi x]) C, phi = (east tilt, -north tilt, -azimuth)."""
+    meridian, normal = (float(part) + 10_000.0 for part in curvature_radii_m(np.rad2deg(truth[0])))
+    phi = np.array([x[EAST + TILT], -x[NORTH + TILT], -x[AZIMUTH]])
+    out = np.array(truth)
+    out[:4] += [x[0] / meridian, x[EAST] / (normal * np.cos(truth[0])), x[1], x[EAST + 1]]
+    out[4:] = ((np.eye(3) - skew(phi)) @ truth[4:].reshape(3, 3)).ravel()
+    return out
+
+
+@pytest.mark.parametrize("latitude, north, east", [(45.0, 120.0, 200.0), (-30.0, -150.0, 90.0), (60.0, 10.0, -240.0)])
+def test_matrix_is_the_jacobian_of_a_strapdown_mechanisation(latitude: float, north: float, east: float) -> None:
+    acceleration = np.array([1.5, -2.5])
+    motion = craft(latitude, (north, east), (1.5, -2.5))
+    A = coupled.coupled_matrix(motion, BETA)[0]
+    C = expm(skew(np.array([0.1, -0.05, 0.7])))
+    truth = np.concatenate([[np.deg2rad(latitude), 0.3, north, east], C.ravel()])
+    force = motion.specific_force_mps2()[0]
+    # the mechanisation at the true state accelerates as the craft does
+    assert np.allclose(strapdown_rates(truth, np.zeros(3), C.T @ force)[0][2:], acceleration, atol=1e-9)
+    rate = C.T @ np.array([0.01, -0.02, 0.05])
+    states = [NORTH, NORTH + 1, NORTH + 2, EAST, EAST + 1, EAST + 2, AZIMUTH]
+    sizes = np.array([100.0, 0.1, 1e-5, 100.0, 0.1, 1e-5, 1e-5])
+    largest = np.array([0.1, 1e-4, 1.6e-8, 0.1, 1e-4, 1.6e-8, 1.6e-8])  # velocity, g x tilt, velocity / R
+    for state, size in zip(states, sizes, strict=True):
+        both = []
+        for sign in (1.0, -1.0):
+            x = np.zeros(coupled.SIZE)
+            x[state] = sign * size
+            both.append(error_rates(truth, perturbed(truth, x), rate, C.T @ force, north))
+        numeric, ours = 0.5 * (both[0] - both[1]), A[states, state] * size
+        assert (np.abs(numeric - ours) < LINEAR_SHARE * np.abs(ours) + LEFT_OUT_SHARE * largest).all(), state
+
+
+def error_rates(truth: FloatArray, wrong: FloatArray, rate: FloatArray, force: FloatArray, north: float) -> FloatArray:
+    """Rates of [pN vN tN pE vE tE azimuth] of an INS at ``wrong``."""
+    (true_rates, true_C), (rates, C) = (strapdown_rates(part, rate, force) for part in (truth, wrong))
+    meridian, normal = (float(part) + 10_000.0 for part in curvature_radii_m(np.rad2deg(truth[0])))
+    change = rates - true_rates
+    d_latitude, beyond = wrong[0] - truth[0], curvature_radii_m(np.rad2deg(truth[0]) + 0.01)[0]
+    growth = (float(beyond) + 10_000.0 - meridian) / np.deg2rad(0.01) * north / meridian  # of the meridian's radius
+    # the parallel shrinks on the way to the pole: (d_lon R cos lat)'
+    d_longitude = wrong[1] - truth[1]
+    east = change[1] * normal * np.cos(truth[0]) - d_longitude * np.sin(truth[0]) * normal * north / meridian
+    C_true, C_wrong = truth[4:].reshape(3, 3), wrong[4:].reshape(3, 3)
+    phi_dot = -(C @ C_true.T + C_wrong @ true_C.T)  # derivative of -(C_wrong C_true')
+    phi = np.array([phi_dot[2, 1] - phi_dot[1, 2], phi_dot[0, 2] - phi_dot[2, 0], phi_dot[1, 0] - phi_dot[0, 1]]) / 2.0
+    return np.array([change[0] * meridian + d_latitude * growth, change[2], -phi[1], east, change[3], phi[0], -phi[2]])
+
+
+def test_signs_of_the_coupling_by_example() -> None:
+    at_rest = coupled.coupled_matrix(craft(60.0, (0.0, 0.0), (0.0, 0.0)), BETA)[0]
+    # heading error to the right (+) while the craft gains speed to the north: the INS believes it drifts east
+    speeding_up = coupled.coupled_matrix(craft(60.0, (0.0, 0.0), (2.0, 0.0)), BETA)[0]
+    assert speeding_up[EAST + VELOCITY, AZIMUTH] == pytest.approx(2.0)
+    assert speeding_up[NORTH + VELOCITY, AZIMUTH] == 0.0
+    # Earth rate north x azimuth tilts the north channel as a drift does: 0.1 deg at 60 deg are 0.013 deg/h
+    assert at_rest[TILT, AZIMUTH] * 0.1 * 3600.0 == pytest.approx(0.01313, rel=1e-3)
+    # Foucault: the plane of oscillation turns with 2 x Earth rate x sin(latitude) in the velocities, to the right
+    assert at_rest[VELOCITY, EAST + VELOCITY] == pytest.approx(-2.0 * EARTH_RATE_RADPS * np.sin(np.pi / 3.0))
+
+
+def test_without_rotation_the_blocks_are_the_channels() -> None:
+    A = coupled.coupled_matrix(craft(45.0, (0.0, 0.0), (0.0, 0.0)), BETA)[0]
+    for channel in CHANNELS:
+        model = ChannelModel.at(45.0, 10_000.0, BETA).matrix()
+        assert np.allclose(A[np.ix_(channel, channel)], model, rtol=2e-3)
+
+
+def test_schuler_and_foucault_periods_come_out() -> None:
+    A = coupled.coupled_matrix(craft(55.0, (0.0, 0.0), (0.0, 0.0)), BETA)[0]
+    rates = np.unique(np.round(np.abs(np.linalg.eigvals(A).imag), 9))
+    rates = rates[rates > 1e-5]
+    schuler = np.sqrt(normal_gravity_mps2(55.0, 10_000.0) / 6.385e6)
+    foucault = EARTH_RATE_RADPS * np.sin(np.deg2rad(55.0))
+    assert rates[0] == pytest.approx(EARTH_RATE_RADPS, rel=0.02)  # the 24 h oscillation
+    assert rates[1:] == pytest.approx([schuler - foucault, schuler + foucault], rel=3e-3)
+
+
+def test_exponential_of_the_filter_is_the_exponential() -> None:
+    from groundstation.estimators.inertial import coupled_kernels as kernels
+
+    motion = craft(50.0, (100.0, 220.0), (3.0, -1.0))
+    E = np.empty((coupled.SIZE, coupled.SIZE))
+    kernels.exponential(coupled.ROWS, coupled.COLUMNS, coupled.coupled_values(motion, BETA)[0], 10.0, E)
+    exact, term = np.eye(coupled.SIZE), np.eye(coupled.SIZE)
+    for order in range(1, 12):
+        term = term @ coupled.coupled_matrix(motion, BETA)[0] * 10.0 / order
+        exact = exact + term
+    sizes = np.array([*TYPICAL, *TYPICAL, 1e-3, 5e-8])
+    assert np.abs((E - exact) * sizes / sizes[:, None]).max() < 1e-8
+
+
+# The filter and the forecast
+
+
+@pytest.mark.parametrize("turn_at", [None, 3000.0])
+def test_forecast_from_the_true_state_follows_the_simulation(turn_at: float | None) -> None:
+    motion = straight(9000.0, 50.0, 30.0, 240.0, turn_at)
+    truth = propagate(motion, drifting(motion, 0.01, -0.02, 1e-3), body_fixed=False)
+    differences = differences_of(motion, truth.position_m[0], truth.velocity_mps[0])
+    at = np.array([1800])
+    x = np.zeros((len(motion.time_s), coupled.SIZE))
+    x[at[0], CHANNELS[:, VELOCITY]] = truth.velocity_mps[0, at[0]]
+    x[at[0], CHANNELS[:, TILT]] = truth.tilt_rad[0, at[0]]
+    x[at[0], CHANNELS[:, DRIFT]] = np.deg2rad(np.array([0.01, -0.02]) / 3600.0)
+    x[at[0], AZIMUTH] = truth.azimuth_rad[0, at[0]]
+    empty = np.zeros((len(x), 2, 2))
+    run = coupled.CoupledRun(differences, InsNoise(), x, np.zeros_like(x), empty, empty, empty.astype(np.int8))
+    forecast = coupled.hindcast_coupled(run, at, LEADS_S, SETTINGS)[0]
+    actual = truth.position_m[0, at[0] + LEADS_S.astype(int)] - truth.position_m[0, at[0]]
+    largest = np.abs(actual).max()
+    assert largest > 1000.0
+    assert np.abs(forecast - actual).max() < RADII_SHARE * largest
+
+
+def test_filter_finds_the_azimuth_in_a_turn_and_every_drift() -> None:
+    motion = straight(9000.0, 50.0, 30.0, 240.0, turn_at=4000.0)
+    truth = propagate(motion, drifting(motion, 0.01, -0.02, 1e-3), body_fixed=False)
+    differences = differences_of(motion, truth.position_m[0], truth.velocity_mps[0])
+    noise = replace(InsNoise(), gnss=QUIET, velocity_walk_mps_per_sqrt_s=1e-6, tilt_walk_deg_per_sqrt_h=1e-5)
+    noise = replace(noise, random_drift_dph=1e-5)
+    run = coupled.run_coupled(differences, noise, replace(SETTINGS, gate_sigmas=1000.0))
+    assert run.x[-1, AZIMUTH] == pytest.approx(truth.azimuth_rad[0, -1], rel=0.02)
+    assert np.rad2deg(run.x[-1, CHANNELS[:, DRIFT]]) * 3600.0 == pytest.approx([0.01, -0.02], abs=5e-4)
+    assert run.sigma[-1, AZIMUTH] < 0.1 * run.sigma[3900, AZIMUTH]
+
+
+def test_consistent_on_matched_truth() -> None:
+    """NEES of the eight dynamic states over 60 runs drawn from the model itself, inside its 99 % chi-square band."""
+    from scipy.stats import chi2
+
+    motion = straight(1800.0, 45.0, 50.0, 230.0, turn_at=900.0)
+    noise = replace(InsNoise(), gnss=GnssNoise(5.0, 0.0, 300.0, 0.05, 0.0, 60.0), velocity_walk_mps_per_sqrt_s=1e-3)
+    differences = differences_of(motion, np.zeros((1801, 2)), np.zeros((1801, 2)))
+    values = coupled.coupled_matrix(CraftMotion.between(differences, motion.time_s), noise.beta_per_s)
+    covariance, density = coupled._noise_of(noise, differences)
+    root = np.linalg.cholesky(covariance + 1e-30 * np.eye(coupled.SIZE))
+    runs, total = 60, np.zeros(coupled.SIZE)
+    rng = np.random.default_rng(5)
+    states = [root @ rng.standard_normal((coupled.SIZE, runs))]
+    for matrix in values:
+        step = np.eye(coupled.SIZE) + matrix + 0.5 * matrix @ matrix + matrix @ matrix @ matrix / 6.0
+        states.append(step @ states[-1] + np.sqrt(density)[:, None] * rng.standard_normal((coupled.SIZE, runs)))
+    for true in np.moveaxis(np.array(states), 2, 0):
+        z = true[:, CHANNELS[:, [POSITION, VELOCITY]]] + rng.standard_normal((1801, 2, 2)) * [5.0, 0.05]
+        run = coupled.run_coupled(differences_of(motion, z[:, :, 0], z[:, :, 1]), noise, SETTINGS)
+        total += np.square((run.x[-1] - true[-1]) / run.sigma[-1])
+    low, high = (
+        float(chi2.ppf(share, runs)) for share in (0.0005, 0.9995)
+    )  # 14 states: one in a hundred tests at random
+    assert (total > low).all() and (total < high).all(), total / runs
+
+
+def test_gaps_irregular_epochs_missing_channel_and_an_outlier() -> None:
+    motion = straight(6000.0, 50.0, 30.0, 240.0)
+    truth = propagate(motion, drifting(motion, 0.01, -0.02, 0.0), body_fixed=False)
+    rng = np.random.default_rng(3)
+    position = truth.position_m[0] + 3.0 * rng.standard_normal((6001, 2))
+    velocity = truth.velocity_mps[0] + 0.05 * rng.standard_normal((6001, 2))
+    whole = coupled.run_coupled(differences_of(motion, position, velocity), InsNoise(), SETTINGS)
+    position[4000:4600], velocity[4000:4600] = np.nan, np.nan
+    position[1000, 0] = np.nan
+    position[2000] += 1100.0
+    run = coupled.run_coupled(differences_of(motion, position, velocity), InsNoise(), SETTINGS)
+    assert np.isfinite(run.x).all() and np.isfinite(run.sigma).all()
+    assert (run.used[2000, 0] == -1).all() and (run.used[2000, 1] == 1).all()
+    assert run.used[1000, 0].tolist() == [0, 1]
+    assert (run.used[4000:4600] == 0).all()
+    assert (np.abs(run.x[2001] - whole.x[2001]) < run.sigma[2001]).all()
+    assert (run.sigma[4599, :3] > run.sigma[3999, :3]).all()
+    assert (np.abs(run.x[-1] - whole.x[-1]) < run.sigma[-1]).all()
+
+
+def test_gap_without_the_ins_is_crossed_in_short_steps() -> None:
+    motion = straight(7200.0, 50.0, 0.0, 0.0)
+    truth = propagate(motion, drifting(motion, 0.01, -0.02, 1e-3), body_fixed=False)
+    keep = np.r_[0:3600, 7200]
+    few = TrueMotion(*(getattr(motion, item.name)[..., keep] for item in fields(motion)))
+    kept = differences_of(few, truth.position_m[0, keep], truth.velocity_mps[0, keep])
+    noise = replace(InsNoise(), gnss=QUIET, velocity_walk_mps_per_sqrt_s=1e-7, tilt_walk_deg_per_sqrt_h=1e-6)
+    noise = replace(noise, random_drift_dph=1e-5, drift_rate_dphph=1e-6)
+    run = coupled.run_coupled(kept, noise, replace(SETTINGS, gate_sigmas=1000.0))
+    grown = np.abs(truth.position_m[0, 7200] - truth.position_m[0, 3599]).max()
+    assert np.abs(run.innovation[-1, 0]).max() < 0.02 * grown
+
+
+def test_a_reset_of_the_ins_is_no_outlier() -> None:
+    motion = straight(2000.0, 50.0, 30.0, 240.0)
+    rng = np.random.default_rng(4)
+    position, velocity = 3.0 * rng.standard_normal((2001, 2)), 0.05 * rng.standard_normal((2001, 2))
+    position[:1000] += [40.0, -60.0]
+    plain = differences_of(motion, position, velocity)
+    marks = np.zeros(2001, dtype=bool)
+    marks[1000] = True
+    run = coupled.run_coupled(replace(plain, epochs=replace(plain.epochs, is_reset=marks)), InsNoise(), SETTINGS)
+    assert (run.used == 1).mean() > 0.999
+    assert np.abs(run.x[1020, CHANNELS[:, POSITION]]).max() < 20.0
+
+
+def test_without_gnss_at_all_nothing_is_claimed() -> None:
+    motion = straight(600.0, 50.0, 30.0, 240.0)
+    nothing = np.full((601, 2), np.nan)
+    run = coupled.run_coupled(differences_of(motion, nothing, nothing), InsNoise(), SETTINGS)
+    assert (run.x == 0.0).all() and np.isnan(run.innovation).all()
+
+
+def test_random_drift_decays() -> None:
+    A = coupled.coupled_matrix(craft(45.0, (0.0, 0.0), (0.0, 0.0)), BETA)[0]
+    for channel in CHANNELS:
+        assert A[channel[RANDOM_DRIFT], channel[RANDOM_DRIFT]] == -BETA
+    assert A[AZIMUTH, AZIMUTH_DRIFT] == 1.0
+
+
+# The gain
+
+
+def test_gain_is_given_against_the_separate_channels_at_the_same_starts() -> None:
+    """Eastbound at 60 deg, Earth rate and craft rate are what the channels lack: the coupled model must gain much."""
+    motion = straight(14_000.0, 60.0, 0.0, 240.0)
+    truth = propagate(motion, drifting(motion, 0.01, -0.01, 3e-4), body_fixed=False)
+    rng = np.random.default_rng(6)
+    position = truth.position_m[0] + 3.0 * rng.standard_normal(truth.position_m[0].shape)
+    velocity = truth.velocity_mps[0] + 0.05 * rng.standard_normal(truth.velocity_mps[0].shape)
+    differences = differences_of(motion, position, velocity)
+    noise = InsNoise()
+    run = run_filter(differences.epochs, ChannelModel.at(60.0, 10_000.0, noise.beta_per_s), noise)
+    at = start_epochs(differences.epochs, 5400.0, 600.0)
+    separate = hindcast(run, at, LEADS_S, ["last_estimate"], SETTINGS)
+    ours = coupled.run_coupled(differences, noise, SETTINGS)
+    rows = coupled.coupled_rows(ours, separate, SETTINGS)
+    assert [row.horizon_min for row in rows] == [10.0, 30.0, 60.0, 90.0, 120.0]  # 1 and 5 are no leads of it
+    lead = 11
+    apart = np.sqrt(np.nanmean(np.square(separate.radial_m("last_estimate")[:, lead])))
+    assert rows[-1].gain == pytest.approx(1.0 - rows[-1].rms_m / apart)
+    assert rows[-1].gain > 0.3
+
+
+def test_a_simulated_family_runs_through() -> None:
+    differences = of_batch(simulate_family(FamilySettings(route="manoeuvring", duration_s=2000.0), 1, 7))
+    run = coupled.run_coupled(differences, InsNoise(), SETTINGS)
+    assert (run.used == 1).mean() > 0.99
+    assert coupled.hindcast_coupled(run, np.array([1000]), np.zeros(0), SETTINGS).shape == (1, 0, 2)
