@@ -1,5 +1,7 @@
 """System 2 on what goes wrong in the air: a finding with place and count each, and no silent nonsense."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -96,6 +98,20 @@ def test_an_outlier_below_the_jump_limit_is_gated_and_counted(flight: Flight) ->
     values[5000] += 0.015
     found = estimate_ins_errors(changed(flight, "gnss", longitude_deg=values), settings=settings)
     assert codes(found)["inertial.outlier"] == 1
+
+
+def test_a_filter_that_rejects_everything_is_opened_again(flight: Flight, tmp_path: Path) -> None:
+    """A class far too good for the INS: without the cure the gate would lock GNSS out for good."""
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text(
+        "position_m = 1.0\nvelocity_mps = 1e-3\ntilt_rad = 1e-9\ndrift_dph = 1e-6\nrandom_drift_dph = 1e-6\n"
+        "velocity_walk_mps_per_sqrt_s = 1e-6\ntilt_walk_deg_per_sqrt_h = 1e-6\n[gnss]\nis_inflated = false\n",
+        encoding="utf-8",
+    )
+    found = estimate_ins_errors(flight, settings=InertialSettings(ins_class=str(wrong)))
+    assert codes(found)["inertial.reopened"] == found.run.reopened > 0
+    away = np.abs(found.run.x[:, 0] - found.compared.epochs.position_m).max(axis=1)
+    assert np.median(away) < 100.0  # m; the raw INS is kilometres off
 
 
 def test_an_ins_reset_in_flight_is_found_and_opens_the_position_again(flight: Flight) -> None:

@@ -11,7 +11,7 @@ from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.estimators.inertial import figures
 from groundstation.estimators.inertial.azimuth import estimate_azimuth
 from groundstation.estimators.inertial.differences import Differences, differences
-from groundstation.estimators.inertial.filter import FilterRun, Smoothed, run_filter, smooth
+from groundstation.estimators.inertial.filter import PATIENCE_S, FilterRun, Smoothed, run_filter, smooth
 from groundstation.estimators.inertial.hindcast import hindcast, leads_of
 from groundstation.estimators.inertial.model import POSITION, STATES, ChannelModel, FloatArray
 from groundstation.estimators.inertial.noise import InsNoise, choose_class
@@ -272,6 +272,12 @@ def _findings(compared: Differences, run: FilterRun, result: InertialResult) -> 
         text = "GNSS against the estimated INS errors: innovation beyond the gate, not used"
         place = f"{times[0]:.1f} to {times[-1]:.1f} s"
         found.append(Finding("warn", "inertial.outlier", text, compared.gnss_topic, place, rejected))
+    if run.reopened:
+        text = (
+            f"GNSS rejected for more than {PATIENCE_S:.0f} s and then believed after all: the noise of INS class "
+            f"{result.ins_class} does not fit this INS or this receiver"
+        )
+        found.append(Finding("warn", "inertial.reopened", text, compared.gnss_topic, count=run.reopened))
     for outage in result.outages:
         after = "GNSS did not come back"
         if outage.jump_m is not None:

@@ -11,6 +11,7 @@ from groundstation.estimators.inertial.noise import InsNoise
 
 TIME_RESOLUTION_S = 1e-4  # intervals that agree to this share one transition
 MOST_TRANSITIONS = 4096  # distinct intervals kept exactly; jittered clocks are rounded more coarsely beyond
+PATIENCE_S = 60.0  # GNSS rejected for so long is believed again
 STANDARD_GATE = 25.0  # squared sigmas
 RESET_POSITION_M, RESET_VELOCITY_MPS = 2e4, 20.0  # what a reset of the INS may change; tilt and drift are kept
 
@@ -103,6 +104,8 @@ class FilterRun:
     used : ndarray of int8, shape (n, 2, c)
         Rejected -1, absent 0, used 1.
     gain : ndarray, shape (g, n, 2, 6)
+    reopened : int
+        How often GNSS was rejected for so long that the filter took it to be right after all.
     """
 
     epochs: Epochs
@@ -115,6 +118,7 @@ class FilterRun:
     innovation_variance: FloatArray
     used: NDArray[np.int8]
     gain: FloatArray
+    reopened: int = 0
 
     def covariance(self, channel: int) -> FloatArray:
         """Covariance of a channel, shape (n, 6, 6)."""
@@ -179,7 +183,7 @@ def run_filter(
         _run_group(z[:, :, group], drag, epochs, steps, noise, gate, first.of(group), first.covariance(group[0]))
         for group in groups
     ]
-    x, P, gain, innovation, variance, used = (list(part) for part in zip(*parts, strict=True))
+    x, P, gain, innovation, variance, used, reopened = (list(part) for part in zip(*parts, strict=True))
     spread = [np.repeat(item[:, :, None], len(group), axis=2) for item, group in zip(variance, groups, strict=True)]
     marks = [np.repeat(item[:, :, None], len(group), axis=2) for item, group in zip(used, groups, strict=True)]
     return FilterRun(
@@ -187,13 +191,24 @@ def run_filter(
         model=model,
         noise=noise,
         steps=steps,
-        x=np.concatenate(x, axis=2),
-        P=np.stack(P),
-        innovation=np.concatenate(innovation, axis=2),
+        x=_joined(x),
+        P=_stacked(P),
+        innovation=_joined(innovation),
         innovation_variance=np.concatenate(spread, axis=2),
         used=np.concatenate(marks, axis=2),
-        gain=np.stack(gain),
+        gain=_stacked(gain),
+        reopened=max(reopened),
     )
+
+
+def _joined(parts: list[FloatArray]) -> FloatArray:
+    """Groups of channels side by side; a single one is not copied."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2)
+
+
+def _stacked(parts: list[FloatArray]) -> FloatArray:
+    """Groups on a first axis; a single one is not copied."""
+    return parts[0][None] if len(parts) == 1 else np.stack(parts)
 
 
 def _run_group(
@@ -205,15 +220,16 @@ def _run_group(
     gate: float,
     x0: FloatArray,
     P0: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, NDArray[np.int8]]:
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, NDArray[np.int8], int]:
     from groundstation.estimators.inertial import kernels
 
     n, _, channels = z.shape
     x, P, K = np.empty((n, SIZE, channels)), np.empty((n, SIZE, SIZE)), np.empty((n, 2, SIZE))
     y, S, used = np.empty((n, 2, channels)), np.empty((n, 2)), np.zeros((n, 2), dtype=np.int8)
     R = np.tile(noise.gnss.variances(epochs.interval_s), (n, 1))
-    reset = np.where(epochs.is_reset[:, None], np.square([RESET_POSITION_M, RESET_VELOCITY_MPS]), 0.0)
-    kernels.run_filter(
+    opened = np.square([RESET_POSITION_M, RESET_VELOCITY_MPS])
+    reset = np.where(epochs.is_reset[:, None], opened, 0.0)
+    reopened = kernels.run_filter(
         steps.index,
         steps.transitions,
         steps.noises,
@@ -224,6 +240,8 @@ def _run_group(
         P0,
         R,
         gate,
+        max(1, round(PATIENCE_S / epochs.interval_s)),
+        opened,
         x,
         P,
         K,
@@ -231,7 +249,7 @@ def _run_group(
         S,
         used,
     )
-    return x, P, K, y, S, used
+    return x, P, K, y, S, used, reopened
 
 
 @dataclass(frozen=True)

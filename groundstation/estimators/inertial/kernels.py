@@ -17,6 +17,61 @@ Marks = NDArray[np.int8]
 
 
 @compiled
+def _absorb(A: FloatArray, K: FloatArray, s: float, m: int, h: FloatArray) -> None:
+    """A <- (I - K H)' A (I - K H) + H' H / s, H of the single state m: its row and column change. ``h`` is room."""
+    dot = 0.0
+    for i in range(6):
+        h[i] = 0.0
+        for j in range(6):
+            h[i] += A[i, j] * K[j]
+    for i in range(6):
+        dot += K[i] * h[i]
+    corner = A[m, m] - 2.0 * h[m] + dot + 1.0 / s
+    for i in range(6):
+        A[i, m] -= h[i]
+        A[m, i] = A[i, m]
+    A[m, m] = corner
+
+
+@compiled
+def _carry_back(A: FloatArray, F: FloatArray, B: FloatArray) -> None:
+    """A <- F' A F for symmetric A, with the zeros of the transition F left out. ``B`` is room."""
+    for i in range(6):
+        B[i, 0] = A[i, 0]
+        for j in range(1, 6):
+            B[i, j] = A[i, 0] * F[0, j] + A[i, 1] * F[1, j] + A[i, 2] * F[2, j]
+        B[i, 3] += A[i, 3]
+        B[i, 4] += A[i, 3] * F[3, 4] + A[i, 4]
+        B[i, 5] += A[i, 5] * F[5, 5]
+    for j in range(6):
+        A[0, j] = B[0, j]
+        A[j, 0] = B[0, j]
+    for i in range(1, 6):
+        for j in range(i, 6):
+            total = F[0, i] * B[0, j] + F[1, i] * B[1, j] + F[2, i] * B[2, j]
+            if i == 3:
+                total += B[3, j]
+            elif i == 4:
+                total += F[3, 4] * B[3, j] + B[4, j]
+            elif i == 5:
+                total += F[5, 5] * B[5, j]
+            A[i, j] = total
+            A[j, i] = total
+
+
+@compiled
+def _carry_state_back(a: FloatArray, F: FloatArray) -> None:
+    """a <- F' a, shape (6,), with the zeros of the transition F left out."""
+    position, velocity, tilt, drift = a[0], a[1], a[2], a[3]
+    for j in range(1, 3):
+        a[j] = F[0, j] * position + F[1, j] * velocity + F[2, j] * tilt
+    for j in range(3, 6):
+        carried = F[0, j] * position + F[1, j] * velocity + F[2, j] * tilt
+        a[j] = carried + (F[5, 5] * a[5] if j == 5 else a[j])
+    a[4] += F[3, 4] * drift
+
+
+@compiled
 def run_filter(
     step: Int64Array,
     transitions: FloatArray,
@@ -28,13 +83,15 @@ def run_filter(
     P0: FloatArray,
     R: FloatArray,
     gate: float,
+    patience: int,
+    opened: FloatArray,
     x: FloatArray,
     P: FloatArray,
     K: FloatArray,
     y: FloatArray,
     S: FloatArray,
     state: Marks,
-) -> None:
+) -> int:
     """Run the Kalman filter over epochs; sequential scalar updates in Joseph form.
 
     Parameters
@@ -54,6 +111,10 @@ def run_filter(
         Variances of the measurements.
     gate : float
         An epoch's measurement is rejected where y^2 / S exceeds it in any channel.
+    patience : int
+        So many rejections in a row of one kind, and it is the filter that is wrong: it is opened again.
+    opened : ndarray, shape (2,)
+        Variance then added to position and velocity.
     x, P : ndarrays, shapes (n, 6, c), (n, 6, 6)
         Filled: states and covariance after the update.
     K, y, S : ndarrays, shapes (n, 2, 6), (n, 2, c), (n, 2)
@@ -61,11 +122,17 @@ def run_filter(
     state : ndarray of int8, shape (n, 2)
         Filled: rejected -1, absent 0, used 1.
 
+    Returns
+    -------
+    int
+        How often the filter was opened again.
+
     Source: Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, chapter V (Joseph's form).
     """
     n, channels = z.shape[0], z.shape[2]
     p, w = P0.copy(), np.zeros((6, 6))
     now, new = x0.copy(), np.zeros((6, channels))
+    in_a_row, reopened = np.zeros(2, dtype=np.int64), 0
     for k in range(n):
         if k > 0:
             F, Q = transitions[step[k]], noises[step[k]]
@@ -131,6 +198,18 @@ def run_filter(
             for c in range(channels):
                 if y[k, m, c] * y[k, m, c] > gate * s:
                     is_good = False
+            if is_good:
+                in_a_row[m] = 0
+            else:
+                in_a_row[m] += 1
+                if in_a_row[m] > patience:
+                    p[0, 0] += opened[0]
+                    p[1, 1] += opened[1]
+                    s = p[m, m] + R[k, m]
+                    S[k, m] = s
+                    in_a_row[:] = 0
+                    reopened += 1
+                    is_good = True
             if not is_good:
                 state[k, m] = REJECTED
                 for i in range(6):
@@ -155,6 +234,7 @@ def run_filter(
                 x[k, i, c] = now[i, c]
             for j in range(6):
                 P[k, i, j] = p[i, j]
+    return reopened
 
 
 @compiled
@@ -187,23 +267,22 @@ def run_smoother(
     Source: Bierman, Fixed interval smoothing with discrete measurements, Int. J. Control 18, 1973, equations 8-13.
     """
     channels = x.shape[2]
-    a, b = np.zeros((6, channels)), np.zeros((6, channels))  # lambda of the book, and room
+    a = np.zeros((channels, 6))  # lambda of the book
     A, B = np.zeros((6, 6)), np.zeros((6, 6))  # Lambda of the book, and room
     h = np.zeros(6)
     for k in range(last, first - 1, -1):
         for i in range(6):
             total = P[k, i, i]
-            for j in range(6):
-                h[j] = 0.0
-                for e in range(6):
-                    h[j] += A[j, e] * P[k, e, i]
-            for j in range(6):
-                total -= P[k, i, j] * h[j]
+            for j in range(6):  # A is symmetric: twice its upper half
+                inner = A[j, j] * P[k, i, j]
+                for e in range(j + 1, 6):
+                    inner += 2.0 * A[j, e] * P[k, i, e]
+                total -= P[k, i, j] * inner
             variance[k, i] = total
             for c in range(channels):
                 back = x[k, i, c]
                 for j in range(6):
-                    back -= P[k, i, j] * a[j, c]
+                    back -= P[k, i, j] * a[c, j]
                 xs[k, i, c] = back
         if k == first:
             break
@@ -214,43 +293,13 @@ def run_smoother(
             for c in range(channels):
                 total = 0.0
                 for i in range(6):
-                    total += K[k, m, i] * a[i, c]
-                a[m, c] -= total + y[k, m, c] / s
-            # A = (I - K H)' A (I - K H) + H' H / s: only row and column m change
-            dot = 0.0
-            for i in range(6):
-                h[i] = 0.0
-                for j in range(6):
-                    h[i] += A[i, j] * K[k, m, j]
-            for i in range(6):
-                dot += K[k, m, i] * h[i]
-            corner = A[m, m] - 2.0 * h[m] + dot + 1.0 / s
-            for i in range(6):
-                A[i, m] -= h[i]
-                A[m, i] = A[i, m]
-            A[m, m] = corner
+                    total += K[k, m, i] * a[c, i]
+                a[c, m] -= total + y[k, m, c] / s
+            _absorb(A, K[k, m], s, m, h)
         F = transitions[step[k]]
         for c in range(channels):
-            for j in range(6):
-                total = 0.0
-                for i in range(6):
-                    total += F[i, j] * a[i, c]
-                b[j, c] = total
-            for j in range(6):
-                a[j, c] = b[j, c]
-        for i in range(6):
-            for j in range(6):
-                total = 0.0
-                for e in range(6):
-                    total += A[i, e] * F[e, j]
-                B[i, j] = total
-        for i in range(6):
-            for j in range(i, 6):
-                total = 0.0
-                for e in range(6):
-                    total += F[e, i] * B[e, j]
-                A[i, j] = total
-                A[j, i] = total
+            _carry_state_back(a[c], F)
+        _carry_back(A, F, B)
 
 
 @compiled
@@ -279,7 +328,7 @@ def run_fixed_lag(
     past : ndarray, shape (s, 6)
         Filled.
     """
-    a, b = np.zeros(6), np.zeros(6)
+    a = np.zeros(6)
     for s in range(len(first)):
         for i in range(6):
             a[i] = 0.0
@@ -290,14 +339,7 @@ def run_fixed_lag(
                     for i in range(6):
                         total += K[k, m, i] * a[i]
                     a[m] -= total
-            F = transitions[step[k]]
-            b[0] = a[0]
-            for j in range(1, 6):
-                b[j] = F[0, j] * a[0] + F[1, j] * a[1] + F[2, j] * a[2]
-            a[0], a[1], a[2] = b[0], b[1], b[2]
-            a[4] = b[4] + F[3, 4] * a[3] + a[4]
-            a[3] += b[3]
-            a[5] = b[5] + F[5, 5] * a[5]
+            _carry_state_back(a, transitions[step[k]])
         k = first[s]
         for i in range(6):
             total = x[k, i]
@@ -397,50 +439,25 @@ def run_lag_covariance(
         for i in range(6):
             for j in range(6):
                 A[i, j] = 0.0
-                C[i, j] = 1.0 if i == j else 0.0  # the transpose of the closed loop, built from its end
+                C[i, j] = 1.0 if i == j else 0.0  # rows of the closed loop, built from its end
         for k in range(last[s], first[s], -1):
             for m in range(1, -1, -1):
                 if state[k, m] != USED:
                     continue
-                dot = 0.0
-                for i in range(6):
-                    h[i] = 0.0
-                    for j in range(6):
-                        h[i] += A[i, j] * K[k, m, j]
-                for i in range(6):
-                    dot += K[k, m, i] * h[i]
-                corner = A[m, m] - 2.0 * h[m] + dot + 1.0 / S[k, m]
-                for i in range(6):
-                    A[i, m] -= h[i]
-                    A[m, i] = A[i, m]
-                A[m, m] = corner
+                _absorb(A, K[k, m], S[k, m], m, h)
                 for j in range(6):
                     total = 0.0
                     for i in range(6):
-                        total += K[k, m, i] * C[i, j]
-                    C[m, j] -= total
+                        total += K[k, m, i] * C[j, i]
+                    C[j, m] -= total
             F = transitions[step[k]]
+            _carry_back(A, F, B)
             for i in range(6):
-                for j in range(6):
-                    total, other = 0.0, 0.0
-                    for e in range(6):
-                        total += A[i, e] * F[e, j]
-                        other += F[e, i] * C[e, j]
-                    B[i, j] = total
-                    smoothed[s, i, j] = other
-            for i in range(6):
-                for j in range(6):
-                    C[i, j] = smoothed[s, i, j]
-                for j in range(i, 6):
-                    total = 0.0
-                    for e in range(6):
-                        total += F[e, i] * B[e, j]
-                    A[i, j] = total
-                    A[j, i] = total
+                _carry_state_back(C[i], F)
         k = first[s]
         for i in range(6):
             for j in range(6):
-                closed[s, i, j] = C[j, i]
+                closed[s, i, j] = C[i, j]
                 total = 0.0
                 for e in range(6):
                     total += A[i, e] * P[k, e, j]

@@ -1,0 +1,172 @@
+"""The forecast study on a few flights: where windows help and where they do not, honesty, tables and page."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from groundstation.base.errors import UsageError
+from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.pipeline.catalogue import catalogue
+from groundstation.pipeline.synthesis import STUDIES, study_to
+from groundstation.results.figures import FigureData
+from groundstation.results.forecast import METHODS
+from groundstation.simulation.inertial_family import simulate_family
+from groundstation.studies import forecast_tables
+from groundstation.studies.forecast import study_forecast
+from groundstation.studies.forecast_cases import FIRST_SEED, Case, epochs_of, study_cases
+from groundstation.studies.forecast_runs import METHOD_NAMES, STUDY_HORIZONS_MIN, Outcome, replay_flight, run_cases
+from groundstation.studies.forecast_tables import BETTER, UNDECIDED, WORSE, Resampled, finding
+from groundstation.studies.page import StudyResult
+
+SEED, FLIGHTS = 5, 12
+SETTINGS = InertialSettings()
+CASES = {case.name: case for case in study_cases(SEED)}
+SHORT = ("matched", "coloured", "gated", "inflated", "walk")
+COVERAGE_SPREAD = (
+    0.03  # of the mean over 12 flights: 0.008 a flight's spread of 0.03, doubled, and the scale's own noise
+)
+ROUNDING_M = 1e-9
+
+
+@pytest.fixture(scope="module")
+def outcomes() -> dict[str, tuple[Outcome, ...]]:
+    return run_cases([CASES[name] for name in SHORT], FLIGHTS, FLIGHTS, SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def samples(outcomes: dict[str, tuple[Outcome, ...]]) -> dict[str, Resampled]:
+    return {name: Resampled.of(several, SEED) for name, several in outcomes.items()}
+
+
+def at_horizon(values: np.ndarray, minutes: float) -> float:
+    return float(values[0, STUDY_HORIZONS_MIN.index(minutes)])
+
+
+def test_windows_hurt_where_the_model_is_exactly_true(samples: dict[str, Resampled]) -> None:
+    ratio = samples["matched"].ratio("windows")
+    assert at_horizon(ratio, 10.0) > 1.5
+    low = np.quantile(ratio[1:], 0.025, axis=0)
+    assert low[0] > 1.0
+    assert at_horizon(ratio, 10.0) > at_horizon(ratio, 60.0) > 1.0
+
+
+def test_windows_help_where_coloured_gnss_is_taken_for_white(samples: dict[str, Resampled]) -> None:
+    ratio = samples["coloured"].ratio("windows")
+    assert (np.quantile(ratio[1:], 0.975, axis=0) < 0.9).all()
+
+
+def test_inflating_r_honestly_beats_windows(samples: dict[str, Resampled]) -> None:
+    cured = samples["inflated"].rms_m("last_estimate") / samples["coloured"].rms_m("windows")
+    assert at_horizon(cured, 10.0) < 0.8
+    assert at_horizon(cured, 60.0) < 0.9
+    assert at_horizon(samples["inflated"].ratio("windows"), 10.0) > 1.2
+
+
+def test_windows_of_a_walking_drift_hurt_at_first_and_help_beyond_an_hour(samples: dict[str, Resampled]) -> None:
+    ratio = samples["walk"].ratio("windows")
+    assert at_horizon(ratio, 10.0) > 1.2
+    assert at_horizon(ratio, 84.0) < 1.0
+    assert at_horizon(samples["walk"].ratio("drift_windows"), 30.0) < 0.9
+
+
+def test_sigma_of_the_matched_last_estimate_is_honest(outcomes: dict[str, tuple[Outcome, ...]]) -> None:
+    table = forecast_tables.honesty_table({"matched": outcomes["matched"]})
+    chosen = (table["method"] == "last_estimate") & (table["horizon_min"] <= 30.0)
+    assert table["coverage95"][chosen] == pytest.approx(0.95, abs=COVERAGE_SPREAD)
+    assert table["coverage95_model"][chosen] == pytest.approx(0.95, abs=COVERAGE_SPREAD)
+    assert ((table["coverage50"] < table["coverage68"]) & (table["coverage68"] < table["coverage95"])).all()
+    inside = (table["first_model"] >= table["first_low"]) & (table["first_model"] <= table["first_high"])
+    assert inside[table["method"] == "last_estimate"].all()
+
+
+def test_outcomes_do_not_depend_on_how_many_run_or_on_threads(outcomes: dict[str, tuple[Outcome, ...]]) -> None:
+    case = CASES["walk"]
+    batch = simulate_family(case.family, 1, case.seed, first_run=3)
+    again = replay_flight(case, batch, 0, False, SETTINGS)
+    assert np.array_equal(again.mean_square_m2, outcomes["walk"][3].mean_square_m2, equal_nan=True)
+
+
+def test_forecast_is_judged_by_the_truth_and_not_by_gnss() -> None:
+    """Raw INS from the start at 3 h: exactly the true error that builds up, whatever GNSS shows."""
+    case = CASES["matched"]
+    batch = simulate_family(case.family, 1, case.seed)
+    outcome = replay_flight(case, batch, 0, False, SETTINGS)
+    place = (METHOD_NAMES.index("raw_ins"), 4, 0)
+    built = batch.position_error_m[0, 11_400] - batch.position_error_m[0, 10_800]
+    assert np.sqrt(outcome.mean_square_m2[place]) == pytest.approx(np.hypot(*built), abs=ROUNDING_M)
+    assert np.isnan(outcome.mean_square_m2[0, 4, STUDY_HORIZONS_MIN.index(120.0)])  # 3 h and 120 min do not fit
+
+
+def test_seeds_were_not_used_for_tuning_and_pairs_share_flights() -> None:
+    assert all(case.seed >= FIRST_SEED for case in study_cases(0))
+    assert not {case.seed for case in study_cases(1)} & {case.seed for case in study_cases(2)}
+    assert CASES["coloured"].seed == CASES["inflated"].seed == CASES["gated"].seed
+    assert CASES["coloured"].family == CASES["inflated"].family
+    assert CASES["matched"].family == CASES["walk"].family
+    assert sum(case.is_held_out for case in CASES.values()) == 3
+
+
+def test_a_case_measures_what_it_says() -> None:
+    case = replace(CASES["straight"], family=replace(CASES["straight"].family, duration_s=900.0))
+    batch = simulate_family(case.family, 1, case.seed)
+    epochs = epochs_of(case, batch, 0)
+    assert np.isfinite(epochs.velocity_mps).all()
+    assert np.any(epochs.drag_per_s != 0.0)
+    expected = batch.position_error_m[0] - batch.gnss_position_error_m[0]
+    assert np.array_equal(epochs.position_m, expected)
+    assert np.isnan(epochs_of(CASES["matched"], batch, 0).velocity_mps).all()
+
+
+def flat(value: float) -> Outcome:
+    """A flight on which every method errs by ``value`` metres, the windows by half as much again."""
+    squares = np.full((len(METHODS), 5, len(STUDY_HORIZONS_MIN)), value**2)
+    squares[METHOD_NAMES.index("windows")] *= 1.5**2
+    return Outcome(squares, 0.0, None)
+
+
+def test_rms_ratios_and_limits_of_known_flights() -> None:
+    sample = Resampled.of([flat(3.0), flat(4.0)], seed=1)
+    assert at_horizon(sample.rms_m("raw_ins"), 10.0) == pytest.approx(np.sqrt(12.5))
+    assert np.unique(np.round(sample.ratio("windows"), 12)) == pytest.approx([1.5])
+    _, low, high = forecast_tables.interval(sample.rms_m("raw_ins"))
+    assert (low[0], high[0]) == pytest.approx((3.0, 4.0))
+    table = forecast_tables.ratio_table({"flat": sample})
+    windows = table["method"] == "windows"
+    assert set(table["finding"][windows]) == {WORSE}
+    assert set(table["finding"][~windows]) == {UNDECIDED}
+    assert (finding(0.5, 0.9), finding(0.9, 1.1), finding(float("nan"), 1.0)) == (BETTER, UNDECIDED, "")
+
+
+def test_held_out_winner_is_the_least_geometric_mean() -> None:
+    case: Case = CASES["straight"]
+    table = forecast_tables.held_out_table([case], {case.name: Resampled.of([flat(3.0), flat(4.0)], seed=1)})
+    assert table["method"][-1] == "windows"
+    assert table["score"][-1] == pytest.approx(1.5)
+
+
+def test_study_writes_its_tables_and_page() -> None:
+    lines: list[str] = []
+    study = study_forecast(runs=2, seed=SEED, progress=lines.append)
+    assert isinstance(study, StudyResult)
+    assert study.name == "forecast"
+    assert len(lines) == 2 * len({case.seed for case in CASES.values()})
+    tables: dict[str, FigureData] = {table.name: table for table in study.tables}
+    assert len(tables) == len(study.tables)
+    assert all(len(table) for table in study.tables)
+    assert set(tables["forecast_rms"]["method"]) == set(METHODS)
+    assert set(tables["forecast_rms"]["starts"]) == {"all", "1.5 h", "2 h", "2.5 h", "3 h"}
+    assert set(tables["forecast_rms"]["case"]) == set(CASES)
+    assert set(tables["forecast_honesty"]["case"]) == {"matched", "i21", "straight", "manoeuvring"}
+    for text in ("Are windows better than the last estimate?", "Best by score: ", "confirmed at "):
+        assert text in study.markdown
+    assert "nan" not in study.markdown
+
+
+def test_every_study_is_listed_and_no_other_is_run(tmp_path: Path) -> None:
+    listed = [entry["name"] for entry in catalogue() if entry["kind"] == "study"]
+    assert listed == list(STUDIES) == ["heading", "forecast"]
+    with pytest.raises(UsageError, match="one of heading, forecast"):
+        study_to("magnetic", tmp_path / "out", runs=10, seed=1, force=False, listen=lambda event: None)
+    assert not (tmp_path / "out").exists()
