@@ -142,12 +142,12 @@ def estimate_azimuth(
     its state before it, is regressed on the change of the INS velocity turned by 90 deg. Beside the azimuth stand its
     drift, a time offset between GNSS and INS (difference = offset x acceleration), a scale error (along the change)
     and accelerometer biases that turn with the craft, each with a prior sigma. The variances come from the class's
-    noise and the filter's covariance, scaled to what quiet stretches of the same flight show, and once more where the
-    turns scatter more than that. The filter is run again with the azimuth found taken off, so that one turn does not
+    noise and the filter's covariance, enlarged where quiet stretches of the same flight scatter more, and once more
+    where the turns do. The filter is run again with the azimuth found taken off, so that one turn does not
     spoil the prediction of the next.
 
     Source: Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed. 2004, section 12.3 (azimuth error x
-    specific force); observability in turns: Groves 2013, section 14.2.6.
+    specific force).
     """
     limits = limits or AzimuthLimits()
     both = np.concatenate([differences.epochs.velocity_mps, differences.velocity_mps], axis=1)

@@ -145,9 +145,9 @@ def coupled_values(motion: CraftMotion, beta_per_s: float) -> FloatArray:
     of the rates come from the errors of latitude and velocity. Left out: vertical motion and its errors, the change of
     gravity with the position error.
 
-    Source: Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed. 2004, section 12.3, equations 12.28
-    and 12.37 onwards; Groves, Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems, 2nd ed.
-    2013, section 14.2.4 (attitude error of opposite sign).
+    Source: Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed. 2004, section 12.3; Groves,
+    Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems, 2nd ed. 2013, section 14.2.4 (attitude
+    error of opposite sign).
     """
     meridian, normal = _radii_m(motion)
     earth_north, earth_down, craft_north, craft_east, craft_down = _rates_radps(motion)
