@@ -173,5 +173,7 @@ def _metadata(scenario: Scenario) -> dict[str, str]:
     if scenario.reference.logged:
         found["reference.parking_heading_deg"] = f"{scenario.reference_heading_deg:.4f}"
         found["reference.parking_heading_sigma_deg"] = f"{scenario.reference.sigma_deg:.4f}"
+    if scenario.ins.error_model == "full":
+        found["ins_class"] = scenario.ins.ins_class
     found |= {"datum": "WGS-84", "notes": scenario.log.notes}
     return {key: value for key, value in found.items() if value}

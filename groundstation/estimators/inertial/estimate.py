@@ -83,7 +83,7 @@ def estimate_ins_errors(
     with the known drag of meridians that converge; INS resets open the position and velocity again.
     """
     settings = settings or InertialSettings()
-    noise, origin = choose_class(settings, aircraft_class)
+    noise, origin = choose_class(settings, aircraft_class, flight.metadata.get("ins_class", ""))
     compared = differences(flight, settings=settings, excluded_s=excluded_s)
     model = ChannelModel.at(
         float(np.nanmean(compared.latitude_deg)),

@@ -185,8 +185,10 @@ def load_class(name: str) -> InsNoise:
     return settings_from(InsNoise, {"name": stem} | table, where)
 
 
-def choose_class(settings: InertialSettings, aircraft_class: str = "") -> tuple[InsNoise, str]:
-    """Noise parameters: the settings' class, else the aircraft file's, else navigation; and who chose them.
+def choose_class(settings: InertialSettings, aircraft_class: str = "", logged_class: str = "") -> tuple[InsNoise, str]:
+    """Noise parameters: of the settings, else of the aircraft file, else of the log, else navigation; and who chose.
+
+    A log may name any INS: of its names only those of shipped classes are taken.
 
     Raises
     ------
@@ -197,6 +199,8 @@ def choose_class(settings: InertialSettings, aircraft_class: str = "") -> tuple[
         return load_class(settings.ins_class), "settings"
     if aircraft_class:
         return load_class(aircraft_class), "aircraft file"
+    if logged_class.lower() in class_names():
+        return load_class(logged_class), "log"
     return load_class(DEFAULT_CLASS), "default"
 
 

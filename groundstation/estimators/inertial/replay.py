@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.base.records import Int64Array
 from groundstation.estimators.inertial.filter import FilterRun
-from groundstation.estimators.inertial.hindcast import leads_of, start_epochs
+from groundstation.estimators.inertial.hindcast import built_up, leads_of, start_epochs
 from groundstation.estimators.inertial.model import FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.results.forecast import HORIZONS_MIN
@@ -14,6 +14,7 @@ from groundstation.results.forecast import HORIZONS_MIN
 LEAD_STEP_S = 60.0
 LEAST_STARTS = 3  # a horizon with fewer is not shown
 LEAST_PAST_S = 300.0
+HALF_HOUR_MIN = 30.0
 PAST_FROM_S = 1800.0  # outages replayed from here on tell how honest the sigma of later ones is
 SHORT_SHARE = 0.4  # of a flight too short for the settings' first start
 MOST_STEPS_OF_MAP = 100
@@ -48,30 +49,34 @@ class Plan:
 
 
 def plan_replay(run: FilterRun, settings: InertialSettings) -> Plan:
-    """Choose the starts: the settings' where the flight is long enough, else from 40 % of it on and closer together."""
+    """Choose the starts: the settings' where they show half an hour of forecast, else from 40 % of the flight on.
+
+    A start counts where GNSS is there at it and at its horizon. Starts before the first one only calibrate.
+    """
     time_s = run.epochs.time_s[run.epochs.has_gnss]
     begin, end = (float(time_s[0]), float(time_s[-1])) if len(time_s) else (0.0, 0.0)
     first, step = settings.first_start_s, settings.start_step_s
-    schuler_s = 60.0 * run.model.schuler_period_min
-    reason = ""
-    if first + 2.0 * step + 60.0 * HORIZONS_MIN[2] > end:
-        first = begin + max(LEAST_PAST_S, SHORT_SHARE * (end - begin))
+    if _judged(run, first, step, HALF_HOUR_MIN) < LEAST_STARTS:
+        first = min(first, begin + max(LEAST_PAST_S, SHORT_SHARE * (end - begin)))
         step = min(step, max(10.0, (end - first) / 20.0))
-    if first - begin < schuler_s:
+    past_min = max(first - begin, 0.0) / 60.0
+    reason = ""
+    if past_min < run.model.schuler_period_min:
         reason = (
-            f"only {max(first - begin, 0.0) / 60.0:.0f} min of GNSS before the first replayed outage, less than one "
-            f"Schuler period ({run.model.schuler_period_min:.1f} min): the sigma is the class's alone"
+            f"only {past_min:.0f} min of flight before the first replayed outage, less than one Schuler period "
+            f"({run.model.schuler_period_min:.1f} min): the sigma rests on the class"
         )
     past = int(max(first - begin - PAST_FROM_S, 0.0) / step)
+    horizons = tuple(float(horizon) for horizon in HORIZONS_MIN if _judged(run, first, step, horizon) >= LEAST_STARTS)
+    lead_s = leads_of(LEAD_STEP_S, 60.0 * max(horizons, default=1.0))
     at = start_epochs(run.epochs, first - past * step, step)
-    starts_s = run.epochs.time_s[at]
-    starts_s = starts_s[starts_s >= first - 1e-6]
-    horizons = tuple(
-        float(horizon) for horizon in HORIZONS_MIN if np.sum(starts_s + 60.0 * horizon <= end + 1.0) >= LEAST_STARTS
-    )
-    longest = max(horizons, default=0.0)
-    lead_s = leads_of(LEAD_STEP_S, 60.0 * longest)
     return Plan(first, step, at, horizons, lead_s, not reason, reason)
+
+
+def _judged(run: FilterRun, first_s: float, step_s: float, horizon_min: float) -> int:
+    """How many starts GNSS could judge at a horizon."""
+    shown = built_up(run.epochs, start_epochs(run.epochs, first_s, step_s), np.array([60.0 * horizon_min]))
+    return int(np.isfinite(shown).all(axis=2).sum())
 
 
 def map_grid(run: FilterRun, settings: InertialSettings) -> tuple[Int64Array, FloatArray]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from groundstation.reports import drawing as d
 from groundstation.reports.parts import Drawing
 from groundstation.reports.sections.inertial_figures import has_values, plain_log
-from groundstation.reports.sections.saved import numbers
+from groundstation.reports.sections.saved import mapping, numbers, objects
 from groundstation.reports.wording import is_number, number
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight
@@ -149,13 +149,16 @@ def classic(saved: SavedFlight) -> Drawing | None:
     if data is None or not has_values(data, "start_s", "time_s", "measured_east_m"):
         return None
     starts = np.unique(d.finite(numbers(data, "start_s")))[:4]
+    rows = objects(mapping(mapping(saved.summary, "results"), "forecast"), "classic_starts")
+    hours = sorted({row["start_h"] for row in rows if is_number(row.get("start_h"))})
+    titles = [f"{part:g} h after take-off" for part in hours] if len(hours) == len(starts) else [""] * len(starts)
 
     def paint(figure: Any) -> None:
         for place, start in enumerate(starts.tolist()):
             left, bottom = 18.0 + 86.0 * (place % 2), 12.0 + 52.0 * (1 - place // 2)
             axes = d.place(figure, left, bottom, left + 70, bottom + 38)
             _paint_start(axes, data, start)
-            axes.set_title(f"start at {start / 3600.0:g} h")
+            axes.set_title(titles[place])
             if place % 2 == 0:
                 axes.set_ylabel("east position error, m")
             if place >= len(starts) - 2:
