@@ -13,7 +13,7 @@ from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import claimed_sigma
 from groundstation.estimators.inertial.starts import start_states
 from groundstation.results.forecast import METHODS, ForecastResult
-from tests.inertial_flights import batch_of, flight_of
+from tests.inertial_flights import batch_of, flight_of, without_rows
 from tests.real_logs import real_log
 
 SETTINGS = InertialSettings()
@@ -119,6 +119,33 @@ def test_the_map_is_rectangular_and_empty_beyond_the_flight(forecast: ForecastRe
     beyond = figure["start_s"] + 60.0 * figure["horizon_min"] > found.run.epochs.time_s[-1] + 1.0
     assert np.isnan(figure["last_estimate_m"][beyond]).all()
     assert np.isfinite(figure["last_estimate_m"][~beyond]).all()
+
+
+def test_the_coupled_model_is_used_when_it_is_chosen(found: Estimation, forecast: ForecastResult) -> None:
+    coupled = assess_forecast(found, settings=InertialSettings(model="coupled"))
+    chosen = {row.horizon_min: row.rms_m for row in coupled.skill if row.method == "last_estimate"}
+    for row in forecast.coupled:  # what the separate model's result announces is what the coupled one delivers
+        assert chosen[row.horizon_min] == pytest.approx(row.rms_m, rel=1e-9)
+    others = [row for row in coupled.skill if row.method == "windows"]
+    assert others == [row for row in forecast.skill if row.method == "windows"]
+
+
+def test_an_outage_of_the_log_is_crossed_by_the_method_and_model_chosen() -> None:
+    flight = flight_of(batch_of(duration_s=7200.0))
+    time_s = flight.time_s("gnss")
+    lost = without_rows(flight, "gnss", (time_s < 4000.0) | (time_s > 5800.0))
+    tracks = {}
+    for name, settings in (
+        ("filter", InertialSettings()),
+        ("windows", InertialSettings(default_method="windows")),
+        ("coupled", InertialSettings(model="coupled")),
+    ):
+        tracks[name] = estimate_ins_errors(lost, settings=settings).corrected_error_m
+    inside = slice(5000, 5700)
+    assert np.array_equal(tracks["filter"][:4000], tracks["windows"][:4000])
+    for other in ("windows", "coupled"):
+        apart = np.abs(tracks[other][inside] - tracks["filter"][inside]).max()
+        assert 1.0 < apart < 5000.0  # m: another forecast, of the same INS
 
 
 def test_a_short_flight_says_that_it_is_not_calibrated() -> None:

@@ -10,6 +10,7 @@ from groundstation.base.findings import Finding
 from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.estimators.inertial import figures
 from groundstation.estimators.inertial.azimuth import estimate_azimuth
+from groundstation.estimators.inertial.coupled import hindcast_coupled, run_coupled
 from groundstation.estimators.inertial.differences import Differences, differences
 from groundstation.estimators.inertial.filter import PATIENCE_S, FilterRun, Smoothed, run_filter, smooth
 from groundstation.estimators.inertial.hindcast import hindcast, leads_of
@@ -95,7 +96,7 @@ def estimate_ins_errors(
     smoothed = smooth(run)
     kind, kind_reason = kind_of(compared, settings)
     outages = real_outages(run, settings)
-    corrected = _corrected(run, outages, settings)
+    corrected = _corrected(compared, run, outages, settings)
     azimuth = estimate_azimuth(compared, run, settings) if kind == UNAIDED else None
     result = _result(compared, run, smoothed, settings, noise, origin, (kind, kind_reason), outages, corrected, azimuth)
     return Estimation(
@@ -140,12 +141,16 @@ def real_outages(run: FilterRun, settings: InertialSettings) -> tuple[RealOutage
     return tuple(found)
 
 
-def _corrected(run: FilterRun, outages: tuple[RealOutage, ...], settings: InertialSettings) -> FloatArray:
+def _corrected(
+    compared: Differences, run: FilterRun, outages: tuple[RealOutage, ...], settings: InertialSettings
+) -> FloatArray:
     """Position error to take off: the filter's, and through outages the default method's forecast."""
     out = np.array(run.x[:, POSITION])
     time_s = run.epochs.time_s
-    if settings.default_method == "last_estimate":
+    is_coupled = settings.model == "coupled" and settings.default_method == "last_estimate"
+    if settings.default_method == "last_estimate" and not is_coupled:
         return out
+    coupled = run_coupled(compared, run.noise, settings) if is_coupled else None
     for outage in outages:
         start = int(np.searchsorted(time_s, outage.start_s))
         inside = np.flatnonzero((time_s > outage.start_s) & (time_s < outage.end_s))
@@ -153,11 +158,15 @@ def _corrected(run: FilterRun, outages: tuple[RealOutage, ...], settings: Inerti
             continue
         step = settings.forecast_step_s
         lead_s = leads_of(step, outage.length_s)
-        grown = hindcast(run, np.array([start]), lead_s, (settings.default_method,), settings)
-        built = grown.forecast_m[settings.default_method][0]
+        at = np.array([start])
+        if coupled is not None:
+            built = hindcast_coupled(coupled, at, lead_s, settings)[0]
+        else:
+            grown = hindcast(run, at, lead_s, (settings.default_method,), settings)
+            built = grown.forecast_m[settings.default_method][0]
         for axis in range(out.shape[1]):
-            at = np.interp(time_s[inside] - outage.start_s, np.r_[0.0, lead_s], np.r_[0.0, built[:, axis]])
-            out[inside, axis] = run.x[start, POSITION, axis] + at
+            grown_m = np.interp(time_s[inside] - outage.start_s, np.r_[0.0, lead_s], np.r_[0.0, built[:, axis]])
+            out[inside, axis] = run.x[start, POSITION, axis] + grown_m
     return out
 
 

@@ -1,13 +1,14 @@
 """The forecast mode judged on the flight itself: outages replayed, every method, and how honest the sigma is."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.inertial import figures
-from groundstation.estimators.inertial.coupled import coupled_rows, run_coupled
+from groundstation.estimators.inertial.coupled import CoupledRun, coupled_rows, hindcast_coupled, run_coupled
 from groundstation.estimators.inertial.estimate import AIDED, Estimation
 from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.gaps import gap_rows
@@ -61,7 +62,10 @@ def assess_forecast(
     if not plan.horizons_min:
         minutes = float(np.ptp(run.epochs.time_s)) / 60.0
         raise NotAssessableError("forecast", f"{minutes:.0f} min of flight are too short for a replayed outage")
-    replay = hindcast(run, plan.at, plan.lead_s, tuple(METHODS), settings)
+    coupled = run_coupled(estimation.compared, estimation.noise, settings)
+    separate = hindcast(run, plan.at, plan.lead_s, tuple(METHODS), settings)
+    since = slice(int(np.searchsorted(separate.start_s, plan.first_start_s - 1e-6)), None)
+    replay = _of_model(separate, coupled, settings)
     claimed = {method: claimed_sigma(method, run, replay, settings) for method in METHODS}
     skill = skill_rows(replay, claimed, plan.horizons_min, plan.first_start_s)
     best = {
@@ -69,7 +73,6 @@ def assess_forecast(
         for horizon in sorted({row.horizon_min for row in skill})  # GNSS may be absent at every end of a horizon
     }
     classic, classic_figures = _classic(run, settings, take_off_s)
-    since = slice(int(np.searchsorted(replay.start_s, plan.first_start_s - 1e-6)), None)
     judged, default = replay.of(since), claimed[settings.default_method]
     default = None if default is None else default.of(since)
     grid_at, grid_lead_s = map_grid(run, settings)
@@ -84,20 +87,25 @@ def assess_forecast(
         phases=_phases(run, settings, phase_of),
         classic_starts=classic,
         calibration=calibration_rows(replay, claimed, plan.horizons_min, plan.first_start_s),
-        coupled=coupled_rows(
-            run_coupled(estimation.compared, estimation.noise, settings),
-            judged,
-            settings,
-            horizons_min=plan.horizons_min,
-        ),
+        coupled=coupled_rows(coupled, separate.of(since), settings, horizons_min=plan.horizons_min),
         best_method=best,
         figures=(
-            figures.map_figure(hindcast(run, grid_at, grid_lead_s, tuple(METHODS), settings)),
+            figures.map_figure(
+                _of_model(hindcast(run, grid_at, grid_lead_s, tuple(METHODS), settings), coupled, settings)
+            ),
             figures.growth_figure(judged, default),
             figures.fan_figure(judged, settings.default_method, default),
             *classic_figures,
         ),
     )
+
+
+def _of_model(replay: Hindcast, coupled: CoupledRun, settings: InertialSettings) -> Hindcast:
+    """The replay with the last estimate of the model that the settings choose; its sigma stays the channels'."""
+    if settings.model == "separate":
+        return replay
+    forecast = hindcast_coupled(coupled, replay.at, replay.lead_s, settings)
+    return replace(replay, forecast_m=replay.forecast_m | {"last_estimate": forecast})
 
 
 def _lengths_that_fit(plan: Plan) -> tuple[float, ...]:
