@@ -1,14 +1,12 @@
 """INS classes: the error budget of an inertial navigator, shipped as TOML beside this module, one file a class."""
 
-import tomllib
 from dataclasses import dataclass, field
 from functools import cache
-from importlib import resources
-from pathlib import Path
-from typing import Any
 
-from groundstation.base.errors import SettingsError
+from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.toml_settings import number, required_number, settings_from
+
+_CLASSES = ShippedToml("groundstation.simulation", "ins_classes", "ins_class")
 
 
 @dataclass(frozen=True)
@@ -69,12 +67,12 @@ def ins_class_names() -> tuple[str, ...]:
     >>> ins_class_names()
     ('i-21', 'mems', 'navigation', 'tactical')
     """
-    return tuple(sorted(Path(entry.name).stem for entry in _shipped().iterdir() if entry.name.endswith(".toml")))
+    return _CLASSES.names()
 
 
 @cache
 def load_ins_class(name: str) -> InsClass:
-    """Load a shipped INS class.
+    """Load a shipped INS class, or one of the user's (a file ``*.toml``).
 
     Raises
     ------
@@ -86,12 +84,5 @@ def load_ins_class(name: str) -> InsClass:
     >>> load_ins_class("i-21").gyro_constant_dph
     0.01
     """
-    if name not in ins_class_names():
-        raise SettingsError("ins_class", repr(name), f"one of {', '.join(ins_class_names())}")
-    where = f"{name}.toml"
-    table = tomllib.loads((_shipped() / where).read_text(encoding="utf-8"))
-    return settings_from(InsClass, {"name": name} | table, where)
-
-
-def _shipped() -> Any:
-    return resources.files("groundstation.simulation") / "ins_classes"
+    file = _CLASSES.read(name)
+    return settings_from(InsClass, {"name": file.name} | file.table, file.where)

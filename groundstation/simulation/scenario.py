@@ -1,14 +1,13 @@
 """Scenarios: everything that determines a simulated flight, as frozen dataclasses read from TOML."""
 
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
-from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
 from groundstation.base.angles import wrap_360
 from groundstation.base.errors import GroundstationError, SettingsError
+from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.signals import TOPICS, field_of
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.toml_settings import number, required_number, settings_from
@@ -16,6 +15,7 @@ from groundstation.simulation.faults import Fault
 from groundstation.simulation.ins_class import ins_class_names
 from groundstation.simulation.legs import Leg
 
+_SCENARIOS = ShippedToml("groundstation.simulation", "scenarios", "scenario")
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 
@@ -279,7 +279,7 @@ def scenario_names() -> tuple[str, ...]:
     >>> "taxi-good" in scenario_names()
     True
     """
-    return tuple(sorted(Path(entry.name).stem for entry in _shipped().iterdir() if entry.name.endswith(".toml")))
+    return _SCENARIOS.names()
 
 
 def load_scenario(name_or_path: str | Path) -> Scenario:
@@ -295,24 +295,8 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     >>> load_scenario("taxi-good").ins.azimuth_error_deg
     1.2
     """
-    text_name = str(name_or_path)
-    if text_name.endswith(".toml"):
-        path = Path(name_or_path)
-        where, name = path.name, path.stem
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise SettingsError(where, f"a scenario that cannot be read ({error})") from error
-    elif text_name in scenario_names():
-        where, name = f"{text_name}.toml", text_name
-        text = (_shipped() / where).read_text(encoding="utf-8")
-    else:
-        raise SettingsError("scenario", repr(text_name), f"a file *.toml or one of {', '.join(scenario_names())}")
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SettingsError(where, f"text that is not TOML ({error})") from error
-    return scenario_from_table(table, name, where)
+    file = _SCENARIOS.read(name_or_path)
+    return scenario_from_table(file.table, file.name, file.where)
 
 
 def scenario_from_table(table: dict[str, Any], name: str, where: str) -> Scenario:
@@ -354,7 +338,3 @@ def _check_rate(rate_hz: float, internal_rate_hz: float, place: str) -> None:
     ratio = internal_rate_hz / rate_hz
     if ratio < 1.0 or abs(ratio - round(ratio)) > 1e-9:
         raise SettingsError(place, f"{rate_hz:g} Hz", f"a divisor of the internal rate {internal_rate_hz:g} Hz")
-
-
-def _shipped() -> Any:
-    return resources.files("groundstation.simulation") / "scenarios"

@@ -1,14 +1,12 @@
 """Noise parameters per INS class: what the filter believes of the gyros, of GNSS and of the start. TOML in classes/."""
 
 import math
-import tomllib
 from dataclasses import dataclass, field
-from importlib import resources
-from pathlib import Path
 
 import numpy as np
 
 from groundstation.base.errors import SettingsError
+from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.toml_settings import number, settings_from
 from groundstation.estimators.inertial.model import FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
@@ -17,6 +15,7 @@ RADPS_PER_DPH = math.pi / 180.0 / 3600.0
 RADPS2_PER_DPHPH = RADPS_PER_DPH / 3600.0
 S_PER_H = 3600.0
 DEFAULT_CLASS = "navigation"
+_CLASSES = ShippedToml("groundstation.estimators.inertial", "classes", "ins_class")
 
 
 @dataclass(frozen=True)
@@ -150,7 +149,7 @@ def class_names() -> tuple[str, ...]:
     >>> "navigation" in class_names()
     True
     """
-    return tuple(sorted(Path(item.name).stem for item in _shipped().iterdir() if item.name.endswith(".toml")))
+    return _CLASSES.names()
 
 
 def load_class(name: str) -> InsNoise:
@@ -166,23 +165,8 @@ def load_class(name: str) -> InsNoise:
     >>> load_class("navigation").name
     'navigation'
     """
-    if name.endswith(".toml"):
-        path = Path(name)
-        where, stem = path.name, path.stem
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise SettingsError(where, f"an INS class file that cannot be read ({error})") from error
-    elif name.lower() in class_names():
-        where, stem = f"{name.lower()}.toml", name.lower()
-        text = (_shipped() / where).read_text(encoding="utf-8")
-    else:
-        raise SettingsError("ins_class", repr(name), f"a file *.toml or one of {', '.join(class_names())}")
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SettingsError(where, f"text that is not TOML ({error})") from error
-    return settings_from(InsNoise, {"name": stem} | table, where)
+    file = _CLASSES.read(name)
+    return settings_from(InsNoise, {"name": file.name} | file.table, file.where)
 
 
 def choose_class(settings: InertialSettings, aircraft_class: str = "", logged_class: str = "") -> tuple[InsNoise, str]:
@@ -202,7 +186,3 @@ def choose_class(settings: InertialSettings, aircraft_class: str = "", logged_cl
     if logged_class.lower() in class_names():
         return load_class(logged_class), "log"
     return load_class(DEFAULT_CLASS), "default"
-
-
-def _shipped() -> resources.abc.Traversable:
-    return resources.files("groundstation.estimators.inertial") / "classes"

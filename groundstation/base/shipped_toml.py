@@ -1,0 +1,69 @@
+"""TOML files that come with the package and are chosen by name; a user's own are chosen by path."""
+
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from groundstation.base.errors import SettingsError
+
+SUFFIX = ".toml"
+
+
+@dataclass(frozen=True)
+class TomlFile:
+    """A file's name without suffix, how errors call it, and its content."""
+
+    name: str
+    where: str
+    table: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class ShippedToml:
+    """The TOML files of one folder of the package.
+
+    Parameters
+    ----------
+    package, folder : str
+        ``"groundstation.simulation"``, ``"scenarios"``.
+    what : str
+        What a file of it is, for errors: ``"scenario"``.
+    """
+
+    package: str
+    folder: str
+    what: str
+
+    def names(self) -> tuple[str, ...]:
+        """Names of the shipped files, in alphabetical order."""
+        entries = (resources.files(self.package) / self.folder).iterdir()
+        return tuple(sorted(Path(entry.name).stem for entry in entries if entry.name.endswith(SUFFIX)))
+
+    def read(self, name_or_path: str | Path) -> TomlFile:
+        """Read a shipped file by name (upper or lower case), or a user's file by its path, which ends in ``.toml``.
+
+        Raises
+        ------
+        SettingsError
+            For an unknown name, and for a file that cannot be read or is not TOML.
+        """
+        wanted = str(name_or_path)
+        if wanted.endswith(SUFFIX):
+            path = Path(name_or_path)
+            where, name = path.name, path.stem
+            try:
+                text = path.read_text(encoding="utf-8")
+            except (OSError, UnicodeDecodeError) as error:
+                raise SettingsError(where, f"a file for {self.what} that cannot be read ({error})") from error
+        elif wanted.lower() in self.names():
+            name = wanted.lower()
+            where = f"{name}{SUFFIX}"
+            text = (resources.files(self.package) / self.folder / where).read_text(encoding="utf-8")
+        else:
+            raise SettingsError(self.what, repr(wanted), f"a file *{SUFFIX} or one of {', '.join(self.names())}")
+        try:
+            return TomlFile(name, where, tomllib.loads(text))
+        except tomllib.TOMLDecodeError as error:
+            raise SettingsError(where, f"text that is not TOML ({error})") from error
