@@ -17,7 +17,13 @@ import numpy as np  # noqa: E402
 from filterpy.kalman import KalmanFilter  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 
-from groundstation.estimators.inertial.filter import FilterRun, Smoothed, run_filter, smooth  # noqa: E402
+from groundstation.estimators.inertial.filter import (  # noqa: E402
+    FilterRun,
+    Smoothed,
+    measurement_variances,
+    run_filter,
+    smooth,
+)
 from groundstation.estimators.inertial.hindcast import hindcast, leads_of, start_epochs  # noqa: E402
 from groundstation.estimators.inertial.settings import InertialSettings  # noqa: E402
 from groundstation.results.forecast import METHODS  # noqa: E402
@@ -43,7 +49,7 @@ def by_filterpy(run: FilterRun) -> Peer:
         kalman = KalmanFilter(dim_x=6, dim_z=2)
         kalman.x, kalman.P = np.zeros(6), np.diag(run.noise.initial_variances())
         kalman.F, kalman.Q, kalman.H = phi, Q, np.eye(2, 6)
-        kalman.R = np.diag(run.noise.gnss.variances(run.epochs.interval_s))
+        kalman.R = np.diag(measurement_variances(run.epochs, run.noise)[0])
         z = np.stack([run.epochs.position_m[:, channel], run.epochs.velocity_mps[:, channel]], axis=1)
         x, P = np.empty((n, 6)), np.empty((n, 6, 6))
         for k in range(n):

@@ -15,6 +15,7 @@ from groundstation.estimators.inertial.filter import (
     RESET_VELOCITY_MPS,
     Epochs,
     FilterRun,
+    measurement_variances,
     run_filter,
     smooth,
 )
@@ -111,7 +112,7 @@ def textbook(epochs: Epochs, model: ChannelModel, noise: InsNoise) -> Textbook:
     n, size = len(epochs), 2 * SIZE
     x, P = np.zeros(size), np.kron(np.eye(2), np.diag(noise.initial_variances()))
     out = Textbook(*(np.zeros((n, size, *rest)) for rest in ((), (size,), (), (size,), (size,))))
-    R_each = noise.gnss.variances(epochs.interval_s)
+    R_each = measurement_variances(epochs, noise)[0]
     reset = np.kron(np.eye(2), np.diag(np.square([RESET_POSITION_M, RESET_VELOCITY_MPS, 0.0, 0.0, 0.0, 0.0])))
     for k in range(n):
         seconds = 0.0 if k == 0 else epochs.time_s[k] - epochs.time_s[k - 1]

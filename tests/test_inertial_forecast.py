@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from groundstation.estimators.inertial.estimate import Estimation, estimate_ins_errors
-from groundstation.estimators.inertial.filter import Epochs, FilterRun, run_filter
+from groundstation.estimators.inertial.filter import Epochs, FilterRun, initial_of, run_filter
 from groundstation.estimators.inertial.forecast import assess_forecast
 from groundstation.estimators.inertial.hindcast import hindcast, leads_of, start_epochs
 from groundstation.estimators.inertial.settings import InertialSettings
@@ -51,7 +51,8 @@ def cut(run: FilterRun, epoch: int) -> FilterRun:
         epochs.drag_per_s[part],
         epochs.is_reset[part],
     )
-    return run_filter(past, run.model, run.noise, gate=SETTINGS.gate_sigmas**2)
+    first = initial_of(past, run.noise)
+    return run_filter(past, run.model, run.noise, gate=SETTINGS.gate_sigmas**2, initial=first)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 
 from groundstation.results.figures import FigureData
 
+FEWEST_STARTS = 5  # independent ones: with fewer the limits of NEES are so wide that anything passes
+
 # Names of the contract, in the order they are shown; titles for people.
 METHODS: dict[str, str] = {
     "raw_ins": "raw INS, no correction",
@@ -49,7 +51,10 @@ class GapRow:
 
 @dataclass(frozen=True)
 class PhaseRow:
-    """Replayed outages of one length that begin in one phase of flight, default method."""
+    """Replayed outages of one length that begin in one phase of flight, default method.
+
+    Their starts are closer together than those of ``SkillRow`` and come earlier in the flight: the numbers differ.
+    """
 
     phase: str
     length_s: float
@@ -93,7 +98,10 @@ class CalibrationRow:
 
 @dataclass(frozen=True)
 class CoupledRow:
-    """Gain of the coupled twelve-state model over two separate channels: 1 - RMS ratio, last estimate of both."""
+    """Gain of the coupled model over two separate channels: 1 - RMS ratio, last estimate of both.
+
+    The coupled model has fourteen states: six of each channel, the azimuth error and its drift.
+    """
 
     horizon_min: float
     rms_m: float
@@ -133,3 +141,20 @@ class ForecastResult:
     coupled: tuple[CoupledRow, ...] = ()
     best_method: dict[str, str] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
+
+
+def honesty(independent_starts: int, nees: float, nees_low: float, nees_high: float) -> str:
+    """Say in words what NEES of a :class:`CalibrationRow` shows of the forecast's sigma.
+
+    Examples
+    --------
+    >>> honesty(11, 1.1, 0.5, 1.7), honesty(11, 0.3, 0.5, 1.7), honesty(11, 2.0, 0.5, 1.7)
+    ('within limits', 'modest', 'too sure')
+    >>> honesty(1, 1.0, 0.03, 3.7)
+    'too few to judge'
+    """
+    if independent_starts < FEWEST_STARTS:
+        return "too few to judge"
+    if nees > nees_high:
+        return "too sure"
+    return "modest" if nees < nees_low else "within limits"

@@ -1,8 +1,16 @@
 """Answer of the INS error estimator (system 2): errors of the INS found against GNSS, and what they rest on."""
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from groundstation.results.figures import FigureData
+
+MISSING: dict[str, str] = {"gnss": "GNSS", "ins": "INS", "both": "both"}  # RealOutage.missing, for people
+NOT_SEEN = 0.01  # observability below which the data said nothing of a state
+UNMOVED = 0.01  # share of its sigma at the start by which the sigma of such a state may differ
+SUMMARY_ROUNDING = 1e-6  # of a sigma in summary.json
 
 
 @dataclass(frozen=True)
@@ -45,10 +53,11 @@ class ChannelResult:
 
 @dataclass(frozen=True)
 class RealOutage:
-    """An interval without GNSS in the log itself: the filter forecast through it.
+    """An interval of the log itself in which nothing could be compared: the filter forecast through it.
 
-    ``jump_m`` is how far the forecast position error was from what GNSS showed on return, ``sigma_m`` what the
-    forecast claimed (both radial); None when GNSS did not come back.
+    ``jump_m`` is how far the forecast position error was from what GNSS showed at its end, ``sigma_m`` what the
+    forecast claimed (both radial); None when the flight ended before. ``missing`` is what was absent: ``"gnss"``,
+    ``"ins"`` or ``"both"``.
     """
 
     start_s: float
@@ -56,6 +65,7 @@ class RealOutage:
     length_s: float
     jump_m: float | None
     sigma_m: float | None
+    missing: str = "gnss"
 
 
 @dataclass(frozen=True)
@@ -84,7 +94,8 @@ class InertialResult:
     ins_class : str
         Noise parameters used, by name; ``ins_class_origin`` says who chose them.
     kind : str
-        ``"unaided"``, or ``"gnss_aided"`` for an INS that never drifts from GNSS: then a forecast means nothing.
+        ``"unaided"``; ``"gnss_aided"`` for an INS that never drifts from GNSS: then a forecast means nothing;
+        ``"unknown"`` where the log is too short or at rest for too long to tell. ``kind_reason`` says why.
     transition : str
         ``"exact"`` or ``"first_order"`` (I + A T of the paper).
     epochs, gnss_seconds
@@ -92,6 +103,12 @@ class InertialResult:
     radial_error_rate_50_nmiph, radial_error_rate_95_nmiph : float or None
         Radial position error over time since the first epoch, nautical miles per hour, median and 95 % over epochs
         later than ten minutes.
+    outages : tuple of RealOutage
+        Intervals of the log itself without GNSS or without the INS.
+    reopened : int
+        How often GNSS was rejected for so long that the filter was opened to it again.
+    other_ins : tuple of str
+        INS topics of the log that were not used.
     settings : dict
         Every parameter of model, noise and gates as used.
     figures : tuple of FigureData
@@ -114,5 +131,35 @@ class InertialResult:
     largest_radial_error_m: float | None
     outages: tuple[RealOutage, ...] = ()
     azimuth: AzimuthEstimate | None = None
+    reopened: int = 0
+    other_ins: tuple[str, ...] = ()
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
+
+
+def is_left_alone(name: str, sigma: Any, observability: Any, settings: Mapping[str, Any]) -> bool:
+    """Whether a state is not estimated in this INS class: the data say nothing of it and its sigma is the one it had.
+
+    A class leaves a state out by a tiny sigma at the start; value and sigma are then no answer of this flight.
+
+    Parameters
+    ----------
+    name : str
+        Name of the state; ``drift``, ``drift_rate`` and ``random_drift`` are the ones a class may leave out.
+    sigma, observability
+        Of the :class:`StateEstimate`; what is not a number is not judged.
+    settings : mapping
+        ``InertialResult.settings``: the sigma at the start stands there.
+
+    Examples
+    --------
+    >>> is_left_alone("drift_rate", 5e-6, 3e-6, {"noise.drift_rate_dphph": 5e-6})
+    True
+    >>> is_left_alone("drift", 0.0048, 0.45, {"noise.drift_dph": 0.0088})
+    False
+    """
+    start = settings.get(f"noise.{name}_dphph" if name == "drift_rate" else f"noise.{name}_dph")
+    known = all(isinstance(value, int | float) and math.isfinite(value) for value in (start, sigma, observability))
+    if start is None or not known or observability >= NOT_SEEN:
+        return False
+    return math.isclose(sigma, start, rel_tol=UNMOVED, abs_tol=SUMMARY_ROUNDING)

@@ -239,6 +239,8 @@ def pair_samples(
     if not len(gnss):
         raise NotAssessableError(f"heading, {gnss_topic}", "no GNSS velocity in the log")
     part, is_after = _ground_part(gnss, np.asarray(ground.mask), bool(method), settings, with_later_runs)
+    if not part.size:
+        raise NotAssessableError(f"heading, {gnss_topic}", _no_ground_reason(settings))
     gnss, mask = gnss.take(part), np.asarray(ground.mask)[part]
     time_s = flight.seconds(gnss.time_ns)
     ins_time, ins_heading = _ins_heading(flight, ins_topic, given.values_deg, time_s)
@@ -293,6 +295,13 @@ def _before_lift_off(gnss: Table, on_ground: BoolArray, is_proven: bool, setting
         if is_fast and time_s[min(end, len(gnss) - 1)] - time_s[start] > 5.0:
             return slice(int(contact[0]), int(start))
     return slice(int(contact[0]), len(gnss))
+
+
+def _no_ground_reason(settings: HeadingSettings) -> str:
+    return (
+        "no GNSS epoch before lift-off: the log begins in the air (no ground contact is logged, and its first epoch is "
+        f"faster than {settings.lift_off_speed_mps:g} m/s)"
+    )
 
 
 def _ins_heading(

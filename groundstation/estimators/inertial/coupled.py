@@ -1,5 +1,7 @@
 """The coupled north-east model: both channels, azimuth, Earth and craft rate; its gain over the two separate channels.
 
+Fourteen states: the six of each channel (``model.STATES``; north, then east), the azimuth error and its drift.
+
 Signs: error = INS - truth. With the phi-angle (computed attitude = (I - [phi x]) n_from_b) the north tilt is -phi_E,
 the east tilt +phi_N - positive where the velocity error falls - and the heading error -phi_D.
 """
@@ -10,17 +12,19 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.geodesy import EARTH_RATE_RADPS, SEMI_MAJOR_M, curvature_radii_m
+from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
 from groundstation.base.records import Int64Array, frozen
 from groundstation.estimators.inertial.differences import Differences
-from groundstation.estimators.inertial.filter import Epochs
-from groundstation.estimators.inertial.hindcast import Hindcast
-from groundstation.estimators.inertial.model import (
-    GRAVITY_ECCENTRICITY_SQUARED,
-    GRAVITY_EQUATOR_MPS2,
-    GRAVITY_POLE_FACTOR,
-    FloatArray,
+from groundstation.estimators.inertial.filter import (
+    PATIENCE_S,
+    RESET_POSITION_M,
+    RESET_VELOCITY_MPS,
+    Epochs,
+    gnss_intervals_s,
+    measurement_variances,
 )
+from groundstation.estimators.inertial.hindcast import Hindcast
+from groundstation.estimators.inertial.model import POSITION, VELOCITY, FloatArray, normal_gravity_mps2
 from groundstation.estimators.inertial.noise import InsNoise
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.results.forecast import HORIZONS_MIN, CoupledRow
@@ -94,7 +98,7 @@ class CraftMotion:
         earth_north, earth_down, craft_north, craft_east, craft_down = _rates_radps(self)
         north, east = self.velocity_mps.T
         down_rate = 2.0 * earth_down + craft_down
-        gravity = _gravity_mps2(self.latitude_deg, self.altitude_m)
+        gravity = normal_gravity_mps2(self.latitude_deg, self.altitude_m)
         return np.stack(
             [
                 self.acceleration_mps2[:, 0] - down_rate * east,
@@ -117,6 +121,8 @@ class CoupledRun:
         Measured minus predicted (position, velocity; north, east), NaN where absent.
     used : ndarray of int8, shape (n, 2, 2)
         Rejected -1, absent 0, used 1.
+    reopened : int
+        How often GNSS was rejected for so long that the filter took it to be right after all.
     """
 
     differences: Differences
@@ -126,6 +132,7 @@ class CoupledRun:
     innovation: FloatArray
     innovation_variance: FloatArray
     used: NDArray[np.int8]
+    reopened: int = 0
 
     def __post_init__(self) -> None:
         for name in ("x", "sigma", "innovation", "innovation_variance", "used"):
@@ -186,6 +193,8 @@ def run_coupled(differences: Differences, noise: InsNoise, settings: InertialSet
 
     The noise of a horizontal channel is the class's; the azimuth starts with ``azimuth_deg``, its gyro with the
     constant drift of the class, and walks like a tilt. An azimuth sigma of zero leaves two coupled channels of six.
+    Position and velocity error may be anything at the start (a log may begin in flight) and after a reset of the INS;
+    a filter that has rejected GNSS for :data:`filter.PATIENCE_S` is opened in the same way, tilt and drift kept.
     """
     from groundstation.estimators.inertial import coupled_kernels as kernels
 
@@ -196,27 +205,32 @@ def run_coupled(differences: Differences, noise: InsNoise, settings: InertialSet
     values = np.zeros((n, len(PATTERN)))
     values[1:] = coupled_values(CraftMotion.between(differences, epochs.time_s), noise.beta_per_s)
     covariance, densities = _noise_of(noise, differences)
-    reset = np.where(epochs.is_reset[:, None], noise.initial_variances()[:2], 0.0)
+    weighted, believed = measurement_variances(epochs, noise)
+    patience = [max(1, round(PATIENCE_S / interval_s)) for interval_s in gnss_intervals_s(epochs)]
+    opened = _opened_variances(noise, epochs)
     x, variance = np.empty((n, SIZE)), np.empty((n, SIZE))
     y, S, used = np.empty((n, 2, 2)), np.empty((n, 2, 2)), np.zeros((n, 2, 2), dtype=np.int8)
-    kernels.run_coupled_filter(
+    reopened = kernels.run_coupled_filter(
         interval,
         ROWS,
         COLUMNS,
         values,
         densities,
         z,
-        reset,
+        np.where(epochs.is_reset[:, None], opened, 0.0),
         covariance,
-        np.array(noise.gnss.variances(epochs.interval_s)),
+        weighted,
+        believed,
         settings.gate_sigmas**2,
+        np.array(patience),
+        opened,
         x,
         variance,
         y,
         S,
         used,
     )
-    return CoupledRun(differences, noise, x, np.sqrt(np.maximum(variance, 0.0)), y, S, used)
+    return CoupledRun(differences, noise, x, np.sqrt(np.maximum(variance, 0.0)), y, S, used, int(reopened))
 
 
 def hindcast_coupled(run: CoupledRun, at: Int64Array, lead_s: FloatArray, settings: InertialSettings) -> FloatArray:
@@ -228,6 +242,8 @@ def hindcast_coupled(run: CoupledRun, at: Int64Array, lead_s: FloatArray, settin
     at : ndarray of int, shape (s,)
     lead_s : ndarray, shape (l,)
         Equal steps from the first: k times ``lead_s[0]``.
+
+    The position error at a start is what GNSS showed; where it showed none, or none that was believed, the estimate.
 
     Returns
     -------
@@ -242,7 +258,9 @@ def hindcast_coupled(run: CoupledRun, at: Int64Array, lead_s: FloatArray, settin
     every = max(1, round(float(lead_s[0]) / min(settings.forecast_step_s, kernels.LONGEST_STEP_S)))
     step_s = float(lead_s[0]) / every
     elapsed = np.arange(every * len(lead_s) + 1) * step_s
-    known = np.nan_to_num(run.epochs.position_m[at])
+    measured = run.epochs.position_m[at]
+    is_known = np.isfinite(measured) & (run.used[at, POSITION] != kernels.REJECTED)
+    known = np.where(is_known, measured, run.x[at][:, CHANNELS[:, POSITION]])
     for index, epoch in enumerate(at):
         motion = CraftMotion.between(run.differences, run.epochs.time_s[epoch] + elapsed)
         values = coupled_values(motion, run.noise.beta_per_s)
@@ -295,6 +313,7 @@ def _noise_of(noise: InsNoise, differences: Differences) -> tuple[FloatArray, Fl
     Source: Titterton and Weston 2004, section 10.3.
     """
     initial, density = noise.initial_variances(), noise.densities()
+    initial[: VELOCITY + 1] = _opened_variances(noise, differences.epochs)
     azimuth = np.deg2rad(noise.azimuth_deg) ** 2
     drift, walk = (initial[3], density[2]) if azimuth > 0.0 else (0.0, 0.0)
     balance = np.eye(SIZE)
@@ -303,6 +322,17 @@ def _noise_of(noise: InsNoise, differences: Differences) -> tuple[FloatArray, Fl
         balance[_DN, AZIMUTH] = -EARTH_RATE_RADPS * np.cos(np.deg2rad(latitude[0]))
     covariance = balance @ np.diag([*initial, *initial, azimuth, drift]) @ balance.T
     return covariance, np.array([*density, *density, walk, 0.0])
+
+
+def _opened_variances(noise: InsNoise, epochs: Epochs) -> FloatArray:
+    """Variances of a position and a velocity error of which nothing is known, shape (2,).
+
+    The class's for the position where GNSS never measures it: it enters the Earth rate, and an unknown one of tens of
+    kilometres would hide the drift for good.
+    """
+    is_measured = bool(np.isfinite(epochs.position_m).any())
+    position = max(RESET_POSITION_M, noise.position_m) if is_measured else noise.position_m
+    return np.square([position, max(RESET_VELOCITY_MPS, noise.velocity_mps)])
 
 
 def _latitude_rad(motion: CraftMotion) -> FloatArray:
@@ -321,14 +351,6 @@ def _rates_radps(motion: CraftMotion) -> tuple[FloatArray, FloatArray, FloatArra
     north, east = motion.velocity_mps.T
     earth = (EARTH_RATE_RADPS * np.cos(latitude_rad), -EARTH_RATE_RADPS * np.sin(latitude_rad))
     return *earth, east / normal, -north / meridian, -east * np.tan(latitude_rad) / normal
-
-
-def _gravity_mps2(latitude_deg: FloatArray, altitude_m: FloatArray) -> FloatArray:
-    """Normal gravity along a flight: :func:`model.normal_gravity_mps2` of arrays."""
-    sine_squared = np.sin(np.deg2rad(latitude_deg)) ** 2
-    at_zero = GRAVITY_EQUATOR_MPS2 * (1.0 + GRAVITY_POLE_FACTOR * sine_squared)
-    at_zero /= np.sqrt(1.0 - GRAVITY_ECCENTRICITY_SQUARED * sine_squared)
-    return np.asarray(at_zero * (1.0 - 2.0 * altitude_m / SEMI_MAJOR_M))
 
 
 def _interpolated(time_s: FloatArray, values: FloatArray, at_s: FloatArray) -> FloatArray:

@@ -39,6 +39,36 @@ def exponential(rows: Int64Array, columns: Int64Array, values: FloatArray, secon
 
 
 @compiled
+def _update(now: FloatArray, p: FloatArray, h: int, residual: float, R: float, K: FloatArray, w: FloatArray) -> None:
+    """Update states and covariance with a measurement of the single state h; ``K``, ``w`` are room."""
+    s = p[h, h] + R
+    for i in range(14):
+        K[i] = p[i, h] / s
+        now[i] += K[i] * residual
+    for i in range(14):  # Joseph: w = (I - K H) p, then w (I - K H)' + K R K'
+        for j in range(14):
+            w[i, j] = p[i, j] - K[i] * p[h, j]
+    for j in range(14):
+        w[h, j] = (1.0 - K[h]) * p[h, j]
+    for i in range(14):
+        for j in range(i, 14):
+            kept = w[i, j] - w[i, h] * K[j]
+            if j == h:
+                kept = w[i, h] * (1.0 - K[h])
+            total = kept + K[i] * R * K[j]
+            p[i, j] = total
+            p[j, i] = total
+
+
+@compiled
+def _open(p: FloatArray, variances: FloatArray) -> None:
+    """Add variances to position and velocity of both channels."""
+    for m in range(2):
+        p[m, m] += variances[m]
+        p[6 + m, 6 + m] += variances[m]
+
+
+@compiled
 def run_coupled_filter(
     interval_s: FloatArray,
     rows: Int64Array,
@@ -49,13 +79,16 @@ def run_coupled_filter(
     reset: FloatArray,
     P0: FloatArray,
     R: FloatArray,
+    believed: FloatArray,
     gate: float,
+    patience: Int64Array,
+    opened: FloatArray,
     x: FloatArray,
     variance: FloatArray,
     y: FloatArray,
     S: FloatArray,
     state: NDArray[np.int8],
-) -> None:
+) -> int:
     """Run the Kalman filter over epochs; sequential scalar updates in Joseph form.
 
     Parameters
@@ -73,10 +106,14 @@ def run_coupled_filter(
         Variance added to position and velocity before the epoch.
     P0 : ndarray, shape (14, 14)
         The state at the first epoch is zero.
-    R : ndarray, shape (2,)
-        Variances of position and velocity measurements.
+    R, believed : ndarrays, shape (2,)
+        Variances of position and velocity measurements, as they are weighted and as single ones are believed to err.
     gate : float
-        Both channels' measurement is rejected where y^2 / S exceeds it in one of them.
+        Both channels' measurement is rejected where y^2 exceeds so many times its variance with ``believed`` in one.
+    patience : ndarray of int, shape (2,)
+        So many rejections in a row of one kind, and it is the filter that is wrong: it is opened again.
+    opened : ndarray, shape (2,)
+        Variance then added to position and velocity.
     x, variance : ndarrays, shape (n, 14)
         Filled: states and their variances after the update.
     y, S : ndarrays, shape (n, 2, 2)
@@ -84,10 +121,16 @@ def run_coupled_filter(
     state : ndarray of int8, shape (n, 2, 2)
         Filled: rejected -1, absent 0, used 1.
 
+    Returns
+    -------
+    int
+        How often the filter was opened again.
+
     Source: Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, chapter V (Joseph's form).
     """
     p, w, E = P0.copy(), np.zeros((14, 14)), np.eye(14)
     now, new, K = np.zeros(14), np.zeros(14), np.zeros(14)
+    in_a_row, reopened = np.zeros(2, dtype=np.int64), 0
     for k in range(z.shape[0]):
         if k > 0:
             parts = max(1, int(np.ceil(interval_s[k] / LONGEST_STEP_S - 1e-9)))
@@ -120,11 +163,9 @@ def run_coupled_filter(
                         p[j, i] = p[i, j]
                 for i in range(14):
                     p[i, i] += 0.5 * seconds * density[i]
+        _open(p, reset[k])
         for m in range(2):
-            p[m, m] += reset[k, m]
-            p[6 + m, 6 + m] += reset[k, m]
-        for m in range(2):
-            is_good = True
+            is_there, is_good = False, True
             for c in range(2):
                 i = 6 * c + m
                 y[k, m, c] = z[k, m, c] - now[i]
@@ -132,10 +173,23 @@ def run_coupled_filter(
                 state[k, m, c] = ABSENT
                 if np.isfinite(y[k, m, c]):
                     state[k, m, c] = USED
-                    if y[k, m, c] * y[k, m, c] > gate * S[k, m, c]:
+                    is_there = True
+                    if y[k, m, c] * y[k, m, c] > gate * (p[i, i] + believed[m]):
                         is_good = False
                 else:
                     y[k, m, c], S[k, m, c] = np.nan, np.nan
+            if is_there and is_good:
+                in_a_row[m] = 0
+            elif not is_good:
+                in_a_row[m] += 1
+                if in_a_row[m] > patience[m]:
+                    _open(p, opened)
+                    for c in range(2):
+                        if state[k, m, c] != ABSENT:
+                            S[k, m, c] = p[6 * c + m, 6 * c + m] + R[m]
+                    in_a_row[:] = 0
+                    reopened += 1
+                    is_good = True
             for c in range(2):
                 if state[k, m, c] == ABSENT:
                     continue
@@ -143,20 +197,11 @@ def run_coupled_filter(
                     state[k, m, c] = REJECTED
                     continue
                 h = 6 * c + m
-                s = p[h, h] + R[m]
-                residual = z[k, m, c] - now[h]
-                for i in range(14):
-                    K[i] = p[i, h] / s
-                    now[i] += K[i] * residual
-                    new[i] = p[h, i]
-                for i in range(14):  # (I - K H) p (I - K H)' + K R K', written out for H of a single one
-                    for j in range(i, 14):
-                        total = p[i, j] - K[i] * new[j] - K[j] * new[i] + K[i] * K[j] * s
-                        p[i, j] = total
-                        p[j, i] = total
+                _update(now, p, h, z[k, m, c] - now[h], R[m], K, w)
         for i in range(14):
             x[k, i] = now[i]
             variance[k, i] = p[i, i]
+    return reopened
 
 
 @compiled

@@ -1,6 +1,6 @@
 """From the tables of a flight to what the filter is given: INS minus GNSS, with what could not be believed left out."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from groundstation.tables.table import Flight, Table
 POSITION_FIELDS = ("latitude_deg", "longitude_deg")
 VELOCITY_FIELDS = ("velocity_north_mps", "velocity_east_mps")
 UNUSED_MODES = ("align", "attitude")
+LONGEST_STEP_S = 10.0  # between samples for a topic to count as there
 LONGEST_FLIGHT_S = 4.0e6  # 46 days: a clock that jumps by years must not fill the memory
 
 
@@ -60,7 +61,7 @@ class Differences:
 
 
 def choose_pair(flight: Flight) -> tuple[str, str]:
-    """The INS and GNSS topics to compare: of each kind the first that has positions.
+    """The INS and GNSS topics to compare: of each kind the one whose positions cover the longest time.
 
     Raises
     ------
@@ -69,13 +70,17 @@ def choose_pair(flight: Flight) -> tuple[str, str]:
     """
     found: dict[str, str] = {}
     for kind, title in (("ins", "INS"), ("gnss", "GNSS")):
-        topic = next(
-            (name for name in topics_of_kind(kind, flight.topics()) if flight[name].has(*POSITION_FIELDS)), None
-        )
-        if topic is None:
+        covered = {name: _covered_s(flight[name]) for name in topics_of_kind(kind, flight.topics())}
+        covered = {name: seconds for name, seconds in covered.items() if flight[name].has(*POSITION_FIELDS)}
+        if not covered:
             raise NotAssessableError("inertial", f"no {title} position in the log")
-        found[kind] = topic
+        found[kind] = max(covered, key=lambda name: (round(covered[name] / 60.0), -list(covered).index(name)))
     return found["ins"], found["gnss"]
+
+
+def _covered_s(table: Table) -> float:
+    times = table.time_ns[table.valid(*POSITION_FIELDS)] / NS_PER_S
+    return seconds_covered(times - times[0], LONGEST_STEP_S) if len(times) else 0.0
 
 
 def differences(
@@ -92,29 +97,24 @@ def differences(
         With the reason: no INS, no GNSS, or less GNSS than ``least_gnss_s``.
     """
     ins_topic, gnss_topic = choose_pair(flight)
-    ins, gnss = _navigating(flight[ins_topic]).unique_times(), flight[gnss_topic].unique_times()
+    ins, realigned_ns = _navigating(flight[ins_topic].unique_times())
+    gnss = flight[gnss_topic].unique_times()
     if not len(ins):
         raise NotAssessableError("inertial", f"{ins_topic} never left alignment")
     findings = list(screening.unknown_values(flight, ins, gnss))
     resets = screening.ins_resets(flight, ins, settings)
     findings += resets.findings
+    reset_ns = np.union1d(resets.time_ns, realigned_ns)
     motion = join(ins, gnss.time_ns, (*POSITION_FIELDS, *VELOCITY_FIELDS), largest_gap_s=settings.ins_gap_max_s)
     position, velocity = _position_difference(motion, gnss, _altitude(gnss)), _velocity_difference(motion, gnss)
-    gnss_s = flight.seconds(gnss.time_ns)
-    for start_s, end_s in excluded_s:
-        position[(gnss_s >= start_s) & (gnss_s <= end_s)] = np.nan
-        velocity[(gnss_s >= start_s) & (gnss_s <= end_s)] = np.nan
-    bad, found = screening.unbelieved(flight, gnss, motion, position, resets.time_ns, settings)
+    unusable = _within(flight.seconds(gnss.time_ns), excluded_s) | _astride(gnss.time_ns, ins.time_ns, reset_ns)
+    position[unusable], velocity[unusable] = np.nan, np.nan
+    bad, found = screening.unbelieved(flight, gnss, motion, position, reset_ns, settings)
     findings += found
     position[bad], velocity[bad] = np.nan, np.nan
-    if not settings.use_position:
-        position[:] = np.nan
-    if not settings.use_velocity:
-        velocity[:] = np.nan
     compared = np.isfinite(position).any(axis=1) | np.isfinite(velocity).any(axis=1)
     time_s, columns = _binned(flight, ins, gnss.take(compared), position[compared], velocity[compared], settings)
-    known = np.isfinite(columns[:, :4]).any(axis=1)
-    gnss_seconds = float(known.sum()) * settings.epoch_interval_s
+    gnss_seconds = seconds_covered(time_s[np.isfinite(columns[:, :4]).any(axis=1)], settings.outage_s)
     if gnss_seconds < settings.least_gnss_s:
         raise NotAssessableError(
             "inertial",
@@ -134,7 +134,7 @@ def differences(
         columns[:, 0:2],
         columns[:, 2:4],
         drag_per_s(latitude, _altitude(at), ins_velocity),
-        _reset_marks(flight, time_s, resets.time_ns),
+        _reset_marks(flight, time_s, reset_ns),
     )
     return Differences(
         *(ins_topic, gnss_topic, epochs, latitude, longitude, _altitude(at), ins_velocity),
@@ -157,13 +157,51 @@ def drag_per_s(latitude_deg: FloatArray, altitude_m: FloatArray, velocity_mps: F
     return np.nan_to_num(out)
 
 
-def _navigating(ins: Table) -> Table:
-    """The samples in which the INS navigates: not while it aligns, not those it calls invalid."""
+def seconds_covered(time_s: FloatArray, longest_gap_s: float) -> float:
+    """Seconds that samples stand for: the steps between them that are no gap."""
+    steps = np.diff(time_s)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    return float(steps[steps <= max(longest_gap_s, 3.0 * usual)].sum())
+
+
+def only_used(epochs: Epochs, settings: InertialSettings) -> Epochs:
+    """The epochs with what the settings keep from the filter left out."""
+    position = epochs.position_m if settings.use_position else np.full_like(epochs.position_m, np.nan)
+    velocity = epochs.velocity_mps if settings.use_velocity else np.full_like(epochs.velocity_mps, np.nan)
+    return replace(epochs, position_m=position, velocity_mps=velocity)
+
+
+def _within(time_s: FloatArray, intervals_s: tuple[tuple[float, float], ...]) -> BoolArray:
+    mask = np.zeros(len(time_s), dtype=bool)
+    for start_s, end_s in intervals_s:
+        mask |= (time_s >= start_s) & (time_s <= end_s)
+    return mask
+
+
+def _astride(gnss_ns: Int64Array, ins_ns: Int64Array, reset_ns: Int64Array) -> BoolArray:
+    """GNSS samples between the last sample of the INS before a reset and the first one after it: half of each."""
+    mask = np.zeros(len(gnss_ns), dtype=bool)
+    for after_ns in reset_ns:
+        row = int(np.searchsorted(ins_ns, after_ns))
+        if row:
+            mask |= (gnss_ns > ins_ns[row - 1]) & (gnss_ns < after_ns)
+    return mask
+
+
+def _navigating(ins: Table) -> tuple[Table, Int64Array]:
+    """The samples in which the INS navigates: not while it aligns, not those it calls invalid.
+
+    With the times at which it took up navigating again: it may come back with other errors.
+    """
     keep = ~np.isin(ins.text("mode"), UNUSED_MODES)
     if "valid" in ins:
         column = ins.columns["valid"]
         keep &= np.asarray(column.values, dtype=bool) | ~column.mask
-    return ins if keep.all() else ins.take(keep)
+    if keep.all():
+        return ins, np.zeros(0, dtype=np.int64)
+    again = keep & ~np.concatenate([[True], keep[:-1]])
+    again &= np.cumsum(keep) > 1  # the first sample of all is no return
+    return ins.take(keep), ins.time_ns[again]
 
 
 def _aided_share(ins: Table) -> float:

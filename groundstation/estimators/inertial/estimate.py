@@ -1,25 +1,32 @@
 """The estimator of INS errors: from the tables of a flight to states, what they rest on, and the corrected track."""
 
-from dataclasses import dataclass, fields, is_dataclass
-from itertools import pairwise
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from groundstation.base.findings import Finding
+from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.estimators.inertial import figures
 from groundstation.estimators.inertial.azimuth import estimate_azimuth
-from groundstation.estimators.inertial.coupled import hindcast_coupled, run_coupled
-from groundstation.estimators.inertial.differences import Differences, differences
-from groundstation.estimators.inertial.filter import PATIENCE_S, FilterRun, Smoothed, run_filter, smooth
-from groundstation.estimators.inertial.hindcast import hindcast, leads_of
+from groundstation.estimators.inertial.differences import Differences, differences, only_used, seconds_covered
+from groundstation.estimators.inertial.filter import (
+    PATIENCE_S,
+    Epochs,
+    FilterRun,
+    Smoothed,
+    initial_of,
+    run_filter,
+    smooth,
+)
+from groundstation.estimators.inertial.kind import AIDED, UNAIDED, kind_of
 from groundstation.estimators.inertial.model import POSITION, STATES, ChannelModel, FloatArray
 from groundstation.estimators.inertial.noise import InsNoise, choose_class
+from groundstation.estimators.inertial.outages import Bridged, bridge_outages
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.start_covariance import covariance_without_data
-from groundstation.results.inertial import AzimuthEstimate, ChannelResult, InertialResult, RealOutage, StateEstimate
-from groundstation.tables.gaps import largest_step_s
+from groundstation.results.inertial import ChannelResult, InertialResult, StateEstimate
 from groundstation.tables.table import Flight
 
 TITLES = {
@@ -30,9 +37,9 @@ TITLES = {
     "drift_rate": "rate of the drift",
     "random_drift": "random gyro drift",
 }
-MINUTE_S, RATE_FROM_S = 60.0, 600.0
+RATE_FROM_S = 600.0
 HALF, BOUND95 = 0.5, 1.959963984540054
-UNAIDED, AIDED = "unaided", "gnss_aided"
+OUTAGES_LISTED = 5
 
 
 @dataclass(frozen=True)
@@ -86,88 +93,23 @@ def estimate_ins_errors(
     settings = settings or InertialSettings()
     noise, origin = choose_class(settings, aircraft_class, flight.metadata.get("ins_class", ""))
     compared = differences(flight, settings=settings, excluded_s=excluded_s)
-    model = ChannelModel.at(
-        float(np.nanmean(compared.latitude_deg)),
-        float(np.nanmean(compared.altitude_m)),
-        noise.beta_per_s,
-        settings.transition,
+    model = ChannelModel.at(*_mean_place(compared), noise.beta_per_s, settings.transition)
+    used = only_used(compared.epochs, settings)
+    run = run_filter(used, model, noise, gate=settings.gate_sigmas**2, initial=initial_of(used, noise))
+    run = replace(run, epochs=compared.epochs)  # what the filter may not use still judges it
+    smoothed, bridged = smooth(run), bridge_outages(flight, compared, run, settings)
+    result = _result(flight, compared, run, smoothed, bridged, settings, origin)
+    findings = (*compared.findings, *_findings(compared, run, result))
+    return Estimation(compared, noise, run, smoothed, bridged.error_m, result, findings)
+
+
+def _mean_place(compared: Differences) -> tuple[float, float]:
+    """Mean latitude, degrees, and altitude, metres, where the INS knew them; the equator at sea level where not."""
+    places = (compared.latitude_deg, compared.altitude_m)
+    latitude, altitude = (
+        float(np.mean(values[np.isfinite(values)])) if np.isfinite(values).any() else 0.0 for values in places
     )
-    run = run_filter(compared.epochs, model, noise, gate=settings.gate_sigmas**2)
-    smoothed = smooth(run)
-    kind, kind_reason = kind_of(compared, settings)
-    outages = real_outages(run, settings)
-    corrected = _corrected(compared, run, outages, settings)
-    azimuth = estimate_azimuth(compared, run, settings) if kind == UNAIDED else None
-    result = _result(compared, run, smoothed, settings, noise, origin, (kind, kind_reason), outages, corrected, azimuth)
-    return Estimation(
-        compared, noise, run, smoothed, corrected, result, (*compared.findings, *_findings(compared, run, result))
-    )
-
-
-def kind_of(compared: Differences, settings: InertialSettings) -> tuple[str, str]:
-    """Whether the INS is corrected by GNSS already: its own mode says so, or it never drifts; and the reason."""
-    if compared.aided_share > HALF:
-        return AIDED, "its own mode says that GNSS corrects it"
-    epochs = compared.epochs
-    known = np.isfinite(epochs.position_m).all(axis=1)
-    minute = np.floor(epochs.time_s[known] / MINUTE_S).astype(np.int64)
-    _, which, count = np.unique(minute, return_inverse=True, return_counts=True)
-    means = np.stack([np.bincount(which, epochs.position_m[known, axis]) / count for axis in range(2)], axis=1)
-    spread = means - np.median(means, axis=0)
-    largest = float(np.quantile(np.hypot(*spread.T), 0.95)) if len(means) else 0.0
-    if largest < settings.aided_radial_m:
-        minutes = float(np.ptp(epochs.time_s[known])) / MINUTE_S
-        return AIDED, (
-            f"it stays within {largest:.1f} m of GNSS for {minutes:.0f} min (95 % of the minute means), "
-            "as no unaided INS does"
-        )
-    return UNAIDED, f"it drifts from GNSS: minute means spread over {largest:.0f} m (95 %)"
-
-
-def real_outages(run: FilterRun, settings: InertialSettings) -> tuple[RealOutage, ...]:
-    """Intervals without GNSS in the log itself, and how the forecast through each came out."""
-    epochs, found = run.epochs, []
-    seen = np.flatnonzero(np.isfinite(epochs.position_m).any(axis=1))
-    limit = max(settings.outage_s, largest_step_s((epochs.time_s[seen] * 1e9).astype(np.int64)))
-    for last, back in pairwise(seen):
-        length = float(epochs.time_s[back] - epochs.time_s[last])
-        if length > limit:
-            jump = float(np.hypot(*run.innovation[back, 0]))
-            sigma = float(np.sqrt(np.sum(run.innovation_variance[back, 0])))
-            found.append(RealOutage(float(epochs.time_s[last]), float(epochs.time_s[back]), length, jump, sigma))
-    if len(seen) and epochs.time_s[-1] - epochs.time_s[seen[-1]] > limit:
-        begin, end = float(epochs.time_s[seen[-1]]), float(epochs.time_s[-1])
-        found.append(RealOutage(begin, end, end - begin, None, None))
-    return tuple(found)
-
-
-def _corrected(
-    compared: Differences, run: FilterRun, outages: tuple[RealOutage, ...], settings: InertialSettings
-) -> FloatArray:
-    """Position error to take off: the filter's, and through outages the default method's forecast."""
-    out = np.array(run.x[:, POSITION])
-    time_s = run.epochs.time_s
-    is_coupled = settings.model == "coupled" and settings.default_method == "last_estimate"
-    if settings.default_method == "last_estimate" and not is_coupled:
-        return out
-    coupled = run_coupled(compared, run.noise, settings) if is_coupled else None
-    for outage in outages:
-        start = int(np.searchsorted(time_s, outage.start_s))
-        inside = np.flatnonzero((time_s > outage.start_s) & (time_s < outage.end_s))
-        if not inside.size:
-            continue
-        step = settings.forecast_step_s
-        lead_s = leads_of(step, outage.length_s)
-        at = np.array([start])
-        if coupled is not None:
-            built = hindcast_coupled(coupled, at, lead_s, settings)[0]
-        else:
-            grown = hindcast(run, at, lead_s, (settings.default_method,), settings)
-            built = grown.forecast_m[settings.default_method][0]
-        for axis in range(out.shape[1]):
-            grown_m = np.interp(time_s[inside] - outage.start_s, np.r_[0.0, lead_s], np.r_[0.0, built[:, axis]])
-            out[inside, axis] = run.x[start, POSITION, axis] + grown_m
-    return out
+    return latitude, altitude
 
 
 def observability(run: FilterRun) -> FloatArray:
@@ -178,44 +120,43 @@ def observability(run: FilterRun) -> FloatArray:
 
 
 def _result(
+    flight: Flight,
     compared: Differences,
     run: FilterRun,
     smoothed: Smoothed,
+    bridged: Bridged,
     settings: InertialSettings,
-    noise: InsNoise,
     origin: str,
-    kind: tuple[str, str],
-    outages: tuple[RealOutage, ...],
-    corrected: FloatArray,
-    azimuth: AzimuthEstimate | None,
 ) -> InertialResult:
-    visible = observability(run)
-    epochs = run.epochs
-    radial = np.hypot(*epochs.position_m.T)
-    rate_50, rate_95 = _radial_rates(epochs.time_s, radial)
-    velocity = epochs.velocity_mps[np.isfinite(epochs.velocity_mps).all(axis=1)]
+    visible, epochs = observability(run), run.epochs
+    kind, kind_reason = kind_of(compared, settings)
+    radial, velocity = np.hypot(*run.measured(0).T), run.measured(1)
+    rate_50, rate_95 = _radial_rates(epochs, radial)
+    speed = velocity[np.isfinite(velocity).all(axis=1)]
     return InertialResult(
         ins_topic=compared.ins_topic,
         gnss_topic=compared.gnss_topic,
-        ins_class=noise.name,
+        ins_class=run.noise.name,
         ins_class_origin=origin,
-        kind=kind[0],
-        kind_reason=kind[1],
+        kind=kind,
+        kind_reason=kind_reason,
         transition=run.model.transition,
         epochs=len(epochs),
-        gnss_seconds=float(epochs.has_gnss.sum()) * settings.epoch_interval_s,
+        gnss_seconds=seconds_covered(epochs.time_s[epochs.has_gnss], settings.outage_s),
         channels=tuple(_channel(run, visible, channel) for channel in range(len(figures.CHANNELS))),
         radial_error_rate_50_nmiph=rate_50,
         radial_error_rate_95_nmiph=rate_95,
-        velocity_error_rms_mps=float(np.sqrt(np.mean(np.sum(velocity**2, axis=1)))) if len(velocity) else None,
+        velocity_error_rms_mps=float(np.sqrt(np.mean(np.sum(speed**2, axis=1)))) if len(speed) else None,
         largest_radial_error_m=float(np.nanmax(radial)) if np.isfinite(radial).any() else None,
-        outages=outages,
-        azimuth=azimuth,
-        settings=_flat(settings) | _flat(noise, "noise."),
+        outages=bridged.outages,
+        azimuth=estimate_azimuth(compared, run, settings) if kind == UNAIDED else None,
+        reopened=run.reopened,
+        other_ins=tuple(name for name in topics_of_kind("ins", flight.topics()) if name != compared.ins_topic),
+        settings=_flat(settings) | _flat(run.noise, "noise."),
         figures=(
             figures.states_figure(run, smoothed),
             figures.observability_figure(run, visible),
-            figures.track_figure(compared, corrected, smoothed.x[:, POSITION], run),
+            figures.track_figure(compared, bridged.error_m, smoothed.x[:, POSITION], run),
         ),
     )
 
@@ -255,14 +196,19 @@ def _channel(run: FilterRun, visible: FloatArray, channel: int) -> ChannelResult
         share_inside95=float(np.mean(inside <= BOUND95**2)),
         innovations=int((used != 0).sum()),
         rejected=int((used == -1).sum()),
-        velocity_error_rms_mps=_rms(run.epochs.velocity_mps[:, channel]),
-        position_error_rms_m=_rms(run.epochs.position_m[:, channel]),
+        velocity_error_rms_mps=_rms(run.measured(1)[:, channel]),
+        position_error_rms_m=_rms(run.measured(0)[:, channel]),
     )
 
 
-def _radial_rates(time_s: FloatArray, radial_m: FloatArray) -> tuple[float | None, float | None]:
-    """Radial error over the time since the first epoch, nmi/h: median and 95 % over epochs later than ten minutes."""
-    elapsed = time_s - time_s[0]
+def _radial_rates(epochs: Epochs, radial_m: FloatArray) -> tuple[float | None, float | None]:
+    """Radial error over the time since the first epoch or the last reset of the INS, nmi/h: median and 95 %.
+
+    Over epochs later than ten minutes after it.
+    """
+    began = np.flatnonzero(epochs.is_reset | (np.arange(len(epochs)) == 0))
+    which = np.searchsorted(began, np.arange(len(epochs)), side="right") - 1
+    elapsed = epochs.time_s - epochs.time_s[began[which]]
     late = (elapsed > RATE_FROM_S) & np.isfinite(radial_m)
     if not late.any():
         return None, None
@@ -283,15 +229,31 @@ def _findings(compared: Differences, run: FilterRun, result: InertialResult) -> 
         found.append(Finding("warn", "inertial.outlier", text, compared.gnss_topic, place, rejected))
     if run.reopened:
         text = (
-            f"GNSS rejected for more than {PATIENCE_S:.0f} s and then believed after all: the noise of INS class "
-            f"{result.ins_class} does not fit this INS or this receiver"
+            f"GNSS rejected for more than {PATIENCE_S:.0f} s and then believed after all: INS or GNSS jumped unseen, "
+            f"or the noise of INS class {result.ins_class} does not fit"
         )
         found.append(Finding("warn", "inertial.reopened", text, compared.gnss_topic, count=run.reopened))
+    if result.other_ins:
+        text = f"INS errors are those of {result.ins_topic} alone; not looked at: {', '.join(result.other_ins)}"
+        found.append(Finding("info", "inertial.other_ins", text, count=len(result.other_ins)))
+    return [*found, *_outage_findings(compared, result)]
+
+
+def _outage_findings(compared: Differences, result: InertialResult) -> list[Finding]:
+    """One finding for each outage, or one for all where there are many."""
+    names = {"gnss": "GNSS", "ins": "INS", "both": "INS and GNSS"}
+    if len(result.outages) > OUTAGES_LISTED:
+        longest = max(result.outages, key=lambda outage: outage.length_s)
+        text = f"INS and GNSS not together in {len(result.outages)} intervals, the longest {longest.length_s:.0f} s"
+        place = f"longest from {longest.start_s:.1f} s"
+        return [Finding("info", "inertial.outage", text, compared.gnss_topic, place, len(result.outages))]
+    found = []
     for outage in result.outages:
-        after = "GNSS did not come back"
+        after = "how the forecast through it came out is not known"
         if outage.jump_m is not None:
-            after = f"the forecast was {outage.jump_m:.0f} m off when it came back (claimed {outage.sigma_m:.0f} m)"
-        text = f"no GNSS for {outage.length_s:.0f} s: {after}"
+            claimed = "" if outage.sigma_m is None else f" (claimed {outage.sigma_m:.0f} m)"
+            after = f"the forecast was {outage.jump_m:.0f} m off at its end{claimed}"
+        text = f"no {names[outage.missing]} for {outage.length_s:.0f} s: {after}"
         found.append(Finding("info", "inertial.outage", text, compared.gnss_topic, f"from {outage.start_s:.1f} s"))
     return found
 

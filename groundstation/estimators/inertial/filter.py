@@ -1,17 +1,21 @@
 """Kalman filter and smoother of the two channels over one flight, on irregular epochs and across gaps."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Int64Array, frozen
-from groundstation.estimators.inertial.model import SIZE, ChannelModel, FloatArray
+from groundstation.estimators.inertial.model import POSITION, SIZE, VELOCITY, ChannelModel, FloatArray
 from groundstation.estimators.inertial.noise import InsNoise
 
 TIME_RESOLUTION_S = 1e-4  # intervals that agree to this share one transition
 MOST_TRANSITIONS = 4096  # distinct intervals kept exactly; jittered clocks are rounded more coarsely beyond
+FIRST_SAMPLES = 15
+ROOM_OF_THE_GATE = 3.0  # times the sigma of a single measurement
 PATIENCE_S = 60.0  # GNSS rejected for so long is believed again
+REJECTED = -1
 STANDARD_GATE = 25.0  # squared sigmas
 RESET_POSITION_M, RESET_VELOCITY_MPS = 2e4, 20.0  # what a reset of the INS may change; tilt and drift are kept
 
@@ -54,7 +58,7 @@ class Epochs:
 
     @property
     def interval_s(self) -> float:
-        """Median interval of the epochs, seconds; 1 for fewer than two."""
+        """Median interval of the epochs, with GNSS or without, seconds; 1 for fewer than two."""
         return float(np.median(np.diff(self.time_s))) if len(self) > 1 else 1.0
 
     @property
@@ -120,6 +124,11 @@ class FilterRun:
     gain: FloatArray
     reopened: int = 0
 
+    def measured(self, kind: int) -> FloatArray:
+        """Position (0) or velocity (1) differences, shape (n, c), NaN also where the filter rejected them."""
+        values = (self.epochs.position_m, self.epochs.velocity_mps)[kind]
+        return np.where(self.used[:, kind] == REJECTED, np.nan, values)
+
     def covariance(self, channel: int) -> FloatArray:
         """Covariance of a channel, shape (n, 6, 6)."""
         return np.asarray(self.P[min(channel, len(self.P) - 1)])
@@ -127,6 +136,20 @@ class FilterRun:
     def sigma(self, channel: int) -> FloatArray:
         """Standard deviations of a channel's states, shape (n, 6)."""
         return np.asarray(np.sqrt(np.maximum(np.einsum("nii->ni", self.covariance(channel)), 0.0)))
+
+
+def initial_of(epochs: Epochs, noise: InsNoise) -> Initial:
+    """Start from what the first samples show: a recording may begin in flight, hours after the alignment of the INS.
+
+    Position and velocity error are the medians of the first :data:`FIRST_SAMPLES` differences, with the class's sigma.
+    """
+    x = np.zeros((SIZE, epochs.position_m.shape[1]))
+    for state, measured in ((POSITION, epochs.position_m), (VELOCITY, epochs.velocity_mps)):
+        for channel in range(x.shape[1]):
+            known = measured[np.isfinite(measured[:, channel]), channel]
+            if len(known):
+                x[state, channel] = float(np.median(known[:FIRST_SAMPLES]))
+    return Initial(x, np.diag(noise.initial_variances())[None])
 
 
 def steps_between(time_s: FloatArray, model: ChannelModel, noise: InsNoise) -> Steps:
@@ -179,10 +202,11 @@ def run_filter(
     groups = [list(range(channels))] if together else [[channel] for channel in range(channels)]
     drag = epochs.drag_per_s * np.diff(epochs.time_s, prepend=epochs.time_s[:1])[:, None, None]
     first = initial or Initial(np.zeros((SIZE, channels)), np.diag(noise.initial_variances())[None])
-    parts = [
-        _run_group(z[:, :, group], drag, epochs, steps, noise, gate, first.of(group), first.covariance(group[0]))
-        for group in groups
-    ]
+    parts: list[tuple[Any, ...]] = []
+    for group in groups:  # the channel north comes first: it is not dragged by the other
+        pushed = _pushed(drag, group, [part[0] for part in parts])
+        own = np.ascontiguousarray(drag[:, group][:, :, group])
+        parts.append(_run_group(z[:, :, group], own, pushed, epochs, steps, noise, gate, first, group))
     x, P, gain, innovation, variance, used, reopened = (list(part) for part in zip(*parts, strict=True))
     spread = [np.repeat(item[:, :, None], len(group), axis=2) for item, group in zip(variance, groups, strict=True)]
     marks = [np.repeat(item[:, :, None], len(group), axis=2) for item, group in zip(used, groups, strict=True)]
@@ -211,37 +235,67 @@ def _stacked(parts: list[FloatArray]) -> FloatArray:
     return parts[0][None] if len(parts) == 1 else np.stack(parts)
 
 
+def gnss_intervals_s(epochs: Epochs) -> tuple[float, float]:
+    """Median interval of the epochs with a position and of those with a velocity; 1 s for fewer than two."""
+    found = []
+    for measured in (epochs.position_m, epochs.velocity_mps):
+        times = epochs.time_s[np.isfinite(measured).any(axis=1)]
+        found.append(float(np.median(np.diff(times))) if len(times) > 1 else 1.0)
+    return found[0], found[1]
+
+
+def measurement_variances(epochs: Epochs, noise: InsNoise) -> tuple[FloatArray, FloatArray]:
+    """Variances of position and velocity, shape (2,) each: as they are weighted, and as a single one errs.
+
+    The first are inflated for slow errors; the second are not, or the gate would be as wide as the inflation, but leave
+    room for a receiver worse than the class thinks and for the lag of a filter that weighs it little.
+    """
+    weighted = [noise.gnss.variances(interval)[kind] for kind, interval in enumerate(gnss_intervals_s(epochs))]
+    believed = replace(noise.gnss, is_inflated=False).variances(1.0)
+    return np.array(weighted), ROOM_OF_THE_GATE**2 * np.array(believed)
+
+
+def _pushed(drag: FloatArray, group: list[int], earlier: list[FloatArray]) -> FloatArray:
+    """Metres by which a channel alone is dragged by the one that was run before it, shape (n, c)."""
+    push = np.zeros((len(drag), len(group)))
+    if len(group) == 1 and earlier:
+        north = earlier[0][:, POSITION, 0]
+        push[1:, 0] = drag[1:, group[0], 0] * north[:-1]
+    return push
+
+
 def _run_group(
     z: FloatArray,
     drag: FloatArray,
+    push: FloatArray,
     epochs: Epochs,
     steps: Steps,
     noise: InsNoise,
     gate: float,
-    x0: FloatArray,
-    P0: FloatArray,
+    first: Initial,
+    group: list[int],
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, NDArray[np.int8], int]:
     from groundstation.estimators.inertial import kernels
 
     n, _, channels = z.shape
     x, P, K = np.empty((n, SIZE, channels)), np.empty((n, SIZE, SIZE)), np.empty((n, 2, SIZE))
     y, S, used = np.empty((n, 2, channels)), np.empty((n, 2)), np.zeros((n, 2), dtype=np.int8)
-    R = np.tile(noise.gnss.variances(epochs.interval_s), (n, 1))
+    weighted, believed = measurement_variances(epochs, noise)
     opened = np.square([RESET_POSITION_M, RESET_VELOCITY_MPS])
-    reset = np.where(epochs.is_reset[:, None], opened, 0.0)
     reopened = kernels.run_filter(
         steps.index,
         steps.transitions,
         steps.noises,
         np.ascontiguousarray(z),
         drag,
-        reset,
-        x0,
-        P0,
-        R,
+        push,
+        np.where(epochs.is_reset[:, None], opened, 0.0),
+        first.of(group),
+        first.covariance(group[0]),
+        weighted,
+        believed,
         gate,
-        max(1, round(PATIENCE_S / epochs.interval_s)),
-        opened,
+        max(1, round(PATIENCE_S / min(gnss_intervals_s(epochs)))),
         x,
         P,
         K,

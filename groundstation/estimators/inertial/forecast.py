@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.inertial import figures
 from groundstation.estimators.inertial.coupled import CoupledRun, coupled_rows, hindcast_coupled, run_coupled
-from groundstation.estimators.inertial.estimate import AIDED, Estimation
+from groundstation.estimators.inertial.estimate import Estimation
 from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.gaps import gap_rows
 from groundstation.estimators.inertial.hindcast import Hindcast, hindcast, leads_of, start_epochs
-from groundstation.estimators.inertial.model import FloatArray
+from groundstation.estimators.inertial.kind import AIDED, UNKNOWN
+from groundstation.estimators.inertial.model import POSITION, FloatArray
 from groundstation.estimators.inertial.replay import LEAST_STARTS, Plan, map_grid, plan_replay
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import calibration_rows, claimed_sigma, skill_rows
@@ -46,7 +47,8 @@ def assess_forecast(
     Raises
     ------
     NotAssessableError
-        For an INS that GNSS corrects already, and a flight too short for any replayed outage.
+        For an INS that GNSS corrects already, or of which that cannot be told, and a flight too short for any replayed
+        outage.
 
     Notes
     -----
@@ -58,6 +60,8 @@ def assess_forecast(
         raise NotAssessableError(
             "forecast", f"the INS is corrected by GNSS already ({result.kind_reason}): a forecast from it means nothing"
         )
+    if result.kind == UNKNOWN:
+        raise NotAssessableError("forecast", result.kind_reason)
     plan = plan_replay(run, settings)
     if not plan.horizons_min:
         minutes = float(np.ptp(run.epochs.time_s)) / 60.0
@@ -83,7 +87,7 @@ def assess_forecast(
         is_calibrated=plan.is_calibrated,
         calibration_reason=plan.reason,
         skill=skill,
-        gaps=gap_rows(run, judged.at, _lengths_that_fit(plan)),
+        gaps=gap_rows(run, judged.at, _lengths_that_fit(plan), settings=settings),
         phases=_phases(run, settings, phase_of),
         classic_starts=classic,
         calibration=calibration_rows(replay, claimed, plan.horizons_min, plan.first_start_s),
@@ -160,4 +164,5 @@ def _classic(
 
 
 def _known(run: FilterRun, replay: Hindcast) -> FloatArray:
-    return np.asarray(np.nan_to_num(run.epochs.position_m[replay.at]))
+    measured = run.epochs.position_m[replay.at]
+    return np.where(np.isfinite(measured), measured, run.x[replay.at, POSITION])

@@ -6,14 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.records import BoolArray, Int64Array
+from groundstation.estimators.inertial.differences import only_used
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, Initial, run_filter, smooth
 from groundstation.estimators.inertial.model import POSITION, FloatArray
+from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import QUANTILES
 from groundstation.results.forecast import GapRow
 
 LENGTHS_MIN = (10.0, 30.0, 60.0, 90.0)
 AFTER_S = 5400.0  # of data used behind a gap; more hardly changes what is inside it
 LEAST_AFTER_S = 300.0
+MOST_STARTS = 60
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,9 @@ class _Replayed:
     inside: dict[str, BoolArray]
 
 
-def gap_rows(run: FilterRun, at: Int64Array, lengths_min: Sequence[float] = LENGTHS_MIN) -> tuple[GapRow, ...]:
+def gap_rows(
+    run: FilterRun, at: Int64Array, lengths_min: Sequence[float] = LENGTHS_MIN, *, settings: InertialSettings
+) -> tuple[GapRow, ...]:
     """Take GNSS away from every start for each length, and compare what was made of it with what GNSS showed.
 
     Parameters
@@ -38,9 +43,11 @@ def gap_rows(run: FilterRun, at: Int64Array, lengths_min: Sequence[float] = LENG
     -----
     ``forward`` is the filter's own forecast, ``rts`` the smoother with :data:`AFTER_S` of data behind the gap.
     """
-    rows = []
+    rows, chosen = [], at[:: max(1, -(-len(at) // MOST_STARTS))]
     for length in lengths_min:
-        replayed = [part for part in (_replay(run, int(epoch), length * 60.0) for epoch in at) if part is not None]
+        replayed = [
+            part for part in (_replay(run, int(epoch), length * 60.0, settings) for epoch in chosen) if part is not None
+        ]
         for method in ("forward", "rts"):
             largest = [np.nanmax(part.radial_m[method]) for part in replayed]
             inside = np.concatenate([part.inside[method] for part in replayed]) if replayed else np.zeros(0)
@@ -57,7 +64,7 @@ def gap_rows(run: FilterRun, at: Int64Array, lengths_min: Sequence[float] = LENG
     return tuple(rows)
 
 
-def _replay(run: FilterRun, epoch: int, length_s: float) -> _Replayed | None:
+def _replay(run: FilterRun, epoch: int, length_s: float, settings: InertialSettings) -> _Replayed | None:
     """None where the gap does not fit the flight or GNSS was not there to judge it."""
     time_s = run.epochs.time_s
     end_s = time_s[epoch] + length_s
@@ -66,10 +73,14 @@ def _replay(run: FilterRun, epoch: int, length_s: float) -> _Replayed | None:
     if first_after >= behind or time_s[behind - 1] - end_s < LEAST_AFTER_S:
         return None
     span, inside = slice(epoch, behind), slice(1, first_after - epoch)
-    measured = run.epochs.position_m[span][inside]
+    measured = run.measured(0)[span][inside]
+    if run.epochs.is_reset[epoch + 1 : behind].any():
+        return None
     if not np.isfinite(measured).all(axis=1).any():
         return None
-    forward = run_filter(_without(run.epochs, span, first_after - epoch), run.model, run.noise, initial=_at(run, epoch))
+    cut = only_used(_without(run.epochs, span, first_after - epoch), settings)
+    gate = settings.gate_sigmas**2
+    forward = run_filter(cut, run.model, run.noise, gate=gate, initial=_at(run, epoch))
     smoothed = smooth(forward)
     sigmas = np.stack([forward.sigma(channel)[inside, POSITION] for channel in range(measured.shape[1])], axis=1)
     lead_s = time_s[span][inside] - time_s[epoch]

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.records import Int64Array
-from groundstation.estimators.inertial.filter import Epochs, FilterRun
-from groundstation.estimators.inertial.model import FloatArray
+from groundstation.estimators.inertial.filter import Epochs, FilterRun, gnss_intervals_s
+from groundstation.estimators.inertial.model import POSITION, FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.starts import start_states
 
-NEAREST_S = 1.0  # a forecast is compared with an epoch no further away than this
+NEAREST_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -54,11 +54,14 @@ def start_epochs(epochs: Epochs, first_s: float, step_s: float) -> Int64Array:
     """Epochs with GNSS at or just after ``first_s``, ``first_s + step_s`` ... , as indices."""
     if not len(epochs):
         return np.zeros(0, dtype=np.int64)
-    wanted = np.arange(first_s, epochs.time_s[-1], step_s)
-    at = np.searchsorted(epochs.time_s, wanted - 1e-6)
-    near = np.abs(epochs.time_s[np.minimum(at, len(epochs) - 1)] - wanted) <= NEAREST_S
-    at = np.unique(at[near])
-    return np.asarray(at[np.isfinite(epochs.position_m[at]).all(axis=1)], dtype=np.int64)
+    known = np.flatnonzero(np.isfinite(epochs.position_m).all(axis=1))
+    if not len(known):
+        return np.zeros(0, dtype=np.int64)
+    times = epochs.time_s[known]
+    wanted = np.arange(first_s, times[-1], step_s)
+    at = np.minimum(np.searchsorted(times, wanted - 1e-6), len(known) - 1)
+    near = np.abs(times[at] - wanted) <= nearest_s(epochs)
+    return np.unique(known[at[near]])
 
 
 def hindcast(
@@ -79,7 +82,7 @@ def hindcast(
     every = max(1, round(lead_step / settings.forecast_step_s))
     step_s = lead_step / every
     drag = _drag_along(epochs, start_s, step_s, every * len(lead_s))
-    known = np.nan_to_num(epochs.position_m[at])
+    known = np.where(np.isfinite(epochs.position_m[at]), epochs.position_m[at], run.x[at, POSITION])
     forecasts = {
         method: _forecast(run, method, start_states(method, run, at, settings), drag, known, step_s, every, len(lead_s))
         for method in methods
@@ -93,15 +96,29 @@ def leads_of(step_s: float, longest_s: float) -> FloatArray:
 
 
 def built_up(epochs: Epochs, at: Int64Array, lead_s: FloatArray) -> FloatArray:
-    """Position error that built up from each start to each lead as GNSS showed it, shape (s, l, c), NaN unknown."""
+    """Position error that built up from each start to each lead as GNSS showed it, shape (s, l, c), NaN unknown.
+
+    Unknown too where the INS was reset in between: what built up then is none of the forecast's.
+    """
     when = epochs.time_s[at][:, None] + np.asarray(lead_s)[None, :]
-    after = np.minimum(np.searchsorted(epochs.time_s, when - 1e-6), len(epochs) - 1)
+    known = np.flatnonzero(np.isfinite(epochs.position_m).all(axis=1))
+    if not len(known):
+        return np.full((*when.shape, epochs.position_m.shape[1]), np.nan)
+    times = epochs.time_s[known]
+    after = np.minimum(np.searchsorted(times, when - 1e-6), len(known) - 1)
     before = np.maximum(after - 1, 0)
-    is_before = np.abs(epochs.time_s[before] - when) < np.abs(epochs.time_s[after] - when)
-    nearest = np.where(is_before, before, after)
-    near = np.abs(epochs.time_s[nearest] - when) <= NEAREST_S
+    is_before = np.abs(times[before] - when) < np.abs(times[after] - when)
+    nearest = known[np.where(is_before, before, after)]
+    resets = np.cumsum(epochs.is_reset)
+    is_shown = np.abs(epochs.time_s[nearest] - when) <= nearest_s(epochs)
+    is_shown &= resets[nearest] == resets[at][:, None]
     change = epochs.position_m[nearest] - epochs.position_m[at][:, None]
-    return np.where(near[:, :, None], change, np.nan)
+    return np.where(is_shown[:, :, None], change, np.nan)
+
+
+def nearest_s(epochs: Epochs) -> float:
+    """How far from a start or a lead an epoch may be that is compared: one interval of GNSS, a second at least."""
+    return max(NEAREST_S, gnss_intervals_s(epochs)[0])
 
 
 def _forecast(

@@ -78,13 +78,14 @@ def run_filter(
     noises: FloatArray,
     z: FloatArray,
     drive: FloatArray,
+    push: FloatArray,
     reset: FloatArray,
     x0: FloatArray,
     P0: FloatArray,
     R: FloatArray,
+    believed: FloatArray,
     gate: float,
     patience: int,
-    opened: FloatArray,
     x: FloatArray,
     P: FloatArray,
     K: FloatArray,
@@ -102,19 +103,20 @@ def run_filter(
         Phi and Q of each distinct interval.
     z : ndarray, shape (n, 2, c)
         Measurements of position and velocity error per channel, NaN where absent (in any channel: in all).
-    drive : ndarray, shape (n, 2, 2)
-        Known rates (1/s) by which the position error of channel i is dragged by that of channel j (transport).
+    drive : ndarray, shape (n, c, c)
+        Share of its position error by which that of channel i is dragged by channel j in the step (transport).
+    push : ndarray, shape (n, c)
+        Metres by which the position error grows in the step besides.
     reset : ndarray, shape (n, 2)
         Variance added to position and velocity before the epoch (an INS reset); 0 elsewhere.
     x0, P0 : ndarrays, shapes (6, c), (6, 6)
-    R : ndarray, shape (n, 2)
-        Variances of the measurements.
+    R, believed : ndarrays, shape (2,)
+        Variances of the measurements, as they are weighted and as single ones are believed to err.
     gate : float
-        An epoch's measurement is rejected where y^2 / S exceeds it in any channel.
+        A measurement is rejected where y^2 exceeds so many times its variance with ``believed``, in any channel.
     patience : int
-        So many rejections in a row of one kind, and it is the filter that is wrong: it is opened again.
-    opened : ndarray, shape (2,)
-        Variance then added to position and velocity.
+        So many rejections in a row of one kind, and it is the filter that is wrong: the state that was measured is
+        opened by the square of the innovation.
     x, P : ndarrays, shapes (n, 6, c), (n, 6, 6)
         Filled: states and covariance after the update.
     K, y, S : ndarrays, shapes (n, 2, 6), (n, 2, c), (n, 2)
@@ -146,9 +148,10 @@ def run_filter(
                 new[3, c] = now[3, c] + F[3, 4] * now[4, c]
                 new[4, c] = now[4, c]
                 new[5, c] = F[5, 5] * now[5, c]
-            if channels == 2:
-                for c in range(2):
-                    new[0, c] += drive[k, c, 0] * now[0, 0] + drive[k, c, 1] * now[0, 1]
+            for c in range(channels):
+                new[0, c] += push[k, c]
+                for j in range(channels):
+                    new[0, c] += drive[k, c, j] * now[0, j]
             for c in range(channels):
                 for i in range(6):
                     now[i, c] = new[i, c]
@@ -192,20 +195,20 @@ def run_filter(
                 for i in range(6):
                     K[k, m, i] = 0.0
                 continue
-            s = p[m, m] + R[k, m]
+            s = p[m, m] + R[m]
             S[k, m] = s
             is_good = True
             for c in range(channels):
-                if y[k, m, c] * y[k, m, c] > gate * s:
+                if y[k, m, c] * y[k, m, c] > gate * (p[m, m] + believed[m]):
                     is_good = False
             if is_good:
                 in_a_row[m] = 0
             else:
                 in_a_row[m] += 1
                 if in_a_row[m] > patience:
-                    p[0, 0] += opened[0]
-                    p[1, 1] += opened[1]
-                    s = p[m, m] + R[k, m]
+                    for c in range(channels):
+                        p[m, m] += y[k, m, c] * y[k, m, c]
+                    s = p[m, m] + R[m]
                     S[k, m] = s
                     in_a_row[:] = 0
                     reopened += 1
@@ -221,12 +224,17 @@ def run_filter(
             for c in range(channels):
                 for i in range(6):
                     now[i, c] += K[k, m, i] * y[k, m, c]
-            # Joseph: (I - K H) p (I - K H)' + K R K', written out for H of a single one; w holds row m.
-            for i in range(6):
-                w[0, i] = p[m, i]
+            # Joseph: w = (I - K H) p, then w (I - K H)' + K R K', for H of the single state m
+            for j in range(6):
+                for i in range(6):
+                    w[i, j] = p[i, j] - K[k, m, i] * p[m, j]
+                w[m, j] = (1.0 - K[k, m, m]) * p[m, j]
             for i in range(6):
                 for j in range(i, 6):
-                    total = p[i, j] - K[k, m, i] * w[0, j] - K[k, m, j] * w[0, i] + K[k, m, i] * K[k, m, j] * s
+                    kept = w[i, j] - w[i, m] * K[k, m, j]
+                    if j == m:
+                        kept = w[i, m] * (1.0 - K[k, m, m])
+                    total = kept + K[k, m, i] * R[m] * K[k, m, j]
                     p[i, j] = total
                     p[j, i] = total
         for i in range(6):

@@ -5,10 +5,10 @@ Shared by both channels: neither the transition nor the noise depends on which w
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, overload
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from groundstation.base.geodesy import EARTH_RATE_RADPS, SEMI_MAJOR_M, curvature_radii_m
 
@@ -25,8 +25,12 @@ GRAVITY_EQUATOR_MPS2, GRAVITY_POLE_FACTOR = 9.7803253359, 0.00193185265241  # WG
 GRAVITY_ECCENTRICITY_SQUARED = 0.00669437999013
 
 
-def normal_gravity_mps2(latitude_deg: float, altitude_m: float) -> float:
-    """Normal gravity, m/s^2, at a latitude and an altitude above the ellipsoid.
+@overload
+def normal_gravity_mps2(latitude_deg: float, altitude_m: float) -> float: ...
+@overload
+def normal_gravity_mps2(latitude_deg: FloatArray, altitude_m: FloatArray) -> FloatArray: ...
+def normal_gravity_mps2(latitude_deg: ArrayLike, altitude_m: ArrayLike) -> float | FloatArray:
+    """Normal gravity, m/s^2, at latitudes and altitudes above the ellipsoid: a number of numbers, an array of arrays.
 
     Source: NIMA TR8350.2, 2000, equations 4-1 and 4-3 (the first two terms of the height).
 
@@ -34,14 +38,17 @@ def normal_gravity_mps2(latitude_deg: float, altitude_m: float) -> float:
     --------
     >>> round(normal_gravity_mps2(45.0, 0.0), 5)
     9.8062
+    >>> normal_gravity_mps2(np.array([0.0, 90.0]), np.array([0.0, 10_000.0])).round(5).tolist()
+    [9.78033, 9.80135]
     """
-    sine_squared = math.sin(math.radians(latitude_deg)) ** 2
+    sine_squared = np.sin(np.deg2rad(np.asarray(latitude_deg, dtype=np.float64))) ** 2
     at_zero = (
         GRAVITY_EQUATOR_MPS2
         * (1.0 + GRAVITY_POLE_FACTOR * sine_squared)
-        / math.sqrt(1.0 - GRAVITY_ECCENTRICITY_SQUARED * sine_squared)
+        / np.sqrt(1.0 - GRAVITY_ECCENTRICITY_SQUARED * sine_squared)
     )
-    return at_zero * (1.0 - 2.0 * altitude_m / SEMI_MAJOR_M)
+    gravity = np.asarray(at_zero * (1.0 - 2.0 * np.asarray(altitude_m, dtype=np.float64) / SEMI_MAJOR_M))
+    return gravity if gravity.ndim else float(gravity)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.records import Int64Array
+from groundstation.estimators.inertial.differences import seconds_covered
 from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.hindcast import built_up, leads_of, start_epochs
 from groundstation.estimators.inertial.model import FloatArray
@@ -59,11 +60,11 @@ def plan_replay(run: FilterRun, settings: InertialSettings) -> Plan:
     if _judged(run, first, step, HALF_HOUR_MIN) < LEAST_STARTS:
         first = min(first, begin + max(LEAST_PAST_S, SHORT_SHARE * (end - begin)))
         step = min(step, max(10.0, (end - first) / 20.0))
-    past_min = max(first - begin, 0.0) / 60.0
+    past_min = seconds_covered(time_s[time_s <= first], settings.outage_s) / 60.0
     reason = ""
     if past_min < run.model.schuler_period_min:
         reason = (
-            f"only {past_min:.0f} min of flight before the first replayed outage, less than one Schuler period "
+            f"only {past_min:.0f} min of GNSS before the first replayed outage, less than one Schuler period "
             f"({run.model.schuler_period_min:.1f} min): the sigma rests on the class"
         )
     past = int(max(first - begin - PAST_FROM_S, 0.0) / step)

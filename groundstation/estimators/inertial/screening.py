@@ -17,8 +17,11 @@ from groundstation.tables.motion import runs
 from groundstation.tables.table import Flight, Table
 
 CHANNEL_FIELDS = ("latitude_deg", "longitude_deg", "velocity_north_mps", "velocity_east_mps")
-LONGEST_STEP_S = 5.0  # between two samples for a step of position to be held against the velocity
+LONGEST_STEP_S = 120.0  # between two samples for a step of position to be held against the velocity
+UNEXPLAINED = 0.03  # of the distance flown in the step: the velocity in between is not known
+JUDGED_GAP_S = 60.0  # a difference may have moved anywhere in a longer gap of INS or GNSS: the filter judges that
 DRIFT_MPS = 5.0  # by which a difference may grow unseen: 10 nmi/h
+SIGMAS_OF_A_JUMP = 8.0
 LISTED = 3
 
 
@@ -99,10 +102,13 @@ def _steps(table: Table, limit_m: float) -> Int64Array:
     unexplained = np.zeros(len(seconds))
     for moved, name in ((north, "velocity_north_mps"), (east, "velocity_east_mps")):
         velocity = table.values(name)[known]
+        if not np.isfinite(velocity).any():  # the position's own rate before the step is the next best
+            velocity = np.concatenate([moved[:1] / seconds[:1], moved / seconds])
+            velocity[1:] = velocity[:-1].copy()
         mean = 0.5 * (velocity[1:] + velocity[:-1])
         spread = 0.5 * np.abs(velocity[1:] - velocity[:-1]) * seconds  # the velocity may turn in between
-        expected = np.where(np.isfinite(mean), mean, np.nan) * seconds
-        unexplained += np.square(np.maximum(np.abs(moved - expected) - spread - 0.01 * np.abs(moved), 0.0))
+        slack = spread + np.where(seconds > 2.0, UNEXPLAINED, 0.01) * np.abs(moved)
+        unexplained += np.square(np.maximum(np.abs(moved - mean * seconds) - slack, 0.0))
     is_step = (np.sqrt(unexplained) > limit_m) & (seconds <= LONGEST_STEP_S)
     return known[1:][is_step]
 
@@ -142,8 +148,9 @@ def _displaced(
     if len(known) < 2:
         return out
     time_s, difference = flight.seconds(gnss.time_ns[known]), position_m[known]
-    allowed = settings.jump_m + DRIFT_MPS * np.diff(time_s)
-    moved = np.hypot(*np.diff(difference, axis=0).T)
+    step_s, moved = np.diff(time_s), np.hypot(*np.diff(difference, axis=0).T)
+    jump_m = max(settings.jump_m, SIGMAS_OF_A_JUMP * float(np.median(moved)))  # a noisy receiver jumps all the time
+    allowed = np.where(step_s > JUDGED_GAP_S, np.inf, jump_m + DRIFT_MPS * step_s)
     resets = np.searchsorted(gnss.time_ns[known], reset_ns)  # the INS jumped there: not the receiver's fault
     is_reset = np.zeros(len(known) + 1, dtype=bool)
     is_reset[resets] = True
@@ -165,8 +172,8 @@ def _displaced(
                 believed.add(index)
                 last = index
                 continue
-            away = float(np.hypot(*(difference[here] - difference[there])))
-            if away <= settings.jump_m + DRIFT_MPS * abs(time_s[here] - time_s[there]):
+            away, apart_s = float(np.hypot(*(difference[here] - difference[there]))), abs(time_s[here] - time_s[there])
+            if away <= jump_m + DRIFT_MPS * apart_s:
                 believed.add(index)
                 last = index
     for index, (first, end) in enumerate(pieces):

@@ -27,8 +27,10 @@ class Claimed:
     Parameters
     ----------
     model_m, scaled_m : ndarrays, shape (s, l, c)
-        ``scaled_m`` is ``model_m`` times what the class and the flight's own past before the start show.
+        What GNSS errs at both ends is in both: it is against GNSS that a forecast is judged.
     scale : ndarray, shape (s, l)
+        What the INS part of ``model_m`` was multiplied by: the class's scale and the flight's own past before the start
+        (which multiplies the part of GNSS too).
     """
 
     model_m: FloatArray
@@ -49,17 +51,19 @@ def claimed_sigma(method: str, run: FilterRun, replay: Hindcast, settings: Inert
     if method not in WITH_COVARIANCE:
         return None
     channels = replay.actual_m.shape[2]
-    growth = lead_growth(run, replay.lead_s)
-    variance = [
+    growth, of_class = lead_growth(run, replay.lead_s), run.noise.calibration.at(replay.lead_s)
+    parts = [
         growth.variance(start_covariance(method, run, replay.at, channel, settings)) for channel in range(len(run.P))
     ]
-    model = np.sqrt(np.stack([variance[min(channel, len(variance) - 1)] for channel in range(channels)], axis=2))
-    scale = _scale(np.square(replay.error_m(method) / model), replay, run)
-    return Claimed(model, model * scale[:, :, None], scale)
+    ins = np.stack([parts[min(channel, len(parts) - 1)] for channel in range(channels)], axis=2)
+    judge = growth.judge_m2[None, :, None]
+    expected = np.sqrt(ins * np.square(of_class)[None, :, None] + judge)
+    own = _own_scale(np.square(replay.error_m(method) / expected), replay, run)
+    return Claimed(np.sqrt(ins + judge), expected * own[:, :, None], own * of_class[None, :])
 
 
-def _scale(ratio: FloatArray, replay: Hindcast, run: FilterRun) -> FloatArray:
-    """Root of the mean squared ratio of error to sigma, class and past together, shape (s, l).
+def _own_scale(ratio: FloatArray, replay: Hindcast, run: FilterRun) -> FloatArray:
+    """What the past of the flight adds to the class's scale: root of the mean squared ratio of error to sigma, (s, l).
 
     Found at the class's horizons, from the shortest on: what the past of a flight shows of short outages is expected,
     in part, of longer ones, for which it has seen fewer or none. Between them it is interpolated.
@@ -67,14 +71,13 @@ def _scale(ratio: FloatArray, replay: Hindcast, run: FilterRun) -> FloatArray:
     calibration = run.noise.calibration
     nodes = [(lead, 60.0 * horizon) for lead, horizon in _leads(replay, calibration.horizon_min)]
     if not nodes:
-        return np.broadcast_to(calibration.at(replay.lead_s), ratio.shape[:2]).copy()
+        return np.ones(ratio.shape[:2])
     factor, squares = np.ones(len(ratio)), []
     for lead, seconds in nodes:
-        class_square = float(calibration.at(np.array([seconds]))[0]) ** 2
         mean, weight = _past_mean(ratio[:, lead], replay.start_s, seconds)
         expected = 1.0 + INHERITED * (factor - 1.0)
-        factor = (calibration.weight * expected + weight * mean / class_square) / (calibration.weight + weight)
-        squares.append(factor * class_square)
+        factor = (calibration.weight * expected + weight * mean) / (calibration.weight + weight)
+        squares.append(factor)
     at = np.log([seconds for _, seconds in nodes])
     scales, leads = np.sqrt(np.stack(squares, axis=1)), np.log(replay.lead_s)
     return np.stack([np.interp(leads, at, row) for row in scales])

@@ -6,7 +6,7 @@ the model allows follows from E[x^(s) x^(t)'] = (Pi(s) - P(s)) Phi(t, s)' for s 
 true state without any data. d holds the lag of a window behind the true oscillation, which P alone knows nothing of.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -86,7 +86,7 @@ def _windowed(method: str, run: FilterRun, at: Int64Array, channel: int, setting
     time_s, P = run.epochs.time_s, run.covariance(channel)
     known = covariance_without_data(run) - P  # of the estimates themselves
     lengths_s = windows_of(method, settings).lengths_s
-    lags = np.arange(0.0, max(lengths_s) + 1e-9, LAG_STEP_S)
+    lags = np.arange(0.0, min(max(lengths_s), float(np.ptp(time_s))) + 1e-9, LAG_STEP_S)
     phi = np.stack([run.model.transition_over(float(lag)) for lag in lags])
     later = np.abs(np.arange(len(lags))[:, None] - np.arange(len(lags))[None, :])
     out = np.array(P[at])
@@ -120,26 +120,31 @@ def _weights(lags: FloatArray, lengths_s: tuple[float, ...]) -> FloatArray:
 def covariance_without_data(run: FilterRun) -> FloatArray:
     """Covariance Pi of the true states at every epoch had nothing been measured, shape (n, 6, 6)."""
     nothing = np.full((len(run.epochs), 1), np.nan)
-    blind = Epochs.plain(run.epochs.time_s, nothing, nothing)
+    blind = replace(Epochs.plain(run.epochs.time_s, nothing, nothing), is_reset=run.epochs.is_reset)
     return np.asarray(run_filter(blind, run.model, run.noise).P[0])
 
 
 @dataclass(frozen=True)
 class LeadGrowth:
-    """What the model makes of a start at each lead: ``rows`` (l, 6) of Phi, and ``added_m2`` (l,) by noise."""
+    """What the model makes of a start at each lead: ``rows`` (l, 6) of Phi, and ``added_m2`` (l,) by noise.
+
+    ``judge_m2`` (l,) is what GNSS errs at both ends, against which the forecast is judged.
+    """
 
     rows: FloatArray
     added_m2: FloatArray
+    judge_m2: FloatArray
 
     def variance(self, covariance: FloatArray) -> FloatArray:
         """Variance of the position error forecast to build up from starts (s, 6, 6), m^2, shape (s, l)."""
-        return np.asarray(np.einsum("la,sab,lb->sl", self.rows, covariance, self.rows, optimize=True) + self.added_m2)
+        carried = np.einsum("la,sab,lb->sl", self.rows, covariance, self.rows, optimize=True)
+        return np.asarray(np.maximum(carried, 0.0) + self.added_m2)
 
 
 def lead_growth(run: FilterRun, lead_s: FloatArray) -> LeadGrowth:
     """Growth of a forecast's error over leads in equal steps from the first.
 
-    What GNSS itself errs at both ends is in it, for it is against GNSS that a forecast is judged.
+    Source: the model; errors of GNSS at the two ends are correlated as the noise of the class says.
     """
     gnss = run.noise.gnss
     rows, added = np.zeros((len(lead_s), SIZE)), np.zeros(len(lead_s))
@@ -152,4 +157,4 @@ def lead_growth(run: FilterRun, lead_s: FloatArray) -> LeadGrowth:
             rows[lead], added[lead] = carried[POSITION], noise[POSITION, POSITION]
     decay = np.exp(-np.asarray(lead_s) / max(gnss.position_correlation_s, 1e-9))
     ends = 2.0 * (gnss.position_white_m**2 + gnss.position_correlated_m**2 * (1.0 - decay))
-    return LeadGrowth(rows, added + ends)
+    return LeadGrowth(rows, added, ends)

@@ -81,7 +81,7 @@ def start_states(method: str, run: FilterRun, at: Int64Array, settings: Inertial
 
 def _held_velocity(run: FilterRun, at: Int64Array, length_s: float) -> FloatArray:
     """Mean of the measured velocity error over the last seconds; of the estimate where it was not measured."""
-    time_s, measured = run.epochs.time_s, run.epochs.velocity_mps
+    time_s, measured = run.epochs.time_s, run.measured(1)
     states = np.zeros((len(at), SIZE, run.x.shape[2]))
     known = np.isfinite(measured)
     total = _from_zero(np.cumsum(np.where(known, measured, 0.0), axis=0))
@@ -99,7 +99,7 @@ def _schuler_fit(run: FilterRun, at: Int64Array, length_s: float) -> FloatArray:
     As a state: the bias is a constant drift of -bias / R, the slope a tilt of -slope / g.
     """
     time_s = run.epochs.time_s
-    measured = run.epochs.velocity_mps if np.isfinite(run.epochs.velocity_mps).any() else run.x[:, VELOCITY]
+    measured = run.measured(1) if np.isfinite(run.epochs.velocity_mps).any() else run.x[:, VELOCITY]
     rate = run.model.schuler_rate_radps
     phase = rate * time_s
     basis = np.stack([np.ones_like(phase), np.cos(phase), np.sin(phase)], axis=1)
@@ -140,7 +140,8 @@ def _carried_average(run: FilterRun, at: Int64Array, window: Window) -> FloatArr
     """Means of past estimates, each carried to the start by the model first: nothing true is smoothed away."""
     time_s = run.epochs.time_s
     states = np.array(run.x[at])
-    lags = np.arange(0.0, max(window.lengths_s) + 1e-9, LAG_STEP_S)
+    span_s = float(np.ptp(time_s)) if len(time_s) else 0.0
+    lags = np.arange(0.0, min(max(window.lengths_s), span_s) + 1e-9, LAG_STEP_S)
     carried = np.stack([run.model.transition_over(float(lag)) for lag in lags])
     source = np.searchsorted(time_s, time_s[at][:, None] - lags[None, :] + 1e-6, side="right") - 1
     is_there = source >= 0

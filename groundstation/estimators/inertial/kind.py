@@ -1,0 +1,41 @@
+"""Whether GNSS corrects an INS already: then there is nothing to forecast."""
+
+import numpy as np
+
+from groundstation.estimators.inertial.differences import Differences
+from groundstation.estimators.inertial.settings import InertialSettings
+
+UNAIDED, AIDED, UNKNOWN = "unaided", "gnss_aided", "unknown"
+HALF = 0.5
+MINUTE_S, LEAST_MINUTES = 60.0, 5.0
+AT_REST_MPS = 5.0
+DRIFT_MPS = 0.005  # an INS that stays below has not drifted: 0.01 nmi/h
+
+
+def kind_of(compared: Differences, settings: InertialSettings) -> tuple[str, str]:
+    """Say whether GNSS corrects the INS, and why it is thought so.
+
+    Its own mode says so, or it never drifts: 95 % of the minute means of the position difference lie nearer to their
+    median than ``aided_radial_m``, and than an INS of 0.01 nmi/h would drift in the time. Of an INS at rest, and of a
+    few minutes, nothing can be said.
+    """
+    if compared.aided_share > HALF:
+        return AIDED, "its own mode says that GNSS corrects it"
+    epochs = compared.epochs
+    known = np.isfinite(epochs.position_m).all(axis=1)
+    minute = np.floor(epochs.time_s[known] / MINUTE_S).astype(np.int64)
+    _, which, count = np.unique(minute, return_inverse=True, return_counts=True)
+    if len(count) < LEAST_MINUTES:
+        return UNKNOWN, f"{len(count)} min of positions are too short to tell whether GNSS corrects this INS"
+    speed = np.hypot(*compared.velocity_mps.T)
+    if np.isfinite(speed).any() and np.nanquantile(speed, 0.95) < AT_REST_MPS:
+        return UNKNOWN, "the aircraft hardly moved: whether GNSS corrects this INS cannot be told"
+    means = np.stack([np.bincount(which, epochs.position_m[known, axis]) / count for axis in range(2)], axis=1)
+    largest = float(np.quantile(np.hypot(*(means - np.median(means, axis=0)).T), 0.95))
+    seconds = float(np.ptp(epochs.time_s[known]))
+    if largest < min(settings.aided_radial_m, DRIFT_MPS * seconds):
+        return AIDED, (
+            f"it stays within {largest:.1f} m of GNSS for {seconds / MINUTE_S:.0f} min (95 % of the minute means), "
+            "as no unaided INS does"
+        )
+    return UNAIDED, f"it drifts from GNSS: minute means spread over {largest:.0f} m (95 %)"

@@ -1,0 +1,100 @@
+"""Intervals without GNSS in the log itself: what was missing, the forecast through each, and how it came out."""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from groundstation.base.units import NS_PER_S
+from groundstation.estimators.inertial.coupled import CoupledRun, hindcast_coupled, run_coupled
+from groundstation.estimators.inertial.differences import Differences
+from groundstation.estimators.inertial.filter import FilterRun
+from groundstation.estimators.inertial.hindcast import hindcast, leads_of
+from groundstation.estimators.inertial.model import POSITION, FloatArray
+from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.estimators.inertial.start_covariance import WITH_COVARIANCE, lead_growth, start_covariance
+from groundstation.results.inertial import RealOutage
+from groundstation.tables.gaps import largest_step_s
+from groundstation.tables.table import Flight
+
+PRESENT_SHARE = 0.5  # of the seconds of an outage in which a source has samples, to count as there
+
+
+@dataclass(frozen=True)
+class Bridged:
+    """The outages, and the position error to take off the INS at every epoch, shape (n, c), forecast through them."""
+
+    outages: tuple[RealOutage, ...]
+    error_m: FloatArray
+
+
+def bridge_outages(flight: Flight, compared: Differences, run: FilterRun, settings: InertialSettings) -> Bridged:
+    """Find the outages and forecast through each with the method and model of the settings.
+
+    ``jump_m`` compares that very forecast with the first GNSS position after it.
+    """
+    epochs = run.epochs
+    seen = np.flatnonzero(epochs.has_gnss)
+    error_m, found = np.array(run.x[:, POSITION]), []
+    if not len(seen):
+        return Bridged((), error_m)
+    usual = largest_step_s(np.round(epochs.time_s[seen] * NS_PER_S).astype(np.int64))
+    limit_s = max(settings.outage_s, usual if np.isfinite(usual) else 0.0)
+    long = [
+        (last, back) for last, back in pairwise(seen.tolist()) if epochs.time_s[back] - epochs.time_s[last] > limit_s
+    ]
+    is_coupled = settings.model == "coupled" and settings.default_method == "last_estimate"
+    coupled = run_coupled(compared, run.noise, settings) if is_coupled and long else None
+    for last, back in long:
+        outage = _empty(flight, compared, float(epochs.time_s[last]), float(epochs.time_s[back]))
+        grown = _grown(run, last, back, coupled, settings)
+        error_m[last + 1 : back] = run.x[last, POSITION] + grown[:-1]
+        measured = epochs.position_m[back]
+        if np.isfinite(measured).all() and not epochs.is_reset[last + 1 : back + 1].any():
+            away = float(np.hypot(*(measured - run.x[last, POSITION] - grown[-1])))
+            outage = replace(outage, jump_m=away, sigma_m=_sigma(run, last, outage.length_s, settings))
+        found.append(outage)
+    if epochs.time_s[-1] - epochs.time_s[seen[-1]] > limit_s:
+        found.append(_empty(flight, compared, float(epochs.time_s[seen[-1]]), float(epochs.time_s[-1])))
+    return Bridged(tuple(found), error_m)
+
+
+def _grown(run: FilterRun, last: int, back: int, coupled: CoupledRun | None, settings: InertialSettings) -> FloatArray:
+    """Position error forecast to build up since epoch ``last``, at the epochs behind it up to ``back``, (k, c)."""
+    elapsed = run.epochs.time_s[last + 1 : back + 1] - run.epochs.time_s[last]
+    step_s = min(settings.forecast_step_s, float(elapsed[-1]))
+    lead_s = leads_of(step_s, float(elapsed[-1]) + step_s)
+    at = np.array([last])
+    if coupled is not None:
+        built = hindcast_coupled(coupled, at, lead_s, settings)[0]
+    else:
+        built = hindcast(run, at, lead_s, (settings.default_method,), settings).forecast_m[settings.default_method][0]
+    times = np.concatenate([[0.0], lead_s])
+    columns = [np.interp(elapsed, times, np.concatenate([[0.0], column])) for column in built.T]
+    return np.stack(columns, axis=1)
+
+
+def _sigma(run: FilterRun, last: int, length_s: float, settings: InertialSettings) -> float | None:
+    """Radial sigma of the forecast at the end of an outage, what the first GNSS position errs included."""
+    if settings.default_method not in WITH_COVARIANCE:
+        return None
+    lead_s = np.array([length_s])
+    growth, scale = lead_growth(run, lead_s), float(run.noise.calibration.at(lead_s)[0])
+    total = 0.0
+    for channel in range(run.x.shape[2]):
+        start = start_covariance(settings.default_method, run, np.array([last]), channel, settings)
+        total += scale**2 * float(growth.variance(start)[0, 0])
+        total += float(run.covariance(channel)[last, POSITION, POSITION]) + float(growth.judge_m2[0])
+    return float(np.sqrt(total))
+
+
+def _empty(flight: Flight, compared: Differences, start_s: float, end_s: float) -> RealOutage:
+    """An outage of which it is not known how the forecast came out; what was missing is told by the tables."""
+    present = {}
+    for kind, topic in (("ins", compared.ins_topic), ("gnss", compared.gnss_topic)):
+        table = flight[topic]
+        times = flight.seconds(table.time_ns[table.valid("latitude_deg", "longitude_deg")])
+        inside = times[(times > start_s) & (times < end_s)]
+        present[kind] = len(np.unique(np.floor(inside))) > PRESENT_SHARE * (end_s - start_s)
+    missing = "both" if not any(present.values()) else "gnss" if present["ins"] else "ins"
+    return RealOutage(start_s, end_s, end_s - start_s, None, None, missing)
