@@ -144,7 +144,7 @@ def inertial_result(duration_s: float = LONG_S, **changes: Any) -> InertialResul
         largest_radial_error_m=2140.0,
         outages=(
             RealOutage(start, end, end - start, 212.0, 260.0),
-            RealOutage(0.97 * duration_s, duration_s, 0.03 * duration_s, None, None),
+            RealOutage(0.97 * duration_s, duration_s, 0.03 * duration_s, None, None, "gnss"),
         ),
         azimuth=AzimuthEstimate(True, 0.042, 0.015, 7, 410.0, "seven turns, 410 m/s of velocity change"),
         settings={"position_sigma_m": 6.0, "correlation_time_s": 300.0, "beta_per_h": 1.0, "velocity_used": False},

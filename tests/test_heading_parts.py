@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from groundstation.base.errors import SettingsError
+from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.records import Column
 from groundstation.base.toml_settings import settings_from
 from groundstation.estimators.heading.arms import know_arm
@@ -215,6 +215,16 @@ def test_samples_after_lift_off_are_not_looked_at() -> None:
     assert samples.time_s.max() <= 120.0
     del tables["discrete"]
     assert pair_samples(replace(flight, tables=tables), "ins", "gnss", settings=SETTINGS).time_s.max() <= 120.0
+
+
+@pytest.mark.parametrize("with_later_runs", [False, True])
+def test_a_log_that_begins_in_the_air_is_not_assessable(with_later_runs: bool) -> None:
+    flight = taxi_flight(simulate_taxi(TaxiCase(), np.random.default_rng(0)))
+    gnss = flight["gnss"]
+    fast = replace(gnss, columns={**gnss.columns, "velocity_north_mps": Column(np.full(len(gnss), 80.0))})
+    tables = {name: table for name, table in flight.tables.items() if name != "discrete"} | {"gnss": fast}
+    with pytest.raises(NotAssessableError, match="gnss: no GNSS epoch before lift-off: the log begins in the air"):
+        pair_samples(replace(flight, tables=tables), "ins", "gnss", settings=SETTINGS, with_later_runs=with_later_runs)
 
 
 def test_intervals_that_touch_no_epoch_are_told() -> None:

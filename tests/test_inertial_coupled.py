@@ -7,11 +7,20 @@ import pytest
 from scipy.linalg import expm
 
 from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
+from groundstation.base.records import Int64Array
 from groundstation.estimators.inertial import coupled
-from groundstation.estimators.inertial.coupled import AZIMUTH, AZIMUTH_DRIFT, CHANNELS, EAST, NORTH, CraftMotion
+from groundstation.estimators.inertial.coupled import (
+    AZIMUTH,
+    AZIMUTH_DRIFT,
+    CHANNELS,
+    EAST,
+    NORTH,
+    CoupledRun,
+    CraftMotion,
+)
 from groundstation.estimators.inertial.differences import Differences, drag_per_s
-from groundstation.estimators.inertial.filter import Epochs, run_filter
-from groundstation.estimators.inertial.hindcast import hindcast, start_epochs
+from groundstation.estimators.inertial.filter import PATIENCE_S, Epochs, run_filter
+from groundstation.estimators.inertial.hindcast import built_up, hindcast, start_epochs
 from groundstation.estimators.inertial.model import (
     DRIFT,
     POSITION,
@@ -35,6 +44,9 @@ BETA = 1.0 / 3600.0
 LINEAR_SHARE = 5e-3  # gravity changes with the position error, and radii do, which the matrix leaves out
 RADII_SHARE = 2e-3  # the simulation leaves out that radii change with the latitude error
 LEFT_OUT_SHARE = 3e-4  # the same against the largest term of a row
+USED_SHARE = 0.999  # five sigmas of the gate, which white noise hardly leaves
+FOLLOWED_SIGMAS = 1.0  # an undisturbed estimate differs by what the disturbance made it forget: less than its sigma
+AS_GOOD_SHARE = 1.8  # what was learned of tilt and drift is kept, but for a minute of a velocity step not yet believed
 
 
 def craft(latitude_deg: float, velocity: tuple[float, float], acceleration: tuple[float, float]) -> CraftMotion:
@@ -310,17 +322,151 @@ def test_gap_without_the_ins_is_crossed_in_short_steps() -> None:
     assert np.abs(run.innovation[-1, 0]).max() < 0.02 * grown
 
 
-def test_a_reset_of_the_ins_is_no_outlier() -> None:
-    motion = straight(2000.0, 50.0, 30.0, 240.0)
+def eastbound(latitude_deg: float = 50.0) -> tuple[TrueMotion, FloatArray, FloatArray]:
+    """Two hours and a half: the motion, position and velocity differences with white noise of GNSS."""
+    motion = straight(9000.0, latitude_deg, 30.0, 240.0)
+    truth = propagate(motion, drifting(motion, 0.01, -0.02, 1e-4), body_fixed=False)
     rng = np.random.default_rng(4)
-    position, velocity = 3.0 * rng.standard_normal((2001, 2)), 0.05 * rng.standard_normal((2001, 2))
-    position[:1000] += [40.0, -60.0]
-    plain = differences_of(motion, position, velocity)
-    marks = np.zeros(2001, dtype=bool)
-    marks[1000] = True
-    run = coupled.run_coupled(replace(plain, epochs=replace(plain.epochs, is_reset=marks)), InsNoise(), SETTINGS)
-    assert (run.used == 1).mean() > 0.999
-    assert np.abs(run.x[1020, CHANNELS[:, POSITION]]).max() < 20.0
+    shape = truth.position_m[0].shape
+    position = truth.position_m[0] + 3.0 * rng.standard_normal(shape)
+    return motion, position, truth.velocity_mps[0] + 0.05 * rng.standard_normal(shape)
+
+
+def with_resets(plain: Differences, at: list[int]) -> Differences:
+    marks = np.zeros(len(plain.epochs), dtype=bool)
+    marks[at] = True
+    return replace(plain, epochs=replace(plain.epochs, is_reset=marks))
+
+
+def grown_from(step: FloatArray, motion: TrueMotion, at: int) -> FloatArray:
+    """What a step of position (row 0) and velocity (row 1) at an epoch grows to, shape (n, 14): zero before it."""
+    nothing = np.zeros((len(motion.time_s), 2))
+    between = CraftMotion.between(differences_of(motion, nothing, nothing), motion.time_s)
+    out = np.zeros((len(motion.time_s), coupled.SIZE))
+    out[at, CHANNELS[:, [POSITION, VELOCITY]]] = step.T
+    for k, A in enumerate(coupled.coupled_matrix(between, BETA)[at:], start=at):
+        out[k + 1] = out[k] + A @ (out[k] + 0.5 * A @ out[k])
+    return out
+
+
+def assert_follows(run: CoupledRun, whole: CoupledRun, added: FloatArray, since: int) -> None:
+    """The estimate is that of the undisturbed run plus what was added."""
+    apart = run.x[since:] - whole.x[since:] - added[since:]
+    assert (np.abs(apart) < FOLLOWED_SIGMAS * run.sigma[since:]).all()
+
+
+def assert_forecasts_as_well(run: CoupledRun, whole: CoupledRun, at: Int64Array) -> None:
+    """Outages replayed from ``at`` come out as in the undisturbed flight."""
+    lead_s: FloatArray = np.array([600.0, 1200.0])
+    rms = []
+    for one in (run, whole):
+        error = coupled.hindcast_coupled(one, at, lead_s, SETTINGS) - built_up(one.epochs, at, lead_s)
+        rms.append(np.sqrt(np.mean(np.square(error), axis=(0, 2))))
+    assert (rms[0] < AS_GOOD_SHARE * rms[1]).all(), rms
+
+
+SHIFT: FloatArray = np.array([[1600.0, -1200.0], [1.5, -1.0]])  # 2 km and 1.8 m/s
+
+
+@pytest.mark.parametrize("is_marked", [True, False], ids=["marked", "unmarked"])
+@pytest.mark.parametrize("step", [np.diag([1.0, 0.0]) @ SHIFT, SHIFT], ids=["position", "both"])
+def test_a_reset_of_the_ins_is_followed(is_marked: bool, step: FloatArray) -> None:
+    motion, position, velocity = eastbound()
+    whole = coupled.run_coupled(differences_of(motion, position, velocity), InsNoise(), SETTINGS)
+    at = 4000
+    added = grown_from(step, motion, at)
+    position += added[:, CHANNELS[:, POSITION]]
+    velocity += added[:, CHANNELS[:, VELOCITY]]
+    disturbed = differences_of(motion, position, velocity)
+    run = coupled.run_coupled(with_resets(disturbed, [at] if is_marked else []), InsNoise(), SETTINGS)
+    since = at if is_marked else at + round(PATIENCE_S) + 1
+    assert run.reopened == (0 if is_marked else 1)
+    assert (run.used[since:] == 1).mean() > USED_SHARE and (run.used[:at] == 1).mean() > USED_SHARE
+    assert_follows(run, whole, added, since)
+    assert_forecasts_as_well(run, whole, np.arange(since + 300, 7800, 300))
+
+
+def test_a_log_that_starts_in_flight_with_the_ins_far_off_is_followed() -> None:
+    motion, position, velocity = eastbound()
+    whole = coupled.run_coupled(differences_of(motion, position, velocity), InsNoise(), SETTINGS)
+    added = grown_from(np.array([[4000.0, -3000.0], [6.0, -5.0]]), motion, 0)
+    position += added[:, CHANNELS[:, POSITION]]
+    velocity += added[:, CHANNELS[:, VELOCITY]]
+    run = coupled.run_coupled(differences_of(motion, position, velocity), InsNoise(), SETTINGS)
+    assert run.reopened == 0 and (run.used == 1).mean() > USED_SHARE
+    assert_follows(run, whole, added, 60)
+    assert_forecasts_as_well(run, whole, np.arange(3600, 7800, 300))
+
+
+def test_patience_is_counted_in_seconds_for_each_kind_and_channels_may_be_missing() -> None:
+    """Positions every ten seconds, none of the east channel, velocities every second; a jump north of 2 km."""
+    motion, position, velocity = eastbound()
+    position[np.arange(len(position)) % 10 != 0] = np.nan
+    position[:, 1] = np.nan
+    position[4000:, 0] += 2000.0
+    run = coupled.run_coupled(differences_of(motion, position, velocity), InsNoise(), SETTINGS)
+    assert run.reopened == 1
+    rejected = np.flatnonzero((run.used == -1).any(axis=(1, 2)))
+    assert 4000 + PATIENCE_S - 10.0 <= rejected[rejected >= 4000][-1] <= 4000 + PATIENCE_S
+    assert np.abs(run.innovation[4100::10, 0, 0]).max() < 50.0
+
+
+def test_what_velocity_alone_shows_of_the_drift_is_not_hidden_by_an_unknown_position() -> None:
+    motion, position, velocity = eastbound()
+    run = coupled.run_coupled(differences_of(motion, np.full_like(position, np.nan), velocity), InsNoise(), SETTINGS)
+    both = coupled.run_coupled(differences_of(motion, position, velocity), InsNoise(), SETTINGS)
+    drifts = CHANNELS[:, DRIFT]
+    assert (run.sigma[-1, drifts] < 1.5 * both.sigma[-1, drifts]).all()
+
+
+def test_weight_of_gnss_depends_on_its_own_interval_not_on_that_of_the_epochs() -> None:
+    """Positions every 10 s, velocities every 5 s: epochs of the INS alone between them change nothing."""
+    motion, position, velocity = eastbound()
+    row = np.arange(len(position))
+    position[row % 10 != 0], velocity[row % 5 != 0] = np.nan, np.nan
+    run = coupled.run_coupled(differences_of(motion, position, velocity), InsNoise(), SETTINGS)
+    keep = row[::5]
+    few = TrueMotion(*(getattr(motion, item.name)[..., keep] for item in fields(motion)))
+    alone = coupled.run_coupled(differences_of(few, position[keep], velocity[keep]), InsNoise(), SETTINGS)
+    assert run.sigma[keep] == pytest.approx(alone.sigma, rel=0.02)
+    assert (np.abs(run.x[keep] - alone.x) < 0.1 * alone.sigma).all()
+
+
+def test_gate_is_as_wide_as_a_single_measurement_errs() -> None:
+    """200 m: 2.7 sigmas of a position as it is weighted for slow errors (73 m), far beyond what one errs (4 m)."""
+    motion, position, velocity = eastbound()
+    position[3000] += [200.0, 0.0]
+    run = coupled.run_coupled(differences_of(motion, position, velocity), InsNoise(), SETTINGS)
+    assert (run.used[3000] == [[-1, -1], [1, 1]]).all()
+    assert run.reopened == 0
+
+
+def test_position_at_the_start_of_a_forecast_is_the_estimate_where_gnss_shows_none() -> None:
+    """No GNSS there, or a position that was rejected: as if GNSS had shown the estimate."""
+    motion = straight(4000.0, 60.0, 200.0, 100.0)
+    at, lead_s = np.array([1000]), np.array([600.0, 1200.0])
+    x = np.zeros((4001, coupled.SIZE))
+    x[1000, CHANNELS[:, POSITION]] = 20_000.0, -30_000.0
+    built = []
+    for measured, mark in (((20_000.0, -30_000.0), 1), ((np.nan, np.nan), 0), ((1e7, -30_000.0), -1), ((0.0, 0.0), 1)):
+        position = np.tile(measured, (4001, 1))
+        differences, empty = differences_of(motion, position, np.zeros_like(position)), np.zeros((4001, 2, 2))
+        used = np.full((4001, 2, 2), mark, dtype=np.int8)
+        run = coupled.CoupledRun(differences, InsNoise(), x, np.zeros_like(x), empty, empty, used)
+        built.append(coupled.hindcast_coupled(run, at, lead_s, SETTINGS))
+    assert np.array_equal(built[0], built[1]) and np.array_equal(built[0], built[2])
+    assert np.abs(built[0] - built[3]).max() > 100.0  # m: what it matters
+
+
+def test_forecast_from_inside_a_gap_goes_on_as_the_filter_does() -> None:
+    motion, position, velocity = eastbound(60.0)
+    position += np.array([4000.0, -3000.0])
+    position[5000:7001], velocity[5000:7001] = np.nan, np.nan
+    run = coupled.run_coupled(differences_of(motion, position, velocity), InsNoise(), SETTINGS)
+    at = np.array([5300])
+    forecast = coupled.hindcast_coupled(run, at, np.array([600.0, 1200.0]), SETTINGS)[0]
+    states = CHANNELS[:, POSITION]
+    assert forecast == pytest.approx(run.x[[5900, 6500]][:, states] - run.x[5300, states], abs=1.0)
 
 
 def test_without_gnss_at_all_nothing_is_claimed() -> None:

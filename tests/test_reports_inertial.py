@@ -11,7 +11,7 @@ import pytest
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable
 from groundstation.results.forecast import ForecastResult, SkillRow
-from groundstation.results.inertial import AzimuthEstimate, ChannelResult, InertialResult
+from groundstation.results.inertial import AzimuthEstimate, ChannelResult, InertialResult, RealOutage
 from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import example
 from tests.test_reports import HOSTILE, Page, report
@@ -64,7 +64,121 @@ def test_states_stand_with_sigma_and_observability(full: str) -> None:
     text = Page(full).text.replace("\u202f", " ")
     assert "Platform tilt, arcsec +11.2 1.5 0.81 10:00" in text
     assert "Random gyro drift, °/h +0.0021 0.0040 0.08 never" in text
-    assert "2:40:00 – 3:01:20 21:20 212 m 260 m ✓ within 2 σ" in text and "○ GNSS did not return" in text
+    assert "2:40:00 – 3:01:20 GNSS 21:20 212 m 260 m ✓ within 2 σ" in text and "○ GNSS did not return" in text
+
+
+@pytest.mark.parametrize(
+    ("missing", "left", "returned"),
+    [
+        ("gnss", "GNSS", "GNSS did not return"),
+        ("ins", "INS", "INS did not return"),
+        ("both", "both", "neither returned"),
+    ],
+)
+def test_an_outage_says_what_was_missing(tmp_path: Path, missing: str, left: str, returned: str) -> None:
+    outages = (RealOutage(60.0, 120.0, 60.0, 5.0, 9.0, missing), RealOutage(600.0, 660.0, 60.0, None, None, missing))
+    text = text_of(tmp_path, {"outages": outages})
+    assert f"1:00 – 2:00 {left} 1:00 5 m 9 m ✓ within 2 σ" in text and f"○ {returned}" in text
+
+
+def changed_states(name: str, **changes: float) -> dict[str, Any]:
+    """Both channels with one state changed."""
+    channels = tuple(
+        replace(
+            channel,
+            states=tuple(replace(state, **changes) if state.name == name else state for state in channel.states),
+        )
+        for channel in inertial_result().channels
+    )
+    return {"channels": channels, "settings": {"noise.drift_rate_dphph": 5e-6}}
+
+
+def test_a_state_the_class_leaves_out_has_no_number(tmp_path: Path) -> None:
+    alone = changed_states("drift_rate", value=0.0, sigma=5e-6, observability=3e-6)
+    assert "Drift rate, °/h² (not estimated in this class) — — — — — — — —" in text_of(tmp_path, alone)
+    north = replace(inertial_result(**alone), channels=(alone["channels"][0], inertial_result().channels[1]))
+    text = text_of(tmp_path, {"channels": north.channels, "settings": north.settings})
+    assert "Drift rate, °/h² (north not estimated in this class) — — — — +0.0029" in text
+
+
+@pytest.mark.parametrize(("sigma", "observability"), [(5e-6, 0.2), (4e-3, 3e-6)], ids=["seen", "grown"])
+def test_a_state_that_was_seen_or_has_grown_keeps_its_number(
+    tmp_path: Path, sigma: float, observability: float
+) -> None:
+    text = text_of(tmp_path, changed_states("drift_rate", sigma=sigma, observability=observability))
+    assert "Drift rate, °/h² +0.0029" in text and "(not estimated" not in text
+
+
+def test_an_ins_of_unknown_kind_is_not_called_unaided(tmp_path: Path) -> None:
+    text = text_of(tmp_path, {"kind": "unknown", "kind_reason": "it stood still all the time."})
+    assert "Whether GNSS corrects this INS already cannot be told: it stood still all the time. If it does" in text
+    assert "An INS of 0.41 nmi/h (median; 95 % of the time below 1.32 nmi/h), taken as unaided:" in text
+    assert "if it does, what follows says nothing of a forecast" in text and "An unaided INS" not in text
+    assert "INS drift" not in text[: text.index("1 Heading correction")]
+
+
+def test_reopening_and_other_ins_are_told(tmp_path: Path) -> None:
+    text = text_of(tmp_path, {"reopened": 2, "other_ins": ("ins.1", "ins.2")})
+    assert "the filter was opened to it again, 2 times: the noise of INS class navigation does not fit" in text
+    assert "not used: ins.1, ins.2" in text
+    assert "was opened to it again" not in text_of(tmp_path)
+
+
+def test_units_of_the_settings_are_read_from_their_names(tmp_path: Path) -> None:
+    settings = {
+        "noise.velocity_walk_mps_per_sqrt_s": 0.004,
+        "noise.tilt_walk_deg_per_sqrt_h": 0.0044,
+        "noise.drift_walk_dph_per_sqrt_h": 0.5,
+        "noise.drift_rate_walk_dphph_per_sqrt_h": 0.25,
+        "noise.tilt_rad": 0.0002,
+    }
+    text = text_of(tmp_path, {"settings": settings})
+    for told in ("velocity walk 0.004 m/s/√s", "tilt walk 0.0044 °/√h", "drift walk 0.5 °/h/√h", "tilt 0.0002 rad"):
+        assert f"noise.{told}" in text
+    assert "noise.drift rate walk 0.25 °/h²/√h" in text and "sqrt" not in text
+
+
+@pytest.mark.parametrize(
+    ("independent", "nees", "verdict"),
+    [
+        *((5, 1.0, "✓ within limits"), (5, 9.0, "▲ too sure"), (5, 0.1, "○ modest")),
+        *((4, 1.0, "○ too few to judge"), (1, 9.0, "○ too few to judge")),
+    ],
+)
+def test_calibration_is_judged_from_enough_starts_only(
+    tmp_path: Path, independent: int, nees: float, verdict: str
+) -> None:
+    rows = tuple(replace(row, independent_starts=independent, nees=nees) for row in forecast_result().calibration)
+    text = text_of(tmp_path, forecast={"calibration": rows})
+    table = text[text.index("Is the claimed σ honest? Drift windows") :]
+    assert f"{nees:.2f} 0.60 … 1.50 1.80 {verdict}" in table
+    judged = "At 10, 30, 60, 90 and 120 min too few to judge: fewer than 5 independent starts."
+    assert (judged in text) == (independent < 5)
+
+
+def test_horizons_not_judged_are_not_among_every_horizon(tmp_path: Path) -> None:
+    rows = tuple(
+        replace(row, independent_starts=6 if row.horizon_min < 60.0 else 2) for row in forecast_result().calibration
+    )
+    change = changed_skill(lambda row: row if row.coverage95 is None else replace(row, coverage95=1.0))
+    text = text_of(tmp_path, forecast=change | {"calibration": rows})
+    assert "wider than needed at 1, 5, 10 and 30 min. At 60, 90 and 120 min too few to judge" in text
+
+
+def test_nothing_is_called_honest_from_too_few_starts(tmp_path: Path) -> None:
+    rows = tuple(
+        replace(forecast_result().calibration[0], horizon_min=float(minutes), independent_starts=1)
+        for minutes in (1, 5, 10, 30, 60, 90, 120)
+    )
+    text = text_of(tmp_path, forecast={"calibration": rows})
+    assert "Whether its σ is honest cannot be judged: fewer than 5 independent starts." in text
+    assert "honest on this flight" not in text
+
+
+def test_captions_say_which_starts_and_how_many_states(full: str) -> None:
+    text = Page(full).text
+    assert "These starts are not those of the table of skill: they come every 60 s from 10 min" in text
+    assert "Fourteen states" in text
 
 
 def test_an_aided_ins_is_told_at_once_and_its_forecast_not_praised(tmp_path: Path) -> None:
@@ -92,13 +206,16 @@ def with_share(share: float, *, raised: bool) -> dict[str, Any]:
         (0.80, False, "the filter is surer than it should be"),
         (0.80, True, "the filter is surer than it should be"),
         (0.995, False, "the filter claims less than it knows"),
-        (0.995, True, "more than 95 % is by design"),
+        (0.995, True, "innovations cannot show whether the filter is consistent"),
+        (1.0, True, "innovations cannot show whether the filter is consistent"),
     ],
 )
 def test_conclusion_on_the_filter_follows_its_innovations(
     tmp_path: Path, share: float, raised: bool, verdict: str
 ) -> None:
-    assert verdict in text_of(tmp_path, with_share(share, raised=raised))
+    text = text_of(tmp_path, with_share(share, raised=raised))
+    assert verdict in text
+    assert ("of the innovations lie inside" in text) == (not raised or share < 0.93)
 
 
 def changed_skill(change: Callable[[SkillRow], SkillRow]) -> dict[str, Any]:

@@ -78,8 +78,12 @@ def test_schema_is_a_schema() -> None:
         system_2(inertial_result(), forecast_result()),
         system_2(least_inertial(), least_forecast()),
         system_2(inertial_result(), None),
+        system_2(inertial_result(kind="unknown", reopened=2, other_ins=("ins.1",)), None),
     ],
-    ids=["full", "least heading", "no heading", "bare", "no time", "system 2", "least of system 2", "no forecast"],
+    ids=[
+        *("full", "least heading", "no heading", "bare", "no time"),
+        *("system 2", "least of system 2", "no forecast", "unknown kind"),
+    ],
 )
 def test_summaries_obey_the_schema(results: FlightResults) -> None:
     VALIDATOR.validate(written(results))
@@ -175,6 +179,9 @@ def test_schema_refuses_what_is_wrong(path: tuple[str, ...], value: object) -> N
     ("path", "value"),
     [
         (("inertial", "kind"), "good"),
+        (("inertial", "outages", 0, "missing"), "nothing"),
+        (("inertial", "reopened"), -1),
+        (("inertial", "other_ins"), "ins.1"),
         (("inertial", "north"), None),
         (("inertial", "channels"), []),
         (("inertial", "east", "share_inside95"), 1.2),

@@ -9,6 +9,7 @@ import rerun as rr
 
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable
+from groundstation.results.inertial import RealOutage
 from groundstation.tables.table import Flight
 from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.recorder import Line, Recorder
@@ -131,6 +132,36 @@ def test_a_recording_is_written_whatever_the_figures_lack(
     inertial, forecast = replace(results.inertial, figures=()), replace(results.forecast, figures=())
     contents = written(tmp_path, flight, replace(results, inertial=inertial, forecast=forecast, figures=shown))
     assert "nmi/h" in contents.text("/inertial/answer")
+
+
+def test_panels_tell_what_is_not_known() -> None:
+    outages = (RealOutage(0.0, 20.0, 20.0, 3.0, 4.0, "ins"), RealOutage(50.0, 90.0, 40.0, None, None, "both"))
+    changes = {"outages": outages, "reopened": 3, "other_ins": ("ins.1",), "settings": {"noise.drift_rate_dphph": 0.01}}
+    alone = tuple(
+        replace(
+            channel,
+            nis_low=None,
+            nis_high=None,
+            states=tuple(
+                replace(state, sigma=0.01, observability=0.001) if state.name == "drift_rate" else state
+                for state in channel.states
+            ),
+        )
+        for channel in inertial_result().channels
+    )
+    text = inertial_text(inertial_result(kind="unknown", channels=alone, **changes))
+    assert text.startswith("# Whether GNSS corrects this INS cannot be told")
+    assert "| 0 s | INS | 20 s | 3 m | 4 m |" in text and "| 50 s | both | 40 s | neither returned | – |" in text
+    assert "| drift rate | not estimated in this class | – |" in text and "| 3 times |" in text and "ins\\.1" in text
+    assert "says nothing of consistency" in text and "inside their" not in text
+
+
+def test_calibration_panel_judges_from_enough_starts_only() -> None:
+    few = tuple(replace(row, independent_starts=4) for row in forecast_result().calibration)
+    text = forecast_text(forecast_result(calibration=few), kind="unknown")
+    assert "| too few to judge |" in text and "| within limits |" not in text
+    assert "**cannot be told**" in text and "fourteen states" in text
+    assert "| within limits |" in forecast_text(forecast_result())
 
 
 def test_panels_hold_no_markup_of_a_log() -> None:

@@ -128,8 +128,13 @@ def words(name: str) -> str:
     return clean(name).replace("_", " ").strip()
 
 
-UNIT_SIGNS = {
+UNIT_SIGNS = {  # a suffix that ends like a shorter one stands before it
+    "mps_per_sqrt_s": "m/s/√s",
+    "deg_per_sqrt_h": "°/√h",
+    "dphph_per_sqrt_h": "°/h²/√h",
+    "dph_per_sqrt_h": "°/h/√h",
     "deg": "°",
+    "rad": "rad",
     "arcmin": "′",
     "arcsec": "arcsec",
     "dphph": "°/h²",
@@ -159,6 +164,8 @@ def named_quantity(name: str) -> tuple[str, str]:
     --------
     >>> named_quantity("drift_deg_per_h"), named_quantity("speed_limit_mps"), named_quantity("cycles")
     (('drift', '°/h'), ('speed limit', 'm/s'), ('cycles', ''))
+    >>> named_quantity("walk_mps_per_sqrt_s"), named_quantity("drift_walk_dph_per_sqrt_h"), named_quantity("tilt_rad")
+    (('walk', 'm/s/√s'), ('drift walk', '°/h/√h'), ('tilt', 'rad'))
     """
     for suffix, sign in UNIT_SIGNS.items():
         if name.endswith("_" + suffix):

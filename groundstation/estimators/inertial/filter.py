@@ -255,6 +255,11 @@ def measurement_variances(epochs: Epochs, noise: InsNoise) -> tuple[FloatArray, 
     return np.array(weighted), ROOM_OF_THE_GATE**2 * np.array(believed)
 
 
+def patience_of(epochs: Epochs) -> Int64Array:
+    """Rejections in a row of each kind, shape (2,), after which the filter takes GNSS to be right."""
+    return np.array([max(1, round(PATIENCE_S / interval)) for interval in gnss_intervals_s(epochs)], dtype=np.int64)
+
+
 def _pushed(drag: FloatArray, group: list[int], earlier: list[FloatArray]) -> FloatArray:
     """Metres by which a channel alone is dragged by the one that was run before it, shape (n, c)."""
     push = np.zeros((len(drag), len(group)))
@@ -295,7 +300,7 @@ def _run_group(
         weighted,
         believed,
         gate,
-        max(1, round(PATIENCE_S / min(gnss_intervals_s(epochs)))),
+        patience_of(epochs),
         x,
         P,
         K,

@@ -85,7 +85,7 @@ def run_filter(
     R: FloatArray,
     believed: FloatArray,
     gate: float,
-    patience: int,
+    patience: Int64Array,
     x: FloatArray,
     P: FloatArray,
     K: FloatArray,
@@ -114,7 +114,7 @@ def run_filter(
         Variances of the measurements, as they are weighted and as single ones are believed to err.
     gate : float
         A measurement is rejected where y^2 exceeds so many times its variance with ``believed``, in any channel.
-    patience : int
+    patience : ndarray of int, shape (2,)
         So many rejections in a row of one kind, and it is the filter that is wrong: the state that was measured is
         opened by the square of the innovation.
     x, P : ndarrays, shapes (n, 6, c), (n, 6, 6)
@@ -205,7 +205,7 @@ def run_filter(
                 in_a_row[m] = 0
             else:
                 in_a_row[m] += 1
-                if in_a_row[m] > patience:
+                if in_a_row[m] > patience[m]:
                     for c in range(channels):
                         p[m, m] += y[k, m, c] * y[k, m, c]
                     s = p[m, m] + R[m]

@@ -3,17 +3,18 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from groundstation.reports.parts import Cell, Grid, Head, Mark, Note, Part, Section
+from groundstation.reports.parts import Cell, Grid, Head, Mark, Note, Part, Section, Tone
 from groundstation.reports.sections import forecast_figures
 from groundstation.reports.sections.inertial import percent
 from groundstation.reports.sections.saved import mapping, not_assessable_reason, objects
 from groundstation.reports.wording import clock, is_number, number, typeset, words
 from groundstation.results.files import SavedFlight
-from groundstation.results.forecast import METHODS
+from groundstation.results.forecast import FEWEST_STARTS, METHODS, honesty
 
 HONEST = (0.90, 0.98)  # shares inside the 95 % band that pass for it
 SAME = 0.03  # two RMS values closer than this are not told apart
 HEADLINE_MIN = 60.0  # the horizon the conclusion quotes, or the longest there is
+HONESTY_TONES: dict[str, Tone] = {"within limits": "good", "too sure": "warn"}
 COMPARED = ("last_estimate", "windows")  # beside the shipped method in the calibration table
 LEAD = (
     "GNSS taken away at many moments of this flight, on paper: the errors the filter forecast from there, against what "
@@ -51,10 +52,17 @@ def build(saved: SavedFlight) -> Section | None:
 
 def _conclusions(saved: SavedFlight, forecast: Mapping[str, Any]) -> list[Note]:
     """What the chapter comes to: skill, honesty, windows; a sentence each."""
-    if mapping(saved.summary, "results", "inertial").get("kind") == "gnss_aided":
+    kind = mapping(saved.summary, "results", "inertial").get("kind")
+    if kind == "gnss_aided":
         text = "The INS is aided by GNSS: what follows shows how it follows GNSS, and nothing about a forecast."
         return [Note(text, "warn")]
-    notes = [_gain(forecast), _honesty(forecast), _windows(forecast)]
+    text = "Whether GNSS corrects this INS already cannot be told: if it does, what follows says nothing of a forecast."
+    notes = [
+        Note(text, "unknown") if kind == "unknown" else None,
+        _gain(forecast),
+        _honesty(forecast),
+        _windows(forecast),
+    ]
     return [note for note in notes if note is not None]
 
 
@@ -87,24 +95,42 @@ def _gain(forecast: Mapping[str, Any]) -> Note | None:
 def _honesty(forecast: Mapping[str, Any]) -> Note | None:
     reason = typeset(str(forecast.get("calibration_reason") or "")).strip().rstrip(".")
     default = _rows(forecast, str(forecast.get("default_method") or ""))
-    shares = {lead: row["coverage95"] for lead, row in default.items() if is_number(row.get("coverage95"))}
+    few = _too_few(forecast)
+    known = {lead: row["coverage95"] for lead, row in default.items() if is_number(row.get("coverage95"))}
+    shares = {lead: share for lead, share in known.items() if lead not in few}
     start = (
         "" if forecast.get("is_calibrated") else f"Not calibrated: {reason or 'too little data before the outage'}. "
     )
+    unjudged = [lead for lead in known if lead in few]
+    why = f"fewer than {FEWEST_STARTS} independent starts"
     if not shares:
-        return Note(start.strip(), "warn") if start else None
+        text = f"{start}Whether its σ is honest cannot be judged: {why}." if unjudged else start.strip()
+        return Note(text, "warn" if start else "unknown") if text else None
+    left = f" {_where(unjudged, list(known)).capitalize()} too few to judge: {why}." if unjudged else ""
     low, high = percent(min(shares.values())), percent(max(shares.values()))
     held = low if low == high else f"{low} to {high} (by horizon)"
     text = f"{start}The 95 % band of the forecast held {held} of the errors: "
     narrow = [lead for lead, share in shares.items() if share < HONEST[0]]
     wide = [lead for lead, share in shares.items() if share > HONEST[1]]
     if not narrow and not wide:
-        return Note(f"{text}the σ it claims is honest on this flight.", "warn" if start else "good")
+        return Note(f"{text}the σ it claims is honest on this flight.{left}", "warn" if start else "good")
     told = [
-        f"too narrow {_where(narrow, list(shares))}" if narrow else "",
-        f"wider than needed {_where(wide, list(shares))}" if wide else "",
+        f"too narrow {_where(narrow, list(known))}" if narrow else "",
+        f"wider than needed {_where(wide, list(known))}" if wide else "",
     ]
-    return Note(text + " and ".join(filter(None, told)) + ".", "warn")
+    return Note(text + " and ".join(filter(None, told)) + f".{left}", "warn")
+
+
+def _too_few(forecast: Mapping[str, Any]) -> set[float]:
+    """Horizons at which the shipped method has too few independent starts for a judgement."""
+    return {
+        float(row["horizon_min"])
+        for row in objects(forecast, "calibration")
+        if row.get("method") == forecast.get("default_method")
+        and is_number(row.get("horizon_min"))
+        and is_number(row.get("independent_starts"))
+        and row["independent_starts"] < FEWEST_STARTS
+    }
 
 
 def _windows(forecast: Mapping[str, Any]) -> Note | None:
@@ -219,7 +245,8 @@ def _calibration(forecast: Mapping[str, Any]) -> list[Grid]:
     heads = (Head("Horizon"), *(Head(title, True) for title in titles), Head("NEES is"))
     caption = (
         "NEES: mean squared error over the variance claimed, 1 is honest; its 95 % limits come from the number of "
-        "independent starts. σ scale: what the model's σ was multiplied by."
+        f"independent starts, and below {FEWEST_STARTS} of those nothing is judged. σ scale: what the model's σ was "
+        "multiplied by."
     )
     for name in dict.fromkeys((str(forecast.get("default_method")), *COMPARED)):
         rows = [_calibration_cells(row) for row in objects(forecast, "calibration") if row.get("method") == name]
@@ -232,16 +259,15 @@ def _calibration(forecast: Mapping[str, Any]) -> list[Grid]:
 
 
 def _calibration_cells(row: Mapping[str, Any]) -> tuple[Cell, ...]:
-    nees, low, high = (row.get(key) for key in ("nees", "nees_low", "nees_high"))
+    nees, low, high, independent = (row.get(key) for key in ("nees", "nees_low", "nees_high", "independent_starts"))
     state: Cell = ""
-    if is_number(nees) and is_number(low) and is_number(high):
-        state = Mark("good", "within limits")
-        if not low <= nees <= high:
-            state = Mark("warn", "too sure") if nees > high else Mark("unknown", "modest")
+    if is_number(nees) and is_number(low) and is_number(high) and is_number(independent):
+        text = honesty(int(independent), nees, low, high)
+        state = Mark(HONESTY_TONES.get(text, "unknown"), text)
     return (
         number(row.get("horizon_min"), 0, "min"),
         number(row.get("starts"), 0),
-        number(row.get("independent_starts"), 0),
+        number(independent, 0),
         *(percent(row.get(key)) for key in ("inside50", "inside68", "inside95")),
         number(nees, 2),
         f"{number(low, 2)} … {number(high, 2)}",
@@ -300,7 +326,11 @@ def _phases(forecast: Mapping[str, Any]) -> Grid | None:
     ]
     titles = ("Length", "Starts", "Shipped, RMS m", "Raw INS, RMS m")
     heads = (Head("Begins in"), *(Head(title, True) for title in titles))
-    return Grid("Outages by phase of flight", heads, rows, "Lengths in min:s.") if rows else None
+    caption = (
+        "Lengths in min:s. These starts are not those of the table of skill: they come every 60 s from 10 min after "
+        "the first epoch on, when the filter has hardly settled, so the numbers differ from the skill at equal lengths."
+    )
+    return Grid("Outages by phase of flight", heads, rows, caption) if rows else None
 
 
 def _coupled(forecast: Mapping[str, Any]) -> Grid | None:
@@ -309,7 +339,10 @@ def _coupled(forecast: Mapping[str, Any]) -> Grid | None:
         for row in objects(forecast, "coupled")
     ]
     heads = (Head("Horizon"), Head("Coupled, RMS m", True), Head("Gain", True))
-    caption = "Twelve states, north and east coupled, against two separate channels; last estimate of both."
+    caption = (
+        "Fourteen states (six of each channel, coupled, azimuth and its drift) against two separate channels; last "
+        "estimate of both."
+    )
     return Grid("Coupled model", heads, rows, caption) if rows else None
 
 

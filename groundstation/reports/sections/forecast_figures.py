@@ -13,7 +13,7 @@ from groundstation.reports.sections.saved import mapping, numbers, objects
 from groundstation.reports.wording import is_number, number
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight
-from groundstation.results.forecast import METHODS
+from groundstation.results.forecast import FEWEST_STARTS, METHODS
 
 OTHERS = ("#e69f00", "#56b4e9", "#8a2be2", "#7a6a00", "#cc79a7", "#a9b1ba", "#d55e00")
 MAP_CELLS = 90  # along each side: finer is not seen on paper and makes the page heavy
@@ -87,6 +87,8 @@ def calibration(rows: Sequence[Mapping[str, Any]], default: str) -> Drawing | No
             low, high = columns["nees_low"], columns["nees_high"]
             right.fill_between(horizon, low, high, color=d.USED, alpha=0.18, linewidth=0, label="95 % limits")
             right.plot(horizon, columns["nees"], "o-", color=d.INK, markersize=3.0, linewidth=1.0, label="NEES")
+            few = columns.get("independent_starts", np.full(len(mine), np.inf)) < FEWEST_STARTS
+            right.plot(horizon[few], columns["nees"][few], "o", color=d.INK, markerfacecolor="white", markersize=3.0)
             right.axhline(1.0, color=d.FAINT, linewidth=0.6)
             right.set_ylim(bottom=0.0)
             d.legend_above(right)
@@ -96,7 +98,8 @@ def calibration(rows: Sequence[Mapping[str, Any]], default: str) -> Drawing | No
 
     caption = (
         "Left: how many errors the claimed bands held; on the dashed lines they are honest, below too narrow. Right: "
-        "squared error over claimed variance; above the shaded limits the forecast is surer than it may be."
+        "squared error over claimed variance; above the shaded limits the forecast is surer than it may be. "
+        f"Hollow: fewer than {FEWEST_STARTS} independent starts, not to be judged."
     )
     alt = "Coverage of the claimed bands and NEES by horizon."
     return Drawing("Calibration of the shipped method", caption, alt, d.draw("calibration", 64, paint))

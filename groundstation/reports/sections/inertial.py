@@ -17,6 +17,7 @@ from groundstation.reports.wording import (
     unit_sign,
 )
 from groundstation.results.files import SavedFlight
+from groundstation.results.inertial import MISSING, is_left_alone
 
 CHANNELS = ("north", "east")
 PLACES = {"m": 1, "mps": 3, "arcsec": 1, "dph": 4, "dphph": 4}
@@ -35,7 +36,7 @@ def build(saved: SavedFlight) -> Section | None:
         note = Note(f"Not assessable: {reason}", "unknown")
         return Section("inertial", "INS errors", LEAD, (note,)) if reason else None
     parts: tuple[Part | None, ...] = (
-        _conclusion(inertial),
+        *_conclusions(inertial),
         _figures_of_merit(inertial),
         _states(inertial),
         inertial_figures.state(saved, "position"),
@@ -52,16 +53,34 @@ def build(saved: SavedFlight) -> Section | None:
     return Section("inertial", "INS errors", LEAD, tuple(part for part in parts if part is not None))
 
 
-def _conclusion(inertial: Mapping[str, Any]) -> Note:
-    """The chapter in one or two sentences."""
-    reason = typeset(str(inertial.get("kind_reason") or ""))
+def _conclusions(inertial: Mapping[str, Any]) -> list[Note]:
+    """The chapter in a few sentences: what the INS is like, and whether the filter can be trusted."""
+    reason = typeset(str(inertial.get("kind_reason") or "")).strip().rstrip(".")
+    reopened = inertial.get("reopened")
     if inertial.get("kind") == "gnss_aided":
-        return Note(f"This INS is aided by GNSS, and a forecast from it means nothing: {reason}.", "warn")
+        return [Note(f"This INS is aided by GNSS, and a forecast from it means nothing: {reason}.", "warn")]
+    notes = []
+    if inertial.get("kind") == "unknown":
+        text = f"Whether GNSS corrects this INS already cannot be told: {reason or 'the log does not show it'}."
+        notes.append(Note(f"{text} If it does, its errors and any forecast mean nothing.", "unknown"))
+    notes.append(_quality(inertial))
+    if is_number(reopened) and reopened > 0:
+        times = "once" if reopened == 1 else f"{number(reopened, 0)} times"
+        text = (
+            f"GNSS was rejected for so long that the filter was opened to it again, {times}: the noise of INS class "
+            f"{inertial.get('ins_class') or ABSENT} does not fit this INS or this receiver."
+        )
+        notes.append(Note(text, "warn"))
+    return notes
+
+
+def _quality(inertial: Mapping[str, Any]) -> Note:
     rates = [number(inertial.get(f"radial_error_rate_{share}_nmiph"), 2, "nmi/h") for share in (50, 95)]
     rate = "" if ABSENT in rates else f" of {rates[0]} (median; 95 % of the time below {rates[1]})"
     velocity = number(inertial.get("velocity_error_rms_mps"), 2, "m/s")
     largest = number(inertial.get("largest_radial_error_m"), 0, "m")
-    text = f"An unaided INS{rate}: velocity error {velocity} RMS, position error up to {largest}. {_in_words(inertial)}"
+    name = f"An INS{rate}, taken as unaided" if inertial.get("kind") == "unknown" else f"An unaided INS{rate}"
+    text = f"{name}: velocity error {velocity} RMS, position error up to {largest}. {_in_words(inertial)}"
     tone: Tone = "plain" if _is_inflated(inertial) else "good"  # raised noise proves nothing
     return Note(text.strip(), tone if _is_consistent(inertial) else "warn")
 
@@ -95,7 +114,10 @@ def _in_words(inertial: Mapping[str, Any]) -> str:
     if min(shares.values()) < CONSISTENT[0]:
         return f"{text}: the filter is surer than it should be."
     if _is_inflated(inertial):
-        return f"{text}; the GNSS noise was raised to cover slow errors, so more than 95 % is by design."
+        return (
+            "The GNSS noise was raised to cover slow errors, so innovations cannot show whether the filter is "
+            "consistent."
+        )
     return f"{text}: " + (
         "the filter is consistent."
         if max(shares.values()) <= CONSISTENT[1]
@@ -120,19 +142,25 @@ def _figures_of_merit(inertial: Mapping[str, Any]) -> Facts:
             typeset(str(inertial.get("kind_reason") or "")),
         ),
         ("INS class", str(inertial.get("ins_class") or ABSENT), f"noise parameters: {origin}" if origin else ""),
-        ("Pair used", f"{inertial.get('ins_topic')} against {inertial.get('gnss_topic')}", ""),
+        ("Pair used", f"{inertial.get('ins_topic')} against {inertial.get('gnss_topic')}", _others(inertial)),
         (
             "Epochs compared",
             number(inertial.get("epochs"), 0),
             f"{clock(inertial.get('gnss_seconds'))} of the flight with GNSS",
         ),
         ("Transition matrix", transition, ""),
+        ("Filter opened again", number(inertial.get("reopened"), 0, "times"), "after GNSS had been rejected for long"),
     )
     return Facts("The INS in figures", pairs)
 
 
+def _others(inertial: Mapping[str, Any]) -> str:
+    topics = inertial.get("other_ins")
+    return f"not used: {any_value(topics)}" if isinstance(topics, list) and topics else ""
+
+
 def _states(inertial: Mapping[str, Any]) -> Grid | None:
-    channels = _channels(inertial)
+    channels, used = _channels(inertial), mapping(inertial, "settings")
     by_name = [{str(state.get("name")): state for state in objects(channel, "states")} for _, channel in channels]
     names = list(dict.fromkeys(name for states in by_name for name in states))
     if not names:
@@ -142,14 +170,27 @@ def _states(inertial: Mapping[str, Any]) -> Grid | None:
         known = next(states[name] for states in by_name if name in states)
         unit = str(known.get("unit") or "")
         title = str(known.get("title") or name)
-        cells = [cell for states in by_name for cell in _state_cells(states.get(name, {}), PLACES.get(unit, 3))]
-        rows.append((f"{title[:1].upper()}{title[1:]}, {unit_sign(unit)}", *cells))
+        title = f"{title[:1].upper()}{title[1:]}, {unit_sign(unit)}"
+        alone = [
+            channel
+            for (channel, _), states in zip(channels, by_name, strict=True)
+            if is_left_alone(name, states.get(name, {}).get("sigma"), states.get(name, {}).get("observability"), used)
+        ]
+        if alone:
+            where = "" if len(alone) == len(channels) else f"{alone[0]} "
+            title += f" ({where}not estimated in this class)"
+        cells: list[Cell] = []
+        for (channel, _), states in zip(channels, by_name, strict=True):
+            places = PLACES.get(unit, 3)
+            cells += [ABSENT] * 4 if channel in alone else _state_cells(states.get(name, {}), places)
+        rows.append((title, *cells))
     heads = [Head("State")]
     for channel, _ in channels:
         heads += [Head(f"{channel.capitalize()}", True), Head("± σ", True), Head("Seen", True), Head("From", True)]
     caption = (
         "At the last time GNSS was there. Seen: observability, 1 − σ/σ without GNSS; near 0 the data say nothing of "
-        "the state. From: flight time since when it stays above one half."
+        "the state. From: flight time since when it stays above one half. Not estimated: the class holds the state at "
+        "zero, and its σ never moved."
     )
     return Grid("States", heads, rows, caption, ("inertial_states",))
 
@@ -184,7 +225,8 @@ def _consistency(inertial: Mapping[str, Any]) -> Grid | None:
     titles = ("NIS", "95 % limits", "Inside 95 %", "Innovations", "Rejected", "Velocity RMS", "Position RMS")
     caption = (
         "NIS: mean normalised innovation squared, 1 where the noise model is right. Noise raised: slow GNSS errors are "
-        "covered by a larger white noise, so NIS stays below 1 and has no limits."
+        "covered by a larger white noise; then NIS stays below 1, has no limits, and neither it nor the share inside "
+        "says anything of consistency."
     )
     heads = (Head("Channel"), *(Head(title, True) for title in titles))
     return Grid("Consistency of the filter", heads, rows, caption) if rows else None
@@ -205,14 +247,20 @@ def _outages(inertial: Mapping[str, Any]) -> Grid | None:
     rows: list[Sequence[Cell]] = []
     for outage in objects(inertial, "outages"):
         jump, sigma = outage.get("jump_m"), outage.get("sigma_m")
-        state: Cell = Mark("unknown", "GNSS did not return")
+        missing = MISSING.get(str(outage.get("missing") or "gnss"), ABSENT)
+        state: Cell = Mark("unknown", "neither returned" if missing == "both" else f"{missing} did not return")
         if is_number(jump) and is_number(sigma):
             state = Mark("good", "within 2 σ") if jump <= 2.0 * sigma else Mark("warn", "beyond 2 σ")
         span = f"{clock(outage.get('start_s'))} – {clock(outage.get('end_s'))}"
-        rows.append((span, clock(outage.get("length_s")), number(jump, 0, "m"), number(sigma, 0, "m"), state))
-    heads = (Head("Without GNSS"), Head("Length", True), Head("Off on return", True), Head("σ claimed", True), Head(""))
-    caption = "The filter went over to the forecast by itself; off on return: forecast against the first GNSS position."
-    return Grid("GNSS outages in the log", heads, rows, caption) if rows else None
+        cells = (clock(outage.get("length_s")), number(jump, 0, "m"), number(sigma, 0, "m"))
+        rows.append((span, missing, *cells, state))
+    numeric = (Head(title, True) for title in ("Length", "Off on return", "σ claimed"))
+    heads = (Head("Flight time"), Head("Without"), *numeric, Head(""))
+    caption = (
+        "The filter went over to the forecast by itself; off on return: forecast against the first position difference "
+        "seen again."
+    )
+    return Grid("Outages in the log", heads, rows, caption) if rows else None
 
 
 def _azimuth(inertial: Mapping[str, Any]) -> Note | None:

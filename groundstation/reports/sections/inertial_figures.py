@@ -46,7 +46,7 @@ def state(saved: SavedFlight, name: str) -> Drawing | None:
 
     caption = (
         "Grey: INS − GNSS as measured; green: estimate of the filter; black: smoothed with the data on both sides "
-        "(RTS); shaded: estimate ± 1.96 σ. Yellow ground: no GNSS, the filter forecasts."
+        "(RTS); shaded: estimate ± 1.96 σ. Yellow ground: nothing to compare, the filter forecasts."
     )
     alt = f"North and east {name} error over flight time with the estimate and its band."
     svg = d.draw(f"inertial-{name}", 106, paint)
@@ -185,7 +185,8 @@ def innovations(saved: SavedFlight) -> Drawing | None:
 
     caption = (
         "Innovation (measured − predicted position) over its own σ. If the noise model is right, 95 % lie between the "
-        "dashed lines and nothing slow is seen; waves mean slow GNSS errors or an INS the model does not know."
+        "dashed lines and nothing slow is seen; waves mean slow GNSS errors or an INS the model does not know. With "
+        "the noise raised nearly all lie inside, which proves nothing."
     )
     alt = "Normalised innovations of both channels over flight time with limits at 1.96."
     svg = d.draw("inertial-innovations", 80, paint)

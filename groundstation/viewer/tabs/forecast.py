@@ -31,8 +31,8 @@ def forecast(recorder: Recorder, results: FlightResults) -> rrb.Container | None
     answer = results.forecast
     if answer is None and not reasons:
         return None
-    is_aided = results.inertial is not None and results.inertial.kind == "gnss_aided"
-    recorder.document("forecast/answer", forecast_text(answer, reasons, is_aided=is_aided))
+    kind = results.inertial.kind if results.inertial is not None else "unaided"
+    recorder.document("forecast/answer", forecast_text(answer, reasons, kind=kind))
     text = document("How far a forecast can be trusted", "forecast/answer")
     rows: list[rrb.Container] = []
     fan = _fan(recorder, results)

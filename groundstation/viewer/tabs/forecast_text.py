@@ -2,17 +2,18 @@
 
 from collections.abc import Sequence
 
-from groundstation.results.forecast import METHODS, ForecastResult, SkillRow
+from groundstation.results.forecast import METHODS, ForecastResult, SkillRow, honesty
 from groundstation.viewer.markdown import markdown_text, number, table
 from groundstation.viewer.names import words
 
 
-def forecast_text(result: ForecastResult | None, reasons: Sequence[str] = (), *, is_aided: bool = False) -> str:
-    """Markdown of the panel; without a result the reasons why there is none."""
+def forecast_text(result: ForecastResult | None, reasons: Sequence[str] = (), *, kind: str = "unaided") -> str:
+    """Markdown of the panel; without a result the reasons why there is none. ``kind`` is that of the INS."""
     if result is None:
         return "\n\n".join(["# Forecast not assessed", *(markdown_text(reason) for reason in reasons)])
     parts = [
-        "# This INS is aided by GNSS: a forecast from it means nothing" if is_aided else f"# {_headline(result)}",
+        "# This INS is aided by GNSS: a forecast from it means nothing" if kind == "gnss_aided" else _headline(result),
+        "Whether GNSS corrects this INS already **cannot be told**." if kind == "unknown" else "",
         _calibrated(result),
         *_skill(result),
         *_calibration(result),
@@ -24,7 +25,7 @@ def forecast_text(result: ForecastResult | None, reasons: Sequence[str] = (), *,
 
 
 def _headline(result: ForecastResult) -> str:
-    return f"Shipped method: {markdown_text(METHODS.get(result.default_method, result.default_method))}"
+    return f"# Shipped method: {markdown_text(METHODS.get(result.default_method, result.default_method))}"
 
 
 def _calibrated(result: ForecastResult) -> str:
@@ -69,11 +70,12 @@ def _calibration(result: ForecastResult) -> list[str]:
             *(_share(share) for share in (row.inside50, row.inside68, row.inside95)),
             f"{number(row.nees, 2)} ({number(row.nees_low, 2)} … {number(row.nees_high, 2)})",
             number(row.scale, 2),
+            honesty(row.independent_starts, row.nees, row.nees_low, row.nees_high),
         ]
         for row in result.calibration
         if row.method == result.default_method
     ]
-    head = ["min", "in 50 %", "in 68 %", "in 95 %", "NEES (limits)", "σ scale"]
+    head = ["min", "in 50 %", "in 68 %", "in 95 %", "NEES (limits)", "σ scale", "NEES is"]
     return ["## Is the claimed sigma honest, shipped method", table(head, rows)] if rows else []
 
 
@@ -98,7 +100,8 @@ def _phases(result: ForecastResult) -> list[str]:
         for row in result.phases
     ]
     head = ["phase at the start", "length, s", "starts", "RMS, m", "raw INS, m"]
-    return ["## Outages by flight phase", table(head, rows)] if rows else []
+    title = "## Outages by flight phase; other starts than above (every 60 s from 10 min on), so other numbers"
+    return [title, table(head, rows)] if rows else []
 
 
 def _coupled(result: ForecastResult) -> list[str]:
@@ -107,4 +110,4 @@ def _coupled(result: ForecastResult) -> list[str]:
         for row in result.coupled
     ]
     head = ["min", "RMS, m", "gain"]
-    return ["## Coupled north-east model against two channels", table(head, rows)] if rows else []
+    return ["## Coupled model (fourteen states) against two channels", table(head, rows)] if rows else []

@@ -1,8 +1,9 @@
 """The text panel of the INS errors tab: the figures people ask first, then every state with its sigma."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from groundstation.results.inertial import ChannelResult, InertialResult, StateEstimate
+from groundstation.results.inertial import MISSING, ChannelResult, InertialResult, StateEstimate, is_left_alone
 from groundstation.viewer.markdown import markdown_text, number, table
 from groundstation.viewer.names import UNITS
 
@@ -17,7 +18,7 @@ def inertial_text(result: InertialResult | None, reasons: Sequence[str] = ()) ->
         f"# {_headline(result)}",
         markdown_text(result.kind_reason),
         _figures(result),
-        *(_channel(channel) for channel in result.channels),
+        *(_channel(channel, result.settings) for channel in result.channels),
         *_outages(result),
         *_azimuth(result),
     ]
@@ -27,6 +28,8 @@ def inertial_text(result: InertialResult | None, reasons: Sequence[str] = ()) ->
 def _headline(result: InertialResult) -> str:
     if result.kind == "gnss_aided":
         return "This INS is aided by GNSS: a forecast from it means nothing"
+    if result.kind == "unknown":
+        return "Whether GNSS corrects this INS cannot be told"
     rate = number(result.radial_error_rate_50_nmiph, 2, "nmi/h")
     return f"Unaided INS, {rate} (median)" if rate != "–" else "Unaided INS"
 
@@ -41,21 +44,26 @@ def _figures(result: InertialResult) -> str:
         ["pair used", f"{markdown_text(result.ins_topic)}, {markdown_text(result.gnss_topic)}"],
         ["epochs, with GNSS", f"{result.epochs}, {number(result.gnss_seconds, 0, 's')}"],
         ["transition matrix", "exact exponential" if result.transition == "exact" else "first order, I + A T"],
+        ["filter opened again after long rejection of GNSS", f"{result.reopened} times"],
+        ["other INS topics, not used", ", ".join(markdown_text(topic) for topic in result.other_ins) or "–"],
     ]
     return table(["figure", "value"], [row for row in rows if row[1] != "–"])
 
 
-def _channel(channel: ChannelResult) -> str:
-    rows = [_state(state) for state in channel.states]
-    limits = (
-        "noise inflated, below 1 by design"
-        if channel.nis_low is None
-        else f"95 % limits {number(channel.nis_low, 2)} … {number(channel.nis_high, 2)}"
-    )
-    lines = (
-        f"NIS {number(channel.nis, 2)} ({limits}), {number(100.0 * channel.share_inside95, 1)} % of "
-        f"{channel.innovations} innovations inside their 95 % band, {channel.rejected} rejected."
-    )
+def _channel(channel: ChannelResult, settings: Mapping[str, Any]) -> str:
+    rows = [_state(state, settings) for state in channel.states]
+    counted = f"{channel.innovations} innovations, {channel.rejected} rejected"
+    if channel.nis_low is None:
+        lines = (
+            f"{counted}. NIS {number(channel.nis, 2)}: the noise was raised to cover slow GNSS errors, so it says "
+            "nothing of consistency."
+        )
+    else:
+        limits = f"95 % limits {number(channel.nis_low, 2)} … {number(channel.nis_high, 2)}"
+        lines = (
+            f"NIS {number(channel.nis, 2)} ({limits}), {number(100.0 * channel.share_inside95, 1)} % inside their 95 % "
+            f"band of {counted}."
+        )
     return "\n\n".join(
         [
             f"## {channel.name.capitalize()} channel, last time with GNSS",
@@ -65,7 +73,9 @@ def _channel(channel: ChannelResult) -> str:
     )
 
 
-def _state(state: StateEstimate) -> list[str]:
+def _state(state: StateEstimate, settings: Mapping[str, Any]) -> list[str]:
+    if is_left_alone(state.name, state.sigma, state.observability, settings):
+        return [markdown_text(state.title), "not estimated in this class", "–"]
     digits, unit = DIGITS.get(state.unit, 3), UNITS.get(state.unit, state.unit)
     value = f"{number(state.value, digits, sign=True)} ± {number(state.sigma, digits, unit)}"
     return [markdown_text(state.title), value, number(state.observability, 2)]
@@ -77,13 +87,18 @@ def _outages(result: InertialResult) -> list[str]:
     rows = [
         [
             number(outage.start_s, 0, "s"),
+            MISSING.get(outage.missing, "–"),
             number(outage.length_s, 0, "s"),
-            number(outage.jump_m, 0, "m") if outage.jump_m is not None else "GNSS did not return",
+            number(outage.jump_m, 0, "m") if outage.jump_m is not None else _no_return(outage.missing),
             number(outage.sigma_m, 0, "m"),
         ]
         for outage in result.outages
     ]
-    return ["## GNSS outages in the log", table(["from", "length", "off on return", "σ claimed"], rows)]
+    return ["## Outages in the log", table(["from", "without", "length", "off on return", "σ claimed"], rows)]
+
+
+def _no_return(missing: str) -> str:
+    return "neither returned" if missing == "both" else f"{MISSING.get(missing, 'it')} did not return"
 
 
 def _azimuth(result: InertialResult) -> list[str]:
