@@ -16,6 +16,8 @@ from tests import viewer_shots  # noqa: E402
 IMAGES = ROOT / "docs" / "images"
 LOG = ROOT / "sample_logs" / "taxi-good.csv"
 TABS = {"Overview": "overview", "Heading": "heading"}
+PLAYHEAD_S = 9000.0  # behind the second of the paper's four starts
+LONG_FLIGHT, LONG_TABS = "norilsk-moscow", {"INS errors": "inertial", "Forecast": "forecast"}
 COLOURS = 128
 CHROMIUM = (
     *("chromium", "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
@@ -29,20 +31,35 @@ def save(png: bytes, name: str) -> None:
     image.save(IMAGES / f"{name}.png", optimize=True)
 
 
+def groundstation(*arguments: str) -> None:
+    """Run the command line."""
+    subprocess.run([sys.executable, "-m", "groundstation", *arguments], check=True)
+
+
+def shoot(log: Path, home: Path, tabs: dict[str, str], playhead_s: float | None = None) -> Path:
+    """Run a log, keep a picture of the first page of each tab, return the flight's folder."""
+    groundstation("run", str(log), "-o", str(home / log.stem))
+    flight = next(path.parent for path in (home / log.stem).glob("*/manifest.json"))
+    wanted = dict(tabs)
+    with viewer_shots.viewer(next(flight.glob("*.rrd")), home) as client:
+        if playhead_s is not None:
+            client.set_time(timeline="flight_time", duration=playhead_s)
+        for name, _ in viewer_shots.pages(client):
+            picture = wanted.pop(name.strip(" /").partition("#")[0].strip(), None)
+            if picture:
+                save(viewer_shots.settled(client), picture)
+    return flight
+
+
 def main() -> None:
-    """Run the sample, shoot two tabs and the first page of the report."""
+    """Run the sample and a simulated long flight, shoot their tabs and the first page of the report."""
     IMAGES.mkdir(exist_ok=True)
     viewer_shots.WINDOW = "1600x1000"
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
-        subprocess.run([sys.executable, "-m", "groundstation", "run", str(LOG), "-o", str(home / "out")], check=True)
-        flight = next(path.parent for path in (home / "out").glob("*/manifest.json"))
-        with viewer_shots.viewer(next(flight.glob("*.rrd")), home) as client:
-            for name, _ in viewer_shots.pages(client):
-                tab = TABS.get(name.strip(" /").partition("#")[0].strip())
-                if tab:
-                    save(viewer_shots.settled(client), tab)
-                    TABS.pop(next(key for key, value in TABS.items() if value == tab))
+        flight = shoot(LOG, home, TABS)
+        groundstation("simulate", LONG_FLIGHT, "-o", str(home))
+        shoot(home / f"{LONG_FLIGHT}.csv", home, LONG_TABS, PLAYHEAD_S)
         pdf, page = home / "report.pdf", home / "page"
         profile = f"--user-data-dir={home / 'chromium'}"
         report = (flight / "report.html").as_uri()

@@ -241,7 +241,7 @@ def _findings(compared: Differences, run: FilterRun, result: InertialResult) -> 
 
 def _outage_findings(compared: Differences, result: InertialResult) -> list[Finding]:
     """One finding for each outage, or one for all where there are many."""
-    names = {"gnss": "GNSS", "ins": "INS", "both": "INS and GNSS"}
+    lost = {"gnss": "no GNSS", "ins": "no INS", "both": "neither INS nor GNSS"}
     if len(result.outages) > OUTAGES_LISTED:
         longest = max(result.outages, key=lambda outage: outage.length_s)
         text = f"INS and GNSS not together in {len(result.outages)} intervals, the longest {longest.length_s:.0f} s"
@@ -253,7 +253,7 @@ def _outage_findings(compared: Differences, result: InertialResult) -> list[Find
         if outage.jump_m is not None:
             claimed = "" if outage.sigma_m is None else f" (claimed {outage.sigma_m:.0f} m)"
             after = f"the forecast was {outage.jump_m:.0f} m off at its end{claimed}"
-        text = f"no {names[outage.missing]} for {outage.length_s:.0f} s: {after}"
+        text = f"{lost[outage.missing]} for {outage.length_s:.0f} s: {after}"
         found.append(Finding("info", "inertial.outage", text, compared.gnss_topic, f"from {outage.start_s:.1f} s"))
     return found
 
