@@ -76,7 +76,7 @@ def assess_forecast(
         f"{horizon:g}": min((row for row in skill if row.horizon_min == horizon), key=lambda row: row.rms_m).method
         for horizon in sorted({row.horizon_min for row in skill})  # GNSS may be absent at every end of a horizon
     }
-    classic, classic_figures = _classic(run, settings, take_off_s)
+    classic, classic_figures = _classic(run, coupled, settings, take_off_s)
     judged, default = replay.of(since), claimed[settings.default_method]
     default = None if default is None else default.of(since)
     grid_at, grid_lead_s = map_grid(run, settings)
@@ -88,7 +88,7 @@ def assess_forecast(
         calibration_reason=plan.reason,
         skill=skill,
         gaps=gap_rows(run, judged.at, _lengths_that_fit(plan), settings=settings),
-        phases=_phases(run, settings, phase_of),
+        phases=_phases(run, coupled, settings, phase_of),
         classic_starts=classic,
         calibration=calibration_rows(replay, claimed, plan.horizons_min, plan.first_start_s),
         coupled=coupled_rows(coupled, separate.of(since), settings, horizons_min=plan.horizons_min),
@@ -106,7 +106,7 @@ def assess_forecast(
 
 def _of_model(replay: Hindcast, coupled: CoupledRun, settings: InertialSettings) -> Hindcast:
     """The replay with the last estimate of the model that the settings choose; its sigma stays the channels'."""
-    if settings.model == "separate":
+    if settings.model == "separate" or "last_estimate" not in replay.forecast_m:
         return replay
     forecast = hindcast_coupled(coupled, replay.at, replay.lead_s, settings)
     return replace(replay, forecast_m=replay.forecast_m | {"last_estimate": forecast})
@@ -116,7 +116,9 @@ def _lengths_that_fit(plan: Plan) -> tuple[float, ...]:
     return tuple(length for length in plan.horizons_min if 10.0 <= length <= 90.0)
 
 
-def _phases(run: FilterRun, settings: InertialSettings, phase_of: PhaseOf | None) -> tuple[PhaseRow, ...]:
+def _phases(
+    run: FilterRun, coupled: CoupledRun, settings: InertialSettings, phase_of: PhaseOf | None
+) -> tuple[PhaseRow, ...]:
     """Outages of 10 s to 1 h that begin in each phase, default method beside raw INS."""
     if phase_of is None:
         return ()
@@ -126,7 +128,7 @@ def _phases(run: FilterRun, settings: InertialSettings, phase_of: PhaseOf | None
     rows = []
     for lengths, step in ((SHORT_S, SHORT_S[0]), (LONG_S, LONG_S[0])):
         lead_s = leads_of(step, lengths[-1])
-        replay = hindcast(run, at, lead_s, methods, settings)
+        replay = _of_model(hindcast(run, at, lead_s, methods, settings), coupled, settings)
         for length in lengths:
             lead = round(length / step) - 1
             errors = {method: replay.radial_m(method)[:, lead] for method in methods}
@@ -139,7 +141,7 @@ def _phases(run: FilterRun, settings: InertialSettings, phase_of: PhaseOf | None
 
 
 def _classic(
-    run: FilterRun, settings: InertialSettings, take_off_s: float
+    run: FilterRun, coupled: CoupledRun, settings: InertialSettings, take_off_s: float
 ) -> tuple[tuple[ClassicStart, ...], tuple[FigureData, ...]]:
     """The paper's four starts: at equal horizons as rows, to the end of the flight as its figure 2."""
     time_s = run.epochs.time_s
@@ -150,7 +152,7 @@ def _classic(
     rest = float(time_s[-1] - time_s[at[0]])
     lead_s = leads_of(60.0, rest)
     methods = tuple(dict.fromkeys((*CLASSIC_METHODS, settings.default_method)))
-    replay = hindcast(run, at, lead_s, methods, settings)
+    replay = _of_model(hindcast(run, at, lead_s, methods, settings), coupled, settings)
     rows = []
     for start, hours in enumerate(CLASSIC_H):
         for method in methods:
