@@ -7,7 +7,7 @@ BIN    := $(VENV)/bin
 RUNTIME := $(VENV)/.runtime
 DEV     := $(VENV)/.dev
 
-.PHONY: demo test check slow schemas bench clean help
+.PHONY: demo test check slow fuzz schemas bench clean help
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -41,6 +41,9 @@ check: $(DEV) ## format, lint, types, tests, doctests, architecture
 
 slow: $(DEV) ## the long Monte Carlo tests
 	$(BIN)/python -m pytest -q -n auto -m slow
+
+fuzz: $(DEV) ## mutated logs through every reader for three minutes; FUZZ=10000: so many of each format
+	$(BIN)/python -m tests.fuzz
 
 schemas: $(DEV) ## recompile schemas/*.proto into the package's descriptor set
 	$(BIN)/python -m grpc_tools.protoc -Ischemas --include_imports \

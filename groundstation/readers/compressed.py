@@ -20,10 +20,11 @@ GZIP_MAGIC, ZSTD_MAGIC = b"\x1f\x8b\x08", b"\x28\xb5\x2f\xfd"
 MAX_RATIO = 200  # a recorded flight shrinks 2 to 20 times, a table of constants some 100 times
 MIN_LIMIT_BYTES = 64 << 20  # small files may expand this far whatever the ratio
 MAX_LIMIT_BYTES = 64 << 30
+FREE_FRAMES, BYTES_PER_FRAME = 10_000, 512  # more frames than the first, each of fewer bytes, are no log
 _READ_BYTES = 256 << 10
 _STEP_BYTES = 1 << 20
 _GZIP_HEADER_BYTES = 70_000  # names, comments and extras are shorter
-_GZIP_STEP_BYTES = 4 << 10  # where data is damaged, what a step would have given is lost
+_GZIP_STEP_BYTES = 4 << 10  # where data is damaged, a step is repeated byte by byte
 _ZSTD_STEP_BYTES = 256  # decompressobj has no bound on its output: 256 bytes expand to 8 MiB at most
 _Pieces = Iterator[bytes]
 
@@ -130,45 +131,74 @@ class _Broken(Exception):  # noqa: N818 -- a signal inside this module
         self.kind = kind
 
 
+class _FrameCount:
+    """Counts members or frames; a file of hardly anything but their headers is no log."""
+
+    def __init__(self) -> None:
+        self._count = self._bytes = 0
+
+    def add(self, size: int) -> None:
+        """Count one of ``size`` decompressed bytes."""
+        self._count, self._bytes = self._count + 1, self._bytes + size
+        if self._count > FREE_FRAMES + self._bytes // BYTES_PER_FRAME:
+            raise _Broken("corrupt", f"it is cut into {self._count} frames of {self._bytes} bytes in all")
+
+
 def _gzip_pieces(stream: BinaryIO) -> _Pieces:
     """Decompressed pieces of all members of a gzip file; zero bytes after the last one are padding.
 
     The frame of a member is read here: zlib's own reader withholds what it has when the checksum behind is wrong.
     """
-    data = stream.read(_READ_BYTES)
-    while data:
-        data = _behind_gzip_header(data, stream)
+    data, at, count = stream.read(_READ_BYTES), 0, _FrameCount()
+    while at < len(data):
+        if len(data) - at < _GZIP_HEADER_BYTES:
+            data, at = data[at:] + stream.read(_READ_BYTES), 0
+        at = _behind_gzip_header(data, at)
         member, checksum, size = zlib.decompressobj(wbits=-15), 0, 0
         while not member.eof:
-            if not data:
-                data = stream.read(_READ_BYTES)
+            if at >= len(data):
+                data, at = stream.read(_READ_BYTES), 0
             if not data:
                 raise _Broken("truncated", "it ends early: the file was cut")
+            step, before = data[at : at + _GZIP_STEP_BYTES], member.copy()
             try:
-                piece = member.decompress(data[:_GZIP_STEP_BYTES], _STEP_BYTES)
+                piece = member.decompress(step, _STEP_BYTES)
             except zlib.error as error:
+                yield from _last_pieces(before, step)
                 raise _Broken("corrupt", "it makes no sense from here on") from error
-            data = (member.unused_data if member.eof else member.unconsumed_tail) + data[_GZIP_STEP_BYTES:]
+            at += len(step) - len(member.unused_data if member.eof else member.unconsumed_tail)
             checksum, size = zlib.crc32(piece, checksum), size + len(piece)
             if piece:
                 yield piece
-        data += stream.read(8) if len(data) < 8 else b""
-        if len(data) < 8:
+        if len(data) - at < 8:
+            data, at = data[at:] + stream.read(_READ_BYTES), 0
+        if len(data) - at < 8:
             raise _Broken("truncated", "it ends before its checksum: the file was cut")
-        if data[:8] != checksum.to_bytes(4, "little") + (size & 0xFFFFFFFF).to_bytes(4, "little"):
+        if data[at : at + 8] != checksum.to_bytes(4, "little") + (size & 0xFFFFFFFF).to_bytes(4, "little"):
             raise _Broken("corrupt", "its checksum or size is not that of what came out")
-        data = data[8:] or stream.read(_READ_BYTES)
-        while data and not data.strip(b"\0"):
-            data = stream.read(_READ_BYTES)
+        count.add(size)
+        at += 8
+        data, at = (data, at) if at < len(data) else (stream.read(_READ_BYTES), 0)
+        while at < len(data) and not data[at] and not data[at:].strip(b"\0"):
+            data, at = stream.read(_READ_BYTES), 0
 
 
-def _behind_gzip_header(data: bytes, stream: BinaryIO) -> bytes:
-    """What follows the header of a member (RFC 1952)."""
-    if len(data) < _GZIP_HEADER_BYTES:
-        data += stream.read(_GZIP_HEADER_BYTES)
-    if not data.startswith(GZIP_MAGIC):
+def _last_pieces(member: Any, data: bytes) -> _Pieces:
+    """What a member still gives, byte by byte, before the place where it breaks."""
+    for at in range(len(data)):
+        try:
+            piece = member.decompress(data[at : at + 1])
+        except zlib.error:
+            return
+        if piece:
+            yield piece
+
+
+def _behind_gzip_header(data: bytes, at: int) -> int:
+    """Where the header of the member that begins at ``at`` ends (RFC 1952)."""
+    if not data.startswith(GZIP_MAGIC, at):
         raise _Broken("corrupt", "it makes no sense from here on")
-    flags, at = (data[3] if len(data) > 3 else 0), 10
+    flags, at = (data[at + 3] if len(data) > at + 3 else 0), at + 10
     if flags & 4:
         at += 2 + int.from_bytes(data[at : at + 2], "little")
     for flag in (8, 16):  # name and comment, each ended by a zero byte
@@ -178,31 +208,33 @@ def _behind_gzip_header(data: bytes, stream: BinaryIO) -> bytes:
     at += 2 if flags & 2 else 0
     if at > len(data):
         raise _Broken("truncated", "it ends within its header")
-    return data[at:]
+    return at
 
 
 def _zstd_pieces(stream: BinaryIO) -> _Pieces:
     """Decompressed pieces of all frames of a zstd file."""
-    data, is_open = stream.read(_READ_BYTES), False
+    data, at, count = stream.read(_READ_BYTES), 0, _FrameCount()
     frame: Any = None
-    while data or is_open:
-        if not is_open:
-            frame, is_open = zstandard.ZstdDecompressor(max_window_size=128 << 20).decompressobj(), True
-        if not data:
+    size = 0
+    while at < len(data) or frame is not None:
+        if frame is None:
+            frame, size = zstandard.ZstdDecompressor(max_window_size=128 << 20).decompressobj(), 0
+        if at >= len(data):
             raise _Broken("truncated", "it ends early: the file was cut")
-        for at in range(0, len(data), _ZSTD_STEP_BYTES):
-            try:
-                piece = frame.decompress(data[at : at + _ZSTD_STEP_BYTES])
-            except zstandard.ZstdError as error:
-                raise _Broken("corrupt", "it makes no sense from here on") from error
-            if piece:
-                yield piece
-            if frame.eof:
-                data, is_open = frame.unused_data + data[at + _ZSTD_STEP_BYTES :], False
-                break
-        else:
-            data = b""
-        data = data or stream.read(_READ_BYTES)
+        step = data[at : at + _ZSTD_STEP_BYTES]
+        try:
+            piece = frame.decompress(step)
+        except zstandard.ZstdError as error:
+            raise _Broken("corrupt", "it makes no sense from here on") from error
+        at, size = at + len(step), size + len(piece)
+        if piece:
+            yield piece
+        if frame.eof:
+            at -= len(frame.unused_data)
+            frame = None
+            count.add(size)
+        if at >= len(data):
+            data, at = stream.read(_READ_BYTES), 0
 
 
 _PIECES: dict[str, Callable[[BinaryIO], _Pieces]] = {"gzip": _gzip_pieces, "zstd": _zstd_pieces}

@@ -28,6 +28,8 @@ from groundstation.readers.source import Claim, Source
 from groundstation.readers.start import unusable_references, utc_of_zero
 
 NAME = "csv-profile"
+DISTINCTIVE_COLUMNS = 4
+DAMAGED_HEAD_LINES = 20  # in which a header row is looked for when the first line is not the profile's
 
 
 @dataclass(frozen=True)
@@ -48,12 +50,25 @@ def _shipped() -> tuple[Profile, ...]:
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim a file whose first line and header row are those of a shipped profile."""
+    """Claim a file whose first line and header row are those of a shipped profile.
+
+    Where the first line is damaged a header row with enough of the profile's columns will do.
+    """
     first = source.head[:4096].removeprefix(b"\xef\xbb\xbf").decode("utf-8", errors="replace").lstrip()
     for profile in _shipped():
-        if profile.first_line and first.startswith(profile.first_line) and _fit(source, profile) is not None:
-            return Claim(NAME, profile.name, 1.0)
+        if not profile.first_line:
+            continue
+        if first.startswith(profile.first_line):
+            if _fit(source, profile) is not None:
+                return Claim(NAME, profile.name, 1.0)
+        elif (fit := _fit(source, profile, limit=DAMAGED_HEAD_LINES)) is not None and _is_distinctive(fit):
+            return Claim(NAME, profile.name, 0.9)
     return None
+
+
+def _is_distinctive(fit: _Fit) -> bool:
+    """Whether a header row has enough of the columns that the profile names to be no other table's."""
+    return len({rule.name for rule in fit.profile.columns}.intersection(fit.names)) >= DISTINCTIVE_COLUMNS
 
 
 def claim_by(source: Source, profile: Path) -> Claim:
@@ -100,10 +115,10 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
     yield from items
 
 
-def _fit(source: Source, profile: Profile) -> _Fit | None:
+def _fit(source: Source, profile: Profile, limit: int = 1000) -> _Fit | None:
     """Find the header row: the first one that has every column the profile asks for."""
     encoding = detect_encoding(source.head, source.name)
-    lines = head_lines(source, encoding)
+    lines = head_lines(source, encoding, limit)
     wanted = {*profile.required, *profile.time.columns[:2]}
     for at, line in enumerate(lines):
         for delimiter in DELIMITERS:

@@ -273,11 +273,8 @@ class Summary:
             self.metadata.append(record)
 
 
-def read_summary(file: BinaryIO, size: int) -> Summary | None:
-    """Summary of a file of ``size`` bytes; None when it has no footer at its end or no summary.
-
-    A summary with a wrong checksum is read as far as it goes, ``is_intact`` False.
-    """
+def _footer(file: BinaryIO, size: int) -> tuple[bytes, Footer] | None:
+    """The last bytes of a file and the footer in them; None when there is none at its end."""
     tail = FOOTER_BYTES + len(MAGIC)
     if size < len(MAGIC) + tail:
         return None
@@ -287,7 +284,24 @@ def read_summary(file: BinaryIO, size: int) -> Summary | None:
     footer = parse_record(opcode, end[RECORD_PREFIX:FOOTER_BYTES])
     if not isinstance(footer, Footer) or length != 20 or end[FOOTER_BYTES:] != MAGIC:
         return None
-    start, stop = footer.summary_start, size - tail
+    return end, footer
+
+
+def ends_whole(file: BinaryIO, size: int) -> bool:
+    """Whether a file has a footer at its end: whatever happened inside, it was not cut."""
+    return _footer(file, size) is not None
+
+
+def read_summary(file: BinaryIO, size: int) -> Summary | None:
+    """Summary of a file of ``size`` bytes; None when it has no footer at its end or no summary.
+
+    A summary with a wrong checksum is read as far as it goes, ``is_intact`` False.
+    """
+    found = _footer(file, size)
+    if found is None:
+        return None
+    end, footer = found
+    start, stop = footer.summary_start, size - len(end)
     if not len(MAGIC) <= start <= stop or stop - start > MAX_RECORD_BYTES:
         return None
     file.seek(start)

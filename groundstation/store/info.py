@@ -7,9 +7,12 @@ from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import Any
 
+from groundstation.store.shape import sound_damages, sound_ledger, sound_remarks
+
 METADATA_NAME = "groundstation"
 COPY_NAME = "groundstation_copy"  # the same record before the end of data: one flip cannot take both
 FORMAT_VERSION = "1"
+MAX_START_NS = 1 << 62  # first sample in the year 2116: later ones are damage
 _TEXTS = {"versions", "metadata"}  # mappings whose values are text
 _CHECKSUM, _FORMAT, _DEFINITIONS = "crc32", "format", "definitions_crc32"
 
@@ -132,9 +135,15 @@ def from_strings(strings: Mapping[str, str]) -> StoreInfo:
             values[entry.name] = value
     for name in _TEXTS & values.keys():
         values[name] = {key: value if isinstance(value, str) else str(value) for key, value in values[name].items()}
+    if "ledger" in values:
+        values["ledger"] = sound_ledger(values["ledger"])
+    for name, sound in (("damages", sound_damages), ("remarks", sound_remarks)):
+        values[name] = sound(values.get(name))
+    if abs(values.get("start_ns") or 0) > MAX_START_NS:
+        values["start_ns"] = None
     try:
         return StoreInfo(**values)
-    except RecursionError:
+    except (RecursionError, ValueError):
         return defaults
 
 

@@ -24,7 +24,9 @@ from groundstation.store.recovery import (
     chunks_by_index,
     chunks_by_walk,
     find_facts,
+    index_fits,
     read_definitions,
+    search_definitions,
 )
 from groundstation.store.schema import WireField, message_type, own_columns
 from groundstation.store.wire import Decoded, Messages, decode
@@ -91,7 +93,7 @@ def read(path: str | os.PathLike[str]) -> Iterator[Item]:
         if not is_intact:
             yield Damage("corrupt", "metadata", 1, "metadata record and its copy: what the file is of is uncertain")
         summary = read_summary(file, size)
-        by_index = summary is not None and summary.is_intact
+        by_index = summary is not None and summary.is_intact and index_fits(file, summary)
         definitions = _definitions(file, size, summary, definition_checksums(facts) if is_intact else {})
         reading = _Reading(definitions, info.has_utc)
         found = chunks_by_index(file, summary) if summary is not None and by_index else chunks_by_walk(file, size)
@@ -103,7 +105,7 @@ def read(path: str | os.PathLike[str]) -> Iterator[Item]:
             else:
                 yield from reading.batches(chunk)
         if not by_index and not is_cut:
-            what = "summary at the end of the file; the chunks were found by walking the file"
+            what = "summary at the end of the file, or what stands before it; the chunks were found by walking the file"
             yield Damage("corrupt", "summary", 1, what, loses_data=False)
 
 
@@ -131,11 +133,13 @@ class _Definition:
 def _definitions(
     file: BinaryIO, size: int, summary: Summary | None, checksums: dict[str, int]
 ) -> dict[int, _Definition]:
-    """Definitions by channel id: from an intact summary, else those of the file's start, else a damaged summary's.
+    """Definitions by channel id: from an intact summary, else those of the file's start, then any that are found.
 
     Where the metadata has their checksums, only definitions that agree with them count.
     """
-    sources = [summary] if summary and summary.is_intact else [read_definitions(file, size), summary]
+    sources = [summary]
+    if summary is None or not summary.is_intact:
+        sources = [read_definitions(file, size), summary, search_definitions(file, size, checksums)]
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
     for source in reversed([source for source in sources if source]):
@@ -220,6 +224,9 @@ class _Reading:
         topic = ", ".join(definition.topic for definition in known)
         loses = not known or not all(definition.is_derived for definition in known)
         place = f"byte {lost.start} to {lost.end}"
+        if lost.is_cut and lost.start == lost.end:
+            what = f"bytes of an unfinished record, but {lost.reason}; what followed is not known"
+            return Damage("truncated", f"byte {lost.start}", 0, what)
         if lost.is_cut:
             what = f"bytes of an unfinished record: {lost.reason}; what followed is not known"
             return Damage("truncated", f"byte {lost.start}", lost.end - lost.start, what)

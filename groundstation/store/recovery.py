@@ -5,8 +5,10 @@ and checksum matter. Without one the file is walked record by record; where no r
 is searched for by its signature. A chunk counts only when its checksum is right.
 """
 
+import re
 import struct
-from collections.abc import Iterator
+import zlib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import BinaryIO, TypeAlias
 
@@ -22,6 +24,7 @@ from groundstation.store.framing import (
     ChunkHead,
     Summary,
     decompress,
+    ends_whole,
     parse_record,
     read_chunk_head,
     read_message_index,
@@ -36,6 +39,11 @@ SIGNATURE_AT = 37
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 SEARCH_BYTES = 1 << 20
 PEEK_BYTES = 64
+# Opcode and length of what may be a schema or channel record of less than 16 MiB.
+_DEFINITION = re.compile(rb"[\x03\x04](?=[\x00-\xff]{3}\x00{5})")
+_ENCODING = struct.pack("<I", 8) + b"protobuf"  # stands behind the name of either
+_NAME_BYTES = 4096  # names of topics and types are shorter
+_MOST_DEFINITIONS = 1 << 17  # twice as many as there are channel ids
 _INDEX_BYTES = RECORD_PREFIX + 6  # of a MessageIndex without its entries
 
 
@@ -80,6 +88,17 @@ def _opened(data: memoryview, compression: str, size: int, crc: int) -> list[Mes
     return messages
 
 
+def index_fits(file: BinaryIO, summary: Summary) -> bool:
+    """Whether chunks stand where the indexes say; one may be damaged, two show that bytes were lost or added."""
+    astray = 0
+    for index in summary.chunks:
+        head = read_chunk_head(_read(file, index.chunk_start_offset, PEEK_BYTES))
+        astray += head is None or head.length != index.chunk_length
+        if astray > 1:
+            return False
+    return True
+
+
 def chunks_by_index(file: BinaryIO, summary: Summary) -> Iterator[Found]:
     """Chunks of a file with an intact summary, in the order of the file."""
     free_from = len(MAGIC)
@@ -113,9 +132,10 @@ def _lost(index: ChunkIndex, count: int | None, reason: str) -> Lost:
 def chunks_by_walk(file: BinaryIO, size: int) -> Iterator[Found]:
     """Chunks of a file without a usable summary, in the order of the file.
 
-    The last item is a :class:`Lost` of ``is_cut`` when the file ends before its data does.
+    The last item is a :class:`Lost` of ``is_cut`` when the file ends before its data does, without bytes where a whole
+    record stands before the cut.
     """
-    at = len(MAGIC)
+    at, has_end = len(MAGIC), ends_whole(file, size)
     while at < size:
         peek = _read(file, at, PEEK_BYTES)
         head = _chunk_at(peek, at, size)
@@ -126,13 +146,14 @@ def chunks_by_walk(file: BinaryIO, size: int) -> Iterator[Found]:
         end = _record_end(file, at, size, peek)
         if end is None:
             end = find_chunk(file, at + 1, size)
-            yield Lost(at, end, "no record can be recognised", is_cut=end == size)
+            yield Lost(at, end, "no record can be recognised", is_cut=end == size and not has_end)
             if end == size:
                 return
         elif peek[0] == Opcode.DATA_END:
             return
         at = end
-    yield Lost(size, size, "the file ends without its summary", is_cut=True)
+    if not has_end:
+        yield Lost(size, size, "the file ends without its summary", is_cut=True)
 
 
 def _try_chunk(file: BinaryIO, at: int, size: int, head: ChunkHead) -> tuple[Found, int]:
@@ -239,7 +260,7 @@ def _facts_at(file: BinaryIO, place: int, name_bytes: int) -> dict[str, str]:
 
 
 def read_definitions(file: BinaryIO, size: int) -> Summary:
-    """Schemas and channels that stand at the start of the file, before its first chunk."""
+    """Schemas and channels that stand at the start of the file, before its first chunk and before any damage."""
     found = Summary()
     at = len(MAGIC)
     while at + RECORD_PREFIX <= size:
@@ -252,4 +273,32 @@ def read_definitions(file: BinaryIO, size: int) -> Summary:
         if isinstance(record, Schema | Channel):
             found.add(record, raw)
         at = end
+    return found
+
+
+def search_definitions(file: BinaryIO, size: int, checksums: Mapping[str, int]) -> Summary:
+    """Schemas and channels wherever they stand in the file, told by their form.
+
+    The first of each id counts that agrees with its checksum, where that is known.
+    """
+    found = Summary()
+    overlap = RECORD_PREFIX + 8 + _NAME_BYTES + len(_ENCODING)
+    for base in range(0, size, SEARCH_BYTES):
+        block = _read(file, base, SEARCH_BYTES + overlap)
+        for match in _DEFINITION.finditer(block, 0, SEARCH_BYTES + RECORD_PREFIX):
+            at = match.start()
+            name_at = at + RECORD_PREFIX + (2 if block[at] == Opcode.SCHEMA else 4)
+            behind = name_at + 4 + int.from_bytes(block[name_at : name_at + 4], "little")
+            if block[behind : behind + len(_ENCODING)] != _ENCODING:
+                continue
+            length = int.from_bytes(block[at + 1 : at + RECORD_PREFIX], "little")
+            raw = _read(file, base + at, RECORD_PREFIX + length)
+            record = parse_record(raw[0], raw[RECORD_PREFIX:])
+            if not isinstance(record, Schema | Channel):
+                continue
+            key = f"{'schema' if isinstance(record, Schema) else 'channel'} {record.id}"
+            if key not in found.definitions and (not checksums or checksums.get(key) == zlib.crc32(raw)):
+                found.add(record, raw)
+        if len(found.definitions) > _MOST_DEFINITIONS:
+            break
     return found

@@ -1,0 +1,197 @@
+"""Sound logs that are mutated: written here, and the beginnings of recorded ones where those are."""
+
+import gzip
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import zstandard
+
+from tests.dataflash_writer import MAGIC as DATAFLASH_MAGIC
+from tests.dataflash_writer import flight_log
+from tests.real_logs import REAL_LOGS
+from tests.ulog_writer import GPS, GPS_CODE, small_flight
+
+SAMPLES = Path(__file__).parents[2] / "sample_logs"
+CSV_BYTES, BINARY_BYTES = 40_000, 150_000  # of a recorded log: enough for all that it defines
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """A sound log.
+
+    Parameters
+    ----------
+    name : str
+        ``ulog-written``, or ``ulog-`` and the name of the recorded log.
+    format : str
+    data : bytes
+    starts : ndarray of int64
+        Where its records begin, as far as known: their lengths stand there.
+    is_recorded : bool
+        It is of a real aircraft: nothing of it may be kept.
+    """
+
+    name: str
+    format: str
+    data: bytes
+    starts: np.ndarray
+    is_recorded: bool = False
+
+
+def flat_csv() -> bytes:
+    """A flat CSV with every kind of cell, some 20 kB."""
+    lines = ["# aircraft: SIM-1", "# start_utc: 2026-05-04T06:00:00Z"]
+    lines.append("time_s,ins.roll_deg,ins.true_heading_deg,ins.mode,ins.valid,gnss.latitude_deg,event.name,volts,note")
+    for row in range(400):
+        gnss = f"{55 + row * 1e-6:.6f}" if row % 5 == 0 else ""
+        event = "start" if row == 7 else ""
+        note = f'"a, {row}"'
+        lines.append(f"{row / 50:.3f},{row % 7 - 3.5},{row % 360},nav,{row % 2},{gnss},{event},{row % 28},{note}")
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _noisy_csv() -> bytes:
+    """A flat CSV of some 200 kB that compresses as badly as a recorded one, in several blocks."""
+    rng = np.random.default_rng(20_260_504)
+    rows = (f"{row / 50:.3f},{roll:.4f},{rate:.5f}" for row, (roll, rate) in enumerate(rng.normal(size=(9_000, 2))))
+    return ("time_s,ins.roll_deg,ins.rate_x_dps\n" + "\n".join(rows) + "\n").encode()
+
+
+def g1000() -> bytes:
+    """A table as Garmin's G1000 writes it, some 30 kB."""
+    names = "Lcl Date, Lcl Time, UTCOfst, Latitude, Longitude, GndSpd, HDG, TRK, MagVar, AltGPS, AltInd, BaroA, GPSfix"
+    lines = ['#airframe_info, log_version="1.03", airframe_name="X"', "#yyy-mm-dd, hh:mm:ss, hh:mm, degrees", names]
+    for row in range(400):
+        clock = f"12:{row // 60:02d}:{row % 60:02d}"
+        place = f"{49 + row * 1e-5:.6f}, 4.250000, {row % 120}.5" if row > 20 else "  ,  ,  "
+        lines.append(f"2022-04-17, {clock}, +02:00, {place}, {row % 360}.1, {row % 360}.9, 1.5, 900, 850, 29.92, 3D")
+    return ("\r\n".join(lines) + "\r\n").encode()
+
+
+def ulog() -> bytes:
+    """A ULog with attitude, air data, GPS, nested definitions, text and sync messages, some 30 kB."""
+    log = small_flight(300)
+    log.format(GPS).format("point:float x;float y;").format("track:uint64_t timestamp;point[3] at;char[8] name;")
+    log.subscribe(2, "vehicle_gps_position").subscribe(3, "track", 1)
+    for row in range(60):
+        time_us = 7_000_000 + 100_000 * row
+        place = (1_700_000_000_000_000 + 100_000 * row, 550_000_000 + row, 370_000_000, 200_000, 210_000)
+        log.row(2, GPS_CODE, time_us, *place, 0.05, 1.0, 5.0, 3.0, 4.0, 0.0, 0.1, 3, 1, 12)
+        log.row(3, "Q6f8s", time_us + 9, *range(6), b"abc")
+    return bytes(log.dropout(30).data)
+
+
+def dataflash() -> bytes:
+    """A DataFlash log of today's layout, some 30 kB."""
+    return flight_log(8).content
+
+
+@cache
+def _converted(path: Path) -> bytes:
+    from groundstation.pipeline.convert import convert_log
+    from groundstation.pipeline.log import open_log
+
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / "flight.mcap"
+        convert_log(open_log(path), target)
+        return target.read_bytes()
+
+
+def ulog_starts(data: bytes) -> Iterator[int]:
+    """Where messages begin."""
+    at = 16
+    while at + 3 <= len(data):
+        yield at
+        at += 3 + int.from_bytes(data[at : at + 2], "little")
+
+
+def mcap_starts(data: bytes) -> Iterator[int]:
+    """Where MCAP records begin."""
+    at = 8
+    while at + 9 <= len(data):
+        yield at
+        at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+
+
+def line_starts(data: bytes) -> Iterator[int]:
+    """Where lines begin."""
+    at = 0
+    while 0 <= at < len(data):
+        yield at
+        at = data.find(b"\n", at) + 1 or -1
+
+
+def dataflash_starts(data: bytes) -> Iterator[int]:
+    """Where something that looks like a record begins."""
+    at = data.find(DATAFLASH_MAGIC)
+    while at >= 0:
+        yield at
+        at = data.find(DATAFLASH_MAGIC, at + 3)
+
+
+_STARTS: dict[str, Callable[[bytes], Iterator[int]]] = {
+    "flat-csv": line_starts,
+    "csv-profile": line_starts,
+    "ulog": ulog_starts,
+    "dataflash": dataflash_starts,
+    "mcap": mcap_starts,
+    "gzip": lambda data: iter(range(min(18, len(data)))),
+    "zstd": lambda data: iter(range(min(18, len(data)))),
+}
+FORMATS = tuple(_STARTS)
+_WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
+    "flat-csv": (flat_csv,),
+    "csv-profile": (g1000,),
+    "ulog": (ulog,),
+    "dataflash": (dataflash,),
+    "mcap": (lambda: _converted(SAMPLES / "taxi-short.csv"),),
+    "gzip": (lambda: gzip.compress(_noisy_csv(), mtime=0), lambda: gzip.compress(dataflash(), mtime=0)),
+    "zstd": (lambda: zstandard.compress(_noisy_csv()), lambda: zstandard.compress(ulog())),
+}
+_RECORDED = {
+    "csv-profile": ("g1000/log_220502_135932_EGPN.csv", "fixedwing/umn_thor_flight75.csv"),
+    "ulog": ("ulog/sample_px4_events.ulg", "ulog/pyulog_sample_log_small_vtol.ulg"),
+    "dataflash": ("damaged/erle_tiny_no_gps.BIN", "dataflash/TestLog2_REENCODED_plane.BIN"),
+    "mcap": ("g1000/log_220416_161856_LFQA.csv",),
+}
+
+
+def _cut(data: bytes, format_name: str, size: int) -> bytes:
+    """The beginning of a log, ended behind a whole record."""
+    if len(data) <= size:
+        return data
+    ends = list(_STARTS[format_name](data[: size + 1]))
+    return data[: ends[-1]]
+
+
+def _make(name: str, format_name: str, data: bytes, *, is_recorded: bool = False) -> Base:
+    return Base(name, format_name, data, np.fromiter(_STARTS[format_name](data), np.int64), is_recorded)
+
+
+@cache
+def bases(format_name: str, *, recorded: bool = True) -> tuple[Base, ...]:
+    """Logs of a format, those written here first."""
+    found = [
+        _make(f"{format_name}-written-{number}", format_name, write())
+        for number, write in enumerate(_WRITTEN[format_name], 1)
+    ]
+    for name in _RECORDED.get(format_name, ()) if recorded else ():
+        path = REAL_LOGS / name
+        if not path.exists():
+            continue
+        if format_name == "mcap":
+            data = _converted(path)
+        else:
+            data = _cut(path.read_bytes(), format_name, CSV_BYTES if "csv" in format_name else BINARY_BYTES)
+        found.append(_make(f"{format_name}-{Path(name).stem}", format_name, data, is_recorded=True))
+    return tuple(found)
+
+
+def base_named(name: str) -> Base | None:
+    """The base of a name; None where its recorded log is not here."""
+    known = (base for format_name in FORMATS if name.startswith(format_name) for base in bases(format_name))
+    return next((base for base in known if base.name == name), None)
