@@ -43,7 +43,7 @@ def test_a_verb_of_a_later_version_says_so(verb: str) -> None:
 
 def test_every_verb_has_help() -> None:
     _, text, _ = groundstation("--help")
-    for verb in ("info", "convert", "run", "report", "view", "simulate", "study", "list"):
+    for verb in ("info", "check", "convert", "run", "report", "view", "simulate", "study", "list"):
         assert verb in text
         code, verb_text, _ = groundstation(verb, "--help")
         assert code == 0 and "Usage" in verb_text
@@ -56,7 +56,7 @@ def test_wrong_usage_is_exit_2() -> None:
 
 
 def test_a_missing_file_is_one_line_on_stderr(tmp_path: Path) -> None:
-    for verb in ("info", "list"):
+    for verb in ("info", "check", "list"):
         code, out, err = groundstation(verb, str(tmp_path / "none.csv"))
         assert (code, out) == (2, "")
         assert err.count("\n") == 1 and "none.csv" in err
@@ -66,7 +66,7 @@ def test_a_missing_file_is_one_line_on_stderr(tmp_path: Path) -> None:
 def test_what_no_reader_claims_is_exit_1_in_one_line(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "odd.bin"
     path.write_bytes(content)
-    for arguments in (["info", str(path)], ["run", str(path), "-o", str(tmp_path / "out")]):
+    for arguments in (["info", str(path)], ["check", str(path)], ["run", str(path), "-o", str(tmp_path / "out")]):
         code, _, err = groundstation(*arguments)
         assert code == 1, err
         assert len(err.strip().splitlines()) == 1 and "odd.bin" in err and "Traceback" not in err

@@ -66,3 +66,14 @@ def test_a_wrong_value_is_named(section: str, values: dict[str, object], says: s
 def test_a_missing_file_is_told() -> None:
     with pytest.raises(SettingsError, match=r"nowhere\.toml"):
         load_configuration(Path("nowhere.toml"))
+
+
+def test_thresholds_are_a_section_and_a_file(tmp_path: Path) -> None:
+    config = written(tmp_path, "c.toml", "[thresholds]\nversion = 1\ngaps.min_s = 0.5\n")
+    assert user_settings(load_configuration(config)).thresholds.gaps.min_s == 0.5
+    own = written(tmp_path, "t.toml", "version = 1\n[gaps]\nperiods = 4\n")
+    found = load_configuration(config, thresholds=own)
+    assert user_settings(found).thresholds.gaps == type(user_settings(found).thresholds.gaps)(4.0, 0.2)
+    assert found.to_dict() == {"thresholds": {"version": 1, "gaps": {"periods": 4}}}
+    with pytest.raises(SettingsError, match=r"c.toml, key thresholds.version"):
+        user_settings(load_configuration(written(tmp_path, "c.toml", "[thresholds]\ngaps.min_s = 0.5\n")))

@@ -7,7 +7,7 @@ import pytest
 
 from groundstation.base.records import Column, Damage, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity import LedgerSettings, corrected, ledger_findings, survey
+from groundstation.integrity import corrected, ledger_findings, survey, thresholds_from
 from groundstation.integrity.ledger import gaps_of
 from groundstation.integrity.ordering import joined
 
@@ -31,12 +31,12 @@ def test_rates_coverage_and_gaps() -> None:
 def test_the_definition_of_a_gap_can_be_set() -> None:
     items: list[Item] = [LogHeader("t"), batch("ins", [0.0, 0.1, 0.2, 0.45, 0.55, 1.55, 1.65])]
     for settings, count in (
-        (None, 1),
-        (LedgerSettings(2.0), 2),
-        (LedgerSettings(2.0, 0.5), 1),
-        (LedgerSettings(20.0), 0),
+        ({}, 1),
+        ({"periods": 2.0}, 2),
+        ({"periods": 2.0, "min_s": 0.5}, 1),
+        ({"periods": 20.0}, 0),
     ):
-        found = survey(items, ledger_settings=settings)
+        found = survey(items, thresholds=thresholds_from({"version": 1, "gaps": settings}))
         assert len(found.ledger["ins"].gaps) == count
         assert sum(len(gaps) for gaps in found.gaps) == count
 

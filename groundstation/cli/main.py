@@ -59,6 +59,10 @@ IntervalsFile = Annotated[
     Path | None,
     typer.Option("--intervals", help="Intervals to exclude or force (TOML).", metavar="FILE", readable=False),
 ]
+ThresholdsFile = Annotated[
+    Path | None,
+    typer.Option("--thresholds", help="Limits of the integrity ledger (TOML).", metavar="FILE", readable=False),
+]
 
 
 def say(text: str) -> None:
@@ -132,6 +136,32 @@ def info(
 
 @app.command()
 @answers_with_exit_code
+def check(
+    logs: Annotated[list[Path], typer.Argument(help="Recorded logs or MCAPs.", metavar="LOG...", readable=False)],
+    thresholds: ThresholdsFile = None,
+    config: ConfigFile = None,
+    profile: Profile = None,
+    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is this grave.")] = "none",
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+    progress: Progress = "auto",
+) -> int | None:
+    """Print the integrity ledger: rates, coverage, gaps, losses and odd values of every topic. Writes nothing."""
+    from groundstation.cli import check_table, printing
+    from groundstation.cli.progress import listener
+    from groundstation.pipeline.check import check_many
+    from groundstation.pipeline.configuration import load_configuration
+
+    configuration = load_configuration(config, profile=profile, thresholds=thresholds)
+    with listener("none" if quiet else progress) as listen:
+        checked = check_many(logs, configuration, fail_on=fail_on, listen=listen)
+    check_table.show(checked, as_json_text=json, quiet=quiet, everything=verbose)
+    return printing.worst_code(tuple(one.outcome for one in checked))
+
+
+@app.command()
+@answers_with_exit_code
 def convert(
     logs: Annotated[list[Path], typer.Argument(help="Recorded logs.", metavar="LOG...", readable=False)],
     output: Annotated[Path, typer.Option("-o", "--output", help="MCAP to write; a folder for several logs.")],
@@ -162,6 +192,7 @@ def run(
     aircraft: AircraftFile = None,
     site: SiteFile = None,
     intervals: IntervalsFile = None,
+    thresholds: ThresholdsFile = None,
     profile: Profile = None,
     jobs: Annotated[int, typer.Option("-j", "--jobs", help="Processes; 0: one per core.", min=0)] = 0,
     fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is this grave.")] = "none",
@@ -177,7 +208,7 @@ def run(
     from groundstation.pipeline.batch import run_many
     from groundstation.pipeline.configuration import load_configuration
 
-    configuration = load_configuration(config, aircraft, site, intervals, profile)
+    configuration = load_configuration(config, aircraft, site, intervals, profile, thresholds)
     with listener("none" if quiet else progress) as listen:
         outcomes = run_many(paths, output, configuration, jobs=jobs, force=force, fail_on=fail_on, listen=listen)
     printing.outcomes(outcomes, as_json_text=json, quiet=quiet, with_times=verbose)
@@ -286,7 +317,6 @@ def list_(
 
 
 LATER_VERBS = {
-    "check": "Print the integrity ledger of a log.",
     "compare": "Compare two flights or two configurations.",
     "clip": "Cut a part of a flight.",
     "cooperative": "Navigation between aircraft.",

@@ -14,6 +14,7 @@ import numpy as np
 
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch, frozen
 from groundstation.base.timescales import duration_text, iso_to_utc_ns, utc_ns_to_iso
+from groundstation.base.toml_settings import number
 from groundstation.base.units import NS_PER_S
 
 _DAY_NS = 86_400 * NS_PER_S
@@ -36,10 +37,10 @@ class ClockSettings:
         A longer jump ahead is a clock that was set; a shorter one is a gap in the data.
     """
 
-    stray_rows: int = 5
-    rows_after_step: int = 3
-    unordered_share: float = 0.2
-    forward_step_s: float = 86_400.0
+    stray_rows: int = number(5, 0)
+    rows_after_step: int = number(3, 1)
+    unordered_share: float = number(0.2, 0.0, 1.0)
+    forward_step_s: float = number(86_400.0, 1.0, 1e9)
 
 
 @dataclass(frozen=True)
@@ -183,6 +184,7 @@ class Clock:
             "stale_times": self.stale_times,
             "stray_rows": self.stray_rows,
             "is_unordered": self.is_unordered,
+            "is_counting": self.is_counting,
             "shift_s": round(self.shift_ns / NS_PER_S, 3),
         }
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.records import BoolArray, Column, Int64Array
+from groundstation.base.toml_settings import number
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import Clock, interpolated, middle_of, zero_of
 
@@ -30,8 +31,8 @@ class CountingSettings:
         So many records in a row, each within the tolerance of the one before, are believed wherever they stand.
     """
 
-    tolerance_s: float = 3.0
-    run_records: int = 50
+    tolerance_s: float = number(3.0, 0.001, 1e6)
+    run_records: int = number(50, 1, 1_000_000)
 
 
 def is_frozen(times: int, repeats: int) -> bool:

@@ -1,48 +1,30 @@
 """The integrity ledger: what a log holds, topic by topic, and what is odd about it. Figures only, no judgement."""
 
+import math
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from groundstation.base.records import Damage, Int64Array, Remark, frozen
-from groundstation.base.signals import kind_of
+from groundstation.base.records import Damage, Int64Array, Remark
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import Clock, quantile
+from groundstation.integrity.clock import Clock
+from groundstation.integrity.limits import Thresholds, shipped
+from groundstation.integrity.rhythm import Gaps, rhythm_of
+from groundstation.integrity.sequence import Sequence
+from groundstation.integrity.spans import Dropout, Span, Timeline, skipped_bytes, spans_of, truncation
+from groundstation.integrity.stuck import Stuck
 
-GAPS_LISTED = 100
-SPORADIC_KINDS = ("event", "onboard")  # written when something happens: a pause in them is no gap
-MOST_STEPS = 10_000  # of which a typical step is taken
-FEWEST_STEPS, UNEVEN = 4, 3.0  # a raw topic with fewer steps, or a fifth of them so much longer than usual, has no rate
-
-
-@dataclass(frozen=True)
-class LedgerSettings:
-    """Definition of a gap: a step longer than ``gap_periods`` nominal periods and than ``gap_min_s`` seconds."""
-
-    gap_periods: float = 3.0
-    gap_min_s: float = 0.2
-
-
-@dataclass(frozen=True)
-class Gaps:
-    """Gaps of one topic: last sample before each (corrected nanoseconds) and seconds to the next, shape (n,)."""
-
-    topic: str
-    start_ns: Int64Array
-    length_s: np.ndarray[Any, np.dtype[np.float64]]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "start_ns", frozen(self.start_ns))
-        object.__setattr__(self, "length_s", frozen(self.length_s))
-
-    def __len__(self) -> int:
-        return len(self.start_ns)
+GAPS_LISTED = STUCK_LISTED = SPANS_LISTED = 100
 
 
 @dataclass(frozen=True)
 class FieldLedger:
-    """One field: samples present, NaN the device wrote, values outside the physical range and the first of them."""
+    """One field: samples present, NaN the device wrote, values outside the physical range, stretches it was stuck.
+
+    ``first_out_of_range`` is the record of the first value outside the range; ``first_outside_ns`` and
+    ``last_outside_ns`` are the corrected times of the first and the last.
+    """
 
     name: str
     present: int
@@ -51,10 +33,38 @@ class FieldLedger:
     first_out_of_range: int | None = None
     low: float = float("-inf")
     high: float = float("inf")
+    first_outside_ns: int | None = None
+    last_outside_ns: int | None = None
+    stuck: tuple[Stuck, ...] = ()
 
-    def to_dict(self) -> dict[str, Any]:
+    @property
+    def is_odd(self) -> bool:
+        """Whether there is more to say of it than how many samples it has."""
+        return bool(self.nan or self.out_of_range or self.stuck)
+
+    def to_dict(self, clock: Clock) -> dict[str, Any]:
         """JSON-able."""
-        return {"present": self.present, "nan": self.nan, "out_of_range": self.out_of_range}
+        plain: dict[str, Any] = {"present": self.present, "nan": self.nan, "out_of_range": self.out_of_range}
+        if self.out_of_range:
+            first_ns = self.first_outside_ns
+            plain["first_out_of_range"] = {
+                "record": self.first_out_of_range,
+                "time": None if first_ns is None else clock.text(first_ns),
+                "range": [end if math.isfinite(end) else None for end in (self.low, self.high)],
+            }
+        if self.stuck:
+            plain["stuck"] = [
+                {
+                    "record": one.record_index,
+                    "start": clock.text(one.start_ns),
+                    "length_s": round(one.length_s, 3),
+                    "samples": one.samples,
+                    "value": one.value,
+                    "why": one.why,
+                }
+                for one in self.stuck[:STUCK_LISTED]
+            ]
+        return plain
 
 
 @dataclass(frozen=True)
@@ -68,7 +78,8 @@ class TopicLedger:
     first_ns, last_ns : int
         Corrected time of the first and last record.
     nominal_rate_hz : float or None
-        From the median step; None with fewer than two distinct times.
+        From the median step; None where no step is usual: fewer than two distinct times, or a topic that is written
+        when something happens.
     actual_rate_hz : float or None
         Distinct times less one, over the span.
     coverage : float or None
@@ -77,6 +88,8 @@ class TopicLedger:
         Records at the time of the one before (in order of time); steps back of device time; records out of order.
     gaps : Gaps
     fields : tuple of FieldLedger
+    sequences : tuple of Sequence
+        What record counters say is missing.
     """
 
     topic: str
@@ -91,6 +104,7 @@ class TopicLedger:
     stray_rows: int
     gaps: Gaps
     fields: tuple[FieldLedger, ...]
+    sequences: tuple[Sequence, ...] = ()
 
     @property
     def span_s(self) -> float:
@@ -117,7 +131,8 @@ class TopicLedger:
                 "longest_s": round(float(self.gaps.length_s.max(initial=0.0)), 3),
                 "listed": [[clock.text(int(start)), round(float(length), 3)] for start, length in listed],
             },
-            "fields": {ledger.name: ledger.to_dict() for ledger in self.fields},
+            "sequences": [sequence.to_dict(clock) for sequence in self.sequences],
+            "fields": {ledger.name: ledger.to_dict(clock) for ledger in self.fields},
         }
 
 
@@ -129,7 +144,9 @@ class Ledger:
     clock: Clock = field(default_factory=Clock)
     damages: tuple[Damage, ...] = ()
     remarks: tuple[Remark, ...] = ()
-    settings: LedgerSettings = field(default_factory=LedgerSettings)
+    thresholds: Thresholds = field(default_factory=shipped)
+    dropouts: tuple[Dropout, ...] = ()
+    timeline: Timeline | None = None
 
     def __getitem__(self, topic: str) -> TopicLedger:
         """The ledger of one topic; KeyError when the log has none of that name."""
@@ -153,11 +170,46 @@ class Ledger:
         """Share of expected samples by topic, where it is known, rounded to 6 decimals."""
         return {ledger.topic: round(ledger.coverage, 6) for ledger in self.topics if ledger.coverage is not None}
 
+    @property
+    def start_ns(self) -> int:
+        """Corrected time of the first record of any topic: flight time zero."""
+        return min((ledger.first_ns for ledger in self.topics), default=0)
+
+    @property
+    def spans(self) -> tuple[Span, ...]:
+        """Spans of time with damage, in order of time; gaps stand with their topics."""
+        end_ns = max((ledger.last_ns for ledger in self.topics), default=0)
+        timeline = self.timeline or Timeline(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
+        found = spans_of(self.damages, self.dropouts, timeline, end_ns) if self.topics else []
+        for topic in self.topics:
+            found += _spans_of_topic(topic)
+        return tuple(sorted(found, key=lambda span: (span.start_ns, span.topic, span.field, span.cause)))
+
+    def losses(self, topic: str) -> dict[str, int]:
+        """What could not be read of a topic, counted by kind of damage."""
+        counts: dict[str, int] = {}
+        for damage in self.damages:
+            if damage.topic == topic and damage.loses_data:
+                counts[damage.kind] = counts.get(damage.kind, 0) + damage.count
+        return counts
+
     def to_dict(self) -> dict[str, Any]:
         """JSON-able, in a fixed order."""
+        limits, spans = self.thresholds.gaps, self.spans
+        skipped, skipped_spans = skipped_bytes(self.damages)
         return {
-            "gap_definition": {"periods": self.settings.gap_periods, "min_s": self.settings.gap_min_s},
-            "topics": {ledger.topic: ledger.to_dict(self.clock) for ledger in self.topics},
+            "thresholds": self.thresholds.to_dict(),
+            "gap_definition": {"periods": limits.periods, "min_s": limits.min_s},
+            "topics": {
+                ledger.topic: {**ledger.to_dict(self.clock), "losses": self.losses(ledger.topic)}
+                for ledger in self.topics
+            },
+            "bytes_skipped": skipped,
+            "skipped_spans": skipped_spans,
+            "truncated": truncation(self.damages),
+            "dropouts": {"count": len(self.dropouts), "total_s": round(sum(one.length_s for one in self.dropouts), 3)},
+            "spans": [span.to_dict(self.clock, self.start_ns) for span in spans[:SPANS_LISTED]],
+            "spans_more": max(0, len(spans) - SPANS_LISTED),
             "damages": [
                 {
                     "kind": damage.kind,
@@ -173,8 +225,26 @@ class Ledger:
         }
 
 
-def gaps_of(topic: str, time_ns: Int64Array, *, settings: LedgerSettings | None = None) -> Gaps:
-    """Gaps of a topic by the definition of :class:`LedgerSettings`, from its corrected times in order, shape (n,).
+def _spans_of_topic(topic: TopicLedger) -> list[Span]:
+    """Spans of wrong values and of records that a counter misses."""
+    found = []
+    for ledger in topic.fields:
+        if ledger.first_outside_ns is not None and ledger.last_outside_ns is not None:
+            start_ns, end_ns = sorted((ledger.first_outside_ns, ledger.last_outside_ns))
+            count = ledger.out_of_range
+            found.append(Span("out_of_range", topic.topic, ledger.name, start_ns, end_ns, count == 1, count))
+        for one in ledger.stuck:
+            end_ns = one.start_ns + round(one.length_s * NS_PER_S)
+            found.append(Span("stuck", topic.topic, ledger.name, one.start_ns, end_ns, True, one.samples))
+    for sequence in topic.sequences:
+        for time_ns, lost in sequence.places:
+            scope = topic.topic if sequence.kind == "records" else ""
+            found.append(Span("sequence", scope, "", time_ns, time_ns, False, lost))
+    return found
+
+
+def gaps_of(topic: str, time_ns: Int64Array, *, thresholds: Thresholds | None = None) -> Gaps:
+    """Gaps of a topic by the thresholds, from its corrected times in order, shape (n,).
 
     Topics that are written when something happens (events) have none.
 
@@ -184,15 +254,8 @@ def gaps_of(topic: str, time_ns: Int64Array, *, settings: LedgerSettings | None 
     >>> gaps.start_ns.tolist(), gaps.length_s.tolist()
     ([2000000000], [7.0])
     """
-    return _gaps(topic, time_ns, _rhythm(topic, time_ns), settings or LedgerSettings())
-
-
-def _gaps(topic: str, time_ns: Int64Array, rhythm: "_Rhythm", settings: LedgerSettings) -> Gaps:
-    if not rhythm.is_regular:
-        return Gaps(topic, np.zeros(0, dtype=np.int64), np.zeros(0))
-    longest_ns = max(settings.gap_periods * rhythm.typical_ns, settings.gap_min_s * NS_PER_S)
-    before = np.flatnonzero(rhythm.steps_ns > longest_ns)
-    return Gaps(topic, time_ns[before], rhythm.steps_ns[before] / NS_PER_S)
+    limits = thresholds or shipped()
+    return rhythm_of(topic, time_ns, limits).gaps(topic, time_ns)
 
 
 def topic_ledger(
@@ -202,56 +265,28 @@ def topic_ledger(
     backward_steps: int,
     stray_rows: int,
     fields: tuple[FieldLedger, ...],
-    settings: LedgerSettings,
+    sequences: tuple[Sequence, ...] = (),
+    thresholds: Thresholds,
 ) -> TopicLedger:
     """Ledger of one topic from its corrected times in order, shape (n,), n at least 1."""
-    rhythm = _rhythm(topic, time_ns)
+    rhythm = rhythm_of(topic, time_ns, thresholds)
     span_ns = int(time_ns[-1] - time_ns[0])
-    period_ns, ahead = rhythm.typical_ns, rhythm.ahead
+    ahead = rhythm.ahead
     return TopicLedger(
         topic,
         rows=len(time_ns),
         first_ns=int(time_ns[0]),
         last_ns=int(time_ns[-1]),
-        nominal_rate_hz=NS_PER_S / period_ns if period_ns else None,
-        actual_rate_hz=ahead * NS_PER_S / span_ns if period_ns else None,
-        coverage=min(1.0, (ahead + 1) / (span_ns / period_ns + 1.0)) if rhythm.is_regular else None,
-        duplicates=len(rhythm.steps_ns) - ahead,
+        nominal_rate_hz=NS_PER_S / rhythm.period_ns if rhythm.has_rate else None,
+        actual_rate_hz=ahead * NS_PER_S / span_ns if ahead else None,
+        coverage=rhythm.coverage if rhythm.has_rate else None,
+        duplicates=len(time_ns) - 1 - ahead,
         backward_steps=backward_steps,
         stray_rows=stray_rows,
-        gaps=_gaps(topic, time_ns, rhythm, settings),
+        gaps=rhythm.gaps(topic, time_ns),
         fields=fields,
+        sequences=sequences,
     )
-
-
-class _Rhythm(NamedTuple):
-    """How a topic's times follow each other: steps, how many lead ahead, their median, whether it is a period.
-
-    A topic that is written when something happens has none.
-    """
-
-    steps_ns: Int64Array
-    ahead: int
-    typical_ns: float
-    is_regular: bool
-
-
-def _rhythm(topic: str, time_ns: Int64Array) -> _Rhythm:
-    """The rhythm of a topic, from its corrected times in order."""
-    steps = np.diff(time_ns)
-    ahead = steps[steps > 0]
-    if not len(ahead):
-        return _Rhythm(steps, 0, 0.0, False)
-    some = np.sort(ahead[:: len(ahead) // MOST_STEPS | 1])  # odd: two steps in turn are both met
-    typical_ns = quantile(some, 0.5)
-    return _Rhythm(steps, len(ahead), typical_ns, not _is_sporadic(topic, len(ahead), typical_ns, quantile(some, 0.8)))
-
-
-def _is_sporadic(topic: str, steps: int, usual_ns: float, long_ns: float) -> bool:
-    """Whether a topic is written when something happens: by its kind, or, of a raw one, by steps of every length."""
-    if kind_of(topic) != "raw":
-        return kind_of(topic) in SPORADIC_KINDS
-    return steps < FEWEST_STEPS or long_ns > UNEVEN * usual_ns
 
 
 def _rounded(value: float | None, digits: int) -> float | None:

@@ -6,11 +6,14 @@ from groundstation.base.findings import Finding, Severity
 from groundstation.base.signals import is_canonical
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import Clock, ClockStep
-from groundstation.integrity.ledger import Ledger, TopicLedger
+from groundstation.integrity.ledger import FieldLedger, Ledger, TopicLedger
+from groundstation.integrity.limits import DuplicateLimits
+from groundstation.integrity.sequence import Sequence
 
-MANY_MISSING_TIMES = 0.01  # share of records without a time above which it is a warning
-MANY_DUPLICATES, STANDS_STILL = 0.2, 0.9  # share of a topic's records: a warning, and a clock that stands still
-FEWEST_DUPLICATES = 10  # that are worth a warning
+TOPIC_CODES = (
+    *("time.duplicates", "data.gaps", "data.sequence", "data.sequence_reset"),
+    *("values.out_of_range", "values.nan", "values.stuck"),
+)
 _REMARKS_THAT_WARN = ("assumed_utc", "clock_disagrees", "unreadable_metadata", "plug_in", "duplicate_column")
 
 
@@ -20,13 +23,16 @@ def ledger_findings(ledger: Ledger) -> tuple[Finding, ...]:
     Codes: ``clock.backward_step``, ``clock.forward_step``, ``clock.missing_times``, ``clock.implausible_times``,
     ``clock.stale_times``, ``clock.shifted``, ``clock.no_utc``, ``clock.no_times``, ``time.unordered``,
     ``time.stray_rows``, ``time.duplicates``, ``data.none``, ``data.gaps``, ``data.<kind of damage>``
-    (``data.truncated``, ``data.dropped_rows``, ``data.unreadable_cells`` ...), ``values.out_of_range``, ``values.nan``,
-    ``reader.<remark>`` (``reader.derived``, ``reader.assumed_utc`` ...).
+    (``data.truncated``, ``data.dropped_rows``, ``data.unreadable_cells`` ...), ``data.sequence``,
+    ``data.sequence_reset``, ``values.out_of_range``, ``values.nan``, ``values.stuck``, ``reader.<remark>``
+    (``reader.derived``, ``reader.assumed_utc`` ...).
     """
-    findings = [*_clock(ledger), *_damages(ledger)]
-    for topic in ledger.topics:
-        findings += _topic(topic, ledger)
-    return (*findings, *_remarks(ledger))
+    return (*_clock(ledger), *_damages(ledger), *topic_findings(ledger), *_remarks(ledger))
+
+
+def topic_findings(ledger: Ledger) -> tuple[Finding, ...]:
+    """Those of the findings that are about topics: order, gaps, counters and values."""
+    return tuple(finding for topic in ledger.topics for finding in _topic(topic, ledger))
 
 
 def _clock(ledger: Ledger) -> Iterator[Finding]:
@@ -42,7 +48,8 @@ def _clock(ledger: Ledger) -> Iterator[Finding]:
         yield _step(step, clock)
     if clock.missing_times:
         rows = sum(topic.rows for topic in ledger.topics)
-        severity: Severity = "warn" if clock.missing_times > MANY_MISSING_TIMES * rows else "info"
+        many = ledger.thresholds.findings.missing_times_share * rows
+        severity: Severity = "warn" if clock.missing_times > many else "info"
         text = f"{_counted(clock.missing_times, 'record')} without a time: placed by their neighbours"
         yield Finding(severity, "clock.missing_times", text, count=clock.missing_times)
     if clock.implausible_times:
@@ -89,20 +96,20 @@ def _damages(ledger: Ledger) -> Iterator[Finding]:
         yield Finding(severity, f"data.{damage.kind}", text, damage.topic, damage.place, damage.count)
 
 
-def _duplicates(topic: TopicLedger, clock: Clock) -> Finding:
+def _duplicates(topic: TopicLedger, clock: Clock, limits: DuplicateLimits) -> Finding:
     """Records at one time: a warning where many, but of a counting clock's topics, whose sources share times."""
     share = topic.duplicates / topic.rows
     text = f"{topic.topic}: {topic.duplicates} of {topic.rows} records repeat the time of the one before"
-    is_many = topic.duplicates >= FEWEST_DUPLICATES and share > MANY_DUPLICATES
+    is_many = topic.duplicates >= limits.fewest and share > limits.share
     is_odd = is_many and is_canonical(topic.topic) and not clock.is_counting
-    if is_odd and share > STANDS_STILL:
+    if is_odd and share > limits.standing_share:
         text += ": the clock stands still"
     return Finding("warn" if is_odd else "info", "time.duplicates", text, topic.topic, count=topic.duplicates)
 
 
 def _topic(topic: TopicLedger, ledger: Ledger) -> Iterator[Finding]:
     if topic.duplicates:
-        yield _duplicates(topic, ledger.clock)
+        yield _duplicates(topic, ledger.clock, ledger.thresholds.duplicates)
     if len(topic.gaps):
         longest = int(topic.gaps.length_s.argmax())
         place = ledger.clock.text(int(topic.gaps.start_ns[longest]))
@@ -112,20 +119,51 @@ def _topic(topic: TopicLedger, ledger: Ledger) -> Iterator[Finding]:
         )
         severity: Severity = "warn" if is_canonical(topic.topic) else "info"  # nothing is estimated from raw topics
         yield Finding(severity, "data.gaps", text, topic.topic, place, len(topic.gaps))
+    for sequence in topic.sequences:
+        yield from _sequence(topic.topic, sequence, ledger.clock)
     for field in topic.fields:
-        name = f"{topic.topic}.{field.name}"
-        if field.out_of_range:
-            place = f"record {field.first_out_of_range}"
-            count = _counted(field.out_of_range, "value")
-            text = f"{name}: {count} outside [{field.low:g}, {field.high:g}], first at {place}"
-            yield Finding("warn", "values.out_of_range", text, topic.topic, place, field.out_of_range)
-        if field.nan:
-            text = f"{name}: {field.nan} of {field.present} values are NaN as the device wrote them"
-            yield Finding("info", "values.nan", text, topic.topic, count=field.nan)
+        yield from _field(topic.topic, field, ledger.clock)
 
 
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+def _field(topic: str, field: FieldLedger, clock: Clock) -> Iterator[Finding]:
+    name = f"{topic}.{field.name}"
+    if field.out_of_range:
+        place = f"record {field.first_out_of_range}"
+        count = _counted(field.out_of_range, "value")
+        text = f"{name}: {count} outside [{field.low:g}, {field.high:g}], first at {place}"
+        if field.first_outside_ns is not None:
+            text += f" ({clock.text(field.first_outside_ns)})"
+        yield Finding("warn", "values.out_of_range", text, topic, place, field.out_of_range)
+    if field.nan:
+        text = f"{name}: {field.nan} of {field.present} values are NaN as the device wrote them"
+        yield Finding("info", "values.nan", text, topic, count=field.nan)
+    if field.stuck:
+        longest = max(field.stuck, key=lambda one: one.length_s)
+        place = clock.text(longest.start_ns)
+        text = (
+            f"{name}: stuck {_counted(len(field.stuck), 'time')}, the longest at {longest.value:g} for "
+            f"{longest.length_s:.1f} s ({longest.samples} samples) from {place}: {longest.why}"
+        )
+        yield Finding("warn", "values.stuck", text, topic, place, len(field.stuck))
+
+
+def _sequence(topic: str, sequence: Sequence, clock: Clock) -> Iterator[Finding]:
+    name = f"{topic}.{sequence.field}"
+    if sequence.lost:
+        place = clock.text(sequence.places[0][0])
+        what = "records missing by the counter" if sequence.kind == "records" else "losses counted by the recorder"
+        text = f"{name}: {sequence.lost} {what}, the first before {place}"
+        yield Finding("warn", "data.sequence", text, topic, place, sequence.lost)
+    if sequence.before:
+        text = f"{name}: the recorder had counted {_counted(sequence.before, 'loss', 'losses')} when the log began"
+        yield Finding("info", "data.sequence", text, topic, count=sequence.before)
+    if sequence.resets:
+        text = f"{name}: the counter jumped {_counted(sequence.resets, 'time')}: no loss is counted there"
+        yield Finding("info", "data.sequence_reset", text, topic, count=sequence.resets)
+
+
+def _counted(count: int, noun: str, nouns: str = "") -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {nouns or noun + 's'}"
 
 
 def _remarks(ledger: Ledger) -> Iterator[Finding]:

@@ -3,29 +3,22 @@
 Kept are 12 bytes a record for each set of topics that are sampled together, beyond 16 MiB in a temporary file.
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from groundstation.base.records import (
-    BoolArray,
-    Column,
-    Damage,
-    Int64Array,
-    Item,
-    LogHeader,
-    RecordBatch,
-    Remark,
-)
-from groundstation.base.signals import field_of
+from groundstation.base.records import BoolArray, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import Clock, ClockSettings, estimate_clock
+from groundstation.integrity.clock import Clock, estimate_clock
+from groundstation.integrity.contents import Contents
 from groundstation.integrity.counting import CountingSettings, estimate_counting_clock
-from groundstation.integrity.ledger import FieldLedger, Gaps, Ledger, LedgerSettings, TopicLedger, topic_ledger
+from groundstation.integrity.ledger import Ledger, TopicLedger, topic_ledger
+from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.integrity.ordering import joined_columns
 from groundstation.integrity.places import Kept, Places
+from groundstation.integrity.rhythm import Gaps
 from groundstation.integrity.thinning import Thinner
 
 
@@ -61,78 +54,6 @@ class Survey:
         return self.ledger.gaps
 
 
-@dataclass
-class _FieldTally:
-    """Counts of one field, growing batch by batch."""
-
-    low: float
-    high: float
-    is_known: bool = True  # of a field that nobody knows, infinity may be meant: "no limit"
-    present: int = 0
-    nan: int = 0
-    out_of_range: int = 0
-    first_out_of_range: int | None = None
-
-    def add(self, column: Column, record_index: Int64Array) -> None:
-        values, mask = column.values, column.present
-        self.present += len(column) if mask is None else int(np.count_nonzero(mask))
-        if values.dtype.kind != "f":
-            return
-        nan = np.isnan(values)
-        self.nan += int(np.count_nonzero(nan if mask is None else nan & mask))
-        if not self.is_known:
-            return
-        outside = (values < self.low) | (values > self.high) | np.isinf(values)
-        if mask is not None:
-            outside &= mask
-        if outside.any():
-            self.out_of_range += int(np.count_nonzero(outside))
-            if self.first_out_of_range is None:
-                self.first_out_of_range = int(record_index[np.argmax(outside)])
-
-    def ledger(self, name: str) -> FieldLedger:
-        return FieldLedger(
-            name, self.present, self.nan, self.out_of_range, self.first_out_of_range, self.low, self.high
-        )
-
-
-def _tally_fields(fields: dict[str, _FieldTally], batch: RecordBatch) -> None:
-    """Add a batch to the counts of its topic's fields."""
-    for name, column in batch.columns.items():
-        tally = fields.get(name)
-        if tally is None:
-            known = field_of(batch.topic, name)
-            low, high = (known.low, known.high) if known else (float("-inf"), float("inf"))
-            tally = fields[name] = _FieldTally(low, high, known is not None)
-        tally.add(column, batch.record_index)
-
-
-@dataclass
-class _TopicTally:
-    """Times and counts of one topic, growing batch by batch."""
-
-    topic: str
-    pieces: list[Kept] = field(default_factory=list)
-    fields: dict[str, _FieldTally] = field(default_factory=dict)
-
-    def add(self, batch: RecordBatch, piece: Kept) -> None:
-        """Count one more batch."""
-        self.pieces.append(piece)
-        _tally_fields(self.fields, batch)
-
-    def ledger(self, order: "_Order", settings: LedgerSettings) -> TopicLedger:
-        """The topic's ledger."""
-        fields = tuple(tally.ledger(name) for name, tally in self.fields.items())
-        return topic_ledger(
-            self.topic,
-            order.time_ns,
-            backward_steps=order.backward_steps,
-            stray_rows=order.stray_rows,
-            fields=fields,
-            settings=settings,
-        )
-
-
 class _Order(NamedTuple):
     """Corrected times of a topic in order, and how far it was from it: lateness in nanoseconds, counts."""
 
@@ -161,74 +82,83 @@ def _order_of(places: Places, pieces: Sequence[Kept], clock: Clock) -> _Order:
     return _Order(time_ns, lateness, backward, stray)
 
 
-def survey(
-    items: Iterable[Item],
-    *,
-    clock_settings: ClockSettings | None = None,
-    ledger_settings: LedgerSettings | None = None,
-) -> Survey:
+def survey(items: Iterable[Item], *, thresholds: Thresholds | None = None) -> Survey:
     """Read a log once and say what is in it.
 
     Parameters
     ----------
     items : iterable of Item
         As a reader yields them.
+    thresholds : Thresholds, optional
+        Limits of the ledger; the shipped ones when left out.
 
     Returns
     -------
     Survey
         With the clock that :func:`groundstation.integrity.ordering.corrected` needs for the second pass.
     """
+    limits = thresholds or shipped()
     header = LogHeader("")
     damages: list[Damage] = []
     remarks: list[Remark] = []
-    tallies: dict[str, _TopicTally] = {}
-    places = Places()
+    pieces: dict[str, list[Kept]] = {}
+    places, contents = Places(), Contents(limits)
     for item in items:
         if isinstance(item, RecordBatch):
             if len(item):
-                tallies.setdefault(item.topic, _TopicTally(item.topic)).add(item, places.of(item))
+                pieces.setdefault(item.topic, []).append(places.of(item))
+                contents.add(item)
         elif isinstance(item, Damage):
             damages.append(item)
         elif isinstance(item, Remark):
             remarks.append(item)
         else:
             header = item
-    clock = _clock_of(header, places, [tallies[topic].pieces for topic in sorted(tallies)], clock_settings)
-    settings = ledger_settings or LedgerSettings()
-    results = _ledgers(places, tallies.values(), clock, settings) if clock.has_times else []
+    clock = _clock_of(header, places, [pieces[topic] for topic in sorted(pieces)], limits)
+    results = _ledgers(places, pieces, contents, clock, limits) if clock.has_times else []
     topics = tuple(ledger for ledger, _lateness in results)
     clock = replace(clock, lateness_ns={ledger.topic: lateness for ledger, lateness in results})
-    return Survey(header, clock, Ledger(topics, clock, tuple(damages), tuple(remarks), settings))
+    dropouts, timeline = (contents.dropouts(clock), contents.timeline(clock)) if clock.has_times else ((), None)
+    ledger = Ledger(topics, clock, tuple(damages), tuple(remarks), limits, dropouts, timeline)
+    return Survey(header, clock, ledger)
 
 
 def _ledgers(
-    places: Places, tallies: Iterable[_TopicTally], clock: Clock, settings: LedgerSettings
+    places: Places, pieces: Mapping[str, Sequence[Kept]], contents: Contents, clock: Clock, limits: Thresholds
 ) -> list[tuple[TopicLedger, int]]:
     """Ledgers and latenesses of all topics in alphabetical order; topics that are sampled together share theirs."""
-    together: dict[tuple[int, ...], list[_TopicTally]] = {}
-    for tally in tallies:
-        together.setdefault(tuple(kept.number for kept in tally.pieces), []).append(tally)
+    together: dict[tuple[int, ...], list[str]] = {}
+    for topic, several in pieces.items():
+        together.setdefault(tuple(kept.number for kept in several), []).append(topic)
     results = []
-    for several in together.values():
-        order = _order_of(places, several[0].pieces, clock)
-        results += [(tally.ledger(order, settings), order.lateness_ns) for tally in several]
+    for topics in together.values():
+        order = _order_of(places, pieces[topics[0]], clock)
+        for topic in topics:
+            ledger = topic_ledger(
+                topic,
+                order.time_ns,
+                backward_steps=order.backward_steps,
+                stray_rows=order.stray_rows,
+                fields=contents.fields(topic, clock),
+                sequences=contents.sequences(topic, clock),
+                thresholds=limits,
+            )
+            results.append((ledger, order.lateness_ns))
     return sorted(results, key=lambda result: result[0].topic)
 
 
-def _clock_of(
-    header: LogHeader, places: Places, topics: Sequence[Sequence[Kept]], settings: ClockSettings | None
-) -> Clock:
+def _clock_of(header: LogHeader, places: Places, topics: Sequence[Sequence[Kept]], limits: Thresholds) -> Clock:
     """The model of the log's clock, of the kind that its reader names."""
     if header.has_counting_clock:
-        return _counting_clock(header, places, topics)
+        return _counting_clock(header, places, topics, limits.counting_clock)
     index, time = places.in_one(topics)
-    return estimate_clock(index, time, header.utc_of_zero_ns, settings=settings)
+    return estimate_clock(index, time, header.utc_of_zero_ns, settings=limits.clock)
 
 
-def _counting_clock(header: LogHeader, places: Places, topics: Sequence[Sequence[Kept]]) -> Clock:
+def _counting_clock(
+    header: LogHeader, places: Places, topics: Sequence[Sequence[Kept]], settings: CountingSettings
+) -> Clock:
     """The model of a counting clock; of a long log only the records that have a say are laid together."""
-    settings = CountingSettings()
     thinner = Thinner(round(settings.tolerance_s * NS_PER_S), settings.run_records)
     windows: list[tuple[Int64Array, Column, BoolArray]] = []
     for index, time, frozen in places.in_order(topics):
@@ -249,12 +179,13 @@ def _counting_clock(header: LogHeader, places: Places, topics: Sequence[Sequence
 
 
 class Census:
-    """Ledger of records whose corrected time is known: what is left in a store file that was damaged."""
+    """Ledger of records whose corrected time is known: what is in a store file."""
 
-    def __init__(self, is_absolute: bool) -> None:
-        self._clock = Clock(is_absolute=is_absolute)
+    def __init__(self, is_absolute: bool, thresholds: Thresholds | None = None, *, is_counting: bool = False) -> None:
+        self._clock = Clock(is_absolute=is_absolute, is_counting=is_counting)
+        self._thresholds = thresholds or shipped()
         self._times: dict[str, list[Int64Array]] = {}
-        self._fields: dict[str, dict[str, _FieldTally]] = {}
+        self._contents = Contents(self._thresholds)
         self.rows = 0
 
     def add(self, batch: RecordBatch) -> None:
@@ -263,19 +194,22 @@ class Census:
         if not len(batch) or batch.time_ns is None:
             return
         self._times.setdefault(batch.topic, []).append(np.array(batch.time_ns))
-        _tally_fields(self._fields.setdefault(batch.topic, {}), batch)
+        self._contents.add(batch, batch.time_ns)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Topics as in the ledger's plain form, in alphabetical order."""
-        found = {}
-        for topic, times in sorted(self._times.items()):
-            ledger = topic_ledger(
+    def ledger(self, damages: Sequence[Damage] = ()) -> Ledger:
+        """The ledger of what is in the file; device order and device clock are not in it."""
+        topics = [
+            topic_ledger(
                 topic,
                 np.sort(np.concatenate(times), kind="stable"),
                 backward_steps=0,
                 stray_rows=0,
-                fields=tuple(tally.ledger(name) for name, tally in self._fields[topic].items()),
-                settings=LedgerSettings(),
+                fields=self._contents.fields(topic, self._clock),
+                sequences=self._contents.sequences(topic, self._clock),
+                thresholds=self._thresholds,
             )
-            found[topic] = ledger.to_dict(self._clock)
-        return found
+            for topic, times in sorted(self._times.items())
+        ]
+        clock, contents = self._clock, self._contents
+        dropouts, timeline = contents.dropouts(clock), contents.timeline(clock)
+        return Ledger(tuple(topics), clock, tuple(damages), (), self._thresholds, dropouts, timeline)

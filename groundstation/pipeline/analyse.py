@@ -13,11 +13,13 @@ from groundstation.base.toml_settings import settings_from
 from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings, Interval, SiteData
 from groundstation.estimators.inertial.noise import choose_class
 from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.integrity.limits import Thresholds, thresholds_from
 from groundstation.pipeline import configuration as configured
 from groundstation.pipeline import overview
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.inertial import analyse_inertial
 from groundstation.pipeline.intervals import seconds_of
+from groundstation.pipeline.leaning import leaning_findings
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
 from groundstation.results.heading import HeadingResult
@@ -48,6 +50,7 @@ class UserSettings:
     inertial: InertialSettings
     aircraft: AircraftData
     site: SiteData
+    thresholds: Thresholds
 
 
 def user_settings(configuration: Configuration) -> UserSettings:
@@ -63,11 +66,23 @@ def user_settings(configuration: Configuration) -> UserSettings:
         settings_from(InertialSettings, configuration.inertial, configuration.file_of("inertial"), "inertial"),
         settings_from(AircraftData, configuration.aircraft, configuration.file_of("aircraft"), "aircraft"),
         settings_from(SiteData, configuration.site, configuration.file_of("site"), "site"),
+        configured_thresholds(configuration),
     )
     choose_class(
         settings.inertial, settings.aircraft.ins_class
     )  # a class that does not exist is found out before a run
     return settings
+
+
+def configured_thresholds(configuration: Configuration) -> Thresholds:
+    """The user's thresholds of the ledger, the shipped ones where none are set.
+
+    Raises
+    ------
+    SettingsError
+        For another version, an unknown key or a value of the wrong kind.
+    """
+    return thresholds_from(configuration.thresholds, configuration.file_of("thresholds"), "thresholds")
 
 
 def analyse(flight: Flight, given: Given, configuration: Configuration) -> FlightResults:
@@ -93,6 +108,7 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     findings += inertial.findings
     not_assessable += inertial.not_assessable
     figures = (*_figures(flight, given, settings, phases, heading), *inertial.figures)
+    findings += leaning_findings(flight, given.ledger, heading, inertial.inertial, settings.thresholds)
     if heading is not None:
         findings += heading_findings(heading)
         findings += _findings_of_what_was_set(flight, heading, configuration, settings)
@@ -213,7 +229,7 @@ def _figures(
         overview.phase_figure(phases),
         overview.gnss_lanes(flight, settings.heading.geometry_max),
         overview.state_lanes(flight),
-        *overview.ledger_figures(flight, given.ledger),
+        *overview.ledger_figures(flight, given.ledger, settings.thresholds),
     )
     return (*(figure for figure in general if figure is not None), *(heading.figures if heading else ()))
 

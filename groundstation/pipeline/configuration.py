@@ -9,7 +9,7 @@ from typing import Any
 
 from groundstation.base.errors import SettingsError
 
-TABLES = ("heading", "inertial", "aircraft", "site")
+TABLES = ("heading", "inertial", "aircraft", "site", "thresholds")
 SECTIONS = (*TABLES, "exclude", "force")
 
 
@@ -26,7 +26,8 @@ class Interval:
 class Configuration:
     """Everything a user may set for a run, as read from TOML; plain values, so that it travels to worker processes.
 
-    ``heading``, ``inertial``, ``aircraft`` and ``site`` are the tables as written; they become dataclasses where used.
+    ``heading``, ``inertial``, ``aircraft``, ``site`` and ``thresholds`` are the tables as written; they become
+    dataclasses where used.
     """
 
     heading: Mapping[str, Any] = field(default_factory=dict)
@@ -37,6 +38,7 @@ class Configuration:
     force: tuple[Interval, ...] = ()
     profile: str | None = None
     files: Mapping[str, str] = field(default_factory=dict)
+    thresholds: Mapping[str, Any] = field(default_factory=dict)
 
     def file_of(self, section: str) -> str:
         """The file a section was read from, for messages."""
@@ -76,6 +78,7 @@ def load_configuration(
     site: Path | None = None,
     intervals: Path | None = None,
     profile: Path | None = None,
+    thresholds: Path | None = None,
 ) -> Configuration:
     """Read the user's files into one configuration; a file named for a section wins over that section of ``config``.
 
@@ -86,8 +89,9 @@ def load_configuration(
     """
     document = read_toml(config) if config else {}
     _refuse_unknown(document, SECTIONS, str(config))
-    files = {"heading": config, "inertial": config, "aircraft": aircraft or config, "site": site or config}
-    for name, path in (("aircraft", aircraft), ("site", site)):
+    own = {"aircraft": aircraft, "site": site, "thresholds": thresholds}
+    files = {name: own.get(name) or config for name in TABLES}
+    for name, path in own.items():
         if path:
             document[name] = read_toml(path)
     if intervals:
@@ -102,6 +106,7 @@ def load_configuration(
         inertial=document.get("inertial", {}),
         aircraft=document.get("aircraft", {}),
         site=document.get("site", {}),
+        thresholds=document.get("thresholds", {}),
         exclude=_intervals(document.get("exclude", []), f"{intervals or config}, exclude"),
         force=_intervals(document.get("force", []), f"{intervals or config}, force"),
         profile=str(profile) if profile else None,

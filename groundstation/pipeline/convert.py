@@ -10,9 +10,14 @@ from groundstation import __version__
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.records import Damage, RecordBatch, Remark
+from groundstation.integrity.ledger_findings import TOPIC_CODES, topic_findings
+from groundstation.integrity.limits import Thresholds, shipped
+from groundstation.integrity.spans import is_span
 from groundstation.integrity.survey import Census
 from groundstation.pipeline.log import Log
 from groundstation.store.info import StoreInfo
+
+COUNTED_CAUSES = ("dropout", "stuck", "out_of_range", "sequence")  # of spans: counted again with the topics
 
 
 @dataclass(frozen=True)
@@ -27,25 +32,33 @@ class Converted:
     has_lost_data: bool
 
 
-def convert_log(log: Log, target: Path) -> Converted:
+def convert_log(log: Log, target: Path, thresholds: Thresholds | None = None) -> Converted:
     """Write a log's MCAP, under a temporary name until it is whole.
+
+    Parameters
+    ----------
+    log : Log
+    target : Path
+    thresholds : Thresholds, optional
+        Limits of the ledger; the shipped ones when left out.
 
     Raises
     ------
     UnreadableLogError
         When the log holds no record at all.
     """
-    return _copy_store(log, target) if log.is_store else _convert_recorded(log, target)
+    limits = thresholds or shipped()
+    return _copy_store(log, target, limits) if log.is_store else _convert_recorded(log, target, limits)
 
 
-def _convert_recorded(log: Log, target: Path) -> Converted:
+def _convert_recorded(log: Log, target: Path, limits: Thresholds) -> Converted:
     from groundstation.integrity.ledger_findings import ledger_findings
     from groundstation.integrity.ordering import corrected
     from groundstation.integrity.survey import survey
     from groundstation.store.writer import StoreWriter
 
     items = log.replay()
-    found = survey(items)
+    found = survey(items, thresholds=limits)
     if not found.ledger.topics:
         raise UnreadableLogError(log.path.name, "no record that could be read", "", "`info` tells what the file is")
     findings = ledger_findings(found.ledger)
@@ -79,14 +92,14 @@ def _derivations(remarks: tuple[Remark, ...]) -> dict[str, str]:
     }
 
 
-def _copy_store(log: Log, target: Path) -> Converted:
+def _copy_store(log: Log, target: Path, limits: Thresholds) -> Converted:
     """Write the intact content of a groundstation MCAP again; an undamaged one comes out equal in content."""
     from groundstation.store.reader import read_info
     from groundstation.store.writer import StoreWriter
 
     info = read_info(log.path)
     damages: list[Damage] = []
-    census = Census(info.has_utc)
+    census = census_of(info, limits)
     with StoreWriter(target, info) as writer:
         for item in log.items():
             if isinstance(item, RecordBatch):
@@ -96,22 +109,49 @@ def _copy_store(log: Log, target: Path) -> Converted:
                 damages.append(item)
         if not census.rows:
             raise UnreadableLogError(log.path.name, "no intact record", "", "the file is damaged beyond its index")
-        if damages:
-            info = writer.info = _with_damage(info, damages, census)
+        if damages or has_other_limits(info, limits):
+            info = writer.info = recounted(info, damages, census)
     return Converted(info, stored_findings(info), any(entry.get("loses_data") for entry in info.damages))
 
 
-def _with_damage(info: StoreInfo, damages: list[Damage], census: Census) -> StoreInfo:
-    """Facts of a store file that was damaged: what is left of each topic is counted anew, the damage is kept."""
+def census_of(info: StoreInfo, limits: Thresholds) -> Census:
+    """Counts what is in a store file anew, by its kind of clock."""
+    return Census(info.has_utc, limits, is_counting=bool(info.clock.get("is_counting")))
+
+
+def has_other_limits(info: StoreInfo, limits: Thresholds) -> bool:
+    """Whether the ledger in a store file was made with other thresholds."""
+    return bool(info.ledger.get("thresholds", {}).get("sha256") != limits.sha256)
+
+
+def recounted(info: StoreInfo, damages: list[Damage], census: Census) -> StoreInfo:
+    """Facts of a store file whose topics were counted anew: it is damaged, or other thresholds are asked for.
+
+    What only the log could tell (its clock, the order of its records, what its reader lost) stays as it was found.
+    """
     listed = [asdict(damage) for damage in damages]
-    findings = [*info.ledger.get("findings", ()), *(asdict(damage_finding(damage)) for damage in damages)]
-    ledger = {
-        **info.ledger,
-        "topics": census.to_dict(),
-        "damages": [*info.ledger.get("damages", ()), *listed],
-        "findings": findings,
-    }
-    return replace(info, ledger=ledger, damages=(*info.damages, *listed))
+    ledger = census.ledger(damages)
+    plain, before = ledger.to_dict(), info.ledger
+    for name, topic in plain["topics"].items():
+        known = before.get("topics", {}).get(name, {})
+        topic.update({key: known[key] for key in ("backward_steps", "stray_rows") if key in known})
+        losses = known.get("losses", {})
+        topic["losses"] = {kind: count for kind, count in losses.items() if type(count) is int} | topic["losses"]
+    kept = [entry for entry in before.get("spans", ()) if is_span(entry) and entry["cause"] not in COUNTED_CAUSES]
+    if not damages:
+        plain.update({key: before[key] for key in ("bytes_skipped", "skipped_spans", "truncated") if key in before})
+    findings = [
+        *(entry for entry in before.get("findings", ()) if entry.get("code") not in TOPIC_CODES),
+        *(asdict(finding) for finding in topic_findings(ledger)),
+        *(asdict(damage_finding(damage)) for damage in damages),
+    ]
+    plain.update(
+        spans=sorted([*kept, *plain["spans"]], key=lambda entry: float(entry["start_s"])),
+        damages=[*before.get("damages", ()), *listed],
+        remarks=list(before.get("remarks", ())),
+        findings=findings,
+    )
+    return replace(info, ledger=plain, damages=(*info.damages, *listed))
 
 
 def stored_findings(info: StoreInfo) -> tuple[Finding, ...]:

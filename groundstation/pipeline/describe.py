@@ -1,5 +1,6 @@
 """What a log is: format, clock, span and topics, for the verb ``info``."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,7 @@ def _recorded(log: Log) -> Description:
         if isinstance(item, RecordBatch):
             fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
     ledger = found.ledger.to_dict()
-    facts = _facts(log, dict(found.header.metadata), ledger)
+    facts = facts_of(log, dict(found.header.metadata), ledger)
     lost = any(damage.loses_data for damage in found.damages)
     return Description(facts, _topics(ledger, fields), ledger_findings(found.ledger), lost)
 
@@ -84,7 +85,7 @@ def _stored(log: Log) -> Description:
             fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
         elif isinstance(item, Damage):
             damages.append(item)
-    facts = _facts(log, dict(info.metadata), dict(info.ledger))
+    facts = facts_of(log, dict(info.metadata), dict(info.ledger))
     facts["log"] = f"{info.source_name}, read as {info.reader}"
     findings = (*stored_findings(info), *(damage_finding(damage) for damage in damages))
     return Description(facts, _topics(dict(info.ledger), fields), findings, _has_lost(info, damages))
@@ -95,7 +96,8 @@ def _has_lost(info: StoreInfo, damages: list[Damage]) -> bool:
     return any(entry.get("loses_data") for entry in info.damages) or any(damage.loses_data for damage in damages)
 
 
-def _facts(log: Log, metadata: dict[str, str], ledger: dict[str, Any]) -> dict[str, str]:
+def facts_of(log: Log, metadata: Mapping[str, str], ledger: Mapping[str, Any]) -> dict[str, str]:
+    """What a log is, name to text: file, size, format, first and last sample, metadata."""
     facts = {
         "file": log.source.name,
         "size": f"{log.source.size_bytes} bytes",

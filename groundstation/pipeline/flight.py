@@ -14,7 +14,7 @@ from pathlib import Path
 from groundstation.base.errors import GroundstationError, UnclaimedLogError
 from groundstation.base.findings import SEVERITIES, worst
 from groundstation.base.records import RecordBatch
-from groundstation.pipeline.analyse import Given, analyse
+from groundstation.pipeline.analyse import Given, analyse, configured_thresholds
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.convert import Converted, convert_log
 from groundstation.pipeline.identity import flight_id
@@ -118,7 +118,7 @@ def _run(log: Log, job: Job, partial: Path, watch: Stopwatch) -> Outcome:
 
     mcap = partial / "flight.mcap"
     with watch.stage("converting"):
-        converted = convert_log(log, mcap)
+        converted = convert_log(log, mcap, configured_thresholds(job.configuration))
     with watch.stage("reading the MCAP"):
         flight = read_flight(mcap, converted)
     start_utc_ns = flight.start_ns if flight.has_utc else None
@@ -195,6 +195,8 @@ def _inertial_sentence(results: FlightResults) -> str:
         return ""
     if inertial.kind == "gnss_aided":
         return "INS corrected by GNSS already, no forecast"
+    if inertial.kind == "unknown":
+        return "INS errors estimated, too little to tell whether GNSS corrects it"
     parts = []
     if inertial.radial_error_rate_50_nmiph is not None:
         parts.append(f"{inertial.radial_error_rate_50_nmiph:.2f} nmi/h")

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
+from groundstation.integrity.limits import Thresholds
 from groundstation.results.figures import FigureData
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight, Table
@@ -205,7 +206,7 @@ def state_lanes(flight: Flight) -> FigureData | None:
     return FigureData("state_lanes", columns, {"start_s": 2, "end_s": 2})
 
 
-def ledger_figures(flight: Flight, ledger: Mapping[str, Any]) -> tuple[FigureData, ...]:
+def ledger_figures(flight: Flight, ledger: Mapping[str, Any], thresholds: Thresholds) -> tuple[FigureData, ...]:
     """The ledger's topics and gaps as figure data, times in flight seconds."""
     counts = ledger.get("topics", {})
     names = [topic for topic in flight.topics() if topic in counts]
@@ -218,16 +219,19 @@ def ledger_figures(flight: Flight, ledger: Mapping[str, Any]) -> tuple[FigureDat
     columns["gaps"] = np.array([counts[name]["gaps"]["count"] for name in names], dtype=np.int64)
     columns["longest_gap_s"] = np.array([counts[name]["gaps"]["longest_s"] for name in names], dtype=float)
     columns["dropped_rows"] = np.array([_dropped(ledger, name) for name in names], dtype=np.int64)
+    columns["lost_by_counter"] = np.array([_missing(counts[name]) for name in names], dtype=np.int64)
+    columns["out_of_range"] = np.array([_odd_values(counts[name], "out_of_range") for name in names], dtype=np.int64)
+    columns["stuck"] = np.array([_odd_values(counts[name], "stuck") for name in names], dtype=np.int64)
     columns["first_s"] = np.array([flight.time_s(name)[0] for name in names])
     columns["last_s"] = np.array([flight.time_s(name)[-1] for name in names])
     digits = {"coverage": 4, "nominal_rate_hz": 3, "actual_rate_hz": 3, "longest_gap_s": 2, "first_s": 2, "last_s": 2}
-    return FigureData("ledger", columns, digits), _gap_figure(flight, names)
+    return FigureData("ledger", columns, digits), _gap_figure(flight, names, thresholds)
 
 
-def _gap_figure(flight: Flight, names: list[str]) -> FigureData:
+def _gap_figure(flight: Flight, names: list[str], thresholds: Thresholds) -> FigureData:
     from groundstation.integrity.ledger import gaps_of
 
-    found = [gaps_of(name, flight[name].time_ns) for name in names]
+    found = [gaps_of(name, flight[name].time_ns, thresholds=thresholds) for name in names]
     columns: dict[str, NDArray[Any]] = {
         "topic": np.array([gaps.topic for gaps in found for _ in range(len(gaps))], dtype=np.str_),
         "start_s": np.concatenate([np.zeros(0), *(flight.seconds(gaps.start_ns) for gaps in found)]),
@@ -239,6 +243,17 @@ def _gap_figure(flight: Flight, names: list[str]) -> FigureData:
 def _dropped(ledger: Mapping[str, Any], topic: str) -> int:
     damages = ledger.get("damages", ())
     return sum(entry["count"] for entry in damages if entry["topic"] == topic and entry["kind"] == "dropped_rows")
+
+
+def _missing(topic: Mapping[str, Any]) -> int:
+    """Records that the counters of a topic miss."""
+    return sum(entry["lost"] for entry in topic.get("sequences", ()) if type(entry.get("lost")) is int)
+
+
+def _odd_values(topic: Mapping[str, Any], what: str) -> int:
+    """Values outside their range, or stretches in which a value was stuck."""
+    found = [entry.get(what) for entry in topic.get("fields", {}).values() if isinstance(entry, Mapping)]
+    return sum(one if type(one) is int else len(one) if isinstance(one, list) else 0 for one in found)
 
 
 def _number(value: Any) -> float:

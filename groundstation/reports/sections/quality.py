@@ -16,6 +16,16 @@ MOST_TOPICS = 60
 MOST_LANES = 24
 MOST_ENTRIES = 20
 MOST_DAMAGES = 60
+COUNT_TITLES = {
+    "gaps": "Gaps",
+    "duplicates": "Duplicates",
+    "backward_steps": "Steps back",
+    "stray_rows": "Stray",
+    "dropped_rows": "Dropped",
+    "lost_by_counter": "Lost by counter",
+    "out_of_range": "Out of range",
+    "stuck": "Stuck",
+}
 
 
 def build(saved: SavedFlight) -> Section:
@@ -36,7 +46,10 @@ def _ledger(saved: SavedFlight) -> Grid | None:
     data = saved.figure("ledger")
     if data is None:
         return None
-    counts = ("gaps", "duplicates", "backward_steps", "stray_rows", "dropped_rows")
+    counts = (
+        *("gaps", "duplicates", "backward_steps", "stray_rows", "dropped_rows"),
+        *(name for name in ("lost_by_counter", "out_of_range", "stuck") if name in data.columns),
+    )
     columns = {
         name: numbers(data, name)
         for name in ("rows", "nominal_rate_hz", "actual_rate_hz", "longest_gap_s", "coverage", *counts)
@@ -61,7 +74,7 @@ def _ledger(saved: SavedFlight) -> Grid | None:
             Head("Coverage", True),
             Head("Longest gap, s", True),
         ),
-        *(Head(title, True) for title in ("Gaps", "Duplicates", "Steps back", "Stray", "Dropped")),
+        *(Head(COUNT_TITLES[name], True) for name in counts),
     )
     more = len(data) - len(rows)
     caption = f"{more} more topics in the table file." if more else ""
@@ -111,7 +124,13 @@ def _gap_marks(axes: Any, gaps: FigureData, rows: Any, place: int, least: float)
 
 
 def _nested(saved: SavedFlight, key: str, title: str) -> Facts | None:
-    told_above = {"topics", "damages", "remarks"}  # the tables of topics and losses; remarks are findings
+    told_above = {
+        "topics",
+        "damages",
+        "remarks",
+        "spans",
+        "spans_more",
+    }  # the tables of topics and losses; remarks are findings
     document = {name: value for name, value in mapping(saved.summary, key).items() if name not in told_above}
     pairs = [(name, value, "") for name, value in _flat(document)]
     return Facts(title, pairs) if pairs else None

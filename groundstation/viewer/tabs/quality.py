@@ -28,6 +28,9 @@ LEDGER_HEADINGS = {
     "backward_steps": "backward steps",
     "stray_rows": "stray rows",
     "dropped_rows": "dropped rows",
+    "lost_by_counter": "lost by counter",
+    "out_of_range": "values out of range",
+    "stuck": "stuck stretches",
 }
 PLOTS = {
     "GNSS dilution of precision": ("gdop", "pdop", "hdop"),

@@ -1,0 +1,192 @@
+"""How ``check`` looks on stdout: tables for people, JSON for programs."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import typer
+
+from groundstation.base.findings import Finding
+from groundstation.base.signals import is_canonical
+from groundstation.cli.printing import as_json, columns, printable, totals
+from groundstation.pipeline.check import Checked
+
+MOST_LISTED = 8  # gaps or stretches of one topic; all are in the JSON
+Topic = Mapping[str, Any]
+
+
+def show(
+    checked: Sequence[Checked], *, as_json_text: bool = False, quiet: bool = False, everything: bool = False
+) -> None:
+    """Print what was found in each log; failures with their reasons on stderr, then totals.
+
+    ``everything`` lists every topic of the log, not only canonical ones and those with something odd.
+    """
+    if as_json_text:
+        typer.echo(as_json([one.to_dict() for one in checked]))
+        return
+    told = 0
+    for one in checked:
+        if one.outcome.state == "failed":
+            typer.echo(f"error: {printable(one.outcome.text)}", err=True)
+            if everything and one.outcome.trace:
+                typer.echo(one.outcome.trace, err=True)
+        elif not quiet:
+            typer.echo(("\n" if told else "") + text_of(one, everything))
+            told += 1
+    if len(checked) > 1 and not quiet:
+        typer.echo(totals([one.outcome for one in checked]), err=True)
+
+
+def text_of(one: Checked, everything: bool = False) -> str:
+    """The ledger of one log as text."""
+    topics: Mapping[str, Topic] = one.ledger.get("topics", {})
+    shown = {name: topic for name, topic in topics.items() if everything or is_canonical(name) or _is_odd(topic)}
+    parts = [_head(one)]
+    if shown:
+        parts.append(_topics(shown))
+    if len(shown) < len(topics):
+        parts[-1] += f"\n{len(topics) - len(shown)} more topics of the source without anything odd (-v lists them)"
+    tables = (_gaps(topics), _stuck(topics), _outside(topics), _counters(topics), _damages(one.ledger))
+    parts += [table for table in tables if table]
+    findings = [finding for finding in one.findings if everything or not _is_usual(finding)]
+    if findings:
+        rows = [[finding.severity, printable(finding.text)] for finding in findings]
+        parts.append("findings\n" + columns(rows))
+    if len(findings) < len(one.findings):
+        usual = "on NaN and repeated times in topics of the source (-v lists them)"
+        parts.append(f"{len(one.findings) - len(findings)} more findings {usual}")
+    parts.append(f"{printable(one.outcome.source)}: {one.outcome.text}")
+    return "\n\n".join(parts)
+
+
+def _head(one: Checked) -> str:
+    wanted = ("file", "size", "sha256", "format", "first sample", "last sample")
+    rows = [[f"{key}:", printable(one.facts[key])] for key in wanted if key in one.facts]
+    used = one.ledger.get("thresholds")
+    if used:
+        name = f"{printable(str(used['name']))}, version {used['version']}, sha256 {str(used['sha256'])[:16]}"
+        rows.append(["thresholds:", name])
+    return columns(rows)
+
+
+def _is_usual(finding: Finding) -> bool:
+    """Whether a finding is of the kind that fills pages and alarms nobody."""
+    is_of_source = bool(finding.topic) and not is_canonical(finding.topic)
+    return is_of_source and finding.severity == "info" and finding.code in ("values.nan", "time.duplicates")
+
+
+def _is_odd(topic: Topic) -> bool:
+    """Whether a topic has more to tell than its rate; repeated times are common among what a recorder writes."""
+    lost = any(entry["lost"] or entry["resets"] for entry in topic.get("sequences", ()))
+    return bool(topic["gaps"]["count"] or topic["backward_steps"] or topic["stray_rows"] or topic.get("losses")) or lost
+
+
+def _topics(topics: Mapping[str, Topic]) -> str:
+    heads = ["topic", "rows", "span s", "nominal Hz", "actual Hz", "coverage", "gaps", "longest s"]
+    counts = {
+        "repeated": lambda topic: topic["duplicates"],
+        "steps back": lambda topic: topic["backward_steps"],
+        "stray": lambda topic: topic["stray_rows"],
+        "unreadable": lambda topic: sum(topic.get("losses", {}).values()),
+        "missing": lambda topic: sum(entry["lost"] for entry in topic.get("sequences", ())),
+        "NaN": lambda topic: _of_fields(topic, "nan"),
+        "out of range": lambda topic: _of_fields(topic, "out_of_range"),
+        "stuck": lambda topic: _of_fields(topic, "stuck"),
+    }
+    told = {head: count for head, count in counts.items() if any(count(topic) for topic in topics.values())}
+    rows = [[*heads, *told]]
+    for name, topic in topics.items():
+        gaps = topic["gaps"]
+        row = [
+            printable(name),
+            str(topic["rows"]),
+            f"{topic['span_s']:.1f}",
+            _number(topic["nominal_rate_hz"], 3),
+            _number(topic["actual_rate_hz"], 3),
+            "-" if topic["coverage"] is None else f"{100.0 * topic['coverage']:.2f} %",
+            str(gaps["count"]),
+            f"{gaps['longest_s']:.2f}" if gaps["count"] else "",
+        ]
+        rows.append([*row, *(str(count(topic) or "") for count in told.values())])
+    return columns(rows, right=range(1, len(rows[0])))
+
+
+def _of_fields(topic: Topic, what: str) -> int:
+    found = [entry.get(what, 0) for entry in topic["fields"].values()]
+    return sum(one if isinstance(one, int) else len(one) for one in found)
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _gaps(topics: Mapping[str, Topic]) -> str:
+    rows = []
+    for name, topic in topics.items():
+        if not is_canonical(name):
+            continue
+        listed = sorted(topic["gaps"]["listed"], key=lambda gap: -gap[1])[:MOST_LISTED]
+        rows += [[printable(name), start, f"{length:.3f}"] for start, length in sorted(listed)]
+        more = topic["gaps"]["count"] - len(listed)
+        if more:
+            rows.append([printable(name), f"{more} shorter ones", ""])
+    return _titled("gaps", ["topic", "after", "length s"], rows, right=(2,))
+
+
+def _stuck(topics: Mapping[str, Topic]) -> str:
+    rows = []
+    for name, field in _fields(topics):
+        listed = field.get("stuck", ())
+        for one in listed[:MOST_LISTED]:
+            length = f"{one['length_s']:.1f}"
+            rows.append([name, one["start"], length, str(one["samples"]), f"{one['value']:g}", printable(one["why"])])
+        if len(listed) > MOST_LISTED:
+            rows.append([name, f"{len(listed) - MOST_LISTED} more", "", "", "", ""])
+    return _titled("stuck values", ["field", "from", "length s", "samples", "value", "why"], rows, right=(2, 3))
+
+
+def _outside(topics: Mapping[str, Topic]) -> str:
+    rows = []
+    for name, field in _fields(topics):
+        if field["out_of_range"]:
+            first = field["first_out_of_range"]
+            low, high = ("" if end is None else f"{end:g}" for end in first["range"])
+            place = [str(first["record"]), str(first["time"] or "")]
+            rows.append([name, str(field["out_of_range"]), f"[{low}, {high}]", *place])
+    return _titled("values out of range", ["field", "count", "range", "first record", "at"], rows, right=(1, 3))
+
+
+def _counters(topics: Mapping[str, Topic]) -> str:
+    rows = []
+    for name, topic in topics.items():
+        for entry in topic.get("sequences", ()):
+            first = entry["listed"][0][0] if entry["listed"] else ""
+            counts = [str(entry["lost"]), str(entry["before"]), str(entry["resets"])]
+            rows.append([printable(f"{name}.{entry['field']}"), entry["kind"], *counts, first])
+    heads = ["counter", "counts", "missing", "before the log", "resets", "first loss before"]
+    return _titled("counters", heads, rows, right=(2, 3, 4))
+
+
+def _damages(ledger: Mapping[str, Any]) -> str:
+    rows = [
+        [
+            entry["kind"],
+            str(entry["count"]),
+            printable(entry["what"]),
+            printable(f"{entry['topic']} {entry['place']}".strip()),
+        ]
+        for entry in ledger.get("damages", ())
+    ]
+    table = _titled("damage", ["kind", "count", "what", "where"], rows, right=(1,))
+    skipped = ledger.get("bytes_skipped", 0)
+    return table + (f"\nbytes skipped: {skipped}" if skipped else "")
+
+
+def _fields(topics: Mapping[str, Topic]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    for name, topic in topics.items():
+        for field, entry in topic["fields"].items():
+            yield printable(f"{name}.{field}"), entry
+
+
+def _titled(title: str, heads: list[str], rows: list[list[str]], right: Sequence[int] = ()) -> str:
+    return f"{title}\n{columns([heads, *rows], right)}" if rows else ""

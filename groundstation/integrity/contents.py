@@ -1,0 +1,165 @@
+"""What the batches of a log hold, counted as they pass: fields, counters, motion, drop-outs, and rows in time."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
+from groundstation.base.signals import is_canonical
+from groundstation.integrity.clock import Clock
+from groundstation.integrity.ledger import FieldLedger
+from groundstation.integrity.limits import Thresholds
+from groundstation.integrity.sequence import Counter, Sequence, counters_of
+from groundstation.integrity.spans import Dropout, Timeline
+from groundstation.integrity.stretches import Constancy, Place, Sampler
+from groundstation.integrity.stuck import Judge, Motion, Stuck, is_watched
+
+FloatArray = NDArray[np.float64]
+
+DROPOUTS, DROPOUT_LENGTH = "raw.ulog.dropouts", "duration_ms"
+MOST_DROPOUTS = 10_000
+
+
+@dataclass
+class _FieldTally:
+    """Counts of one field, growing batch by batch."""
+
+    low: float
+    high: float
+    is_known: bool = True  # of a field that nobody knows, infinity may be meant: "no limit"
+    constancy: Constancy | None = None
+    present: int = 0
+    nan: int = 0
+    out_of_range: int = 0
+    first: Place | None = None
+    last: Place | None = None
+
+    def add(self, column: Column, record_index: Int64Array, device_ns: Int64Array) -> None:
+        values, mask = column.values, column.present
+        self.present += len(column) if mask is None else int(np.count_nonzero(mask))
+        if values.dtype.kind != "f":
+            return
+        least, most = values.min(initial=np.inf), values.max(initial=-np.inf)
+        if least >= self.low and most <= self.high and (not self.is_known or np.isfinite(least) & np.isfinite(most)):
+            nan, count = None, 0  # the usual case: two passes tell that there is neither NaN nor anything out of range
+        else:
+            nan, count = self._add_odd(values, mask, record_index, device_ns)
+        if self.constancy is not None:
+            if mask is not None or count:
+                good = mask if nan is None else ~nan if mask is None else mask & ~nan
+                values, record_index, device_ns = values[good], record_index[good], device_ns[good]
+            self.constancy.add(values, record_index, device_ns)
+
+    def _add_odd(
+        self, values: FloatArray, mask: BoolArray | None, record_index: Int64Array, device_ns: Int64Array
+    ) -> tuple[BoolArray, int]:
+        """Count NaN and what is out of range; where NaN is (also where absent), and how many are present."""
+        nan = np.isnan(values)
+        count = int(np.count_nonzero(nan if mask is None else nan & mask))
+        self.nan += count
+        if self.is_known:
+            outside = (values < self.low) | (values > self.high) | np.isinf(values)
+            if mask is not None:
+                outside &= mask
+            if outside.any():
+                self._add_outside(np.flatnonzero(outside), record_index, device_ns)
+        return nan, count
+
+    def _add_outside(self, at: Int64Array, record_index: Int64Array, device_ns: Int64Array) -> None:
+        self.out_of_range += len(at)
+        first, last = (Place(int(record_index[one]), int(device_ns[one])) for one in (at[0], at[-1]))
+        self.first, self.last = self.first or first, last
+
+    def ledger(self, name: str, clock: Clock, stuck: tuple[Stuck, ...]) -> FieldLedger:
+        return FieldLedger(
+            name,
+            self.present,
+            self.nan,
+            self.out_of_range,
+            self.first.record_index if self.first else None,
+            self.low,
+            self.high,
+            self.first.time_ns(clock) if self.first else None,
+            self.last.time_ns(clock) if self.last else None,
+            stuck,
+        )
+
+
+@dataclass
+class _TopicTally:
+    fields: dict[str, _FieldTally] = field(default_factory=dict)
+    counters: dict[str, Counter] | None = None
+
+
+class Contents:
+    """Counts the batches of a log; what they say is told once the clock is known."""
+
+    def __init__(self, thresholds: Thresholds) -> None:
+        self._thresholds = thresholds
+        self._topics: dict[str, _TopicTally] = {}
+        self._motion = Motion()
+        self._timeline = Sampler()
+        self._dropouts: list[tuple[Place, float]] = []
+        self._judge: Judge | None = None
+
+    def add(self, batch: RecordBatch, device_ns: Int64Array | None = None) -> None:
+        """Count a batch; ``device_ns`` are the times to go by, those of the device unless they are given."""
+        device_ns = batch.device_time_ns.values if device_ns is None else device_ns
+        tally = self._topics.setdefault(batch.topic, _TopicTally())
+        for name, column in batch.columns.items():
+            self._field(tally, batch.topic, name).add(column, batch.record_index, device_ns)
+        if tally.counters is None:
+            tally.counters = counters_of(batch, self._thresholds.sequence)
+        for name, counter in tally.counters.items():
+            if name in batch.columns:
+                counter.add(batch.columns[name], batch.record_index, device_ns)
+        self._motion.add(batch)
+        self._sample(batch, device_ns)
+        if batch.topic == DROPOUTS and DROPOUT_LENGTH in batch.columns:
+            self._add_dropouts(batch.columns[DROPOUT_LENGTH], batch.record_index, device_ns)
+
+    def _field(self, tally: _TopicTally, topic: str, name: str) -> _FieldTally:
+        found = tally.fields.get(name)
+        if found is None:
+            known = self._thresholds.range_of(topic, name)
+            low, high = known or (float("-inf"), float("inf"))
+            constancy = Constancy(self._thresholds.stuck.min_samples) if is_watched(topic, name) else None
+            found = tally.fields[name] = _FieldTally(low, high, known is not None, constancy)
+        return found
+
+    def _sample(self, batch: RecordBatch, device_ns: Int64Array) -> None:
+        """Keep some rows of canonical topics, to tell the time of a row that was lost."""
+        if not is_canonical(batch.topic):
+            return
+        rows = self._timeline.rows(len(batch))
+        self._timeline.put(np.array(batch.record_index[rows]), {"time": np.array(device_ns[rows], dtype=np.int64)})
+
+    def _add_dropouts(self, column: Column, record_index: Int64Array, device_ns: Int64Array) -> None:
+        for at in np.flatnonzero(column.mask)[: MOST_DROPOUTS - len(self._dropouts)].tolist():
+            length_s = float(column.values[at]) / 1e3
+            if length_s > 0.0:
+                self._dropouts.append((Place(int(record_index[at]), int(device_ns[at])), length_s))
+
+    def fields(self, topic: str, clock: Clock) -> tuple[FieldLedger, ...]:
+        """Ledgers of a topic's fields."""
+        if self._judge is None:
+            self._judge = Judge(self._motion, clock, self._thresholds.stuck)
+        tallies = self._topics[topic].fields
+        watched = {name: tally.constancy for name, tally in tallies.items() if tally.constancy is not None}
+        stuck = self._judge.stuck(topic, watched)
+        return tuple(tally.ledger(name, clock, stuck.get(name, ())) for name, tally in tallies.items())
+
+    def sequences(self, topic: str, clock: Clock) -> tuple[Sequence, ...]:
+        """What the counters of a topic say."""
+        counters = self._topics[topic].counters or {}
+        return tuple(told for told in (counter.sequence(clock) for counter in counters.values()) if told is not None)
+
+    def dropouts(self, clock: Clock) -> tuple[Dropout, ...]:
+        """Drop-outs that the recorder marked."""
+        return tuple(Dropout(place.time_ns(clock), length_s) for place, length_s in self._dropouts)
+
+    def timeline(self, clock: Clock) -> Timeline:
+        """Times of rows."""
+        index, columns = self._timeline.all()
+        return Timeline.of(index, columns.get("time", np.zeros(0, dtype=np.int64)), clock)

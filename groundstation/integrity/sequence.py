@@ -1,0 +1,141 @@
+"""Sequence loss: what record counters and the recorder's own counters of losses say is missing."""
+
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from groundstation.base.records import Column, Int64Array, RecordBatch
+from groundstation.integrity.clock import Clock
+from groundstation.integrity.limits import SequenceLimits
+from groundstation.integrity.stretches import Place
+
+LISTED = 100
+_LARGEST = 2.0**53
+_WRAPS = (1 << 8, 1 << 16, 1 << 32)
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """What one counter says.
+
+    Parameters
+    ----------
+    field : str
+    kind : {'records', 'losses'}
+        It counts the records of its topic, or what the recorder lost.
+    lost : int
+        Records missing between records of the log; of losses, by how much the counter grew.
+    before : int
+        Of losses, where the counter stood at the first record.
+    resets : int
+        Steps back, or too far ahead, that are no wrap.
+    places : tuple of (int, int)
+        Corrected time of the record after each loss, and how many; the first hundred.
+    """
+
+    field: str
+    kind: str
+    lost: int
+    before: int = 0
+    resets: int = 0
+    places: tuple[tuple[int, int], ...] = ()
+
+    def to_dict(self, clock: Clock) -> dict[str, Any]:
+        """JSON-able."""
+        return {
+            "field": self.field,
+            "kind": self.kind,
+            "lost": self.lost,
+            "before": self.before,
+            "resets": self.resets,
+            "listed": [[clock.text(time_ns), lost] for time_ns, lost in self.places],
+        }
+
+
+@dataclass
+class Counter:
+    """Follows one field batch by batch."""
+
+    name: str
+    counts_losses: bool
+    limits: SequenceLimits
+    steps: int = 0
+    units: int = 0
+    lost: int = 0
+    resets: int = 0
+    first: int | None = None
+    last: int = 0
+    places: list[tuple[Place, int]] = field(default_factory=list)
+
+    def add(self, column: Column, record_index: Int64Array, device_ns: Int64Array) -> None:
+        """Go on with a batch."""
+        values = column.values
+        if values.dtype.kind not in "uif":
+            return
+        good = column.mask & (np.abs(values.astype(np.float64)) < _LARGEST)  # NaN is not
+        if not good.any():
+            return
+        count = values[good].astype(np.int64)
+        index, device = record_index[good], device_ns[good]
+        if self.first is None:
+            self.first = self.last = int(count[0])
+            count, index, device = count[1:], index[1:], device[1:]
+        if len(count):
+            self._count(_unwrapped(count, self.last, self.limits.longest_jump), index, device)
+            self.last = int(count[-1])
+
+    def _count(self, step: Int64Array, index: Int64Array, device: Int64Array) -> None:
+        """Count steps; ``index`` and ``device`` are those of the records after them."""
+        usual = 0 if self.counts_losses else 1
+        self.steps += len(step)
+        self.units += int(np.count_nonzero(step == 1))
+        self.resets += int(np.count_nonzero((step < 0) | (step > self.limits.longest_jump)))
+        lost = np.flatnonzero((step > usual) & (step <= self.limits.longest_jump))
+        self.lost += int((step[lost] - usual).sum())
+        for at in lost[: LISTED - len(self.places)].tolist():
+            self.places.append((Place(int(index[at]), int(device[at])), int(step[at]) - usual))
+
+    def sequence(self, clock: Clock) -> Sequence | None:
+        """What it says; None when it is no counter after all."""
+        if self.first is None:
+            return None
+        if not self.counts_losses and (
+            self.steps < self.limits.fewest_steps or self.units <= self.limits.unit_share * self.steps
+        ):
+            return None
+        places = tuple((place.time_ns(clock), lost) for place, lost in self.places)
+        kind = "losses" if self.counts_losses else "records"
+        before = self.first if self.counts_losses else 0
+        return Sequence(self.name, kind, self.lost, before, self.resets, places)
+
+
+def _unwrapped(count: Int64Array, before: int, longest_jump: int) -> Int64Array:
+    """Steps of a counter; one that begins again at the end of 8, 16 or 32 bits goes on."""
+    previous = np.concatenate(([before], count[:-1]))
+    step = count - previous
+    for wrap in _WRAPS:
+        ahead = step + wrap
+        fits = (step < 0) & (previous < wrap) & (count >= 0) & (ahead <= min(longest_jump, wrap // 4))
+        step = np.where(fits, ahead, step)
+    return np.asarray(step, dtype=np.int64)
+
+
+def counters_of(batch: RecordBatch, limits: SequenceLimits) -> dict[str, Counter]:
+    """The counters among the fields of a topic."""
+    found, loss_fields = {}, _loss_fields(limits)
+    for name in batch.columns:
+        counts_losses = name in loss_fields and any(
+            fnmatchcase(f"{batch.topic}.{name}", pattern) for pattern in limits.loss_counters
+        )
+        if counts_losses or name.lower() in limits.fields:
+            found[name] = Counter(name, counts_losses, limits)
+    return found
+
+
+@lru_cache(maxsize=8)
+def _loss_fields(limits: SequenceLimits) -> frozenset[str]:
+    """Fields of the patterns of loss counters: what follows the last dot, which no wildcard stands for."""
+    return frozenset(pattern.rpartition(".")[2] for pattern in limits.loss_counters)

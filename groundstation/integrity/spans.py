@@ -1,0 +1,155 @@
+"""Where damage lies: spans of time in which data was lost or is wrong, and spans of bytes that were skipped."""
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from groundstation.base.records import Column, Damage, Int64Array, frozen
+from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.base.units import NS_PER_S
+from groundstation.integrity.clock import Clock
+
+LISTED = 100
+_ROWS = re.compile(r"\brows? (\d+)(?: to (\d+))?$")
+_BYTES = re.compile(r"\bbytes? (\d+)(?: to (\d+))?$")
+_TIMES = re.compile(r", (\d{4}-\S+Z) to (\d{4}-\S+Z): ")
+
+
+class Dropout(NamedTuple):
+    """The recorder could not write: corrected time of the newest record before, and for how long."""
+
+    start_ns: int
+    length_s: float
+
+
+@dataclass(frozen=True)
+class Span:
+    """A span of time with damage.
+
+    Parameters
+    ----------
+    cause : str
+        ``dropout``, ``stuck``, ``out_of_range``, ``sequence``, or the kind of damage (``dropped_rows`` ...).
+    topic, field : str
+        What is damaged; an empty topic is the whole log, an empty field the whole topic.
+    start_ns, end_ns : int
+        Corrected time.
+    is_exact : bool
+        Everything within is damaged; else the damage lies somewhere within.
+    count : int
+        Records, values, bytes or milliseconds, as the damage counts them.
+    """
+
+    cause: str
+    topic: str
+    field: str
+    start_ns: int
+    end_ns: int
+    is_exact: bool
+    count: int
+
+    def to_dict(self, clock: Clock, zero_ns: int) -> dict[str, Any]:
+        """JSON-able; ``start_s`` counts from the first record of the log, as flight time does."""
+        return {
+            "cause": self.cause,
+            "topic": self.topic,
+            "field": self.field,
+            "start": clock.text(self.start_ns),
+            "start_s": round((self.start_ns - zero_ns) / NS_PER_S, 3),
+            "length_s": round((self.end_ns - self.start_ns) / NS_PER_S, 3),
+            "is_exact": self.is_exact,
+            "count": self.count,
+        }
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """Corrected times of some rows of a log, in order of their places."""
+
+    index: Int64Array
+    time_ns: Int64Array
+
+    @classmethod
+    def of(cls, index: Int64Array, device_ns: Int64Array, clock: Clock) -> "Timeline":
+        """From rows in any order."""
+        index, first = np.unique(index, return_index=True)
+        return cls(frozen(index), frozen(clock.time_ns(index, Column(device_ns[first]))))
+
+    def around(self, first: int, last: int) -> tuple[int, int] | None:
+        """Times of the row before ``first`` and of the row after ``last``; of the log's ends beyond them."""
+        if not len(self.index):
+            return None
+        before = max(0, int(np.searchsorted(self.index, first)) - 1)
+        after = min(len(self.index) - 1, int(np.searchsorted(self.index, last, side="right")))
+        times = sorted((int(self.time_ns[before]), int(self.time_ns[after])))
+        return times[0], times[1]
+
+
+def spans_of(damages: Sequence[Damage], dropouts: Sequence[Dropout], timeline: Timeline, end_ns: int) -> list[Span]:
+    """Spans of what the reader lost, where their place in time is known.
+
+    Rows of a table lie between the rows around them; what the end of a file cuts off lies at the end of the log. Bytes
+    of a binary log have no known time.
+    """
+    found = [
+        Span("dropout", "", "", one.start_ns, one.start_ns + round(one.length_s * NS_PER_S), True, _ms(one))
+        for one in dropouts
+    ]
+    for damage in damages:
+        if not damage.loses_data or damage.kind == "dropout":
+            continue
+        times, is_exact = _times(damage, timeline, end_ns)
+        if times is not None:
+            name = damage.place.partition(",")[0] if "," in damage.place else ""
+            field = name.removeprefix(f"{damage.topic}.") if damage.topic and name.startswith(damage.topic) else ""
+            found.append(Span(damage.kind, damage.topic, field, *times, is_exact, damage.count))
+    return found
+
+
+def _ms(dropout: Dropout) -> int:
+    return round(dropout.length_s * 1e3)
+
+
+def _times(damage: Damage, timeline: Timeline, end_ns: int) -> tuple[tuple[int, int] | None, bool]:
+    """When, and whether all of it."""
+    rows, stated = _ROWS.search(damage.place), _TIMES.search(damage.what)
+    if damage.kind == "truncated":
+        return (end_ns, end_ns), True
+    if rows:
+        first, last = int(rows[1]), int(rows[2] or rows[1])
+        return timeline.around(first, last), damage.count >= last - first + 1
+    if stated:
+        return (iso_to_utc_ns(stated[1])[0], iso_to_utc_ns(stated[2])[0]), True
+    return None, False
+
+
+def is_span(entry: Any) -> bool:
+    """Whether a plain form is that of a span: it may come from a file that anyone wrote."""
+    texts, numbers = ("cause", "topic", "field", "start"), ("start_s", "length_s", "count")
+    return (
+        isinstance(entry, Mapping)
+        and all(isinstance(entry.get(key), str) for key in texts)
+        and all(type(entry.get(key)) in (int, float) and math.isfinite(entry[key]) for key in numbers)
+        and isinstance(entry.get("is_exact"), bool)
+    )
+
+
+def skipped_bytes(damages: Sequence[Damage]) -> tuple[int, list[list[int]]]:
+    """Bytes that no record was made of: how many together, and the spans as [first, last, bytes]."""
+    spans = []
+    for damage in damages:
+        place = _BYTES.search(damage.place)
+        if damage.loses_data and place and damage.what.startswith("bytes"):
+            first = int(place[1])
+            spans.append([first, int(place[2]) if place[2] else first + damage.count - 1, damage.count])
+    return sum(count for _first, _last, count in spans), sorted(spans)[:LISTED]
+
+
+def truncation(damages: Sequence[Damage]) -> dict[str, Any] | None:
+    """Where the log is cut: place, what is lost of it, how many; None when it is whole."""
+    cut = next((damage for damage in damages if damage.kind == "truncated"), None)
+    return None if cut is None else {"place": cut.place, "what": cut.what, "count": cut.count}

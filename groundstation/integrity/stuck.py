@@ -1,0 +1,231 @@
+"""Stuck values: a field that keeps exactly one value while another source says that it must change.
+
+Nothing is called stuck without a witness: a parked aircraft, a held slow channel and a constant are no damage.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from groundstation.base.angles import direction_of, wrap_180
+from groundstation.base.records import Int64Array, RecordBatch
+from groundstation.base.signals import kind_of
+from groundstation.base.units import NS_PER_S
+from groundstation.integrity.clock import Clock
+from groundstation.integrity.limits import StuckLimits
+from groundstation.integrity.stretches import Constancy, FloatArray, Sampler, Stretch
+
+METRES_PER_DEG = 111_195.0  # of latitude, on a sphere: for a comparison with a hundred metres
+FINE = 1.05  # samples that a value lasts, on average, where a channel is finer than its noise
+
+_ALTITUDES = ("altitude_ellipsoid_m", "altitude_msl_m", "pressure_altitude_m")
+_VELOCITIES = ("velocity_north_mps", "velocity_east_mps", "velocity_down_mps", "ground_speed_mps")
+_HEADINGS = ("true_heading_deg", "magnetic_heading_deg", "track_deg")
+_POSITIONS = ("latitude_deg", "longitude_deg")
+_NOISY = (
+    *(f"{quantity}_{axis}_{unit}" for quantity, unit in (("rate", "dps"), ("accel", "mps2")) for axis in "xyz"),
+    *(f"field_{axis}_nt" for axis in ("forward", "right", "down")),
+)
+_WITNESSES = frozenset((*_POSITIONS, *_ALTITUDES, *_VELOCITIES, *_HEADINGS))
+WATCHED = _WITNESSES | frozenset(_NOISY)
+_KINDS = ("ins", "gnss", "baro", "magnetometer")
+
+
+@dataclass(frozen=True)
+class Stuck:
+    """A stretch in which a field was stuck: place, corrected time, length, samples, value, and what says so."""
+
+    record_index: int
+    start_ns: int
+    length_s: float
+    samples: int
+    value: float
+    why: str
+
+
+def is_watched(topic: str, name: str) -> bool:
+    """Whether a field may be found stuck."""
+    return name in WATCHED and kind_of(topic) in _KINDS
+
+
+class _Seen(NamedTuple):
+    """One source of a quantity: topic, field, places and values."""
+
+    topic: str
+    name: str
+    places: Int64Array
+    values: FloatArray
+
+    def within(self, stretch: Stretch) -> FloatArray:
+        """Finite values of the records inside a stretch."""
+        low = np.searchsorted(self.places, stretch.first.record_index)
+        high = np.searchsorted(self.places, stretch.last.record_index, side="right")
+        values = self.values[low:high]
+        return values[np.isfinite(values)]
+
+
+class Motion:
+    """What all sources say of the motion of the aircraft, thinned."""
+
+    def __init__(self) -> None:
+        self._samplers: dict[str, Sampler] = {}
+
+    def add(self, batch: RecordBatch) -> None:
+        """Sample a batch."""
+        if kind_of(batch.topic) not in _KINDS:
+            return
+        names = [name for name in batch.columns if name in _WITNESSES]
+        if not names:
+            return
+        sampler = self._samplers.setdefault(batch.topic, Sampler())
+        rows = sampler.rows(len(batch))
+        columns = {}
+        for name in names:
+            column = batch.columns[name]
+            values = column.values[rows].astype(np.float64)
+            columns[name] = values if column.present is None else np.where(column.present[rows], values, np.nan)
+        sampler.put(np.array(batch.record_index[rows]), columns)
+
+    def sources(self) -> list[_Seen]:
+        """Every source of every quantity; speed and track from velocities where they are not logged."""
+        found = []
+        for topic, sampler in sorted(self._samplers.items()):
+            index, columns = sampler.all()
+            order = np.argsort(index, kind="stable")
+            index, columns = index[order], {name: values[order] for name, values in columns.items()}
+            if {"velocity_north_mps", "velocity_east_mps"} <= columns.keys():
+                north, east = columns["velocity_north_mps"], columns["velocity_east_mps"]
+                columns.setdefault("ground_speed_mps", np.hypot(north, east))
+                columns.setdefault("track_deg", np.where(np.isfinite(north + east), direction_of(north, east), np.nan))
+            found += [_Seen(topic, name, index, values) for name, values in columns.items()]
+        return found
+
+
+class Judge:
+    """Tells stuck stretches from innocent ones."""
+
+    def __init__(self, motion: Motion, clock: Clock, limits: StuckLimits) -> None:
+        self._sources = motion.sources()
+        self._clock, self._limits = clock, limits
+
+    def stuck(self, topic: str, fields: dict[str, Constancy]) -> dict[str, tuple[Stuck, ...]]:
+        """Stuck stretches of a topic, by field."""
+        long = {name: list(self._long(name, constancy)) for name, constancy in fields.items()}
+        found = {}
+        for name, stretches in long.items():
+            told = [(one, self._why(topic, name, one, fields[name], long)) for one in stretches]
+            stuck = tuple(self._told(one, why) for one, why in told if why)
+            if stuck:
+                found[name] = stuck
+        return found
+
+    def _long(self, name: str, constancy: Constancy) -> Iterator[Stretch]:
+        """Stretches that last, of a field that is not constant through the whole log."""
+        times = self._limits.noise_times_usual if name in _NOISY else self._limits.times_usual
+        for stretch in constancy.stretches() if constancy.changes else ():
+            is_long = stretch.samples >= times * constancy.usual_samples(without=stretch)
+            by_device_ns = stretch.last.device_ns - stretch.first.device_ns  # the clock is asked where it matters
+            is_short = 0 <= by_device_ns < self._limits.min_s * NS_PER_S
+            if is_long and not is_short and self._seconds(stretch) >= self._limits.min_s:
+                yield stretch
+
+    def _seconds(self, stretch: Stretch) -> float:
+        return (stretch.last.time_ns(self._clock) - stretch.first.time_ns(self._clock)) / NS_PER_S
+
+    def _told(self, stretch: Stretch, why: str) -> Stuck:
+        start_ns = stretch.first.time_ns(self._clock)
+        index = stretch.first.record_index
+        return Stuck(index, start_ns, self._seconds(stretch), stretch.samples, stretch.value, why)
+
+    def _why(
+        self, topic: str, name: str, stretch: Stretch, constancy: Constancy, long: dict[str, list[Stretch]]
+    ) -> str:
+        """What says that the value should have changed; empty when nothing does."""
+        if name in _NOISY:
+            return self._why_noisy(stretch, constancy.usual_samples(without=stretch))
+        least = self._limits.times_resolution * constancy.resolution
+        if name in _HEADINGS:
+            return self._why_heading(topic, name, stretch, least)
+        if name in _VELOCITIES:
+            return self._why_elsewhere(topic, (name,), stretch, max(self._limits.velocity_mps, least), "m/s")
+        if name in _ALTITUDES:
+            return self._why_elsewhere(topic, _ALTITUDES, stretch, max(self._limits.position_m, least), "m")
+        scale = METRES_PER_DEG * self._shrinks(name, stretch)
+        enough_m = max(self._limits.position_m, least * scale)
+        why = self._why_elsewhere(topic, (name,), stretch, enough_m, "m", scale)
+        return why or self._why_position(topic, name, stretch, enough_m, long)
+
+    def _shrinks(self, name: str, stretch: Stretch) -> float:
+        """How much shorter a degree of longitude is than one of latitude."""
+        if name == "latitude_deg":
+            return 1.0
+        seen = [one.within(stretch) for one in self._sources if one.name == "latitude_deg"]
+        latitudes = [values for values in seen if len(values)]
+        return float(np.cos(np.deg2rad(latitudes[0][0]))) if latitudes else 1.0
+
+    def _why_elsewhere(
+        self, topic: str, names: tuple[str, ...], stretch: Stretch, enough: float, unit: str, scale: float = 1.0
+    ) -> str:
+        """The same quantity of another topic moves."""
+        for seen in self._sources:
+            if seen.name not in names or seen.topic == topic:
+                continue
+            values = seen.within(stretch)
+            moved = float(np.ptp(values)) * scale if len(values) > 1 else 0.0
+            if moved > enough:
+                return f"{seen.topic}.{seen.name} moves by {moved:.0f} {unit} meanwhile"
+        return ""
+
+    def _slowest(self, topic: str, stretch: Stretch) -> tuple[str, float, float] | None:
+        """Source, least and mean speed meanwhile; of the topic itself where that is named."""
+        for seen in self._sources:
+            if seen.name == "ground_speed_mps" and topic in ("", seen.topic):
+                values = seen.within(stretch)
+                if len(values) > 1:
+                    return seen.topic, float(values.min()), float(values.mean())
+        return None
+
+    def _why_position(
+        self, topic: str, name: str, stretch: Stretch, enough_m: float, long: dict[str, list[Stretch]]
+    ) -> str:
+        """Both coordinates stand still while the speed says that the aircraft moves."""
+        other = "longitude_deg" if name == "latitude_deg" else "latitude_deg"
+        first, last = stretch.first.record_index, stretch.last.record_index
+        both = any(one.first.record_index < last and one.last.record_index > first for one in long.get(other, ()))
+        speed = self._slowest(topic, stretch) or self._slowest("", stretch)
+        if not both or speed is None or speed[1] <= self._limits.moving_mps:
+            return ""
+        moved_m = speed[2] * self._seconds(stretch)
+        return f"the speed of {speed[0]} makes {moved_m:.0f} m meanwhile" if moved_m > enough_m else ""
+
+    def _why_heading(self, topic: str, name: str, stretch: Stretch, least: float) -> str:
+        """Another heading or track turns; a track counts only where the aircraft moves."""
+        moving = self._limits.moving_mps
+        own = self._slowest(topic, stretch)
+        if name == "track_deg" and (own is None or own[1] <= moving):
+            return ""
+        for seen in self._sources:
+            if seen.name not in _HEADINGS or (seen.topic, seen.name) == (topic, name):
+                continue
+            speed = self._slowest(seen.topic, stretch)
+            if seen.name == "track_deg" and (speed is None or speed[1] <= moving):
+                continue
+            values = seen.within(stretch)
+            if len(values) < 2:
+                continue
+            turned = wrap_180(values - values[0])
+            moved = float(turned.max() - turned.min())
+            if moved > max(self._limits.heading_deg, least):
+                return f"{seen.topic}.{seen.name} turns by {moved:.0f} deg meanwhile"
+        return ""
+
+    def _why_noisy(self, stretch: Stretch, usual: float) -> str:
+        """What is never still stands still, and the aircraft moves or nobody knows whether it does."""
+        speed = self._slowest("", stretch)
+        if speed is None:
+            return f"a value lasts {usual:.2f} samples otherwise" if usual <= FINE else ""
+        if speed[1] <= self._limits.moving_mps:
+            return ""
+        return f"{speed[0]} says at least {speed[1]:.0f} m/s, and a value lasts {usual:.1f} samples otherwise"

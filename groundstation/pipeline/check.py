@@ -1,0 +1,165 @@
+"""The verb ``check``: the integrity ledger of logs, which is computed and told, and written nowhere."""
+
+import traceback
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from groundstation.base.errors import GroundstationError, UnreadableLogError, UsageError
+from groundstation.base.findings import SEVERITIES, Finding, worst
+from groundstation.base.records import Damage, RecordBatch
+from groundstation.integrity.limits import Thresholds, shipped
+from groundstation.pipeline.analyse import configured_thresholds
+from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.convert import census_of, has_other_limits, recounted, stored_findings
+from groundstation.pipeline.describe import facts_of
+from groundstation.pipeline.log import Log, open_log
+from groundstation.pipeline.outcome import Outcome, State
+from groundstation.pipeline.progress import Event, Listener, silent
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What a check of one log found.
+
+    Parameters
+    ----------
+    outcome : Outcome
+        State and exit code; the reason when the log could not be read.
+    facts : mapping of str to str
+        What the log is; empty when it could not be read.
+    ledger, clock : mapping
+        As in summary.json.
+    findings : tuple of Finding
+    """
+
+    outcome: Outcome
+    facts: Mapping[str, str]
+    ledger: Mapping[str, Any]
+    clock: Mapping[str, Any]
+    findings: tuple[Finding, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-able."""
+        return {
+            "source": self.outcome.source,
+            "state": self.outcome.state,
+            "exit_code": self.outcome.code,
+            "text": self.outcome.text,
+            "sha256": self.outcome.sha256,
+            "facts": dict(self.facts),
+            "clock": dict(self.clock),
+            "ledger": dict(self.ledger),
+            "findings": [asdict(finding) for finding in self.findings],
+        }
+
+
+def check_many(
+    paths: Sequence[Path],
+    configuration: Configuration,
+    *,
+    fail_on: str = "none",
+    listen: Listener = silent,
+) -> tuple[Checked, ...]:
+    """Check logs one after the other, in the order given; a bad one never stops the others.
+
+    Raises
+    ------
+    UsageError
+        When a log is missing, is a folder, or a threshold is wrong.
+    """
+    thresholds = configured_thresholds(configuration)
+    for path in paths:
+        if not path.exists():
+            raise UsageError(str(path), "no such file")
+        if path.is_dir():
+            raise UsageError(str(path), "a folder", "a log", "`run` takes folders")
+    profile = Path(configuration.profile) if configuration.profile else None
+    listen(Event("begin", total=len(paths)))
+    found = []
+    for path in paths:
+        listen(Event("stage", path.name, "reading"))
+        found.append(_check_or_reason(path, profile, thresholds, fail_on))
+        listen(Event("end", path.name, found[-1].outcome.text))
+    return tuple(found)
+
+
+def check_log(log: Log, thresholds: Thresholds | None = None, *, fail_on: str = "none") -> Checked:
+    """Compute the ledger of a log.
+
+    The topics of a groundstation MCAP are counted anew; what only the log could tell is taken from the ledger in it.
+    """
+    limits = thresholds or shipped()
+    return _stored(log, limits, fail_on) if log.is_store else _recorded(log, limits, fail_on)
+
+
+def _check_or_reason(path: Path, profile: Path | None, thresholds: Thresholds, fail_on: str) -> Checked:
+    trace = ""
+    try:
+        return check_log(open_log(path, profile), thresholds, fail_on=fail_on)
+    except GroundstationError as error:
+        reason = str(error)
+    except OSError as error:
+        reason = f"{path.name}: {error.strerror or error}"
+    except MemoryError:
+        reason = f"{path.name}: not enough memory"
+    except Exception as error:
+        trace = traceback.format_exc()
+        reason = f"{path.name}: internal error ({type(error).__name__}: {error}); please report it"
+    return Checked(Outcome(str(path), "failed", reason, trace=trace), {}, {}, {}, ())
+
+
+def _recorded(log: Log, limits: Thresholds, fail_on: str) -> Checked:
+    from groundstation.integrity.ledger_findings import ledger_findings
+    from groundstation.integrity.survey import survey
+
+    found = survey(log.items(), thresholds=limits)
+    ledger = found.ledger.to_dict()
+    facts = facts_of(log, found.header.metadata, ledger)
+    findings = ledger_findings(found.ledger)
+    return _checked(log, facts, ledger, found.clock.to_dict(), findings, found.ledger.loses_data, fail_on)
+
+
+def _stored(log: Log, limits: Thresholds, fail_on: str) -> Checked:
+    from groundstation.store.reader import read_info
+
+    info = read_info(log.path)
+    damages: list[Damage] = []
+    census = census_of(info, limits)
+    for item in log.items():
+        if isinstance(item, RecordBatch):
+            census.add(item)
+        elif isinstance(item, Damage):
+            damages.append(item)
+    if not census.rows:
+        raise UnreadableLogError(log.path.name, "no intact record", "", "the file is damaged beyond its index")
+    anew = recounted(info, damages, census)
+    ledger = {key: value for key, value in anew.ledger.items() if key != "findings"}
+    if damages or has_other_limits(info, limits):  # else what was found in the log is told as it was
+        info = anew
+    facts = facts_of(log, info.metadata, ledger)
+    has_lost = any(entry.get("loses_data") for entry in info.damages)
+    return _checked(log, facts, ledger, info.clock, stored_findings(info), has_lost, fail_on)
+
+
+def _checked(
+    log: Log,
+    facts: Mapping[str, str],
+    ledger: Mapping[str, Any],
+    clock: Mapping[str, Any],
+    findings: tuple[Finding, ...],
+    has_lost_data: bool,
+    fail_on: str,
+) -> Checked:
+    if not ledger.get("topics"):
+        reason = f"{log.path.name}: no record that could be read: `info` tells what the file is"
+        outcome = Outcome(str(log.path), "failed", reason, sha256=log.source.sha256)
+        return Checked(outcome, facts, ledger, clock, findings)
+    gravest = worst(findings)
+    state: State = "data_lost" if has_lost_data else "done"
+    if fail_on in SEVERITIES and gravest and SEVERITIES.index(gravest) >= SEVERITIES.index(fail_on):
+        state = "limit_reached"
+    count = sum(finding.severity != "info" for finding in findings)
+    text = f"{'data lost' if has_lost_data else 'no data lost'}, {count} warning{'' if count == 1 else 's'}"
+    return Checked(Outcome(str(log.path), state, text, sha256=log.source.sha256), facts, ledger, clock, findings)

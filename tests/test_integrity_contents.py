@@ -1,0 +1,248 @@
+"""Stuck values, counters, sporadic topics and spans of damage, each with the truth that was built in."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from groundstation.base.records import Column, Damage, Item, LogHeader, RecordBatch
+from groundstation.base.units import NS_PER_S
+from groundstation.integrity import Ledger, ledger_findings, survey
+from groundstation.integrity.limits import thresholds_from
+from groundstation.integrity.stretches import Sampler
+
+Fields = Mapping[str, NDArray[np.float64]]
+RATE = 5.0
+SECONDS = 120
+TIME_S = np.arange(int(SECONDS * RATE)) / RATE
+FROZEN = slice(200, 300)  # 40.0 s to 59.8 s
+
+
+def batches(topic: str, fields: Fields, time_s: NDArray[np.float64] = TIME_S, pieces: int = 7) -> list[Item]:
+    """A topic in several batches, so that what lasts crosses their borders."""
+    times = np.round(time_s * NS_PER_S).astype(np.int64)
+    parts = np.array_split(np.arange(len(times)), pieces)
+    return [
+        RecordBatch(topic, part, Column(times[part]), {name: Column(values[part]) for name, values in fields.items()})
+        for part in parts
+        if len(part)
+    ]
+
+
+def flight(speed_mps: float = 60.0, turn_dps: float = 3.0) -> dict[str, NDArray[np.float64]]:
+    """A circling flight, or a parked aircraft with speed 0 and no turn."""
+    heading = (turn_dps * TIME_S) % 360.0
+    north = speed_mps * np.cos(np.deg2rad(turn_dps * TIME_S))
+    east = speed_mps * np.sin(np.deg2rad(turn_dps * TIME_S))
+    return {
+        "latitude_deg": 48.0 + np.cumsum(north) / RATE / 111_195.0,
+        "longitude_deg": 2.0 + np.cumsum(east) / RATE / 75_000.0,
+        "velocity_north_mps": north,
+        "velocity_east_mps": east,
+        "true_heading_deg": heading,
+    }
+
+
+def frozen_in(fields: Fields, *names: str, where: slice = FROZEN) -> dict[str, NDArray[np.float64]]:
+    out = {name: np.array(values) for name, values in fields.items()}
+    for name in names:
+        out[name][where] = out[name][where.start]
+    return out
+
+
+def without(fields: Fields, *names: str) -> dict[str, NDArray[np.float64]]:
+    return {name: values for name, values in fields.items() if name not in names}
+
+
+def ledger_of(**topics: Fields) -> Ledger:
+    items: list[Item] = [LogHeader("t")]
+    for topic, fields in topics.items():
+        items += batches(topic, fields)
+    return survey(items).ledger
+
+
+def stuck_fields(ledger: Ledger) -> set[str]:
+    return {f"{topic.topic}.{field.name}" for topic in ledger.topics for field in topic.fields if field.stuck}
+
+
+@pytest.mark.parametrize("name", ["true_heading_deg", "velocity_north_mps", "latitude_deg", "longitude_deg"])
+def test_a_field_that_stands_still_while_another_source_moves_is_stuck(name: str) -> None:
+    other = without(flight(), "true_heading_deg")
+    ledger = ledger_of(ins=frozen_in(flight(), name), gnss=other)
+    assert stuck_fields(ledger) == {f"ins.{name}"}
+    (field,) = (field for field in ledger["ins"].fields if field.name == name)
+    (one,) = field.stuck
+    assert (one.record_index, one.start_ns, one.samples) == (200, 40 * NS_PER_S, 100)
+    assert one.length_s == pytest.approx(19.8) and one.value == flight()[name][200]
+    (finding,) = (finding for finding in ledger_findings(ledger) if finding.code == "values.stuck")
+    assert finding.severity == "warn" and "gnss" in finding.text and "19.8 s (100 samples)" in finding.text
+
+
+def test_a_position_that_stands_still_is_told_by_the_speed_of_its_own_topic() -> None:
+    frozen = frozen_in(flight(turn_dps=0.1), "latitude_deg", "longitude_deg")
+    assert stuck_fields(ledger_of(gnss=frozen)) == {"gnss.latitude_deg", "gnss.longitude_deg"}
+    one_alone = frozen_in(flight(turn_dps=0.1), "latitude_deg")  # flying due east does that
+    assert stuck_fields(ledger_of(gnss=one_alone)) == set()
+
+
+def test_a_parked_aircraft_has_nothing_stuck() -> None:
+    parked = flight(0.0, 0.0)
+    rng = np.random.default_rng(5)
+    noisy = {name: values + rng.normal(0.0, 1e-7, len(values)) for name, values in parked.items()}
+    held = frozen_in(noisy, *noisy)
+    noise_of_track = {**held, "track_deg": rng.uniform(0.0, 360.0, len(TIME_S))}
+    assert stuck_fields(ledger_of(ins=held, gnss=noise_of_track)) == set()
+
+
+def test_what_is_constant_through_the_log_is_not_stuck() -> None:
+    constant = {**flight(), "true_heading_deg": np.full(len(TIME_S), 12.0)}
+    assert stuck_fields(ledger_of(ins=constant, gnss=flight())) == set()
+
+
+def test_a_slow_channel_that_is_held_is_not_stuck() -> None:
+    held = {name: np.repeat(values[::50], 50) for name, values in flight().items()}  # new every 10 s
+    assert stuck_fields(ledger_of(ins=held, gnss=flight())) == set()
+    for values in held.values():
+        values[25:50] += 1e-4  # a small step: the channel is fine, and slow all the same
+    assert stuck_fields(ledger_of(ins=held, gnss=flight())) == set()
+
+
+def test_a_coarse_field_is_not_stuck_between_its_steps() -> None:
+    coarse = {**flight(turn_dps=0.5), "true_heading_deg": np.floor(flight(turn_dps=0.5)["true_heading_deg"] / 15) * 15}
+    assert stuck_fields(ledger_of(ins=coarse, gnss=flight(turn_dps=0.5))) == set()
+
+
+def test_a_coarse_field_is_not_stuck_when_the_turn_slows_down() -> None:
+    turned = np.where(TIME_S < 60.0, 30.0 * TIME_S, 1800.0 + 0.7 * (TIME_S - 60.0))
+    coarse, fine = np.floor(turned / 45.0) * 45.0 % 360.0, turned % 360.0
+    assert (
+        stuck_fields(ledger_of(**{"ins.1": {"true_heading_deg": coarse}, "ins.2": {"true_heading_deg": fine}})) == set()
+    )
+
+
+def test_a_rate_that_is_never_still_is_stuck_when_it_is() -> None:
+    rate = np.random.default_rng(3).normal(0.0, 1.0, len(TIME_S))
+    frozen = frozen_in({"rate_x_dps": rate}, "rate_x_dps")
+    assert stuck_fields(ledger_of(ins=frozen)) == {"ins.rate_x_dps"}
+    assert stuck_fields(ledger_of(ins=frozen, gnss=flight())) == {"ins.rate_x_dps"}
+    assert stuck_fields(ledger_of(ins=frozen, gnss=flight(0.0, 0.0))) == set(), "the aircraft stands"
+    assert stuck_fields(ledger_of(ins={"rate_x_dps": rate})) == set()
+
+
+def test_absent_samples_and_nan_do_not_make_a_stretch_shorter() -> None:
+    heading = frozen_in(flight(), "true_heading_deg")["true_heading_deg"]
+    heading[250] = np.nan
+    items = [LogHeader("t"), *batches("ins", {"true_heading_deg": heading}), *batches("gnss", flight())]
+    assert stuck_fields(survey(items).ledger) == {"ins.true_heading_deg"}
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+def test_a_record_counter_tells_what_is_missing(bits: int) -> None:
+    count = (np.arange(1000) + 2**bits - 300) % 2**bits
+    keep = np.ones(1000, dtype=bool)
+    keep[400:407] = keep[700] = False
+    kind = {8: np.uint8, 16: np.uint16}[bits]
+    items: list[Item] = [LogHeader("t")]
+    for part in np.array_split(np.flatnonzero(keep), 5):
+        times = Column(part.astype(np.int64) * 10**8)
+        items.append(RecordBatch("raw.bus", part, times, {"counter": Column(count[part].astype(kind))}))
+    ledger = survey(items).ledger
+    (found,) = ledger["raw.bus"].sequences
+    assert (found.kind, found.lost, found.resets) == ("records", 8, 0)
+    assert found.places == ((40_700_000_000, 7), (70_100_000_000, 1))
+    assert [finding.count for finding in ledger_findings(ledger) if finding.code == "data.sequence"] == [8]
+
+
+def test_a_counter_of_something_else_or_one_that_is_set_is_no_loss() -> None:
+    index = np.arange(100)
+    times = Column(index * 10**8)
+    decimated = RecordBatch("raw.a", index, times, {"counter": Column(index * 5)})
+    held = RecordBatch("raw.b", index, times, {"counter": Column(np.zeros(100, dtype=np.int64))})
+    again = RecordBatch("raw.c", index, times, {"counter": Column(np.r_[0:50, 0:50])})
+    ledger = survey([LogHeader("t"), decimated, held, again]).ledger
+    assert ledger["raw.a"].sequences == ledger["raw.b"].sequences == ()
+    (found,) = ledger["raw.c"].sequences
+    assert (found.lost, found.resets) == (0, 1)
+
+
+def test_the_recorders_own_count_of_losses() -> None:
+    index = np.arange(6)
+    lost = Column(np.array([3, 3, 5, 5, 9, 9], dtype=np.uint32))
+    ledger = survey([LogHeader("t"), RecordBatch("raw.DSF", index, Column(index * NS_PER_S), {"Dp": lost})]).ledger
+    (found,) = ledger["raw.DSF"].sequences
+    assert (found.kind, found.before, found.lost) == ("losses", 3, 6)
+    assert found.places == ((2 * NS_PER_S, 2), (4 * NS_PER_S, 4))
+
+
+def test_bursts_and_topics_that_are_written_on_an_event_have_no_rate() -> None:
+    bursts = np.concatenate([start + np.arange(8) * 0.012 for start in (0.0, 9.0, 14.0, 40.0)])
+    regular = np.r_[np.arange(0, 60, 0.1), np.arange(600, 660, 0.1)]  # one long gap is no burst
+    pairs = np.sort(np.r_[np.arange(0, 60, 0.1), np.arange(0, 60, 0.1) + 0.001])
+    every_second = np.arange(0.0, 60.0, 1.0)
+    items: list[Item] = [LogHeader("t", has_counting_clock=True)]
+    named = {"raw.acks": bursts, "raw.imu": regular, "raw.home_position": every_second, "raw.slow": every_second}
+    for topic, times in {**named, "ins": pairs}.items():
+        items += batches(topic, {}, times, pieces=1)
+    ledger = survey(items).ledger
+    rates = {topic: (ledger[topic].nominal_rate_hz, ledger[topic].coverage) for topic in (*named, "ins")}
+    assert rates["raw.acks"] == rates["raw.home_position"] == (None, None)
+    assert rates["raw.imu"][0] == pytest.approx(10.0) and rates["raw.imu"][1] == pytest.approx(0.1818, abs=1e-3)
+    assert len(ledger["raw.imu"].gaps) == 1 and len(ledger["raw.acks"].gaps) == 0
+    assert rates["ins"] == (None, None), "two records a cycle: the usual step is no period"
+    assert rates["raw.slow"][0] == pytest.approx(1.0)
+    assert ledger.completeness.keys() == {topic for topic, (rate, _) in rates.items() if rate is not None}
+
+
+def test_samples_missing_one_by_one_lower_the_coverage() -> None:
+    keep = np.random.default_rng(1).uniform(size=1000) > 0.3
+    ledger = survey([LogHeader("t"), *batches("ins", {}, np.flatnonzero(keep) * 0.1)]).ledger
+    assert ledger["ins"].nominal_rate_hz == pytest.approx(10.0)
+    assert ledger["ins"].coverage == pytest.approx(keep.sum() / 1000, abs=0.005)
+
+
+def test_lost_rows_lie_between_the_rows_around_them() -> None:
+    index = np.r_[0:50, 60:100]
+    ins = RecordBatch("ins", index, Column(index * NS_PER_S), {"roll_deg": Column(np.zeros(90))})
+    items: list[Item] = [
+        LogHeader("t"),
+        ins,
+        Damage("dropped_rows", "rows 50 to 59", 10, "rows with fewer cells"),
+        Damage("unreadable_cells", "ins.roll_deg, rows 10 to 80", 2, "cells", "ins"),
+        Damage("corrupt", "bytes 100 to 163", 64, "bytes that belong to no message, skipped"),
+        Damage("truncated", "byte 900", 5, "bytes of a message cut by the end of the file"),
+        Damage("comment_line", "row 7", 1, "comment lines", loses_data=False),
+    ]
+    plain = survey(items).ledger.to_dict()
+    spans = [(one["cause"], one["field"], one["start_s"], one["length_s"], one["is_exact"]) for one in plain["spans"]]
+    assert spans == [
+        ("unreadable_cells", "roll_deg", 9.0, 72.0, False),
+        ("dropped_rows", "", 49.0, 11.0, True),
+        ("truncated", "", 99.0, 0.0, True),
+    ]
+    assert (plain["bytes_skipped"], plain["skipped_spans"]) == (69, [[100, 163, 64], [900, 904, 5]])
+    assert plain["truncated"]["place"] == "byte 900"
+    assert plain["topics"]["ins"]["losses"] == {"unreadable_cells": 2}
+
+
+def test_a_range_of_the_user_is_used() -> None:
+    limits = thresholds_from({"version": 1, "ranges": {"gnss": {"velocity_north_mps": [-50.0, 50.0]}}})
+    items = [LogHeader("t"), *batches("gnss", flight())]
+    assert not any(field.out_of_range for field in survey(items).ledger["gnss"].fields)
+    ledger = survey(items, thresholds=limits).ledger
+    (field,) = (field for field in ledger["gnss"].fields if field.out_of_range)
+    assert field.name == "velocity_north_mps" and field.out_of_range == int(
+        np.count_nonzero(np.abs(flight()["velocity_north_mps"]) > 50.0)
+    )
+    assert ledger.to_dict()["thresholds"]["name"] == "user"
+
+
+def test_a_sampler_keeps_a_bounded_part_evenly() -> None:
+    sampler = Sampler(100)
+    for start in range(0, 10_000, 137):
+        index = np.arange(start, min(start + 137, 10_000))
+        rows = sampler.rows(len(index))
+        sampler.put(index[rows], {"x": index[rows].astype(float)})
+    index, columns = sampler.all()
+    assert 50 <= len(index) <= 100 and np.array_equal(index, columns["x"])
+    assert index[0] == 0 and len(np.unique(np.diff(index))) == 1
