@@ -46,10 +46,12 @@ class _FieldTally:
         else:
             nan, count = self._add_odd(values, mask, record_index, device_ns)
         if self.constancy is not None:
+            rows = None
             if mask is not None or count:
-                good = mask if nan is None else ~nan if mask is None else mask & ~nan
-                values, record_index, device_ns = values[good], record_index[good], device_ns[good]
-            self.constancy.add(values, record_index, device_ns)
+                good = column.mask if nan is None else column.mask & ~nan
+                rows = np.flatnonzero(good)
+                values = values[rows]
+            self.constancy.add(values, record_index, device_ns, rows)
 
     def _add_odd(
         self, values: FloatArray, mask: BoolArray | None, record_index: Int64Array, device_ns: Int64Array

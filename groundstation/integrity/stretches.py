@@ -52,8 +52,10 @@ class Constancy:
         self._kept: list[Stretch] = []
         self._open: Stretch | None = None
 
-    def add(self, values: FloatArray, record_index: Int64Array, device_ns: Int64Array) -> None:
-        """Go on with more samples, all of them finite."""
+    def add(
+        self, values: FloatArray, record_index: Int64Array, device_ns: Int64Array, rows: Int64Array | None = None
+    ) -> None:
+        """Go on with more samples, all of them finite; ``rows`` of the batch they stand in, all of it without."""
         count = len(values)
         if not count:
             return
@@ -64,8 +66,8 @@ class Constancy:
         self.samples += count
         self.changes += changes + int(before is not None and not joins)
         for start, end in _ends_and_long(differs, changes, self._min_samples):
-            first = Place(int(record_index[start]), int(device_ns[start]))
-            last = Place(int(record_index[end - 1]), int(device_ns[end - 1]))
+            ends = (start, end - 1) if rows is None else (rows[start], rows[end - 1])
+            first, last = (Place(int(record_index[row]), int(device_ns[row])) for row in ends)
             stretch = Stretch(first, last, end - start, float(values[start]))
             if start == 0 and before is not None and joins:
                 stretch = Stretch(before.first, last, before.samples + stretch.samples, before.value)

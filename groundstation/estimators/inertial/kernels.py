@@ -224,19 +224,24 @@ def run_filter(
             for c in range(channels):
                 for i in range(6):
                     now[i, c] += K[k, m, i] * y[k, m, c]
-            # Joseph: w = (I - K H) p, then w (I - K H)' + K R K', for H of the single state m
-            for j in range(6):
-                for i in range(6):
-                    w[i, j] = p[i, j] - K[k, m, i] * p[m, j]
-                w[m, j] = (1.0 - K[k, m, m]) * p[m, j]
+            # Joseph: V = (I - K H) p, then V (I - K H)' + K R K', for H of the single state m. Of V a row and a column
+            # are needed again: w[0] is row m of p, w[1] column m of V.
+            rest = 1.0 - K[k, m, m]
             for i in range(6):
+                w[0, i] = p[m, i]
+                w[1, i] = p[i, m] - K[k, m, i] * p[m, m]
+            w[1, m] = rest * p[m, m]
+            for i in range(6):
+                gain = K[k, m, i]
                 for j in range(i, 6):
-                    kept = w[i, j] - w[i, m] * K[k, m, j]
-                    if j == m:
-                        kept = w[i, m] * (1.0 - K[k, m, m])
-                    total = kept + K[k, m, i] * R[m] * K[k, m, j]
+                    total = p[i, j] - gain * w[0, j] - (w[1, i] - gain * R[m]) * K[k, m, j]
                     p[i, j] = total
                     p[j, i] = total
+            for i in range(6):  # where a difference of nearly equal numbers would stand, their product
+                if i != m:
+                    p[i, m] = w[1, i] * rest + K[k, m, i] * R[m] * K[k, m, m]
+                    p[m, i] = p[i, m]
+            p[m, m] = w[1, m] * rest + K[k, m, m] * R[m] * K[k, m, m]
         for i in range(6):
             for c in range(channels):
                 x[k, i, c] = now[i, c]
