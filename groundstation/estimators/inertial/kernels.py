@@ -237,10 +237,7 @@ def run_filter(
                     total = p[i, j] - gain * w[0, j] - (w[1, i] - gain * R[m]) * K[k, m, j]
                     p[i, j] = total
                     p[j, i] = total
-            for i in range(6):  # where a difference of nearly equal numbers would stand, their product
-                if i != m:
-                    p[i, m] = w[1, i] * rest + K[k, m, i] * R[m] * K[k, m, m]
-                    p[m, i] = p[i, m]
+            # the variance measured: a product where a difference of nearly equal numbers stood
             p[m, m] = w[1, m] * rest + K[k, m, m] * R[m] * K[k, m, m]
         for i in range(6):
             for c in range(channels):
