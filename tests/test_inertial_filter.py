@@ -265,7 +265,7 @@ def test_last_smoothed_estimate_is_the_filters() -> None:
 
 def test_fixed_lag_is_smoothing_up_to_the_start() -> None:
     """States and covariance of epoch ``first`` given the data up to ``last``; (I - K H) Phi chained between."""
-    from groundstation.estimators.inertial import kernels
+    from groundstation.estimators.inertial import smoother_kernels
 
     run = run_filter(irregular_epochs(), MODEL, NOISE)
     assert (run.used == -1).sum() == 0
@@ -276,9 +276,11 @@ def test_fixed_lag_is_smoothing_up_to_the_start() -> None:
         )
         past = np.empty((len(first), SIZE))
         x, P, K = np.ascontiguousarray(run.x[:, :, channel]), run.covariance(channel), run.gain[0]
-        kernels.run_fixed_lag(run.steps.index, run.steps.transitions, x, P, K, y, S, used, first, last, past)
+        smoother_kernels.run_fixed_lag(run.steps.index, run.steps.transitions, x, P, K, y, S, used, first, last, past)
         spread, closed = np.empty((len(first), SIZE, SIZE)), np.empty((len(first), SIZE, SIZE))
-        kernels.run_lag_covariance(run.steps.index, run.steps.transitions, P, K, S, used, first, last, spread, closed)
+        smoother_kernels.run_lag_covariance(
+            run.steps.index, run.steps.transitions, P, K, S, used, first, last, spread, closed
+        )
         for row, (begin, end) in enumerate(zip(first, last, strict=True)):
             whole = smooth(run, int(begin), int(end))
             sigma = np.sqrt(whole.variance[begin, :, channel])

@@ -25,6 +25,7 @@ from groundstation.estimators.inertial.model import POSITION, STATES, ChannelMod
 from groundstation.estimators.inertial.noise import InsNoise, choose_class
 from groundstation.estimators.inertial.outages import Bridged, bridge_outages
 from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.estimators.inertial.skill import QUANTILES
 from groundstation.estimators.inertial.start_covariance import covariance_without_data
 from groundstation.results.inertial import ChannelResult, InertialResult, StateEstimate
 from groundstation.tables.table import Flight
@@ -38,7 +39,7 @@ TITLES = {
     "random_drift": "random gyro drift",
 }
 RATE_FROM_S = 600.0
-HALF, BOUND95 = 0.5, 1.959963984540054
+HALF = 0.5
 OUTAGES_LISTED = 5
 
 
@@ -193,7 +194,7 @@ def _channel(run: FilterRun, visible: FloatArray, channel: int) -> ChannelResult
         nis=float(np.mean(ratio[used == 1])),
         nis_low=bounds[0],
         nis_high=bounds[1],
-        share_inside95=float(np.mean(inside <= BOUND95**2)),
+        share_inside95=float(np.mean(inside <= QUANTILES[95] ** 2)),
         innovations=int((used != 0).sum()),
         rejected=int((used == -1).sum()),
         velocity_error_rms_mps=_rms(run.measured(1)[:, channel]),

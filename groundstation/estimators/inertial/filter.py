@@ -324,7 +324,7 @@ def smooth(run: FilterRun, first: int = 0, last: int | None = None) -> Smoothed:
 
     Source: Rauch, Tung, Striebel, 1965, in the form of Bryson and Frazier (Bierman, 1973).
     """
-    from groundstation.estimators.inertial import kernels
+    from groundstation.estimators.inertial import smoother_kernels
 
     n, _, channels = run.x.shape
     last = n - 1 if last is None else last
@@ -332,7 +332,7 @@ def smooth(run: FilterRun, first: int = 0, last: int | None = None) -> Smoothed:
     groups = [list(range(channels))] if len(run.P) == 1 else [[channel] for channel in range(channels)]
     for which, group in enumerate(groups):
         part, spread = np.full((n, SIZE, len(group)), np.nan), np.full((n, SIZE), np.nan)
-        kernels.run_smoother(
+        smoother_kernels.run_smoother(
             run.steps.index,
             run.steps.transitions,
             np.ascontiguousarray(run.x[:, :, group]),

@@ -10,7 +10,7 @@ from typing import Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from groundstation.base.geodesy import EARTH_RATE_RADPS, SEMI_MAJOR_M, curvature_radii_m
+from groundstation.base.geodesy import SEMI_MAJOR_M, curvature_radii_m
 
 FloatArray = NDArray[np.float64]
 Transition = Literal["exact", "first_order"]
@@ -175,9 +175,3 @@ class ChannelModel:
         for _ in range(steps - 1):
             total = whole @ total @ whole.T + once
         return np.asarray(0.5 * (total + total.T))
-
-
-def earth_rate_north_down_radps(latitude_deg: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Earth rate along north and down, rad/s."""
-    latitude_rad = np.deg2rad(latitude_deg)
-    return EARTH_RATE_RADPS * np.cos(latitude_rad), -EARTH_RATE_RADPS * np.sin(latitude_rad)

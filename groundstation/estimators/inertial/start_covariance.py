@@ -55,12 +55,12 @@ def start_covariance(
 
 def _smoothed(run: FilterRun, at: Int64Array, channel: int, lag_s: float) -> FloatArray:
     """Q(L) - Phi P(s|t) Phi' + Phi P(s) Psi' + its transpose; P(t) itself for L = 0."""
-    from groundstation.estimators.inertial import kernels
+    from groundstation.estimators.inertial import smoother_kernels
 
     time_s, group = run.epochs.time_s, min(channel, len(run.P) - 1)
     first = np.maximum(np.searchsorted(time_s, time_s[at] - lag_s, side="left"), 0)
     smoothed, closed = np.empty((len(at), SIZE, SIZE)), np.empty((len(at), SIZE, SIZE))
-    kernels.run_lag_covariance(
+    smoother_kernels.run_lag_covariance(
         run.steps.index,
         run.steps.transitions,
         run.P[group],

@@ -156,7 +156,7 @@ def _carried_average(run: FilterRun, at: Int64Array, window: Window) -> FloatArr
 
 def _smoothed(run: FilterRun, at: Int64Array, lag_s: float) -> FloatArray:
     """The state ``lag_s`` before the start, smoothed with all data up to the start, carried forward by the model."""
-    from groundstation.estimators.inertial import kernels
+    from groundstation.estimators.inertial import smoother_kernels
 
     time_s = run.epochs.time_s
     states = np.empty((len(at), SIZE, run.x.shape[2]))
@@ -164,7 +164,7 @@ def _smoothed(run: FilterRun, at: Int64Array, lag_s: float) -> FloatArray:
     for channel in range(run.x.shape[2]):
         group = min(channel, len(run.P) - 1)
         past = np.empty((len(at), SIZE))
-        kernels.run_fixed_lag(
+        smoother_kernels.run_fixed_lag(
             run.steps.index,
             run.steps.transitions,
             np.ascontiguousarray(run.x[:, :, channel]),
