@@ -100,6 +100,15 @@ def test_an_outlier_below_the_jump_limit_is_gated_and_counted(flight: Flight) ->
     assert codes(found)["inertial.outlier"] == 1
 
 
+def test_single_wild_samples_of_the_ins_are_no_resets(flight: Flight, clean: Estimation) -> None:
+    values = np.array(flight["ins"].values("latitude_deg"))
+    values[[2000, 4000, 6500]] += (0.4, -8.0, 0.01)
+    found = estimate_ins_errors(changed(flight, "ins", latitude_deg=values))
+    assert codes(found) == {"inertial.ins_outlier": 3}
+    assert found.result.radial_error_rate_50_nmiph == pytest.approx(clean.result.radial_error_rate_50_nmiph, rel=1e-3)
+    assert np.abs(final_m(found) - final_m(clean)).max() < SAME_M
+
+
 def test_a_filter_that_rejects_everything_is_opened_again(flight: Flight, tmp_path: Path) -> None:
     """A class far too good for the INS: without the cure the gate would lock GNSS out for good."""
     wrong = tmp_path / "wrong.toml"

@@ -49,6 +49,19 @@ def unknown_values(flight: Flight, ins: Table, gnss: Table) -> Iterator[Finding]
                 yield Finding("warn", "inertial.unknown", text, table.topic, f"from {first:.1f} s", int(missing.sum()))
 
 
+def ins_outliers(flight: Flight, ins: Table, settings: InertialSettings) -> tuple[BoolArray, list[Finding]]:
+    """Single samples of the INS whose position jumps and jumps back at once: no reset; mask (n,) and the finding."""
+    at = _steps(ins, settings.jump_m)
+    mask, rows = np.zeros(len(ins), dtype=bool), at[:-1][np.diff(at) == 1]
+    mask[rows] = True
+    if not rows.size:
+        return mask, []
+    times = flight.seconds(ins.time_ns[rows])
+    text = f"INS position off by {settings.jump_m:.0f} m or more in single samples: not used"
+    place = f"{times[0]:.1f} to {times[-1]:.1f} s"
+    return mask, [Finding("warn", "inertial.ins_outlier", text, ins.topic, place, int(rows.size))]
+
+
 def ins_resets(flight: Flight, ins: Table, settings: InertialSettings) -> Resets:
     """Steps of the INS position that its own velocity does not explain."""
     at = _steps(ins, settings.jump_m)
