@@ -26,7 +26,6 @@ from groundstation.estimators.inertial.noise import InsNoise, choose_class
 from groundstation.estimators.inertial.outages import Bridged, bridge_outages
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import QUANTILES
-from groundstation.estimators.inertial.start_covariance import covariance_without_data
 from groundstation.results.inertial import ChannelResult, InertialResult, StateEstimate
 from groundstation.tables.table import Flight
 
@@ -115,7 +114,7 @@ def _mean_place(compared: Differences) -> tuple[float, float]:
 
 def observability(run: FilterRun) -> FloatArray:
     """1 - sigma / sigma without GNSS of every state at every epoch, shape (n, 6, c), in [0, 1]."""
-    blind = np.sqrt(np.einsum("nii->ni", covariance_without_data(run)))
+    blind = np.sqrt(np.einsum("nii->ni", run.covariance_without_data))
     seen = np.stack([run.sigma(channel) for channel in range(run.x.shape[2])], axis=2)
     return np.asarray(np.clip(1.0 - seen / np.maximum(blind, 1e-300)[:, :, None], 0.0, 1.0))
 

@@ -1,6 +1,7 @@
 """Kalman filter and smoother of the two channels over one flight, on irregular epochs and across gaps."""
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -132,6 +133,13 @@ class FilterRun:
     def covariance(self, channel: int) -> FloatArray:
         """Covariance of a channel, shape (n, 6, 6)."""
         return np.asarray(self.P[min(channel, len(self.P) - 1)])
+
+    @cached_property
+    def covariance_without_data(self) -> FloatArray:
+        """Covariance Pi of the true states at every epoch had nothing been measured, shape (n, 6, 6)."""
+        nothing = np.full((len(self.epochs), 1), np.nan)
+        blind = replace(Epochs.plain(self.epochs.time_s, nothing, nothing), is_reset=self.epochs.is_reset)
+        return frozen(run_filter(blind, self.model, self.noise).P[0])
 
     def sigma(self, channel: int) -> FloatArray:
         """Standard deviations of a channel's states, shape (n, 6)."""

@@ -6,12 +6,12 @@ the model allows follows from E[x^(s) x^(t)'] = (Pi(s) - P(s)) Phi(t, s)' for s 
 true state without any data. d holds the lag of a window behind the true oscillation, which P alone knows nothing of.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.records import Int64Array
-from groundstation.estimators.inertial.filter import Epochs, FilterRun, run_filter
+from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.model import POSITION, SIZE, FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.starts import windows_of
@@ -84,7 +84,7 @@ def _smoothed(run: FilterRun, at: Int64Array, channel: int, lag_s: float) -> Flo
 
 def _windowed(method: str, run: FilterRun, at: Int64Array, channel: int, settings: InertialSettings) -> FloatArray:
     time_s, P = run.epochs.time_s, run.covariance(channel)
-    known = covariance_without_data(run) - P  # of the estimates themselves
+    known = run.covariance_without_data - P  # of the estimates themselves
     lengths_s = windows_of(method, settings).lengths_s
     lags = np.arange(0.0, min(max(lengths_s), float(np.ptp(time_s))) + 1e-9, LAG_STEP_S)
     phi = np.stack([run.model.transition_over(float(lag)) for lag in lags])
@@ -115,13 +115,6 @@ def _weights(lags: FloatArray, lengths_s: tuple[float, ...]) -> FloatArray:
     """Weight of each lag in the mean of each state, shape (lags, 6); all on lag 0 for a state without window."""
     inside = lags[:, None] < np.maximum(np.array(lengths_s)[None, :], 1e-9)
     return np.asarray(inside / inside.sum(axis=0))
-
-
-def covariance_without_data(run: FilterRun) -> FloatArray:
-    """Covariance Pi of the true states at every epoch had nothing been measured, shape (n, 6, 6)."""
-    nothing = np.full((len(run.epochs), 1), np.nan)
-    blind = replace(Epochs.plain(run.epochs.time_s, nothing, nothing), is_reset=run.epochs.is_reset)
-    return np.asarray(run_filter(blind, run.model, run.noise).P[0])
 
 
 @dataclass(frozen=True)
