@@ -20,7 +20,9 @@ MAX_TEXT_CHARACTERS = 1_024
 
 
 def frozen(array: NDArray[Any]) -> NDArray[Any]:
-    """Return a read-only view of ``array``: arrays inside dataclasses never change."""
+    """Return a read-only view of ``array``, itself when it is one: arrays inside dataclasses never change."""
+    if not array.flags.writeable:
+        return array
     view = array.view()
     view.flags.writeable = False
     return view
@@ -91,12 +93,14 @@ class RecordBatch:
         return len(self.record_index)
 
     def take(self, index: Any) -> "RecordBatch":
-        """The rows that ``index`` (slice, mask or positions) selects."""
+        """The rows that ``index`` (slice, mask or positions) selects; columns that share a mask still do."""
+        masks = {id(column.present): column.present for column in self.columns.values() if column.present is not None}
+        taken = {identity: frozen(mask[index]) for identity, mask in masks.items()}
         return RecordBatch(
             self.topic,
             self.record_index[index],
             self.device_time_ns.take(index),
-            {name: column.take(index) for name, column in self.columns.items()},
+            {name: Column(one.values[index], taken.get(id(one.present))) for name, one in self.columns.items()},
             None if self.time_ns is None else self.time_ns[index],
             None if self.validity_time_ns is None else self.validity_time_ns[index],
         )
@@ -144,6 +148,8 @@ class Damage:
         Topic it belongs to; empty when it concerns the whole log.
     loses_data : bool
         False for what is odd but lost nothing (exit code 3 is for lost data).
+    between_records : (int, int), optional
+        Record index of the last record before it and of the first behind it, where ``place`` does not tell.
     """
 
     kind: str
@@ -152,6 +158,7 @@ class Damage:
     what: str
     topic: str = ""
     loses_data: bool = True
+    between_records: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
+from groundstation.base.records import Column, Int64Array, RecordBatch
 from groundstation.base.signals import is_canonical
 from groundstation.integrity.clock import Clock
 from groundstation.integrity.ledger import FieldLedger
@@ -35,38 +35,35 @@ class _FieldTally:
     first: Place | None = None
     last: Place | None = None
 
-    def add(self, column: Column, record_index: Int64Array, device_ns: Int64Array) -> None:
-        values, mask = column.values, column.present
-        self.present += len(column) if mask is None else int(np.count_nonzero(mask))
+    def add(self, column: Column, rows: Int64Array | None, record_index: Int64Array, device_ns: Int64Array) -> None:
+        """Go on with a batch; ``rows`` are those in which the column is present, all of them without."""
+        values = column.values if rows is None else column.values[rows]
+        self.present += len(values)
         if values.dtype.kind != "f":
             return
         least, most = values.min(initial=np.inf), values.max(initial=-np.inf)
-        if least >= self.low and most <= self.high and (not self.is_known or np.isfinite(least) & np.isfinite(most)):
-            nan, count = None, 0  # the usual case: two passes tell that there is neither NaN nor anything out of range
-        else:
-            nan, count = self._add_odd(values, mask, record_index, device_ns)
+        is_sound = least >= self.low and most <= self.high
+        is_finite = np.isfinite(least) and np.isfinite(most)
+        if not is_sound or (self.is_known and not is_finite):  # else two passes tell that there is nothing odd
+            values, rows = self._without_odd(values, rows, record_index, device_ns)
         if self.constancy is not None:
-            rows = None
-            if mask is not None or count:
-                good = column.mask if nan is None else column.mask & ~nan
-                rows = np.flatnonzero(good)
-                values = values[rows]
             self.constancy.add(values, record_index, device_ns, rows)
 
-    def _add_odd(
-        self, values: FloatArray, mask: BoolArray | None, record_index: Int64Array, device_ns: Int64Array
-    ) -> tuple[BoolArray, int]:
-        """Count NaN and what is out of range; where NaN is (also where absent), and how many are present."""
-        nan = np.isnan(values)
-        count = int(np.count_nonzero(nan if mask is None else nan & mask))
-        self.nan += count
+    def _without_odd(
+        self, values: FloatArray, rows: Int64Array | None, record_index: Int64Array, device_ns: Int64Array
+    ) -> tuple[FloatArray, Int64Array | None]:
+        """Count NaN and what is out of range; gives the values that are no NaN, and their rows."""
         if self.is_known:
-            outside = (values < self.low) | (values > self.high) | np.isinf(values)
-            if mask is not None:
-                outside &= mask
-            if outside.any():
-                self._add_outside(np.flatnonzero(outside), record_index, device_ns)
-        return nan, count
+            at = np.flatnonzero((values < self.low) | (values > self.high) | np.isinf(values))
+            if len(at):
+                self._add_outside(at if rows is None else rows[at], record_index, device_ns)
+        nan = np.isnan(values)
+        count = int(np.count_nonzero(nan))
+        if not count:
+            return values, rows
+        self.nan += count
+        kept = np.flatnonzero(~nan)
+        return values[kept], kept if rows is None else rows[kept]
 
     def _add_outside(self, at: Int64Array, record_index: Int64Array, device_ns: Int64Array) -> None:
         self.out_of_range += len(at)
@@ -109,8 +106,12 @@ class Contents:
         """Count a batch; ``device_ns`` are the times to go by, those of the device unless they are given."""
         device_ns = batch.device_time_ns.values if device_ns is None else device_ns
         tally = self._topics.setdefault(batch.topic, _TopicTally())
+        rows_of: dict[int, Int64Array] = {}  # columns of one source share the array that tells where they are present
         for name, column in batch.columns.items():
-            self._field(tally, batch.topic, name).add(column, batch.record_index, device_ns)
+            mask, rows = column.present, None
+            if mask is not None and (rows := rows_of.get(id(mask))) is None:
+                rows = rows_of[id(mask)] = np.flatnonzero(mask)
+            self._field(tally, batch.topic, name).add(column, rows, batch.record_index, device_ns)
         if tally.counters is None:
             tally.counters = counters_of(batch, self._thresholds.sequence)
         for name, counter in tally.counters.items():

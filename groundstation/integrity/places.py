@@ -107,7 +107,7 @@ class Places:
 
     def _keep(self, piece: Piece) -> Kept:
         index, timed = piece.index, piece.timed
-        first, last = int(index.min()), int(index.max())
+        first, last = int(index[0]), int(index[-1])
         is_near, is_timed = last - first < 1 << 32, len(timed) == len(index)
         parts = [(index - first).astype(np.uint32) if is_near else index - first, piece.time.values]
         parts += [] if is_timed else [piece.time.mask]
@@ -116,7 +116,7 @@ class Places:
         try:
             self._file.seek(self._end)
             for part in parts:
-                self._file.write(part.tobytes())
+                self._file.write(part.data)
                 self._end += part.nbytes
         except OSError as error:
             folder, reason = tempfile.gettempdir(), error.strerror or type(error).__name__

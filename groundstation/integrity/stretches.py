@@ -34,6 +34,18 @@ class Stretch(NamedTuple):
     value: float
 
 
+_STRETCH = np.dtype(
+    [
+        ("first_index", np.int64),
+        ("first_ns", np.int64),
+        ("last_index", np.int64),
+        ("last_ns", np.int64),
+        ("samples", np.int64),
+        ("value", np.float64),
+    ]
+)
+
+
 class Constancy:
     """How long a field keeps its value.
 
@@ -49,8 +61,8 @@ class Constancy:
         self.samples = self.changes = 0
         self.resolution = 0.0
         self._min_samples = min_samples
-        self._kept: list[Stretch] = []
-        self._open: Stretch | None = None
+        self._kept: list[NDArray[Any]] = []  # ended, and long enough
+        self._open = np.zeros(0, dtype=_STRETCH)  # the one that may go on, once there is one
 
     def add(
         self, values: FloatArray, record_index: Int64Array, device_ns: Int64Array, rows: Int64Array | None = None
@@ -61,19 +73,22 @@ class Constancy:
             return
         differs: BoolArray = values[1:] != values[:-1]
         changes = int(np.count_nonzero(differs))
-        before = self._open
-        joins = before is not None and before.value == values[0]
+        starts, ends = _ends_and_long(differs, changes, self._min_samples)
+        first, last = (starts, ends - 1) if rows is None else (rows[starts], rows[ends - 1])
+        found = np.empty(len(starts), dtype=_STRETCH)
+        found["first_index"], found["first_ns"] = record_index[first], device_ns[first]
+        found["last_index"], found["last_ns"] = record_index[last], device_ns[last]
+        found["samples"], found["value"] = ends - starts, values[starts]
         self.samples += count
-        self.changes += changes + int(before is not None and not joins)
-        for start, end in _ends_and_long(differs, changes, self._min_samples):
-            ends = (start, end - 1) if rows is None else (rows[start], rows[end - 1])
-            first, last = (Place(int(record_index[row]), int(device_ns[row])) for row in ends)
-            stretch = Stretch(first, last, end - start, float(values[start]))
-            if start == 0 and before is not None and joins:
-                stretch = Stretch(before.first, last, before.samples + stretch.samples, before.value)
-            elif self._open is not None:
-                self._keep(self._open)
-            self._open = stretch
+        self.changes += changes
+        if len(self._open) and self._open["value"][0] == found["value"][0]:
+            found["samples"][0] += self._open["samples"][0]
+            found["first_index"][0], found["first_ns"][0] = self._open["first_index"][0], self._open["first_ns"][0]
+        else:
+            self.changes += len(self._open)
+            self._keep(self._open)
+        self._keep(found[:-1])
+        self._open = found[-1:]
         if 0 < changes < count - 1:
             at = np.flatnonzero(differs)[:CHANGES_MEASURED]
             smallest = float(np.abs(values[at + 1] - values[at]).min())
@@ -81,33 +96,38 @@ class Constancy:
 
     def stretches(self) -> list[Stretch]:
         """The long ones, in the order of the log."""
-        if self._open is not None:
-            self._keep(self._open)
-            self._open = None
-        return sorted(self._kept, key=lambda stretch: stretch.first.record_index)
+        self._keep(self._open)
+        self._open = self._open[:0]
+        kept = np.concatenate((self._open, *self._kept))
+        kept = kept[np.argsort(kept["first_index"], kind="stable")]
+        return [Stretch(Place(*row[:2]), Place(*row[2:4]), *row[4:]) for row in kept.tolist()]
 
     def usual_samples(self, without: Stretch) -> float:
         """Mean length of all other stretches; infinite when there is none."""
         others = self.changes
         return (self.samples - without.samples) / others if others else float("inf")
 
-    def _keep(self, stretch: Stretch) -> None:
-        if stretch.samples >= self._min_samples:
-            self._kept.append(stretch)
-        if len(self._kept) > MOST_STRETCHES:
-            self._kept = sorted(self._kept, key=lambda one: -one.samples)[: MOST_STRETCHES // 2]
+    def _keep(self, ended: NDArray[Any]) -> None:
+        long = ended[ended["samples"] >= self._min_samples]
+        if not len(long):
+            return
+        self._kept.append(long)
+        if sum(map(len, self._kept)) > MOST_STRETCHES:
+            kept = np.concatenate(self._kept)
+            self._kept = [kept[np.argsort(-kept["samples"], kind="stable")[: MOST_STRETCHES // 2]]]
 
 
-def _ends_and_long(differs: BoolArray, changes: int, min_samples: int) -> list[tuple[int, int]]:
+def _ends_and_long(differs: BoolArray, changes: int, min_samples: int) -> tuple[Int64Array, Int64Array]:
     """The first and the last stretch of some samples, and the long ones between: where they start and end."""
     count = len(differs) + 1
     if changes == count - 1:  # every sample differs: the usual case of what is measured
-        return [(0, 1), (count - 1, count)] if count > 1 else [(0, 1)]
-    starts = np.concatenate(([0], np.flatnonzero(differs) + 1)) if changes else np.zeros(1, dtype=np.int64)
-    ends = np.append(starts[1:], count)
+        starts = np.array([0, count - 1] if count > 1 else [0])
+        return starts, starts + 1
+    borders = np.flatnonzero(differs) + 1
+    starts, ends = np.concatenate(([0], borders)), np.concatenate((borders, [count]))
     wanted = ends - starts >= min_samples
     wanted[0] = wanted[-1] = True
-    return [(int(start), int(end)) for start, end in zip(starts[wanted], ends[wanted], strict=True)]
+    return starts[wanted], ends[wanted]
 
 
 class Sampler:

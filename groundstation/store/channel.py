@@ -15,7 +15,7 @@ from groundstation.base.errors import GroundstationError
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
 from groundstation.base.units import NS_PER_S
 from groundstation.store.schema import GrowingType, WireField, columns_text
-from groundstation.store.wire import ByteArray, Slot, encode, slot_of
+from groundstation.store.wire import ByteArray, Slot, encode, slot_of, taken
 
 CHUNK_BYTES = 1 << 20  # a chunk is closed when it has so many bytes: a flipped bit loses no more
 CHUNK_SPAN_NS = 300 * NS_PER_S  # or at each such boundary of time, which bounds the loss of slow topics
@@ -74,7 +74,7 @@ class ChannelWriter:
         slots = self.slots(batch)
         for rows in _pieces(time_ns, row_bytes):
             self._close_at_boundary(int(time_ns[rows.start]))
-            self._append(time_ns[rows], publish_ns[rows], [slot.take(rows) for slot in slots])
+            self._append(time_ns[rows], publish_ns[rows], taken(slots, rows))
             if self._bytes >= CHUNK_BYTES * 7 // 8:
                 self.flush()
 

@@ -68,10 +68,9 @@ class Slot:
         lengths = self.lengths if self.present is None else self.lengths[self.present]
         return len(lengths) > 0 and bool(lengths.min() != lengths.max())
 
-    def take(self, rows: slice | NDArray[np.intp]) -> "Slot":
-        """The slot of some rows."""
-        present, lengths = (None if array is None else array[rows] for array in (self.present, self.lengths))
-        return Slot(self.prefix, self.values[rows], present, lengths)
+    def take(self, rows: slice | NDArray[np.intp], present: BoolArray | None = None) -> "Slot":
+        """The slot of some rows, which are present as ``present`` tells."""
+        return Slot(self.prefix, self.values[rows], present, None if self.lengths is None else self.lengths[rows])
 
     def blocks(self) -> Iterator[Block]:
         """Rows whose bytes have one width: their positions, the bytes before each value, the values as (k, width)."""
@@ -93,6 +92,17 @@ class Slot:
         for length in np.unique(lengths):
             chosen = np.flatnonzero(lengths == length)
             yield positions[chosen], self.prefix + varint(int(length)), matrix[chosen, :length]
+
+
+def taken(slots: Sequence[Slot], rows: slice) -> list[Slot]:
+    """Slots of some rows; those that share a mask still do."""
+    masks = {id(mask): mask[rows] for mask in _masks(slots).values()}
+    return [slot.take(rows, masks.get(id(slot.present))) for slot in slots]
+
+
+def _masks(slots: Sequence[Slot]) -> dict[int, BoolArray]:
+    """The different masks of slots."""
+    return {id(slot.present): slot.present for slot in slots if slot.present is not None}
 
 
 def slot_of(field: WireField, values: NDArray[Any], present: BoolArray | None) -> Slot:
@@ -167,22 +177,22 @@ def _blocks(slots: Iterable[Slot]) -> list[Block]:
 
 def _alike(slots: Sequence[Slot], count: int) -> list[tuple[slice | NDArray[np.intp], list[Slot]]] | None:
     """Rows in groups that have the same fields present, and the slots of those; None where few are alike."""
-    pattern, partial = np.zeros(count, np.int64), 0
-    for slot in slots:
-        if slot.present is not None and not slot.present.all():
-            pattern, partial = pattern * 2 + slot.present, partial + 1
-        if partial > MAX_PARTIAL or slot.has_many_widths:
-            return None
-    if not partial:
+    masks = {identity: mask for identity, mask in _masks(slots).items() if not mask.all()}
+    if len(masks) > MAX_PARTIAL or any(slot.has_many_widths for slot in slots):
+        return None
+    if not masks:
         return [(slice(None), list(slots))]
+    pattern = np.zeros(count, np.int64)
+    for mask in masks.values():
+        pattern = pattern * 2 + mask
     patterns = np.unique(pattern).tolist()
     if len(patterns) * ROWS_ALIKE > count:
         return None
     groups: list[tuple[slice | NDArray[np.intp], list[Slot]]] = []
     for one in patterns:
         rows = np.flatnonzero(pattern == one)
-        known = [slot for slot in slots if slot.present is None or slot.present[rows[0]]]
-        groups.append((rows, [slot.take(rows) for slot in known]))
+        absent = {identity for identity, mask in masks.items() if not mask[rows[0]]}
+        groups.append((rows, [slot.take(rows) for slot in slots if id(slot.present) not in absent]))
     return groups
 
 

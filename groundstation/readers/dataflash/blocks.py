@@ -1,7 +1,7 @@
 """Cuts a log into blocks of records that the definitions in force describe; what belongs to no record is counted."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -18,10 +18,11 @@ from groundstation.readers.dataflash.definitions import (
     fmt_definition,
     parse_fmt,
 )
+from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 
 BLOCK_BYTES = 4 << 20
-SPANS_SHOWN = 20  # damaged spans that are told one by one; the others are told together
+REFUSED_SHOWN = 20  # definitions left out that are told one by one
 MAX_SPANS = 4_096
 MOST_LOGS, MOST_DEFINITIONS = 256, 10_000  # joined in a file, and different ones in it: more is no log but an attack
 _LOG_BEGINS = bytes((FMT_ID, FMT_BYTES)) + b"FMT"  # every log begins with the definition of definitions
@@ -68,43 +69,23 @@ class Block:
 class Spans:
     """Bytes of a log that belong to no record."""
 
-    shown: list[tuple[int, int]] = field(default_factory=list)
-    others: int = 0
-    other_bytes: int = 0
-    other_first: int = 0
-    other_last: int = 0
+    skipped: SkippedBytes
     padding: tuple[int, int] | None = None
     cut: tuple[int, int, str] | None = None
 
-    def add(self, start: int, end: int) -> None:
-        """Count bytes from ``start`` to ``end`` of the file."""
-        if len(self.shown) < SPANS_SHOWN:
-            self.shown.append((start, end))
-            return
-        self.other_first = self.other_first if self.others else start
-        self.others, self.other_bytes, self.other_last = self.others + 1, self.other_bytes + end - start, end
-
     def damages(self) -> Iterator[Damage]:
         """What was skipped, in the order of the file."""
-        for start, end in self.shown:
-            yield Damage("corrupt", _bytes(start, end), end - start, "bytes that belong to no record, skipped")
-        if self.others:
-            what = f"bytes that belong to no record in {self.others} more places, skipped"
-            yield Damage("corrupt", _bytes(self.other_first, self.other_last), self.other_bytes, what)
+        yield from self.skipped.damages()
         if self.cut is not None:
             start, end, name = self.cut
             what = (
                 f"bytes of a {name} record that the end of the file cuts off" if name else "bytes of a record cut off"
             )
-            yield Damage("truncated", _bytes(start, end), end - start, what)
+            yield Damage("truncated", bytes_place(start, end), end - start, what)
         if self.padding is not None:
             start, end = self.padding
             what = "filler bytes behind the last record"
-            yield Damage("padding", _bytes(start, end), end - start, what, loses_data=False)
-
-
-def _bytes(start: int, end: int) -> str:
-    return f"byte {start}" if end - start == 1 else f"bytes {start} to {end - 1}"
+            yield Damage("padding", bytes_place(start, end), end - start, what, loses_data=False)
 
 
 class Scanner:
@@ -121,7 +102,7 @@ class Scanner:
 
     def __init__(self, source: Source) -> None:
         self._source = source
-        self.spans = Spans()
+        self.spans = Spans(SkippedBytes("record"))
         self.refused: list[tuple[int, Definition]] = []
         self.refused_more = 0
         self._met = self._logs = 0
@@ -134,7 +115,7 @@ class Scanner:
         self._state = scan.new_state()
         self._base = 0  # place in the file of the first byte of the data at hand
         self._count = 0
-        self._spans = np.empty((MAX_SPANS, 2), dtype=np.int64)
+        self._spans = np.empty((MAX_SPANS, 3), dtype=np.int64)
 
     def __iter__(self) -> Iterator[Block]:
         data = np.zeros(0, dtype=np.uint8)
@@ -167,16 +148,17 @@ class Scanner:
         """Blocks of the data at hand: one, and more where a definition changes or there are very many records."""
         offsets = np.empty(len(data) // HEADER_BYTES + 1, dtype=np.int64)
         types = np.empty(len(offsets), dtype=np.uint8)
+        magic = scan.magic_places(data)
         state = self._state
-        state[scan.COUNT] = 0
+        state[scan.COUNT] = state[scan.MAGIC] = 0
         limit = len(data) if is_last else len(data) - scan.LOOKAHEAD
         while state[scan.POSITION] < limit:
             state[scan.SPANS] = 0
             stopped = scan.scan(
-                data, is_last, FMT_ID, self._lengths, self._time_kind, offsets, types, self._spans, state
+                data, magic, is_last, FMT_ID, self._lengths, self._time_kind, offsets, types, self._spans, state
             )
-            for start, end in self._spans[: state[scan.SPANS]].tolist():
-                self.spans.add(self._base + start, self._base + end)
+            for start, end, before in self._spans[: state[scan.SPANS]].tolist():
+                self.spans.skipped.add(self._base + start, self._base + end, self._count + before)
             if stopped:
                 count = int(state[scan.COUNT])
                 at = int(offsets[count - 1])
@@ -209,7 +191,7 @@ class Scanner:
         if new is not None and not self._contradicts(type_id, types):
             self._payloads[type_id] = payload
             return new
-        if new is not None and len(self.refused) < SPANS_SHOWN:
+        if new is not None and len(self.refused) < REFUSED_SHOWN:
             self.refused.append((place, new))
         elif self.refused:
             self.refused_more += 1
@@ -237,7 +219,7 @@ class Scanner:
             if skip_start >= 0 and any(not left.strip(filler) for filler in FILLERS):
                 self.spans.padding = (self._base + skip_start, size)
             else:
-                self.spans.add(self._base + skip_start, size)
+                self.spans.skipped.add(self._base + skip_start, size, self._count)
 
 
 def _time_kind(definition: Definition) -> int:

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
-from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Int64Array, RecordBatch
+from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Int64Array, RecordBatch, frozen
 from groundstation.readers.dataflash import rules
 from groundstation.readers.dataflash.atmosphere import pressure_altitude_m
 from groundstation.readers.dataflash.choices import Choices
@@ -222,20 +223,36 @@ def _merged(topic: str, parts: list[_Part]) -> RecordBatch:
     places = np.empty_like(order)
     places[order] = np.arange(len(order))
     places_of = np.split(places, np.cumsum([len(part.rows) for part in parts])[:-1])
-    columns = {}
+    columns: dict[str, Column] = {}
+    masks: dict[tuple[int, ...], BoolArray | None] = {}  # fields of the same parts are present in the same rows
     for name in dict.fromkeys(name for part in parts for name in part.columns):
-        known = [(at, part.columns[name]) for at, part in zip(places_of, parts, strict=True) if name in part.columns]
-        columns[name] = _column(known, len(index))
-    time = _column([(at, part.rows.time_ns) for at, part in zip(places_of, parts, strict=True)], len(index))
+        known = {number: part.columns[name] for number, part in enumerate(parts) if name in part.columns}
+        pieces = [(places_of[number], column) for number, column in known.items()]
+        if any(column.present is not None for column in known.values()):
+            mask = _present(pieces, len(index))
+        elif (key := tuple(known)) in masks:
+            mask = masks[key]
+        else:
+            mask = masks[key] = _present(pieces, len(index))
+        columns[name] = Column(_values(pieces, len(index)), mask)
+    times = [(at, part.rows.time_ns) for at, part in zip(places_of, parts, strict=True)]
+    time = Column(_values(times, len(index)), _present(times, len(index)))
     return RecordBatch(topic, index[order], time, columns)
 
 
-def _column(pieces: list[tuple[Int64Array, Column]], rows: int) -> Column:
-    """One column of several pieces that stand at given places."""
+def _values(pieces: list[tuple[Int64Array, Column]], rows: int) -> Any:
+    """Values of several pieces that stand at given places."""
     kind = np.result_type(*(piece.values.dtype for _at, piece in pieces))
     filler = np.nan if kind.kind == "f" else pieces[0][1].values[0]  # one text throughout is one run to write
-    values, present = np.full(rows, filler, dtype=kind), np.zeros(rows, dtype=bool)
+    values = np.full(rows, filler, dtype=kind)
     for at, piece in pieces:
         values[at] = piece.values
+    return values
+
+
+def _present(pieces: list[tuple[Int64Array, Column]], rows: int) -> BoolArray | None:
+    """Where there is a value; None when everywhere."""
+    present = np.zeros(rows, dtype=bool)
+    for at, piece in pieces:
         present[at] = True if piece.present is None else piece.present
-    return Column(values, None if present.all() else present)
+    return None if present.all() else frozen(present)

@@ -17,10 +17,11 @@ from groundstation.base.compile import compiled
 
 LOOKAHEAD = 1_024  # bytes that must follow the record that is judged: itself and two more, at most 255 each
 NEAR_US = 10_000_000  # a record whose time is within 10 s of the last good one is believed
+MAGIC_BYTES = 0x95A3  # as a little-endian number
 NO_TIME, TIME_US_8, TIME_US_4, TIME_MS = 0, 1, 2, 3
 
 # Places in the state array.
-POSITION, COUNT, SPANS, SKIP_START, LAST_US, CUT_AT, STATE_SIZE = 0, 1, 2, 3, 4, 5, 6
+POSITION, COUNT, SPANS, SKIP_START, LAST_US, CUT_AT, MAGIC, STATE_SIZE = 0, 1, 2, 3, 4, 5, 6, 7
 NOWHERE = -(1 << 62)
 
 
@@ -29,6 +30,14 @@ def new_state() -> NDArray[np.int64]:
     state = np.zeros(STATE_SIZE, dtype=np.int64)
     state[SKIP_START], state[LAST_US], state[CUT_AT] = NOWHERE, NOWHERE, NOWHERE
     return state
+
+
+def magic_places(data: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Where the two bytes of magic stand: looked for in pairs of bytes at even places, then at odd ones."""
+    even, odd = (data[start:][: (len(data) - start) // 2 * 2].view("<u2") == MAGIC_BYTES for start in (0, 1))
+    places = np.concatenate((2 * np.flatnonzero(even), 2 * np.flatnonzero(odd) + 1))
+    places.sort(kind="stable")
+    return places
 
 
 @compiled
@@ -50,6 +59,13 @@ def _time_us(data: Any, at: int, time_kind: Any) -> int:
     for k in range(width - 1, -1, -1):
         value = (value << 8) | int(data[at + 3 + k])
     return value * 1000 if kind == TIME_MS else value
+
+
+@compiled
+def _has_time(data: Any, at: int, time_kind: Any) -> bool:
+    """Whether the record has a time, which is not negative."""
+    kind = time_kind[data[at + 2]]
+    return kind != NO_TIME and (kind != TIME_US_8 or data[at + 10] < 128)
 
 
 @compiled
@@ -98,15 +114,6 @@ def _is_swallowed(data: Any, at: int, end: int, lengths: Any, time_kind: Any, la
 
 
 @compiled
-def _may_hold_record(data: Any, start: int, end: int) -> bool:
-    """Whether the first byte of magic stands in a stretch: no branches, so that many bytes are compared at once."""
-    found = np.uint8(0)
-    for at in range(np.uint64(start), np.uint64(end)):
-        found |= np.uint8(data[at] == np.uint8(0xA3))
-    return bool(found)
-
-
-@compiled
 def _is_false(data: Any, at: int, length: int, lengths: Any, time_kind: Any, last_us: int) -> bool:
     """Whether a record is false, its id being damaged: another record begins inside it.
 
@@ -114,8 +121,6 @@ def _is_false(data: Any, at: int, length: int, lengths: Any, time_kind: Any, las
     payload that looks like that by chance is not to be met.
     """
     end = at + length
-    if not _may_hold_record(data, at + 3, end):
-        return False
     ends_well = end + 2 > len(data) or (data[end] == 0xA3 and data[end + 1] == 0x95)
     for inside in range(at + 3, end - 1 if ends_well else end):
         if data[inside] == 0xA3 and data[inside + 1] == 0x95:
@@ -141,6 +146,7 @@ def _is_cut(data: Any, at: int, length: int, lengths: Any, time_kind: Any, last_
 @compiled
 def scan(
     data: Any,
+    magic: Any,
     is_last: bool,
     stop_at: int,
     lengths: Any,
@@ -155,6 +161,8 @@ def scan(
     Parameters
     ----------
     data : ndarray of uint8, shape (n,)
+    magic : ndarray of int64
+        Where the two bytes of magic stand in ``data``.
     is_last : bool
         Nothing follows ``data`` in the file; else the last LOOKAHEAD bytes are left for the next call.
     stop_at : int
@@ -165,38 +173,47 @@ def scan(
         How the record's time stands behind the header: NO_TIME, TIME_US_8, TIME_US_4, TIME_MS.
     offsets, types : ndarrays of int64 and uint8, out
         Where each record begins, and its type; appended at ``state[COUNT]``.
-    spans : ndarray of int64, shape (k, 2), out
-        Bytes that belong to no record, from start to end; appended at ``state[SPANS]``.
+    spans : ndarray of int64, shape (k, 3), out
+        Bytes that belong to no record, from start to end, and the number of records found before; appended at
+        ``state[SPANS]``.
     state : ndarray of int64
         Positions count from the start of ``data``; ``CUT_AT`` is where the file cuts a record off.
     """
     size = len(data)
     limit = size if is_last else size - LOOKAHEAD
     at, count, skip, last_us = state[POSITION], state[COUNT], state[SKIP_START], state[LAST_US]
+    after = state[MAGIC]  # of the magic, the first behind the header that is judged
+    timed = NOWHERE  # the last good record with a time, which is looked at when somebody asks for it
     stopped = False
     while at < limit and count < len(offsets) and state[SPANS] < len(spans):
         length = _length_at(data, at, lengths)
         is_record = length > 0 and at + length <= size
-        if skip == NOWHERE and not is_record and is_last and _is_cut(data, at, length, lengths, time_kind, last_us):
-            state[CUT_AT] = at
-            at = size
-            break
-        if is_record and skip != NOWHERE:
-            is_record = _is_credible(data, at, lengths, time_kind, last_us)
-        if is_record:
-            is_record = not _is_false(data, at, length, lengths, time_kind, last_us)
-        if not is_record:
-            skip = at if skip == NOWHERE else skip
-            at += 1
-            while at < size and data[at] != 0xA3:
+        while after < len(magic) and magic[after] < at + 3:
+            after += 1
+        is_doubtful = not is_record or skip != NOWHERE or (after < len(magic) and magic[after] < at + length)
+        if is_doubtful:
+            if timed != NOWHERE:
+                last_us, timed = _time_us(data, timed, time_kind), NOWHERE
+            if skip == NOWHERE and not is_record and is_last and _is_cut(data, at, length, lengths, time_kind, last_us):
+                state[CUT_AT] = at
+                at = size
+                break
+            if is_record and skip != NOWHERE:
+                is_record = _is_credible(data, at, lengths, time_kind, last_us)
+            if is_record:
+                is_record = not _is_false(data, at, length, lengths, time_kind, last_us)
+            if not is_record:
+                skip = at if skip == NOWHERE else skip
                 at += 1
-            continue
-        if skip != NOWHERE:
-            spans[state[SPANS], 0], spans[state[SPANS], 1] = skip, at
-            state[SPANS] += 1
-            skip = NOWHERE
-        time = _time_us(data, at, time_kind)
-        last_us = time if time >= 0 else last_us
+                while at < size and data[at] != 0xA3:
+                    at += 1
+                continue
+            if skip != NOWHERE:
+                spans[state[SPANS], 0], spans[state[SPANS], 1], spans[state[SPANS], 2] = skip, at, count
+                state[SPANS] += 1
+                skip = NOWHERE
+        if _has_time(data, at, time_kind):
+            timed = at
         offsets[count] = at
         types[count] = data[at + 2]
         count += 1
@@ -204,5 +221,7 @@ def scan(
         if types[count - 1] == stop_at:
             stopped = True
             break
-    state[POSITION], state[COUNT], state[SKIP_START], state[LAST_US] = at, count, skip, last_us
+    if timed != NOWHERE:
+        last_us = _time_us(data, timed, time_kind)
+    state[POSITION], state[COUNT], state[SKIP_START], state[LAST_US], state[MAGIC] = at, count, skip, last_us, after
     return stopped
