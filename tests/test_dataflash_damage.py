@@ -11,6 +11,7 @@ from groundstation.base.records import Damage, Item, RecordBatch
 from groundstation.readers import registry
 from groundstation.readers.dataflash import blocks, read
 from groundstation.readers.dataflash.blocks import Scanner
+from groundstation.readers.skipped import STRETCHES_SHOWN
 from groundstation.readers.source import Source
 from tests.dataflash_writer import DataFlash, flight_log
 from tests.real_logs import real_log
@@ -160,7 +161,7 @@ def test_very_many_damaged_places_are_told_together(tmp_path: Path) -> None:
     path = tmp_path / "many.BIN"
     path.write_bytes(content)
     places, damages = scanned(path)
-    assert len(places) == len(log.records) and len(damages) <= blocks.SPANS_SHOWN + 2
+    assert len(places) == len(log.records) and len(damages) <= STRETCHES_SHOWN + 2
     assert sum(damage.count for damage in damages) == len(log.records) - 41
 
 

@@ -13,7 +13,8 @@ from groundstation.base.records import Column, Damage, LogHeader, RecordBatch
 from groundstation.base.signals import TOPICS
 from groundstation.store.channel import CHUNK_SPAN_NS, SHORT_SPAN_NS
 from groundstation.store.info import StoreInfo
-from groundstation.store.reader import is_groundstation_mcap, is_mcap, read, read_info
+from groundstation.store.reader import read, read_info
+from groundstation.store.recognition import is_groundstation_mcap, is_mcap
 from groundstation.store.writer import StoreWriter
 
 T0 = 1_777_874_400_000_000_000

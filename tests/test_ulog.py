@@ -145,8 +145,8 @@ def test_appended_sections(tmp_path: Path) -> None:
 
 
 def test_unknown_flags_are_refused_and_unknown_messages_skipped(tmp_path: Path) -> None:
-    log = UlogWriter().flags(incompat=b"\0\x04" + bytes(6)).format(BARO)
-    with pytest.raises(UnreadableLogError, match="flags 0004"):
+    log = UlogWriter().flags(incompat=b"\4" + bytes(7)).format(BARO)
+    with pytest.raises(UnreadableLogError, match="flags 0400"):
         read(tmp_path, log)
     log = UlogWriter().flags(compat=b"\xff" * 8).format(BARO).subscribe(0, "vehicle_air_data")
     log.message("Z", b"from the future").row(0, "Qf", T0_US, 1e5).message("B", bytes(44)).row(0, "Qf", T0_US, 1e5)

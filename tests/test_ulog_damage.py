@@ -124,6 +124,85 @@ def test_a_false_message_of_an_unknown_type_swallows_nothing(tmp_path: Path) -> 
         assert len(times_us(items, RAW[0])) + len(times_us(items, RAW[1])) == len(rows) - 1
 
 
+@pytest.mark.parametrize("size", [600, 3_000, 9_000])
+@pytest.mark.parametrize("head", [b"g", b"E", b"D\xff\x7f", b"L6" + bytes(8), b"M\0\x08char[9] x"])
+def test_a_false_message_swallows_no_definitions(tmp_path: Path, head: bytes, size: int) -> None:
+    """Every letter of a damaged definition is the type of a message; some end where a true one begins."""
+    rows = small_flight(10)
+    log, columns = UlogWriter().flags(), "".join(f"float field_{number};" for number in range(10))
+    for number in range(120):
+        log.format(f"topic_{number:03}:uint64_t timestamp;{columns}")
+    place = log.starts[31]  # behind the flags and thirty formats
+    behind = next(start for start in log.starts[32:] if start - place >= size)
+    log.data[place : place + 2 + len(head)] = struct.pack("<H", behind - place - 3) + head
+    for number in range(120):
+        log.subscribe(100 + number, f"topic_{number:03}").row(100 + number, "Q10f", T0_US, *range(10))
+    log.data += rows.data[rows.starts[0] + 43 :]
+    items = items_of(tmp_path / "x.ulg", bytes(log.data))
+    topics = {item.topic for item in items if isinstance(item, RecordBatch)}
+    assert {f"raw.topic_{number:03}" for number in range(120)} - topics == {"raw.topic_030"}
+    assert len(times_us(items, RAW[0])) == len(times_us(items, RAW[1])) == 10
+
+
+def test_the_message_behind_one_that_lost_bytes_is_kept(tmp_path: Path) -> None:
+    """A data message that lost bytes ends inside the next one: it is none, and the next one is whole."""
+    log = small_flight(40)
+    rows = [start for start in log.starts if log.data[start + 2] == ord("D")]
+    for lost in (1, 3, 8):
+        items = items_of(tmp_path / "x.ulg", bytes(log.data[: rows[21] + 9] + log.data[rows[21] + 9 + lost :]))
+        assert len(times_us(items, RAW[0])) == 40 and len(times_us(items, RAW[1])) == 39
+        assert spans_of(damages_of(items)) == [(rows[21], rows[22] - lost)]
+
+
+def test_a_dropout_in_front_of_garbage_is_kept(tmp_path: Path) -> None:
+    log = small_flight(10)
+    place = log.starts[12]
+    for garbage in (b"\xff" * 50, bytes(50), np.random.default_rng(1).bytes(50)):
+        data = bytes(log.data[:place]) + b"\2\0O\x40\1" + garbage + bytes(log.data[place:])
+        items = items_of(tmp_path / "x.ulg", data)
+        assert [(damage.kind, damage.count) for damage in damages_of(items)] == [("corrupt", 50), ("dropout", 320)]
+        among_garbage = bytes(log.data[:place]) + garbage + b"\2\0O\x40\1" + garbage + bytes(log.data[place:])
+        items = items_of(tmp_path / "x.ulg", among_garbage)
+        assert [(damage.kind, damage.count) for damage in damages_of(items)] == [("corrupt", 105)]
+
+
+@pytest.mark.parametrize("where", [20, 28, 46, 58])
+def test_flags_that_lost_or_gained_bytes_cost_no_definition(tmp_path: Path, where: int) -> None:
+    log = small_flight(10)
+    for data in (log.data[:where] + log.data[where + 1 :], log.data[:where] + b"\x37\x20" + log.data[where:]):
+        items = items_of(tmp_path / "x.ulg", bytes(data))
+        assert len(times_us(items, RAW[0])) == len(times_us(items, RAW[1])) == 10
+
+
+def test_flags_that_no_version_has_are_damage(tmp_path: Path) -> None:
+    """Flags are given from the lowest bit on, so one far up, or a byte full of them, was not set by a writer."""
+    for flags in (b"\0\0\0\x10" + bytes(4), b"\xff" + bytes(7), b"\xff" * 8):
+        log = small_flight(10)
+        log.data[27:35] = flags
+        items = items_of(tmp_path / "x.ulg", bytes(log.data))
+        assert len(times_us(items, RAW[0])) == 10
+        (damage,) = damages_of(items)
+        assert (damage.kind, damage.place, damage.count) == ("corrupt", "bytes 16 to 58", 43)
+        assert flags.hex() in damage.what
+
+
+def test_skipped_bytes_stand_between_the_records_around_them(tmp_path: Path) -> None:
+    """Those told one by one, those told together, and a message that appended data cuts off."""
+    log = small_flight(100)
+    places = [number for number in range(10, 200, 6) if log.data[log.starts[number] + 2] == ord("D")]
+    first = 1  # the flags are no record
+    for number in places:
+        log.data[log.starts[number] + 2] ^= 0xFF
+    log.data += log.data[log.starts[-1] : log.starts[-1] + 7]
+    log.append_section().row(1, "Qf", T0_US + 10**7, 1e5)
+    damages = damages_of(items_of(tmp_path / "x.ulg", bytes(log.data)))
+    before = [number - first - count for count, number in enumerate(places)]
+    assert [one.between_records for one in damages[:20]] == [(index - 1, index) for index in before[:20]]
+    assert damages[20].between_records == (before[20] - 1, before[-1])
+    last = len(log.starts) - 1 - first - len(places)
+    assert damages[21].kind == "truncated" and damages[21].between_records == (last - 1, last)
+
+
 def test_a_short_body_is_no_format(tmp_path: Path) -> None:
     """``01 00 F :`` inside a record, the next one being damaged, is no definition that ends it."""
     log = small_flight(40)

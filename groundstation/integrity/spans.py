@@ -92,8 +92,8 @@ class Timeline:
 def spans_of(damages: Sequence[Damage], dropouts: Sequence[Dropout], timeline: Timeline, end_ns: int) -> list[Span]:
     """Spans of what the reader lost, where their place in time is known.
 
-    Rows of a table lie between the rows around them; what the end of a file cuts off lies at the end of the log. Bytes
-    of a binary log have no known time.
+    Rows of a table, and bytes of a binary log that were skipped, lie between the records around them; what the end of a
+    file cuts off lies at the end of the log.
     """
     found = [
         Span("dropout", "", "", one.start_ns, one.start_ns + round(one.length_s * NS_PER_S), True, _ms(one))
@@ -117,6 +117,9 @@ def _ms(dropout: Dropout) -> int:
 def _times(damage: Damage, timeline: Timeline, end_ns: int) -> tuple[tuple[int, int] | None, bool]:
     """When, and whether all of it."""
     rows, stated = _ROWS.search(damage.place), _TIMES.search(damage.what)
+    if damage.between_records is not None:
+        before, behind = damage.between_records
+        return timeline.around(before + 1, behind - 1), False
     if damage.kind == "truncated":
         return (end_ns, end_ns), True
     if rows:

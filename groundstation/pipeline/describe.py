@@ -45,7 +45,7 @@ def describe(path: Path, profile: Path | None = None) -> Description:
         When the file is missing, or nothing can be said about it.
     """
     from groundstation.base.errors import UsageError
-    from groundstation.store.reader import is_groundstation_mcap, is_mcap
+    from groundstation.store.recognition import is_groundstation_mcap, is_mcap
 
     if not path.exists():
         raise UsageError(str(path), "no such file")

@@ -40,8 +40,8 @@ def leaning_findings(
 ) -> tuple[Finding, ...]:
     """Findings on answers whose samples overlap damage: a warning; gaps alone are for information.
 
-    Codes ``heading.damaged_span``, ``inertial.damaged_span``. Damage without a place in time (bytes of a binary log
-    that were skipped) is in the ledger, and in no such finding.
+    Codes ``heading.damaged_span``, ``inertial.damaged_span``. Damage without a place in time is in the ledger,
+    and in no such finding.
     """
     uses = []
     if heading is not None and heading.segments:

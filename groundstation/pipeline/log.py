@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from groundstation.base.errors import UnreadableLogError
+from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.records import Item, RecordBatch
 from groundstation.pipeline.identity import sha256_of
 from groundstation.results.flight import Source
@@ -60,17 +60,33 @@ def open_log(path: Path, profile: Path | None = None) -> Log:
         When no reader claims it, or it is an MCAP of another program.
     """
     from groundstation.readers.registry import identify
-    from groundstation.store.reader import is_groundstation_mcap, read_info
+    from groundstation.store.reader import read_info
 
     if not path.is_file():
         raise UnreadableLogError(str(path), "no regular file", "a recorded log")
     size = path.stat().st_size
-    if is_groundstation_mcap(path):
+    if _is_store(path, profile):
         info = read_info(path)  # the flight is that of the log, whichever of the two is run
         name, sha256 = info.source_name or path.name, info.source_sha256 or sha256_of(path)
         return Log(path, Source(name, sha256, size, f"groundstation-mcap of {info.reader}"), True, profile)
     claim = identify(path, profile)
     return Log(path, Source(path.name, sha256_of(path), size, claim.title), False, profile)
+
+
+def _is_store(path: Path, profile: Path | None) -> bool:
+    """Whether the store reads a file: an MCAP of ours, unless another log has but a part of one spliced into it."""
+    from groundstation.readers.registry import identify
+    from groundstation.store.recognition import is_groundstation_mcap, is_mostly_mcap
+
+    if not is_groundstation_mcap(path):
+        return False
+    if is_mostly_mcap(path):
+        return True
+    try:
+        identify(path, profile)
+    except GroundstationError:
+        return True
+    return False
 
 
 class Replay:

@@ -238,3 +238,4 @@ def _zstd_pieces(stream: BinaryIO) -> _Pieces:
 
 
 _PIECES: dict[str, Callable[[BinaryIO], _Pieces]] = {"gzip": _gzip_pieces, "zstd": _zstd_pieces}
+COMPRESSIONS = tuple(_PIECES)

@@ -5,11 +5,11 @@ without a canonical field go to ``raw.<topic>`` (``raw.csv`` when their name has
 the file is one, else as text.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from groundstation.base.errors import UnreadableLogError
-from groundstation.base.records import Item, LogHeader, Remark
+from groundstation.base.records import Damage, Item, LogHeader, Remark
 from groundstation.base.signals import RAW_PREFIX, field_of
 from groundstation.readers.dialect import (
     Dialect,
@@ -28,11 +28,12 @@ from groundstation.readers.start import unusable_references, utc_of_zero
 
 NAME = "flat-csv"
 TIME_COLUMNS = {"time_ns": "nanoseconds", "time_s": "seconds", "time_utc": "iso"}  # the recorder's own clock first
+FEWEST_ROWS = 3  # below a header row that does not stand on top
 
 
 @dataclass(frozen=True)
 class _Top:
-    """What stands above the rows."""
+    """What stands above the rows; ``strange_lines`` of it are neither metadata nor the header row."""
 
     encoding: str
     metadata: Mapping[str, str]
@@ -40,22 +41,55 @@ class _Top:
     names: tuple[str, ...]
     delimiter: str
     first_rows: tuple[str, ...]
+    strange_lines: int
+
+    @property
+    def canonical(self) -> list[str]:
+        """Names of columns that are canonical fields."""
+        return [name for name in self.names if field_of(*name.rpartition(".")[::2])]
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether there is a time column, and one of ``<topic>.<field>``."""
+        return any(name in TIME_COLUMNS for name in self.names) and any("." in name.strip(".") for name in self.names)
+
+    @property
+    def has_rows(self) -> bool:
+        """Whether most of the lines below have as many cells as the header row."""
+        sizes = [len(split_cells(row, self.delimiter)) for row in self.first_rows if row.strip()]
+        sound = sizes.count(len(self.names))
+        return sound >= FEWEST_ROWS and 2 * sound > len(sizes)
 
 
 def _read_top(source: Source) -> _Top | None:
+    """The first line below the metadata; where it is damaged, the first header row that has its rows below it."""
     encoding = detect_encoding(source.head, source.name)
     metadata: dict[str, str] = {}
     lines = head_lines(source, encoding)
+    first: _Top | None = None
+    strange_lines = 0
     for at, line in enumerate(lines):
         if line.text.startswith("#"):
             key, colon, value = line.text.lstrip("#").partition(":")
             if colon and key.strip():
                 metadata[key.strip()] = value.strip()
         elif line.text.strip():
-            delimiter = detect_delimiter(line.text)
-            names = tuple(split_cells(line.text, delimiter))
-            return _Top(encoding, metadata, line, names, delimiter, tuple(after.text for after in lines[at + 1 :]))
-    return None
+            if first is None or any(name in line.text for name in TIME_COLUMNS):
+                top = _top(encoding, metadata, lines, at, strange_lines)
+                if top.is_flat and (first is None or (top.canonical and top.has_rows)):
+                    return top
+                first = first or top
+            strange_lines += 1
+    return first
+
+
+def _top(encoding: str, metadata: Mapping[str, str], lines: Sequence[Line], at: int, strange_lines: int) -> _Top:
+    """What stands above the rows when line ``at`` is the header row."""
+    header = lines[at]
+    delimiter = detect_delimiter(header.text)
+    names = tuple(split_cells(header.text, delimiter))
+    below = tuple(line.text for line in lines[at + 1 :])
+    return _Top(encoding, metadata, header, names, delimiter, below, strange_lines)
 
 
 def sniff(source: Source) -> Claim | None:
@@ -63,17 +97,15 @@ def sniff(source: Source) -> Claim | None:
     top = _read_top(source)
     if top is None:
         return None
-    canonical = [name for name in top.names if field_of(*name.rpartition(".")[::2])]
-    has_time = any(name in TIME_COLUMNS for name in top.names)
-    if canonical and not has_time:
+    canonical = top.canonical
+    if canonical and not any(name in TIME_COLUMNS for name in top.names):
         raise UnreadableLogError(
             f"{source.name}, row {top.header.number}",
             f"columns such as {canonical[0]!r} but no time column",
             "time_s, time_ns or time_utc",
             "name the time column so, or describe the file by a profile",
         )
-    dotted = [name for name in top.names if "." in name.strip(".")]
-    return Claim(NAME, "", 0.9 if canonical else 0.4) if has_time and dotted else None
+    return Claim(NAME, "", 0.9 if canonical else 0.4) if top.is_flat else None
 
 
 def read(source: Source) -> Iterator[Item]:
@@ -110,6 +142,9 @@ def read(source: Source) -> Iterator[Item]:
     items = TableReader(source, dialect, layout).items(LogHeader(NAME, top.metadata, utc_of_zero_ns))
     yield next(items)
     yield from remarks + clock_remarks
+    if top.strange_lines:
+        what = "lines above the header row that are no metadata"
+        yield Damage("corrupt", f"rows 1 to {top.header.number - 1}", top.strange_lines, what)
     yield from items
 
 

@@ -6,6 +6,9 @@ from groundstation.readers.source import Source
 
 _NMEA_SENTENCE = re.compile(rb"[$!][A-Z]{2,}[A-Z0-9]*,[ -~]{0,200}\*[0-9A-F]{2}\r?\n")
 
+_SAMPLES, _SAMPLE_BYTES = 32, 4096
+_CONTROL = re.compile(rb"[\0-\x08\x0b\x0c\x0e-\x1f]")
+
 _AT_START: tuple[tuple[bytes, str], ...] = (
     (b"ULog\x01\x12\x35", "PX4 ULog"),
     (b"\xa3\x95", "ArduPilot DataFlash without its definitions"),
@@ -29,6 +32,14 @@ def recognise(source: Source) -> str | None:
     """Name of the format that a file's first bytes show, None when they show none."""
     found = next((name for magic, name in _AT_START if source.head.startswith(magic)), None)
     return found or ("NMEA 0183" if _NMEA_SENTENCE.match(source.head) else None)
+
+
+def is_mostly_text(source: Source) -> bool:
+    """Whether most of the head is lines without a control character, whatever its first bytes are; by samples."""
+    step = max(_SAMPLE_BYTES, len(source.head) // _SAMPLES)
+    sample = b"".join(source.head[at : at + _SAMPLE_BYTES] + b"\n" for at in range(0, len(source.head), step))
+    text = sum(len(line) + 1 for line in sample.split(b"\n") if not _CONTROL.search(line))
+    return 2 * text > len(sample)
 
 
 def is_binary(source: Source) -> bool:

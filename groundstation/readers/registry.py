@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
-from groundstation.base.records import Item, Remark
+from groundstation.base.records import Item, RecordBatch, Remark
 from groundstation.readers import csv_profile, dataflash, flat_csv, magic, ulog
+from groundstation.readers.compressed import COMPRESSIONS
 from groundstation.readers.source import Claim, Source
 
 ENTRY_POINT_GROUP = "groundstation.readers"
@@ -143,7 +144,7 @@ def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]
     refusals: list[GroundstationError] = []
     troubles = list(plug_in_failures())
     for name, reader in _readers().items():
-        if claims and reader in _OF_TEXT:  # claimed by its first bytes: no text, and looking for rows takes time
+        if reader in _OF_TEXT and _are_sure(claims, source):
             continue
         try:
             claim = _own(reader.sniff(source), name)
@@ -156,8 +157,38 @@ def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]
         else:
             claims += [claim] if claim is not None else []
     if claims:
-        return min(claims, key=lambda claim: (-claim.confidence, claim.reader)), tuple(troubles)
+        return _best(claims, source), tuple(troubles)
     raise _unclaimed(source, refusals, troubles)
+
+
+def _are_sure(claims: list[Claim], source: Source) -> bool:
+    """Whether nobody need look for rows: a table is claimed, or a format by its first bytes and no text follows."""
+    if any(claim.reader == csv_profile.NAME for claim in claims):
+        return True
+    return any(claim.confidence == 1.0 for claim in claims) and not magic.is_mostly_text(source)
+
+
+def _best(claims: list[Claim], source: Source) -> Claim:
+    """The claim that the content supports, where the beginning of another log stands in the file or before it.
+
+    In what is mostly text the built-in readers of binary logs come last, in all else those of tables. A reader of
+    binary logs that finds no record gives way.
+    """
+    if len(claims) == 1:
+        return claims[0]
+    tables = {reader.NAME for reader in _OF_TEXT}
+    binary = {reader.NAME for reader in _BUILT_IN} - tables
+    late = binary if magic.is_mostly_text(source) else tables
+    ranked = sorted(claims, key=lambda claim: (claim.reader in late, -claim.confidence, claim.reader))
+    return next((one for one in ranked if one.reader not in binary or _has_records(one, source)), ranked[0])
+
+
+def _has_records(claim: Claim, source: Source) -> bool:
+    """Whether a built-in reader finds any record."""
+    try:
+        return any(isinstance(item, RecordBatch) for item in _readers()[claim.reader].read(source))
+    except GroundstationError:
+        return False
 
 
 def _own(claim: Any, name: str) -> Claim | None:
@@ -168,9 +199,9 @@ def _own(claim: Any, name: str) -> Claim | None:
 
 
 def _unclaimed(source: Source, refusals: list[GroundstationError], troubles: list[str]) -> GroundstationError:
-    if source.compression and not source.head:
-        return UnclaimedLogError(source.name, f"{source.compression} data that cannot be decompressed")
     known = magic.recognise(source)
+    if known in COMPRESSIONS and not source.compression:
+        return UnclaimedLogError(source.name, f"{known} data that cannot be decompressed")
     if known is not None:
         return UnclaimedLogError(
             source.name, f"recognised as {known}, not readable in this version", "", "convert it to the flat CSV"

@@ -35,17 +35,26 @@ class Source:
         """Size in bytes, of the decompressed log when the file is compressed."""
         return self._expanded.size if self.compression else self._file_size
 
-    @cached_property
+    @property
     def compression(self) -> str:
-        """``gzip``, ``zstd`` or nothing, told by the content."""
-        with self._open_file() as stream:
-            return compression_of(stream.read(4))
+        """``gzip``, ``zstd`` or nothing, told by the content (something must come out of it)."""
+        return self._beginning[0]
 
-    @cached_property
+    @property
     def head(self) -> bytes:
         """The first :data:`HEAD_BYTES` bytes, decompressed; fewer when the file is shorter."""
+        return self._beginning[1]
+
+    @cached_property
+    def _beginning(self) -> tuple[str, bytes]:
+        """Compression and head."""
         with self._open_file() as stream:
-            return head_of(stream, self.compression, HEAD_BYTES) if self.compression else stream.read(HEAD_BYTES)
+            compression = compression_of(stream.read(4))
+            stream.seek(0)
+            if compression and (head := head_of(stream, compression, HEAD_BYTES)):
+                return compression, head
+            stream.seek(0)
+            return "", stream.read(HEAD_BYTES)
 
     def open(self) -> BinaryIO:
         """Open for reading bytes; a compressed file is decompressed at the first call.

@@ -37,7 +37,9 @@ MAGIC = b"\x89MCAP0\r\n"
 MAX_CHUNK_BYTES = 64 << 20  # of a decompressed chunk; the writer's have about one megabyte
 MAX_RECORD_BYTES = 64 << 20  # of any record that is read whole
 FOOTER_BYTES = RECORD_PREFIX + 20
+SHIFTED_BYTES = 8 << 20  # of the end of a file, in which a summary is looked for: that of a million chunks is longer
 _PREFIX = struct.Struct("<BQ")
+_DATA_END = _PREFIX.pack(Opcode.DATA_END, 4)
 _CHUNK_HEAD = struct.Struct("<BQQQQII")  # opcode, length, start, end, uncompressed size, crc, length of compression
 _INDEX_HEAD = struct.Struct("<BQHI")  # opcode, length, channel, bytes of entries
 INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
@@ -246,10 +248,14 @@ def _evenly_spaced(buffer: ByteArray) -> Messages | None:
 
 @dataclass
 class Summary:
-    """The summary section: definitions and indexes; ``is_intact`` when its checksum was right."""
+    """The summary section: definitions and indexes; ``is_intact`` when its checksum was right.
+
+    ``is_in_place`` when it stands where the footer says: else bytes before it were lost or added, and its places lie.
+    """
 
     start: int = 0
     is_intact: bool = False
+    is_in_place: bool = True
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     definitions: dict[str, bytes] = field(default_factory=dict)
@@ -292,22 +298,41 @@ def ends_whole(file: BinaryIO, size: int) -> bool:
     return _footer(file, size) is not None
 
 
+def _summary_crc(data: bytes, end: bytes) -> int:
+    """Checksum of a summary and of the footer behind it."""
+    return zlib.crc32(end[: FOOTER_BYTES - 4], zlib.crc32(data))
+
+
+def _shifted_summary(file: BinaryIO, end: bytes, footer: Footer, stop: int) -> bytes:
+    """The summary between the end of data and the footer, where its checksum is right; else nothing."""
+    file.seek(max(0, stop - SHIFTED_BYTES))
+    tail = file.read(min(stop, SHIFTED_BYTES))
+    at = tail.rfind(_DATA_END)
+    data = tail[at + len(_DATA_END) + 4 :] if at >= 0 else b""
+    return data if footer.summary_crc and footer.summary_crc == _summary_crc(data, end) else b""
+
+
 def read_summary(file: BinaryIO, size: int) -> Summary | None:
     """Summary of a file of ``size`` bytes; None when it has no footer at its end or no summary.
 
-    A summary with a wrong checksum is read as far as it goes, ``is_intact`` False.
+    One that does not stand where the footer says is looked for behind the end of data. One with a wrong checksum is
+    read as far as it goes, ``is_intact`` False.
     """
     found = _footer(file, size)
     if found is None:
         return None
     end, footer = found
     start, stop = footer.summary_start, size - len(end)
-    if not len(MAGIC) <= start <= stop or stop - start > MAX_RECORD_BYTES:
+    summary, data = Summary(start), b""
+    if len(MAGIC) <= start <= stop and stop - start <= MAX_RECORD_BYTES:
+        file.seek(start)
+        data = file.read(stop - start)
+        summary.is_intact = footer.summary_crc in (0, _summary_crc(data, end))
+    if not summary.is_intact and (shifted := _shifted_summary(file, end, footer, stop)):
+        data = shifted
+        summary = Summary(stop - len(data), is_intact=True, is_in_place=False)
+    if not data:
         return None
-    file.seek(start)
-    data = file.read(stop - start)
-    crc = zlib.crc32(end[: FOOTER_BYTES - 4], zlib.crc32(data))
-    summary = Summary(start, footer.summary_crc in (0, crc))
     for opcode, raw in parse_records(data):
         record = parse_record(opcode, raw[RECORD_PREFIX:])
         if record is not None:

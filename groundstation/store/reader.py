@@ -2,9 +2,9 @@
 
 import os
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -16,8 +16,9 @@ from groundstation.base.records import MAX_BATCH_ROWS, Damage, Item, LogHeader, 
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.store.channel import COLUMNS_KEY, DERIVED_KEY
-from groundstation.store.framing import MAGIC, Summary, read_summary
-from groundstation.store.info import METADATA_NAME, StoreInfo, definition_checksums, from_strings
+from groundstation.store.framing import Summary, read_summary
+from groundstation.store.info import StoreInfo, definition_checksums, from_strings
+from groundstation.store.recognition import is_groundstation_mcap
 from groundstation.store.recovery import (
     Intact,
     Lost,
@@ -25,41 +26,13 @@ from groundstation.store.recovery import (
     chunks_by_walk,
     find_facts,
     index_fits,
-    read_definitions,
     search_definitions,
 )
 from groundstation.store.schema import WireField, message_type, own_columns
 from groundstation.store.wire import Decoded, Messages, decode
 
 READER = "groundstation-mcap"
-HEAD_BYTES = 4096  # of a file are enough to recognise it
 PLACES_BYTES = 64 << 20  # bound of the working arrays for one piece of a chunk
-
-
-def is_groundstation_mcap(source: str | os.PathLike[str] | bytes) -> bool:
-    """Whether a file, or the first 4096 bytes of one, was written by the store.
-
-    Three marks tell: MCAP's magic number, the library in the header, the name of the metadata record. Two are enough,
-    so that no single flipped bit disowns a file.
-    """
-    head = _head(source)
-    marks = (head.startswith(MAGIC), head[25:39] == b"groundstation ", b"\r\0\0\0" + METADATA_NAME.encode() in head)
-    return sum(marks) >= 2
-
-
-def is_mcap(source: str | os.PathLike[str] | bytes) -> bool:
-    """Whether a file, or the first bytes of one, is an MCAP of any program."""
-    return _head(source).startswith(MAGIC) or is_groundstation_mcap(source)
-
-
-def _head(source: str | os.PathLike[str] | bytes) -> bytes:
-    if isinstance(source, bytes):
-        return source[:HEAD_BYTES]
-    try:
-        with Path(source).open("rb") as file:
-            return file.read(HEAD_BYTES)
-    except OSError:
-        return b""
 
 
 def read_info(path: str | os.PathLike[str]) -> StoreInfo:
@@ -74,12 +47,30 @@ def read_info(path: str | os.PathLike[str]) -> StoreInfo:
         return from_strings(find_facts(file)[0])
 
 
-def read(path: str | os.PathLike[str]) -> Iterator[Item]:
+@dataclass(frozen=True)
+class Part:
+    """Part of a store file: records from ``start_ns`` on and before ``end_ns``, of the topics that ``wants`` says."""
+
+    start_ns: int
+    end_ns: int
+    wants: Callable[[str], bool] = lambda _topic: True
+
+    def cut(self, batch: RecordBatch) -> RecordBatch:
+        """The rows of a batch that belong to the part; none of a topic that is not wanted."""
+        assert batch.time_ns is not None
+        if not self.wants(batch.topic):
+            return batch.take(slice(0, 0))
+        first, last = np.searchsorted(batch.time_ns, [self.start_ns, self.end_ns])
+        return batch if last - first == len(batch) else batch.take(slice(first, last))
+
+
+def read(path: str | os.PathLike[str], part: Part | None = None) -> Iterator[Item]:
     """Items of a store file: one LogHeader, then batches and damages in the order of the file.
 
     Batches have ``time_ns`` and, where it differs, ``validity_time_ns``; their columns are those that the topic had,
     in the source's names and types. The header's ``utc_of_zero_ns`` is 0 when times are UTC, None for NOTIME.
-    One chunk is held at a time.
+    One chunk is held at a time. Of a ``part`` only the chunks that the index places in it are read; without an index
+    all are.
 
     Raises
     ------
@@ -93,17 +84,20 @@ def read(path: str | os.PathLike[str]) -> Iterator[Item]:
         if not is_intact:
             yield Damage("corrupt", "metadata", 1, "metadata record and its copy: what the file is of is uncertain")
         summary = read_summary(file, size)
-        by_index = summary is not None and summary.is_intact and index_fits(file, summary)
+        by_index = summary is not None and summary.is_intact and summary.is_in_place and index_fits(file, summary)
         definitions = _definitions(file, size, summary, definition_checksums(facts) if is_intact else {})
         reading = _Reading(definitions, info.has_utc)
-        found = chunks_by_index(file, summary) if summary is not None and by_index else chunks_by_walk(file, size)
+        if summary is not None and by_index:
+            found = chunks_by_index(file, summary if part is None else _narrowed(summary, part, definitions))
+        else:
+            found = chunks_by_walk(file, size)
         is_cut = False
         for chunk in found:
             if isinstance(chunk, Lost):
                 is_cut |= chunk.is_cut
                 yield reading.damage(chunk)
             else:
-                yield from reading.batches(chunk)
+                yield from reading.batches(chunk) if part is None else _cut(reading.batches(chunk), part)
         if not by_index and not is_cut:
             what = "summary at the end of the file, or what stands before it; the chunks were found by walking the file"
             yield Damage("corrupt", "summary", 1, what, loses_data=False)
@@ -114,7 +108,7 @@ def _opened(path: str | os.PathLike[str]) -> Iterator[tuple[BinaryIO, int]]:
     """The file and its size, when it is one of the store; errors of reading in one line."""
     try:
         with Path(path).open("rb") as file:
-            if not is_groundstation_mcap(file.read(HEAD_BYTES)):
+            if not is_groundstation_mcap(path):
                 raise UnreadableLogError(str(path), "a file of another program", "an MCAP that groundstation wrote")
             yield file, os.fstat(file.fileno()).st_size
     except OSError as error:
@@ -133,25 +127,18 @@ class _Definition:
 def _definitions(
     file: BinaryIO, size: int, summary: Summary | None, checksums: dict[str, int]
 ) -> dict[int, _Definition]:
-    """Definitions by channel id: from an intact summary, else those of the file's start, then any that are found.
+    """Definitions by channel id: from an intact summary, else any that are found in the file.
 
     Where the metadata has their checksums, only definitions that agree with them count.
     """
-    sources = [summary]
-    if summary is None or not summary.is_intact:
-        sources = [read_definitions(file, size), summary, search_definitions(file, size, checksums)]
-    schemas: dict[int, Schema] = {}
-    channels: dict[int, Channel] = {}
-    for source in reversed([source for source in sources if source]):
-        for key, raw in source.definitions.items():
-            kind, number = key.split()
-            if checksums and checksums.get(key) != zlib.crc32(raw):
-                continue
-            if kind == "schema":
-                schemas[int(number)] = source.schemas[int(number)]
-            else:
-                channels[int(number)] = source.channels[int(number)]
+    if summary is None or not summary.is_intact or not _agrees(summary, checksums):
+        summary = search_definitions(file, size, checksums)
+    schemas, channels = summary.schemas, summary.channels
     return {number: _definition(channel, schemas.get(channel.schema_id)) for number, channel in channels.items()}
+
+
+def _agrees(summary: Summary, checksums: dict[str, int]) -> bool:
+    return not checksums or all(checksums.get(key) == zlib.crc32(raw) for key, raw in summary.definitions.items())
 
 
 def _definition(channel: Channel, schema: Schema | None) -> _Definition:
@@ -167,6 +154,26 @@ def _definition(channel: Channel, schema: Schema | None) -> _Definition:
     names = own_columns(columns)
     own = message.own_fields if names is None else tuple(field for field in message.own_fields if field.name in names)
     return _Definition(channel.topic, (*message.fields[:2], *own))
+
+
+def _narrowed(summary: Summary, part: Part, definitions: dict[int, _Definition]) -> Summary:
+    """The summary with the indexes of those chunks alone that may hold records of a part."""
+    unwanted = {number for number, one in definitions.items() if one.is_derived or not part.wants(one.topic)}
+    chunks = [
+        index
+        for index in summary.chunks
+        if index.message_start_time < part.end_ns
+        and index.message_end_time >= part.start_ns
+        and not (index.message_index_offsets and index.message_index_offsets.keys() <= unwanted)
+    ]
+    return replace(summary, chunks=chunks)
+
+
+def _cut(items: Iterator[Item], part: Part) -> Iterator[Item]:
+    for item in items:
+        kept = part.cut(item) if isinstance(item, RecordBatch) else item
+        if not isinstance(kept, RecordBatch) or len(kept):
+            yield kept
 
 
 class _Reading:

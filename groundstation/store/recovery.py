@@ -8,6 +8,7 @@ is searched for by its signature. A chunk counts only when its checksum is right
 import re
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import BinaryIO, TypeAlias
@@ -15,6 +16,8 @@ from typing import BinaryIO, TypeAlias
 from mcap.opcode import Opcode
 from mcap.records import Channel, ChunkIndex, Metadata, Schema
 
+from groundstation.base.errors import GroundstationError
+from groundstation.store.channel import COLUMNS_KEY, DERIVED_KEY
 from groundstation.store.framing import (
     INDEX_ENTRY,
     MAGIC,
@@ -31,6 +34,7 @@ from groundstation.store.framing import (
     split_messages,
 )
 from groundstation.store.info import COPY_NAME, METADATA_NAME, is_intact
+from groundstation.store.schema import PACKAGE, message_type, own_columns
 from groundstation.store.wire import RECORD_PREFIX, Messages
 
 # A chunk record of the writer: this text stands 37 bytes from its start, zstd's magic number 8 bytes after it.
@@ -144,13 +148,16 @@ def chunks_by_walk(file: BinaryIO, size: int) -> Iterator[Found]:
             yield found
             continue
         end = _record_end(file, at, size, peek)
-        if end is None:
+        if end is None or (not _is_plausible(file, end, size) and find_chunk(file, at + 1, size) < end):
             end = find_chunk(file, at + 1, size)
             yield Lost(at, end, "no record can be recognised", is_cut=end == size and not has_end)
             if end == size:
                 return
         elif peek[0] == Opcode.DATA_END:
-            return
+            end = find_chunk(file, at, size)
+            if end == size:
+                return
+            yield Lost(at, end, "chunks follow the end of the data")
         at = end
     if not has_end:
         yield Lost(size, size, "the file ends without its summary", is_cut=True)
@@ -223,16 +230,17 @@ def find_chunk(file: BinaryIO, start: int, size: int) -> int:
 
 
 def find_bytes(file: BinaryIO, needle: bytes, start: int) -> int | None:
-    """Place of the first ``needle`` from ``start`` on; the file is searched in blocks."""
-    at = start
+    """Place of the first ``needle`` from ``start`` on; the file is searched in blocks, small ones first."""
+    at, size = start, PEEK_BYTES
     while True:
-        block = _read(file, at, SEARCH_BYTES)
+        block = _read(file, at, size)
         hit = block.find(needle)
         if hit >= 0:
             return at + hit
-        if len(block) < SEARCH_BYTES:
+        if len(block) < size:
             return None
         at += len(block) - len(needle) + 1
+        size = min(8 * size, SEARCH_BYTES)
 
 
 def find_facts(file: BinaryIO) -> tuple[dict[str, str], bool]:
@@ -259,34 +267,24 @@ def _facts_at(file: BinaryIO, place: int, name_bytes: int) -> dict[str, str]:
     return record.metadata if isinstance(record, Metadata) else {}
 
 
-def read_definitions(file: BinaryIO, size: int) -> Summary:
-    """Schemas and channels that stand at the start of the file, before its first chunk and before any damage."""
-    found = Summary()
-    at = len(MAGIC)
-    while at + RECORD_PREFIX <= size:
-        peek = _read(file, at, PEEK_BYTES)
-        end = None if peek[0] == Opcode.CHUNK else _record_end(file, at, size, peek)
-        if end is None:
-            return found
-        raw = _read(file, at, end - at)
-        record = parse_record(raw[0], raw[RECORD_PREFIX:])
-        if isinstance(record, Schema | Channel):
-            found.add(record, raw)
-        at = end
-    return found
+def chunk_bytes(file: BinaryIO, size: int) -> int:
+    """Bytes of a file that stand in chunks, by their heads alone."""
+    total, at = 0, find_chunk(file, 0, size)
+    while (head := _chunk_at(_read(file, at, PEEK_BYTES), at, size)) is not None:
+        total += head.length
+        at = find_chunk(file, at + head.length, size)
+    return total
 
 
-def search_definitions(file: BinaryIO, size: int, checksums: Mapping[str, int]) -> Summary:
-    """Schemas and channels wherever they stand in the file, told by their form.
-
-    The first of each id counts that agrees with its checksum, where that is known.
-    """
-    found = Summary()
+def definitions_in(file: BinaryIO, start: int, end: int) -> Iterator[tuple[Schema | Channel, bytes]]:
+    """Schemas and channels that begin in a part of a file, told by their form: each record and its bytes."""
     overlap = RECORD_PREFIX + 8 + _NAME_BYTES + len(_ENCODING)
-    for base in range(0, size, SEARCH_BYTES):
+    for base in range(start, end, SEARCH_BYTES):
         block = _read(file, base, SEARCH_BYTES + overlap)
-        for match in _DEFINITION.finditer(block, 0, SEARCH_BYTES + RECORD_PREFIX):
+        for match in _DEFINITION.finditer(block):
             at = match.start()
+            if at >= min(SEARCH_BYTES, end - base):
+                break
             name_at = at + RECORD_PREFIX + (2 if block[at] == Opcode.SCHEMA else 4)
             behind = name_at + 4 + int.from_bytes(block[name_at : name_at + 4], "little")
             if block[behind : behind + len(_ENCODING)] != _ENCODING:
@@ -294,11 +292,44 @@ def search_definitions(file: BinaryIO, size: int, checksums: Mapping[str, int]) 
             length = int.from_bytes(block[at + 1 : at + RECORD_PREFIX], "little")
             raw = _read(file, base + at, RECORD_PREFIX + length)
             record = parse_record(raw[0], raw[RECORD_PREFIX:])
-            if not isinstance(record, Schema | Channel):
-                continue
-            key = f"{'schema' if isinstance(record, Schema) else 'channel'} {record.id}"
-            if key not in found.definitions and (not checksums or checksums.get(key) == zlib.crc32(raw)):
-                found.add(record, raw)
-        if len(found.definitions) > _MOST_DEFINITIONS:
+            if isinstance(record, Schema | Channel):
+                yield record, raw
+
+
+def is_own_schema(schema: Schema) -> bool:
+    """Whether a schema is a message type of the store."""
+    try:
+        return schema.name.startswith(f"{PACKAGE}.") and bool(message_type(schema.data, schema.name))
+    except GroundstationError:
+        return False
+
+
+def search_definitions(file: BinaryIO, size: int, checksums: Mapping[str, int]) -> Summary:
+    """Schemas and channels wherever they stand in the file.
+
+    Of each id the one counts that agrees with its checksum; without checksums one that can be used, and of those the
+    one that is there most often, or the first.
+    """
+    times: Counter[tuple[str, int]] = Counter()
+    known: dict[tuple[str, int], tuple[Schema | Channel, bytes]] = {}
+    for record, raw in definitions_in(file, 0, size):
+        key = f"{'schema' if isinstance(record, Schema) else 'channel'} {record.id}", zlib.crc32(raw)
+        if not checksums or checksums.get(key[0]) == key[1]:
+            times[key] += 1
+            known.setdefault(key, (record, raw))
+        if len(known) > _MOST_DEFINITIONS:
             break
+    rivals = Counter(name for name, _ in known)
+    ranked = sorted(known, key=lambda key: (rivals[key[0]] > 1 and not _is_usable(known[key][0]), -times[key]))
+    found = Summary()
+    for key in ranked:
+        if key[0] not in found.definitions:
+            found.add(*known[key])
     return found
+
+
+def _is_usable(record: Schema | Channel) -> bool:
+    """Whether messages could be read by a definition."""
+    if isinstance(record, Channel):
+        return DERIVED_KEY in record.metadata or own_columns(record.metadata.get(COLUMNS_KEY, "")) is not None
+    return is_own_schema(record)

@@ -4,7 +4,7 @@ import os
 import re
 import tempfile
 import zlib
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -203,7 +203,15 @@ class StoreWriter:
         file.write(MAGIC + to_bytes(Header(profile="", library=LIBRARY)))
         places = [MetadataIndex(offset=file.tell(), length=len(facts), name=METADATA_NAME)]
         file.write(facts + to_bytes(*schemas, *channels))
-        indexes = [self._copy_chunk(file, chunk) for chunk in sorted(self._chunks, key=_order)]
+        again = {channel.id: to_bytes(schema, channel) for schema, channel in definitions}
+        count = Counter[int]()
+        indexes = []
+        for chunk in sorted(self._chunks, key=_order):
+            (channel_id,) = chunk.index.message_index_offsets
+            indexes.append(self._copy_chunk(file, chunk))
+            count[channel_id] += 1
+            if count[channel_id].bit_count() == 1:  # behind chunks 1, 2, 4, 8 ...: should those at both ends be lost
+                file.write(again[channel_id])
         places.append(MetadataIndex(offset=file.tell(), length=len(copy), name=COPY_NAME))
         file.write(copy + to_bytes(DataEnd(0)))
         groups: list[tuple[Opcode, list[McapRecord]]] = [

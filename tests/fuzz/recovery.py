@@ -166,7 +166,8 @@ def our_dataflash(path: Path, found: Found) -> None:
 
 def our_mcap(path: Path, found: Found) -> None:
     for batch in _items(path):
-        found.update((batch.topic, time) for time in batch.time_ns.tolist())
+        times = batch.device_time_ns.values if batch.time_ns is None else batch.time_ns  # taken for another format
+        found.update((batch.topic, time) for time in times.tolist())
 
 
 def _our_rows(path: Path, found: Found, key: Callable[[int], int]) -> None:

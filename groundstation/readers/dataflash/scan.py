@@ -62,7 +62,7 @@ def _time_us(data: Any, at: int, time_kind: Any) -> int:
 
 
 @compiled
-def _has_time(data: Any, at: int, time_kind: Any) -> bool:
+def _has_time(data: Any, at: int, time_kind: Any) -> Any:
     """Whether the record has a time, which is not negative."""
     kind = time_kind[data[at + 2]]
     return kind != NO_TIME and (kind != TIME_US_8 or data[at + 10] < 128)

@@ -29,7 +29,8 @@ def read(source: Source) -> Iterator[Item]:
     UnreadableLogError
         When the file is none, or its flags say that a reader must know more than this one does.
     """
-    from groundstation.readers.ulog.messages import FILE_HEADER_BYTES, flag_bits
+    from groundstation.readers.ulog.blocks import flags_of
+    from groundstation.readers.ulog.messages import FILE_HEADER_BYTES
     from groundstation.readers.ulog.reader import items
 
     head = source.head[:FILE_HEADER_BYTES]
@@ -37,7 +38,7 @@ def read(source: Source) -> Iterator[Item]:
         return _headless(source)
     if not head.startswith(_MAGIC) or len(head) < FILE_HEADER_BYTES:
         raise UnreadableLogError(source.name, "no ULog header", f"{FILE_HEADER_BYTES} bytes", "the file was cut")
-    flags = flag_bits(source.head)
+    flags = flags_of(source)
     if flags is not None and flags.has_unknown:
         raise UnreadableLogError(
             source.name,

@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.records import Damage, Int64Array
+from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 from groundstation.readers.ulog import scan
 from groundstation.readers.ulog.formats import Flattener, Format, Layout, parse_format
-from groundstation.readers.ulog.messages import FILE_HEADER_BYTES, flag_bits, text_of
+from groundstation.readers.ulog.messages import FILE_HEADER_BYTES, FlagBits, flag_bits, text_of
 
 BLOCK_BYTES = 8 << 20
 MAX_TOPICS = 30_000  # numbers of topics have 16 bits
-SPANS_SHOWN = 20  # damaged spans told one by one; the others are told together
+DEFINITIONS_SHOWN = 20  # bad definitions told one by one; the others are told together
 SLACK = 7  # bytes behind the data, so that a row may be rounded up to a multiple of eight
 IDS = 1 << 16
 NOT_SUBSCRIBED = -scan.DATA  # topic number of data messages whose subscription is not there
@@ -141,6 +142,15 @@ class Definitions:
         return self._layouts[name]
 
 
+def flags_of(source: Source) -> FlagBits | None:
+    """Flags of a log; None where it has none, or where no message follows them: bytes of them are gone, or too many."""
+    flags = flag_bits(source.head)
+    if flags is None or flags.is_plain:
+        return flags
+    head, none = np.frombuffer(bytearray(source.head), dtype=np.uint8), Definitions()
+    return flags if scan.leads_on(head, flags.end, len(head), none.least, none.most) else None
+
+
 class Walk:
     """One pass over the messages of a log.
 
@@ -156,15 +166,18 @@ class Walk:
     def __init__(self, source: Source) -> None:
         self._source = source
         self.definitions = Definitions()
-        self._spans: list[tuple[int, int]] = []
-        self._more_spans = [0, 0, 0, 0]  # number, bytes, first, end
+        self._skipped = SkippedBytes("message")
         self._ends: list[Damage] = []
         self._index = 0
         self._capacity = max(1024, BLOCK_BYTES // 16)
 
     def __iter__(self) -> Iterator[Block]:
         with self._source.open() as stream:
-            flags = flag_bits(self._source.head)
+            flags = flags_of(self._source)
+            if flags and flags.is_damaged:
+                place, count = bytes_place(FILE_HEADER_BYTES, flags.end), flags.end - FILE_HEADER_BYTES
+                what = f"bytes of flags that no version has ({flags.incompatible.hex()}), read without them"
+                self._ends.append(Damage("corrupt", place, count, what))
             start = min(flags.end if flags else FILE_HEADER_BYTES, self._source.size)
             for end in self._section_ends(start, flags.appended_offsets if flags else ()):
                 yield from self._section(stream, start, end)
@@ -201,7 +214,7 @@ class Walk:
     def _messages(self, data: NDArray[np.uint8], is_end: bool, base: int, state: Int64Array) -> Iterator[Block]:
         """Blocks of the messages in ``data`` (and slack), which begins at byte ``base`` of the file."""
         definitions = self.definitions
-        spans = np.zeros((4096, 2), dtype=np.int64)
+        spans = np.zeros((4096, 3), dtype=np.int64)
         reason = scan.FULL
         while reason != scan.MORE_DATA:
             at, topic = np.empty(self._capacity, dtype=np.int64), np.empty(self._capacity, dtype=np.int32)
@@ -212,7 +225,8 @@ class Walk:
                 reason = scan.scan(
                     data[: len(data) - SLACK], 0 if is_end else scan.LOOKAHEAD, *tables, at, topic, spans, state
                 )
-                self._count_spans(spans[: state[scan.SPANS]] + base)
+                for start, end, before in spans[: state[scan.SPANS]].tolist():
+                    self._skipped.add(base + start, base + end, self._index + before)
                 if reason == scan.DEFINITION:
                     last = int(state[scan.COUNT]) - 1
                     place = int(at[last])
@@ -234,14 +248,6 @@ class Walk:
             where = f"{self._source.name}, byte {place}"
             raise UnreadableLogError(where, f"no more data ({error.strerror})", "", "copy the file again") from error
 
-    def _count_spans(self, spans: NDArray[np.int64]) -> None:
-        for start, end in spans.tolist():
-            if len(self._spans) < SPANS_SHOWN:
-                self._spans.append((start, end))
-            else:
-                number, total, first, _last = self._more_spans
-                self._more_spans = [number + 1, total + end - start, first if number else start, end]
-
     def _close(self, stream: BinaryIO, state: NDArray[np.int64], base: int, end: int) -> None:
         """Count what is left at the end of a section."""
         cut = int(state[scan.CUT_AT])
@@ -252,11 +258,12 @@ class Walk:
                 what = "zero bytes behind the last message"
                 self._ends.append(Damage("filler", f"bytes {start} to {end - 1}", end - start, what, loses_data=False))
             else:
-                self._count_spans(np.array([[start, stop]]))
+                self._skipped.add(start, stop, self._index)
         if stop < end:
-            why = "the end of the file" if end >= self._source.size else "data that was appended"
-            what = f"bytes of a message cut by {why}"
-            self._ends.append(Damage("truncated", f"byte {stop}", end - stop, what))
+            is_last = end >= self._source.size
+            what = f"bytes of a message cut by {'the end of the file' if is_last else 'data that was appended'}"
+            between = None if is_last else (self._index - 1, self._index)
+            self._ends.append(Damage("truncated", f"byte {stop}", end - stop, what, between_records=between))
 
     def _is_filler(self, stream: BinaryIO, start: int, end: int) -> bool:
         """Whether all bytes are zero: a file that was made longer than its data."""
@@ -267,14 +274,9 @@ class Walk:
     def damages(self) -> Iterator[Damage]:
         """What was lost, once all blocks were gone through."""
         listed = self.definitions.damages
-        yield from listed[:SPANS_SHOWN]
-        if len(listed) > SPANS_SHOWN:
-            rest = listed[SPANS_SHOWN:]
+        yield from listed[:DEFINITIONS_SHOWN]
+        if len(listed) > DEFINITIONS_SHOWN:
+            rest = listed[DEFINITIONS_SHOWN:]
             yield Damage("corrupt", f"from {rest[0].place} on", len(rest), "more definitions that cannot be used")
-        what = "bytes that belong to no message, skipped"
-        for start, end in self._spans:
-            yield Damage("corrupt", f"bytes {start} to {end - 1}", end - start, what)
-        number, total, first, last = self._more_spans
-        if number:
-            yield Damage("corrupt", f"bytes {first} to {last - 1}", total, f"{what}, in {number} more places")
+        yield from self._skipped.damages()
         yield from self._ends

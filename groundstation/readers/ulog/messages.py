@@ -16,16 +16,25 @@ _CODES = dict(zip(DTYPES, "bBhHiIqQfdBb", strict=True))
 
 @dataclass(frozen=True)
 class FlagBits:
-    """Flags of the log: what a reader must understand, where data was appended, and where the message ends."""
+    """Flags of the log: what a reader must understand, where data was appended, and where the message ends.
+
+    ``is_plain``: none is set, and nothing was appended.
+    """
 
     incompatible: bytes
     appended_offsets: tuple[int, ...]
     end: int
+    is_plain: bool
 
     @property
     def has_unknown(self) -> bool:
         """Whether the log says that a reader of today cannot read it."""
-        return bool(self.incompatible[0] & ~APPENDED_BIT or any(self.incompatible[1:]))
+        return bool(self.incompatible[0] & ~APPENDED_BIT) and not self.is_damaged
+
+    @property
+    def is_damaged(self) -> bool:
+        """Whether flags are set that no version has: they are given from the lowest bit on, and one is so far."""
+        return any(self.incompatible[1:]) or self.incompatible[0] == 0xFF
 
 
 @dataclass(frozen=True)
@@ -57,7 +66,8 @@ def flag_bits(head: bytes) -> FlagBits | None:
         return None
     body = head[at + 3 : at + 3 + FLAG_BITS_BYTES]
     offsets = struct.unpack("<3Q", body[16:]) if body[8] & APPENDED_BIT else ()
-    return FlagBits(body[8:16], tuple(offset for offset in offsets if offset), at + 3 + size)
+    offsets = tuple(offset for offset in offsets if offset)
+    return FlagBits(body[8:16], offsets, at + 3 + size, is_plain=size == FLAG_BITS_BYTES and not any(body[8:]))
 
 
 def keyed(body: bytes) -> Keyed:

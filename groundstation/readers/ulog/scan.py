@@ -3,9 +3,10 @@
 A message is a size (two bytes), a type (one byte) and as many bytes as the size says; there is no checksum. What can be
 checked is strong for most messages: a data message must have a known id and the size of its format, texts must be
 texts, the sync message is eleven fixed bytes. Such a message is believed by itself, so that an intact one between two
-damaged ones is kept. One with little to check is believed when a strong one follows within four. Texts, and data with
+damaged ones is kept. One with little to check is believed when a strong one follows within four, and none stands
+inside it: among damaged bytes every letter is the type of a message, and its size leads anywhere. Texts, and data with
 padding that may be left out, have a size that nothing confirms: where no message follows, one that begins inside tells
-that the size is damaged. A message of an unknown type or topic is none if two of known topics stand inside it.
+that the size is damaged. Where none follows a data message, one that begins in its end tells that bytes of it are gone.
 """
 
 from typing import Any
@@ -19,7 +20,8 @@ HEADER = 3
 MAX_MESSAGE = HEADER + 0xFFFF
 LOOKAHEAD = 6 * MAX_MESSAGE  # bytes that must follow the message that is judged: itself, four more, and a header
 LOOKED_AT = 256  # characters of a text or a name: bounds the work that a file made of letters causes
-SWALLOWED_AT = 512  # bytes of a message of unknown type or topic in which others are looked for: bounds it, too
+LONGEST_WEAK = 4_096  # bytes of a message with little to check: one that is longer has a damaged size
+LONGEST_STEP = 512  # bytes of one on the way to a strong message
 NOT_SUBSCRIBED = -1  # of a message id, as its largest size
 
 DATA, SYNC = 0x44, 0x53
@@ -59,43 +61,68 @@ def _is_text(data: Any, start: int, end: int, is_name: bool) -> bool:
 
 
 @compiled
-def _is_keyed(data: Any, start: int, end: int) -> bool:
-    """Whether a message body is a length, a key ``type name`` of that length, and a value."""
-    if start >= end:
-        return False
-    length = np.int64(data[start])
-    if length < 5 or start + 1 + length > end:
-        return False
-    first = data[start + 1]
-    if first not in (0x62, 0x63, 0x64, 0x66, 0x69, 0x75):  # bool, char, double, float, int, uint
-        return False
-    spaces = 0
-    for at in range(start + 1, start + 1 + length):
+def _value_bytes(data: Any, start: Any, stop: Any) -> Any:
+    """Size of the value of a key ``type[count] name``, by the letters and digits that tell the types apart."""
+    first = data[start]
+    width, count, is_array = 8 if first == 0x64 else 4 if first == 0x66 else 1, np.int64(0), False
+    if first == 0x69 or first == 0x75:  # int, uint: 8, 16, 32, 64
+        digit = data[start + (3 if first == 0x69 else 4)]
+        width = 2 if digit == 0x31 else 4 if digit == 0x33 else 8 if digit == 0x36 else 1
+    for at in range(start, stop):
         byte = data[at]
-        spaces += byte == 0x20
-        if byte < 0x20 or byte > 0x7E:
-            return False
-    return spaces == 1
+        if byte == 0x20 or byte == 0x5D:
+            break
+        if is_array:
+            count = min(10 * count + np.int64(byte) - 0x30, np.int64(MAX_MESSAGE))
+        is_array |= byte == 0x5B
+    return width * count if is_array else width
 
 
 @compiled
-def _is_format(data: Any, start: int, end: int) -> bool:
-    """Whether a body is a name that is not empty, a colon, and printable characters with no further colon."""
+def _keyed_strength(data: Any, start: int, end: int) -> int:
+    """How much speaks for a body that is a length, a key ``type name`` of that length, and a value of that type."""
+    if start >= end:
+        return NONE
+    stop = start + 1 + np.int64(data[start])
+    if stop < start + 6 or stop > end:
+        return NONE
+    first = data[start + 1]
+    if first not in (0x62, 0x63, 0x64, 0x66, 0x69, 0x75):  # bool, char, double, float, int, uint
+        return NONE
+    spaces = 0
+    for at in range(start + 1, stop):
+        byte = data[at]
+        spaces += byte == 0x20
+        if byte < 0x20 or byte > 0x7E:
+            return NONE
+    if spaces != 1:
+        return NONE
+    return STRONG if _value_bytes(data, start + 1, stop) == end - stop else WEAK
+
+
+@compiled
+def _format_strength(data: Any, start: int, end: int) -> int:
+    """How much speaks for a name that is not empty, a colon, and printable characters, a semicolon the last of them."""
     colons = 0
     for at in range(start, end):
         byte = data[at]
         colons += byte == 0x3A
         if byte < 0x20 or byte > 0x7E or colons > 1 or (colons == 0 and at - start > LOOKED_AT):
-            return False
-    return colons == 1 and data[start] != 0x3A
+            return NONE
+    if colons != 1 or data[start] == 0x3A:
+        return NONE
+    return STRONG if data[end - 1] == 0x3B else WEAK
 
 
 @compiled
-def _is_logged_text(data: Any, start: int, end: int, time_at: int) -> bool:
-    """Whether a body is a level (a digit), a time (at ``time_at``) with nothing in its highest byte, and a text."""
+def _text_strength(data: Any, start: int, end: int, time_at: int) -> int:
+    """How much speaks for a level (a digit), a time (at ``time_at``) with nothing in its highest byte, and a text."""
     if time_at + 8 > end or data[start] < 0x30 or data[start] > 0x37 or data[time_at + 7] != 0:
-        return False
-    return _is_text(data, time_at + 8, min(end, time_at + 8 + LOOKED_AT), False)
+        return NONE
+    looked_at = time_at + 8 + LOOKED_AT
+    if not _is_text(data, time_at + 8, min(end, looked_at), False):
+        return NONE
+    return STRONG if end <= looked_at else WEAK
 
 
 @compiled
@@ -113,21 +140,6 @@ def _is_sync(data: Any, start: int) -> Any:
 
 
 @compiled
-def _swallows(data: Any, start: int, stop: int, least: Any, most: Any) -> bool:
-    """Whether two data messages of known ids and sizes, one behind the other, begin early in a stretch."""
-    for at in range(start, min(stop - 10, start + SWALLOWED_AT)):
-        place, found = at, 0
-        while found < 2 and place + 5 <= stop and data[place + 2] == 0x44:
-            size, message_id = _u16(data, place), _u16(data, place + 3)
-            if not least[message_id] <= size - 2 <= most[message_id]:
-                break
-            place, found = place + 3 + size, found + 1
-        if found == 2 and place <= stop:
-            return True
-    return False
-
-
-@compiled
 def _strength(data: Any, at: int, end: int, least: Any, most: Any) -> int:
     """How much speaks for a whole message at a place: NONE, WEAK or STRONG."""
     if at + 3 > end:
@@ -142,27 +154,42 @@ def _strength(data: Any, at: int, end: int, least: Any, most: Any) -> int:
             return NONE
         message_id = _u16(data, start)
         if most[message_id] < 0:
-            return NONE if _swallows(data, start, stop, least, most) else WEAK
+            return WEAK
         return STRONG if least[message_id] <= size - 2 <= most[message_id] else NONE
     if kind == 0x53:  # S: sync
         return STRONG if size == 8 and _is_sync(data, start) else NONE
     if kind == 0x41:  # A: subscription
         return STRONG if 4 <= size <= 3 + LOOKED_AT and _is_text(data, start + 3, stop, True) else NONE
     if kind == 0x46:  # F: format
-        return STRONG if _is_format(data, start, stop) else NONE
+        return _format_strength(data, start, stop)
     if kind == 0x49 or kind == 0x50:  # I, P: information, parameter
-        return STRONG if _is_keyed(data, start, stop) else NONE
+        return _keyed_strength(data, start, stop)
     if kind == 0x4D or kind == 0x51:  # M, Q: multiple information, default parameter
-        return STRONG if _is_keyed(data, start + 1, stop) else NONE
+        return _keyed_strength(data, start + 1, stop)
     if kind == 0x4C:  # L: text
-        return STRONG if _is_logged_text(data, start, stop, start + 1) else NONE
+        return _text_strength(data, start, stop, start + 1)
     if kind == 0x43:  # C: tagged text
-        return STRONG if _is_logged_text(data, start, stop, start + 3) else NONE
+        return _text_strength(data, start, stop, start + 3)
     if kind == 0x4F or kind == 0x52:  # O, R: dropout, unsubscription
         return WEAK if size == 2 else NONE
-    if not 0x21 <= kind <= 0x7E or _swallows(data, start, stop, least, most):
-        return NONE
-    return WEAK  # a type that a later version may define
+    return WEAK if 0x21 <= kind <= 0x7E else NONE  # a type that a later version may define
+
+
+@compiled
+def _swallows(data: Any, at: int, stop: int, least: Any, most: Any) -> bool:
+    """Whether a definition or information, or two strong messages one behind the other, stand inside a stretch."""
+    while at + 3 <= stop:
+        place, found = at, 0
+        while found < 2 and place + 3 <= stop and 0x41 <= data[place + 2] <= 0x53:
+            if _strength(data, place, stop, least, most) != STRONG:
+                break
+            kind = data[place + 2]
+            found += 2 if kind in (0x46, 0x49, 0x4D, 0x50, 0x51) else 1
+            place += 3 + _u16(data, place)
+        if found >= 2:
+            return True
+        at += 1
+    return False
 
 
 @compiled
@@ -181,17 +208,20 @@ def _is_cut(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
 
 
 @compiled
-def _leads_on(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
+def leads_on(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
     """Whether a strong message begins at a place, or behind at most three weak ones; the end of the data is as good."""
     for _ in range(4):
         if at + 3 > end:
             return True
         strength = _strength(data, at, end, least, most)
+        stop = at + 3 + _u16(data, at)
         if strength == NONE and data[at + 2] != 0x44 and _is_known_type(data[at + 2]):
-            return at + 3 + _u16(data, at) > end  # cut by the end
+            return end < stop <= at + LONGEST_WEAK  # cut by the end
         if strength != WEAK:
             return strength == STRONG or _is_cut(data, at, end, least, most)
-        at += 3 + _u16(data, at)
+        if stop - at > LONGEST_STEP or _swallows(data, at + 3, stop, least, most):
+            return False
+        at = stop
     return False
 
 
@@ -205,7 +235,7 @@ def _find(data: Any, at: int, limit: int, end: int, least: Any, most: Any) -> in
             if strength == STRONG or (kind == 0x44 and _is_cut(data, at, end, least, most)):
                 return at
             is_known = kind == 0x4F or kind == 0x52
-            if strength == WEAK and is_known and _leads_on(data, at + 5, end, least, most):
+            if strength == WEAK and is_known and leads_on(data, at + 5, end, least, most):
                 return at
         at += 1
     return limit
@@ -228,8 +258,8 @@ def _has_one_size(data: Any, at: int, least: Any, most: Any) -> Any:
 
 
 @compiled
-def _is_believed(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
-    """Whether a message at a place is one; ``end`` is that of the data."""
+def _is_believed(data: Any, at: int, end: int, least: Any, most: Any, is_next: bool) -> Any:
+    """Whether a message at a place is one; ``end`` is that of the data, ``is_next`` that another ends right before."""
     strength = _strength(data, at, end, least, most)
     if strength == NONE:
         return False
@@ -237,9 +267,29 @@ def _is_believed(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
     if strength == STRONG and (kind == 0x53 or (kind == 0x44 and _has_one_size(data, at, least, most))):
         return True
     stop = at + 3 + _u16(data, at)
-    if _leads_on(data, stop, end, least, most):
+    if is_next and (kind == 0x4F or kind == 0x52):
+        return _find(data, at + 1, stop, end, least, most) == stop
+    if strength == WEAK and (stop - at > LONGEST_WEAK or _swallows(data, at + 3, stop, least, most)):
+        return False
+    if leads_on(data, stop, end, least, most):
         return True
     return strength == STRONG and _find(data, at + 3, stop, end, least, most) == stop
+
+
+@compiled
+def _next_inside(data: Any, last: int, at: int, end: int, least: Any, most: Any) -> Any:
+    """Where a message begins inside the data message ``last``, which ends at ``at``, and leads on; else ``at``.
+
+    Bytes of that message are gone then: it ends too late.
+    """
+    if data[last + 2] != 0x44 or last + 3 + _u16(data, last) != at:
+        return at
+    for inside in range(last + 5, at):
+        if inside + 3 <= end and _strength(data, inside, end, least, most) == STRONG:
+            stop = inside + 3 + _u16(data, inside)
+            if stop > at and leads_on(data, stop, end, least, most):
+                return inside
+    return at
 
 
 @compiled
@@ -259,8 +309,9 @@ def scan(
         Gets the place of each message.
     out_topic : ndarray of int32, shape (m,)
         Gets the topic's number of data messages, and minus the type of all others.
-    spans : ndarray of int64, shape (k, 2)
-        Gets the first byte of each stretch that belongs to no message, and the first after it.
+    spans : ndarray of int64, shape (k, 3)
+        Gets the first byte of each stretch that belongs to no message, the first after it, and the number of messages
+        found before.
     state : ndarray of int64
         As :func:`new_state` made it; carried from call to call.
 
@@ -287,17 +338,23 @@ def scan(
                 count += 1
                 at = stop
                 continue
-        if not _is_believed(data, at, end, least, most):
+        is_next = state[SKIP_START] == NOWHERE
+        if not _is_believed(data, at, end, least, most, is_next):
             if is_end and _is_cut_off(data, at, end, least, most):
                 state[CUT_AT] = at
                 at = end
                 break
-            if state[SKIP_START] == NOWHERE:
+            inside = _next_inside(data, out_at[count - 1], at, end, least, most) if is_next and count else at
+            if inside < at:
+                count -= 1
+                state[SKIP_START], at = out_at[count], inside
+                continue
+            if is_next:
                 state[SKIP_START] = at
             at = _find(data, at + 1, limit, end, least, most)
             continue
         if state[SKIP_START] != NOWHERE:
-            spans[state[SPANS], 0], spans[state[SPANS], 1] = state[SKIP_START], at
+            spans[state[SPANS], 0], spans[state[SPANS], 1], spans[state[SPANS], 2] = state[SKIP_START], at, count
             state[SPANS] += 1
             state[SKIP_START] = NOWHERE
             continue  # there is room for the message only if the outputs are looked at again

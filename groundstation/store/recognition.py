@@ -1,0 +1,113 @@
+"""Whether a file is of the store: by its first bytes, or by what is left of it where those are damaged."""
+
+import os
+import re
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.opcode import Opcode
+from mcap.records import Header, Schema
+
+from groundstation.store.framing import MAGIC, parse_record
+from groundstation.store.info import METADATA_NAME
+from groundstation.store.recovery import SEARCH_BYTES, chunk_bytes, definitions_in, is_own_schema
+from groundstation.store.schema import PACKAGE
+from groundstation.store.wire import RECORD_PREFIX
+
+HEAD_BYTES = 4096  # of a sound file are enough to recognise it
+_LIBRARY = "groundstation "
+_BEGINNING = re.compile(re.escape(MAGIC) + rb"\x01[\0-\xff]{8}\0{4}[\0-\xff]{4}" + _LIBRARY.encode())
+
+
+def is_groundstation_mcap(source: str | os.PathLike[str] | bytes) -> bool:
+    """Whether a file, or the first 4096 bytes of one, was written by the store.
+
+    Three marks tell: MCAP's magic number, the library in the header, the name of the metadata record. Two are enough,
+    so that no single flipped bit disowns a file. Of a file with fewer, unless its header names another program, the
+    first and the last 1 MiB are searched for a definition that the store wrote: without any, nothing could be read.
+    """
+    head = _head(source)
+    marks = (head.startswith(MAGIC), head[25:39] == _LIBRARY.encode(), _metadata_mark() in head)
+    if sum(marks) >= 2:
+        return True
+    if isinstance(source, bytes) or _is_of_another_program(head):
+        return False
+    try:
+        with Path(source).open("rb") as file:
+            return _has_definition(file, os.fstat(file.fileno()).st_size)
+    except OSError:
+        return False
+
+
+def is_mcap(source: str | os.PathLike[str] | bytes) -> bool:
+    """Whether a file, or the first bytes of one, is an MCAP of any program."""
+    return _head(source).startswith(MAGIC) or is_groundstation_mcap(source)
+
+
+def is_mostly_mcap(path: str | os.PathLike[str]) -> bool:
+    """Whether a file that :func:`is_groundstation_mcap` is one to its end, or much of it is chunks.
+
+    At least half, a quarter where it begins as one. Else another log may stand in it, of which a part was overwritten.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            size = os.fstat(file.fileno()).st_size
+            begins = is_groundstation_mcap(file.read(HEAD_BYTES))
+            is_whole = begins and _ends_with_magic(file, size)
+            return is_whole or (4 if begins else 2) * chunk_bytes(file, size) >= size
+    except OSError:
+        return False
+
+
+def _metadata_mark() -> bytes:
+    return len(METADATA_NAME).to_bytes(4, "little") + METADATA_NAME.encode()
+
+
+def _head(source: str | os.PathLike[str] | bytes) -> bytes:
+    if isinstance(source, bytes):
+        return source[:HEAD_BYTES]
+    try:
+        with Path(source).open("rb") as file:
+            return file.read(HEAD_BYTES)
+    except OSError:
+        return b""
+
+
+def _is_of_another_program(head: bytes) -> bool:
+    """Whether there is a whole header with a library that is not ours with some characters damaged."""
+    start = len(MAGIC) + RECORD_PREFIX
+    length = int.from_bytes(head[len(MAGIC) + 1 : start], "little")
+    if not head.startswith(MAGIC + bytes([Opcode.HEADER])) or length > HEAD_BYTES:
+        return False
+    header = parse_record(Opcode.HEADER, head[start : start + length])
+    if not isinstance(header, Header) or not header.library.isprintable():
+        return False
+    alike = sum(one == other for one, other in zip(header.library, _LIBRARY, strict=False))
+    return 2 * alike < len(_LIBRARY)
+
+
+def _has_definition(file: BinaryIO, size: int) -> bool:
+    """Whether a message type of the store stands in the first or the last 1 MiB.
+
+    Not when the file is an archive or an image that holds an MCAP: a whole beginning further in, or a summary that
+    does not end with the file.
+    """
+    is_ended = _ends_with_magic(file, size)
+    if _defines(file, 0):
+        file.seek(0)
+        return is_ended or _BEGINNING.search(file.read(SEARCH_BYTES), 1) is None
+    return is_ended and _defines(file, max(0, size - SEARCH_BYTES))
+
+
+def _defines(file: BinaryIO, start: int) -> bool:
+    """Whether a message type of the store begins in the 1 MiB from ``start`` on."""
+    file.seek(start)
+    if PACKAGE.encode() + b"." not in file.read(SEARCH_BYTES):
+        return False
+    found = definitions_in(file, start, start + SEARCH_BYTES)
+    return any(isinstance(record, Schema) and is_own_schema(record) for record, _ in found)
+
+
+def _ends_with_magic(file: BinaryIO, size: int) -> bool:
+    file.seek(max(0, size - len(MAGIC)))
+    return file.read(len(MAGIC)) == MAGIC
