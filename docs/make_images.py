@@ -1,4 +1,4 @@
-"""Make the README's pictures again: `python docs/make_images.py` (a Vulkan driver, Chromium and poppler needed)."""
+"""Make the README's pictures again: `python docs/make_images.py` (a Vulkan driver and poppler needed)."""
 
 import io
 import subprocess
@@ -19,10 +19,6 @@ TABS = {"Overview": "overview", "Heading": "heading"}
 PLAYHEAD_S = 9000.0  # behind the second of the paper's four starts
 LONG_FLIGHT, LONG_TABS = "norilsk-moscow", {"INS errors": "inertial", "Forecast": "forecast"}
 COLOURS = 128
-CHROMIUM = (
-    *("chromium", "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
-    *("--disable-background-networking", "--disable-component-update", "--disable-sync", "--no-pdf-header-footer"),
-)
 
 
 def save(png: bytes, name: str) -> None:
@@ -60,10 +56,7 @@ def main() -> None:
         flight = shoot(LOG, home, TABS)
         groundstation("simulate", LONG_FLIGHT, "-o", str(home))
         shoot(home / f"{LONG_FLIGHT}.csv", home, LONG_TABS, PLAYHEAD_S)
-        pdf, page = home / "report.pdf", home / "page"
-        profile = f"--user-data-dir={home / 'chromium'}"
-        report = (flight / "report.html").as_uri()
-        subprocess.run([*CHROMIUM, profile, f"--print-to-pdf={pdf}", report], check=True, capture_output=True)
+        pdf, page = flight / "report.pdf", home / "page"
         subprocess.run(["pdftoppm", "-r", "80", "-f", "1", "-l", "1", "-singlefile", "-png", pdf, page], check=True)
         save(page.with_suffix(".png").read_bytes(), "report")
 

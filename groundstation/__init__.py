@@ -1,3 +1,38 @@
-"""Ground station for post-flight navigation analysis."""
+"""Ground station for post-flight navigation analysis.
+
+The Python API, see docs/api.md: ``flight = groundstation.open("log.ulg")``.
+"""
 
 __version__ = "0.1.0"
+__all__ = ["GroundstationError", "OpenFlight", "__version__", "open", "open_fleet", "simulate"]
+
+TYPE_CHECKING = False  # type checkers take it for true; nothing is imported at run time
+if TYPE_CHECKING:
+    from groundstation.base.errors import GroundstationError
+    from groundstation.pipeline.api import open_fleet, simulate
+    from groundstation.pipeline.api import open_flight as open
+    from groundstation.pipeline.notebook import OpenFlight
+
+_HOMES = {
+    "GroundstationError": ("groundstation.base.errors", "GroundstationError"),
+    "OpenFlight": ("groundstation.pipeline.notebook", "OpenFlight"),
+    "open": ("groundstation.pipeline.api", "open_flight"),
+    "open_fleet": ("groundstation.pipeline.api", "open_fleet"),
+    "simulate": ("groundstation.pipeline.api", "simulate"),
+}
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name when it is first used (PEP 562)."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    module, original = _HOMES[name]
+    found: object = getattr(import_module(module), original)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

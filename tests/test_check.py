@@ -10,8 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from groundstation.cli.main import app
-from groundstation.pipeline.batch import convert_many, run_many
+from groundstation.pipeline.batch import run_many
 from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.conversions import convert_many
 from groundstation.results.files import load
 from tests.dataflash_writer import DataFlash
 from tests.ulog_writer import ATTITUDE, BARO, UlogWriter

@@ -10,7 +10,8 @@ from typer.testing import CliRunner
 from groundstation.cli.main import LATER_VERBS, app
 
 HEAVY = (
-    *("numpy", "pandas", "pyarrow", "numba", "scipy", "rerun", "matplotlib", "mcap", "google.protobuf", "jinja2"),
+    *("numpy", "pandas", "pyarrow", "numba", "scipy", "rerun", "matplotlib", "mcap", "google.protobuf"),
+    *("jinja2", "typst"),
     *("groundstation.pipeline.batch", "groundstation.readers", "groundstation.viewer"),
 )
 

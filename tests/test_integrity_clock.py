@@ -11,6 +11,7 @@ from groundstation.integrity import ClockSettings, Survey, corrected, ledger_fin
 from groundstation.integrity.clock import Clock, estimate_clock
 
 NAN = float("nan")
+DAY_IN_2026_NS = iso_to_utc_ns("2026-05-04T06:00:00Z")[0]
 
 
 def model(times_s: list[float], utc_of_zero_ns: int | None = None, **settings: float) -> tuple[Clock, list[float]]:
@@ -37,8 +38,23 @@ def test_an_orderly_log_is_left_alone() -> None:
 
 
 def test_utc_of_zero_makes_it_absolute() -> None:
-    clock, times = model([1, 2, 3], 100 * NS_PER_S)
-    assert clock.is_absolute and times == [101.0, 102.0, 103.0]
+    clock, times = model([1, 2, 3], DAY_IN_2026_NS)
+    assert clock.is_absolute and times == [DAY_IN_2026_NS / NS_PER_S + second for second in (1, 2, 3)]
+
+
+@pytest.mark.parametrize("zero", ["1970-01-01T00:00:00Z", "1980-01-06T00:00:00Z"])
+def test_a_clock_that_was_never_set_tells_no_date(zero: str) -> None:
+    clock, times = model([5, 6, 7], iso_to_utc_ns(zero)[0])
+    assert (clock.is_absolute, clock.start, times) == (False, "unset", [5, 6, 7])
+    assert clock.to_dict()["first_device_time"] == zero.replace(":00Z", ":05.000Z")
+    clock, times = model([5, 6, 7], iso_to_utc_ns("1980-02-01T00:00:00Z")[0])
+    assert clock.is_absolute and clock.start == "utc"
+
+
+def test_each_step_tells_by_how_much_the_clock_was_set() -> None:
+    clock, _times = model(counted(100, 10) + counted(50, 10) + counted(200_000, 10))
+    assert [step.size_s for step in clock.steps] == [-59.0, 199_941.0]
+    assert [step.set_s for step in clock.steps] == [-60.0, 199_940.0]  # a second passes between two records
 
 
 def test_backward_step_moves_the_earlier_part() -> None:
@@ -81,8 +97,8 @@ def test_recorder_that_starts_over_is_moved_above_zero_and_says_so() -> None:
 def test_negative_times_are_moved_and_utc_is_kept() -> None:
     clock, times = model([-2, -1, 0, 1])
     assert times == [0, 1, 2, 3] and clock.shift_ns == 2 * NS_PER_S
-    clock, times = model([-2, -1, 0, 1], 10 * NS_PER_S)
-    assert times == [8, 9, 10, 11] and clock.shift_ns == 0
+    clock, times = model([-2, -1, 0, 1], DAY_IN_2026_NS)
+    assert clock.shift_ns == 0 and times[0] == DAY_IN_2026_NS / NS_PER_S - 2
 
 
 def test_a_displaced_row_is_stray_and_its_time_is_believed() -> None:

@@ -1,6 +1,7 @@
 """Stuck values, counters, sporadic topics and spans of damage, each with the truth that was built in."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,12 +12,18 @@ from groundstation.base.units import NS_PER_S
 from groundstation.integrity import Ledger, ledger_findings, survey
 from groundstation.integrity.limits import thresholds_from
 from groundstation.integrity.stretches import Sampler
+from groundstation.pipeline.batch import run_many
+from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.log import open_log
+from groundstation.results.files import load
+from tests.test_formats_agree import as_dataflash, as_ulog
 
 Fields = Mapping[str, NDArray[np.float64]]
 RATE = 5.0
 SECONDS = 120
 TIME_S = np.arange(int(SECONDS * RATE)) / RATE
 FROZEN = slice(200, 300)  # 40.0 s to 59.8 s
+TWO_STEPS_S = 0.2  # of the INS of the simulated taxi: to the records around what was lost
 
 
 def batches(topic: str, fields: Fields, time_s: NDArray[np.float64] = TIME_S, pieces: int = 7) -> list[Item]:
@@ -223,6 +230,50 @@ def test_lost_rows_lie_between_the_rows_around_them() -> None:
     assert (plain["bytes_skipped"], plain["skipped_spans"]) == (69, [[100, 163, 64], [900, 904, 5]])
     assert plain["truncated"]["place"] == "byte 900"
     assert plain["topics"]["ins"]["losses"] == {"unreadable_cells": 2}
+
+
+def test_skipped_bytes_lie_between_the_records_around_them() -> None:
+    index = np.r_[0:50, 50:90]
+    times = Column(np.r_[0:50, 60:100] * NS_PER_S)
+    ins = RecordBatch("ins", index, times, {"roll_deg": Column(np.zeros(90))})
+    what = "bytes that belong to no message, skipped"
+    for between, expected in (
+        ((49, 50), (49.0, 11.0)),
+        ((10, 20), (10.0, 10.0)),
+        ((-1, 0), (0.0, 0.0)),
+        ((89, 90), (99.0, 0.0)),
+    ):
+        damage = Damage("corrupt", "bytes 100 to 163", 64, what, between_records=between)
+        (span,) = survey([LogHeader("t"), ins, damage]).ledger.to_dict()["spans"]
+        assert (span["cause"], span["start_s"], span["length_s"], span["is_exact"]) == ("corrupt", *expected, False)
+
+
+@pytest.mark.parametrize("write", [as_ulog, as_dataflash])
+def test_bytes_wiped_in_the_taxi_are_found_in_time_and_lean(tmp_path: Path, write: Callable[[Path], None]) -> None:
+    """The span holds the times of all records that were lost and hardly more, and the answer says that it leans."""
+    path = tmp_path / "log"
+    write(path)
+    whole, content = records_of(path), path.read_bytes()
+    at = len(content) * 9 // 20  # on the way to the runway, while it rolls straight
+    path.write_bytes(content[:at] + bytes(300) + content[at + 300 :])
+    lost = [time_ns for _topic, time_ns in whole - records_of(path)]
+    start_ns = min(time_ns for _topic, time_ns in whole)
+    assert len(lost) > 5
+    (outcome,) = run_many([path], tmp_path / "out", Configuration())
+    summary = load(Path(outcome.folder)).summary
+    (span,) = (one for one in summary["ledger"]["spans"] if one["cause"] == "corrupt")
+    first_s, last_s = (round((time_ns - start_ns) / NS_PER_S, 3) for time_ns in (min(lost), max(lost)))
+    start_s, end_s = span["start_s"], span["start_s"] + span["length_s"]
+    assert first_s - TWO_STEPS_S <= start_s <= first_s <= last_s <= end_s <= last_s + TWO_STEPS_S
+    (finding,) = (one for one in summary["findings"] if one["code"] == "heading.damaged_span")
+    assert finding["severity"] == "warn" and "corrupt (somewhere from" in finding["text"]
+
+
+def records_of(path: Path) -> set[tuple[str, int]]:
+    """Topics and device times (nanoseconds) of the records of a log."""
+    batches = [item for item in open_log(path).items() if isinstance(item, RecordBatch)]
+    times = [(one.topic, one.device_time_ns) for one in batches if one.topic.startswith("raw.")]
+    return {(topic, time_ns) for topic, column in times for time_ns in column.values[column.mask].tolist()}
 
 
 def test_a_range_of_the_user_is_used() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.signals import TOPICS
-from groundstation.integrity.clock import ClockSettings
+from groundstation.integrity.clock_steps import ClockSettings
 from groundstation.integrity.counting import CountingSettings
 from groundstation.integrity.limits import shipped, thresholds_from
 

@@ -71,6 +71,12 @@ def test_index_links_exist(tmp_path: Path) -> None:
     assert (tmp_path / row["summary"]).is_file() and (tmp_path / row["report"]).is_file()
 
 
+def test_links_follow_the_folder(tmp_path: Path) -> None:
+    save(tmp_path / "renamed", example(heading_result(), flight_id="../elsewhere"), MANIFEST)
+    row = index_row(load(tmp_path / "renamed"))
+    assert row["summary"] == "renamed/summary.json" and row["report"] is None
+
+
 def test_no_cell_of_the_csv_runs_as_a_formula(tmp_path: Path) -> None:
     results = example(heading_result(verdict_reason='=HYPERLINK("x")'))
     results = replace(results, metadata={"aircraft": "=1+1", "flight": "@SUM(A1)\n,;\udcff"})

@@ -74,6 +74,19 @@ def test_parquet_that_is_broken_is_refused(tmp_path: Path) -> None:
         load(tmp_path)
 
 
+def test_figures_are_read_when_they_are_asked_for(tmp_path: Path) -> None:
+    save(tmp_path, example(heading_result()), MANIFEST)
+    path = tmp_path / "results.parquet" / "overview.parquet"
+    content = path.read_bytes()
+    path.write_bytes(content[:4] + bytes(len(content) - 8) + content[-4:])  # whole at its ends alone
+    saved = load(tmp_path)
+    assert "overview" in saved.figures and list(saved.figures) == sorted(saved.figures)
+    first = saved.figures["heading_samples"]
+    assert saved.figures["heading_samples"] is first and saved.figure("none") is None
+    with pytest.raises(UnreadableLogError, match=r"overview\.parquet"):
+        saved.figure("overview")
+
+
 def test_failed_write_leaves_the_old_file_and_no_partial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.txt"
     write_text(path, "old")

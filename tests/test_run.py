@@ -5,21 +5,25 @@ import os
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 
-from groundstation.pipeline.batch import convert_many, report_again, run_many
+from groundstation.pipeline.batch import run_many
 from groundstation.pipeline.configuration import Configuration, Interval
+from groundstation.pipeline.conversions import convert_many
 from groundstation.pipeline.flight import Job, run_flight
 from groundstation.pipeline.outcome import Outcome, worst_code
 from groundstation.pipeline.progress import Event
+from groundstation.pipeline.publishing import flight_folders, report_again
 from groundstation.results.files import load
 from tests.real_logs import real_log
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
-BYTE_IDENTICAL = ("summary.json", "report.html", "tables")
+BYTE_IDENTICAL = ("summary.json", "report.html", "report.pdf", "tables")
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +47,7 @@ def test_the_good_sample_is_accepted_with_all_its_files(good: Outcome) -> None:
     names = {path.name for path in folder.iterdir()}
     identity = good.flight_id
     assert names == {
-        *("summary.json", "manifest.json", "report.html", "results.parquet", "tables"),
+        *("summary.json", "manifest.json", "report.html", "report.pdf", "results.parquet", "tables"),
         *(f"{identity}.mcap", f"{identity}.rrd"),
     }
     summary = load(folder).summary
@@ -210,7 +214,7 @@ def test_copies_of_one_log_are_kept_once_however_many_run_at_a_time(tmp_path: Pa
         (tmp_path / f"logs/{name}.csv").write_bytes((SAMPLES / "taxi-short.csv").read_bytes())
     outcomes = run_many([tmp_path / "logs"], tmp_path / "out", Configuration(), jobs=2)
     assert [outcome.state for outcome in outcomes] == ["done", "skipped", "skipped"]
-    (folder,) = [path for path in (tmp_path / "out").iterdir() if path.is_dir()]
+    (folder,) = flight_folders(tmp_path / "out")
     assert {path.suffix for path in folder.iterdir()} >= {".mcap", ".rrd", ".html", ".json"}
     assert load(folder).summary["flight"]["source"]["name"] == "a.csv"
 
@@ -226,8 +230,14 @@ def test_a_log_and_its_mcap_are_one_flight(tmp_path: Path) -> None:
 
 
 def test_damage_of_an_mcap_is_kept_with_it(good: Outcome, tmp_path: Path) -> None:
-    data = bytearray((Path(good.folder) / f"{good.flight_id}.mcap").read_bytes())
-    data[len(data) // 2] ^= 1
+    whole = Path(good.folder) / f"{good.flight_id}.mcap"
+    data = bytearray(whole.read_bytes())
+    with whole.open("rb") as stream:
+        chunks = make_reader(stream).get_summary().chunk_indexes  # type: ignore[union-attr]
+    by_channel = Counter(tuple(chunk.message_index_offsets) for chunk in chunks)
+    of_channel = [one for one in chunks if tuple(one.message_index_offsets) == by_channel.most_common(1)[0][0]]
+    chunk = of_channel[len(of_channel) // 2]  # neither the first of its topic nor the last
+    data[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 1
     (tmp_path / "flipped.mcap").write_bytes(data)
     (first,) = convert_many([tmp_path / "flipped.mcap"], tmp_path / "again.mcap")
     outcome = run_flight(Job(tmp_path / "again.mcap", tmp_path / "out", Configuration()))

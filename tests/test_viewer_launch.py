@@ -41,9 +41,10 @@ def test_an_installation_without_viewer_says_so(monkeypatch: pytest.MonkeyPatch)
 def test_waits_for_the_viewer_and_hands_on_its_exit_code(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: type[BaseException] | None, code: int
 ) -> None:
-    def run(command: list[str], check: bool, env: dict[str, str]) -> "subprocess.CompletedProcess[bytes]":
+    def run(command: list[str], check: bool, env: dict[str, str], cwd: Path) -> "subprocess.CompletedProcess[bytes]":
         if ending is not None:
             raise ending
+        assert cwd == tmp_path and command[1] == str(tmp_path / "a.rrd")
         return subprocess.CompletedProcess(command, 7)
 
     (tmp_path / "a.rrd").touch()

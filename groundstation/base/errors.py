@@ -30,6 +30,10 @@ class GroundstationError(Exception):
             text += f": {next_step}"
         super().__init__(" ".join(text.split()))  # one line, whatever a log put into it
 
+    def _render_traceback_(self) -> list[str]:
+        """The error as a notebook shows it: its line, without the calls that led there."""
+        return [f"{type(self).__name__}: {self}"]
+
 
 class UnreadableLogError(GroundstationError):
     """No reader claims the file, or nothing in it could be read (exit code 1)."""

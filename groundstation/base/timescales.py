@@ -139,6 +139,17 @@ _GPS_EPOCH_S = 315_964_800  # 1980-01-06, seconds since 1970
 _S_PER_WEEK = 604_800
 
 
+def leap_seconds_at(utc_ns: int) -> int:
+    """GPS time less UTC, whole seconds.
+
+    Examples
+    --------
+    >>> leap_seconds_at(iso_to_utc_ns("2016-12-31T12:00Z")[0]), leap_seconds_at(iso_to_utc_ns("2026-05-04T06:00Z")[0])
+    (17, 18)
+    """
+    return max((leap for day, leap in _LEAP_SECONDS if iso_to_utc_ns(f"{day}T00:00Z")[0] <= utc_ns), default=0)
+
+
 def gps_week_to_utc_ns(week: NDArray[np.int64] | int, week_ms: NDArray[np.int64] | int) -> NDArray[np.int64]:
     """UTC nanoseconds since 1970 of GPS week and milliseconds of the week, less the leap seconds of that day.
 

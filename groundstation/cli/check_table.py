@@ -41,7 +41,7 @@ def text_of(one: Checked, everything: bool = False) -> str:
     """The ledger of one log as text."""
     topics: Mapping[str, Topic] = one.ledger.get("topics", {})
     shown = {name: topic for name, topic in topics.items() if everything or is_canonical(name) or _is_odd(topic)}
-    parts = [_head(one)]
+    parts = [_head(one), _clock(one.clock)]
     if shown:
         parts.append(_topics(shown))
     if len(shown) < len(topics):
@@ -56,7 +56,7 @@ def text_of(one: Checked, everything: bool = False) -> str:
         usual = "on NaN and repeated times in topics of the source (-v lists them)"
         parts.append(f"{len(one.findings) - len(findings)} more findings {usual}")
     parts.append(f"{printable(one.outcome.source)}: {one.outcome.text}")
-    return "\n\n".join(parts)
+    return "\n\n".join(part for part in parts if part)
 
 
 def _head(one: Checked) -> str:
@@ -67,6 +67,45 @@ def _head(one: Checked) -> str:
         name = f"{printable(str(used['name']))}, version {used['version']}, sha256 {str(used['sha256'])[:16]}"
         rows.append(["thresholds:", name])
     return columns(rows)
+
+
+def _clock(clock: Mapping[str, Any]) -> str:
+    """The clock: where it began, how it was set, how it runs by other clocks of the log."""
+    if "first_device_time" not in clock:
+        return ""
+    time = "UTC" if clock["is_absolute"] else "no absolute time (NOTIME): counts from its own zero"
+    began = f"{printable(str(clock['first_device_time']))}{', not set' if clock['start'] == 'unset' else ''}"
+    parts = ["clock\n" + columns([["time:", time], ["first reading:", began]])]
+    steps = [
+        [
+            str(step["record_index"]),
+            f"{step['size_s']:+.3f}",
+            f"{step['set_s']:+.3f}",
+            str(step["mistake"]).replace("_", " "),
+        ]
+        for step in clock["steps"]
+    ]
+    parts.append(_titled("clock steps", ["record", "step s", "set by s", "what"], steps, right=(0, 1, 2)))
+    lines, breaks = [], []
+    for relation in clock["relations"]:
+        name = printable(f"{relation['clock']}: {relation['source']}")
+        if relation["reason"]:
+            lines.append([name, "", "", str(relation["samples"]), relation["reason"], "", ""])
+        for one in relation["segments"]:
+            span = [one["start"] if len(relation["segments"]) > 1 else "", f"{one['length_s']:.1f}"]
+            told = [one["offset"], one["drift"], f"{relation['residual_s']:.4f}"]
+            lines.append([name, *span, str(one["samples"]), *told])
+        for one in relation["breaks"]:
+            step = f"{one['step_s']:+.3f} ± {one['step_sigma_s']:.3f}" if one["kind"] == "step" else ""
+            change = _number(one["drift_change_ppm"], 1)
+            breaks.append([name, one["kind"], f"{one['time']} ± {one['time_sigma_s']:.1f} s", step, change])
+        for one in relation["mistakes"]:
+            breaks.append([name, "error", one["time"] or "", one["text"], ""])
+    heads = ["other clock", "from", "length s", "readings", "other less recorder", "drift of the recorder", "scatter s"]
+    parts.append(_titled("recorder by other clocks (± 1 sigma)", heads, lines, right=(2, 3, 6)))
+    heads = ["other clock", "break", "at", "step s", "drift change ppm"]
+    parts.append(_titled("where the clocks part", heads, breaks))
+    return "\n\n".join(part for part in parts if part)
 
 
 def _is_usual(finding: Finding) -> bool:

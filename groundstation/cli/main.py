@@ -37,6 +37,7 @@ Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing but erro
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more; show where an internal error came from.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
 Force = Annotated[bool, typer.Option("-f", "--force", help="Overwrite what is there.")]
+NoPdf = Annotated[bool, typer.Option("--no-pdf", help="Leave report.pdf out.")]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
 Profile = Annotated[
     Path | None,
@@ -165,6 +166,8 @@ def check(
 def convert(
     logs: Annotated[list[Path], typer.Argument(help="Recorded logs.", metavar="LOG...", readable=False)],
     output: Annotated[Path, typer.Option("-o", "--output", help="MCAP to write; a folder for several logs.")],
+    thresholds: ThresholdsFile = None,
+    config: ConfigFile = None,
     profile: Profile = None,
     force: Force = False,
     quiet: Quiet = False,
@@ -175,10 +178,12 @@ def convert(
     """Convert recorded logs to MCAP (protobuf channels, zstd, indexed); the clock is repaired, both times are kept."""
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.batch import convert_many
+    from groundstation.pipeline.configuration import load_configuration
+    from groundstation.pipeline.conversions import convert_many
 
+    configuration = load_configuration(config, profile=profile, thresholds=thresholds)
     with listener("none" if quiet else progress) as listen:
-        outcomes = convert_many(logs, output, profile=profile, force=force, listen=listen)
+        outcomes = convert_many(logs, output, configuration=configuration, force=force, listen=listen)
     printing.outcomes(outcomes, as_json_text=json, quiet=quiet)
     return printing.worst_code(outcomes)
 
@@ -186,8 +191,8 @@ def convert(
 @app.command()
 @answers_with_exit_code
 def run(
-    paths: Annotated[list[Path], typer.Argument(help="Logs or folders of logs.", metavar="PATH...", readable=False)],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.", metavar="OUT")],
+    paths: Annotated[list[str], typer.Argument(help="Logs or folders of logs, or URLs of them.", metavar="PATH...")],
+    output: Annotated[str, typer.Option("-o", "--output", help="Folder for the results, or its URL.", metavar="OUT")],
     config: ConfigFile = None,
     aircraft: AircraftFile = None,
     site: SiteFile = None,
@@ -195,22 +200,46 @@ def run(
     thresholds: ThresholdsFile = None,
     profile: Profile = None,
     jobs: Annotated[int, typer.Option("-j", "--jobs", help="Processes; 0: one per core.", min=0)] = 0,
+    scheduler: Annotated[
+        str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
+    ] = "",
     fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is this grave.")] = "none",
+    no_pdf: NoPdf = False,
+    redo: Annotated[bool, typer.Option("--redo", help="Do again what an earlier run finished.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done; write nothing.")] = False,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
     progress: Progress = "auto",
 ) -> int | None:
-    """Run everything the data allows: MCAP, heading correction, recording and report of each flight."""
+    """Run everything the data allows: MCAP, heading correction, recording and report of each flight.
+
+    An OUT of an earlier run is continued: what it finished with the same logs and settings is not done again.
+    """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.batch import run_many
+    from groundstation.pipeline.batch import plan_many, run_many
     from groundstation.pipeline.configuration import load_configuration
 
     configuration = load_configuration(config, aircraft, site, intervals, profile, thresholds)
+    if dry_run:
+        planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo)
+        printing.outcomes(planned, as_json_text=json, quiet=quiet)
+        return DONE
     with listener("none" if quiet else progress) as listen:
-        outcomes = run_many(paths, output, configuration, jobs=jobs, force=force, fail_on=fail_on, listen=listen)
+        outcomes = run_many(
+            paths,
+            output,
+            configuration,
+            jobs=jobs,
+            scheduler=scheduler,
+            force=force,
+            fail_on=fail_on,
+            with_pdf=not no_pdf,
+            redo=redo,
+            listen=listen,
+        )
     printing.outcomes(outcomes, as_json_text=json, quiet=quiet, with_times=verbose)
     return printing.worst_code(outcomes)
 
@@ -219,20 +248,21 @@ def run(
 @answers_with_exit_code
 def report(
     out: Annotated[Path, typer.Argument(help="A folder that `run` made, or one flight folder in it.", metavar="OUT")],
+    no_pdf: NoPdf = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
     """Make the reports and the index again from the saved results, without the logs."""
     from groundstation.cli import printing
-    from groundstation.pipeline.batch import report_again
+    from groundstation.pipeline.publishing import report_again
 
-    paths, problems = report_again(out)
+    paths, problems = report_again(out, with_pdf=not no_pdf)
     written = [str(path) for path in paths]
     if not quiet:
         typer.echo(printing.as_json({"written": written}) if json else "\n".join(written))
     for problem in problems:
-        say(f"error: {printing.printable(problem.text)}")
+        say(f"{'error' if problem.code else 'warning'}: {printing.printable(problem.text)}")
     return printing.worst_code(problems)
 
 
@@ -317,11 +347,8 @@ def list_(
 
 
 LATER_VERBS = {
-    "compare": "Compare two flights or two configurations.",
-    "clip": "Cut a part of a flight.",
     "cooperative": "Navigation between aircraft.",
     "plan": "Plan a session or a landing.",
-    "serve": "Offer recordings through Rerun's catalog server.",
 }
 
 
@@ -339,6 +366,9 @@ def _add_later_verb(name: str) -> None:
 
 for _name in LATER_VERBS:
     _add_later_verb(_name)
+
+from groundstation.cli import fleets as fleets  # noqa: E402  more verbs, which need what stands above
+from groundstation.cli import flights as flights  # noqa: E402
 
 
 def main(arguments: Any = None) -> None:

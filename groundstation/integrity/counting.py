@@ -14,7 +14,8 @@ import numpy as np
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.toml_settings import number
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import Clock, interpolated, middle_of, zero_of
+from groundstation.integrity.clock import Clock, interpolated, start_of, zero_of
+from groundstation.integrity.clock_steps import middle_of
 
 FROZEN_SHARE, FROZEN_LEAST_RECORDS = 0.9, 10
 
@@ -117,6 +118,8 @@ def estimate_counting_clock(
         shift_ns=0 if zero.is_absolute else zero.ns,
         has_times=True,
         is_counting=True,
+        start=start_of(int(time[0]), utc_of_zero_ns),
+        first_device_ns=int(time[0]) + (utc_of_zero_ns or 0),
     )
 
 

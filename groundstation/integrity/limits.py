@@ -11,7 +11,8 @@ from groundstation.base.errors import SettingsError
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.signals import TOPICS, field_of, kind_of
 from groundstation.base.toml_settings import required_number, settings_from
-from groundstation.integrity.clock import ClockSettings
+from groundstation.integrity.clock_references import RelationSettings
+from groundstation.integrity.clock_steps import ClockSettings
 from groundstation.integrity.counting import CountingSettings
 
 VERSION = 1
@@ -105,6 +106,7 @@ class Thresholds:
     stuck: StuckLimits
     clock: ClockSettings
     counting_clock: CountingSettings
+    clock_relation: RelationSettings
     findings: FindingLimits
     ranges: Mapping[str, Mapping[str, Range]] = field(default_factory=dict)
 

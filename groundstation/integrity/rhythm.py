@@ -9,7 +9,7 @@ import numpy as np
 from groundstation.base.records import Int64Array, frozen
 from groundstation.base.signals import is_canonical
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import quantile
+from groundstation.integrity.clock_steps import quantile
 from groundstation.integrity.limits import GapLimits, RhythmLimits, Thresholds
 
 MOST_STEPS = 10_000  # of which a typical step is taken

@@ -12,6 +12,7 @@ import numpy as np
 from groundstation.base.records import BoolArray, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import Clock, estimate_clock
+from groundstation.integrity.clock_references import ClockReferences
 from groundstation.integrity.contents import Contents
 from groundstation.integrity.counting import CountingSettings, estimate_counting_clock
 from groundstation.integrity.ledger import Ledger, TopicLedger, topic_ledger
@@ -102,12 +103,13 @@ def survey(items: Iterable[Item], *, thresholds: Thresholds | None = None) -> Su
     damages: list[Damage] = []
     remarks: list[Remark] = []
     pieces: dict[str, list[Kept]] = {}
-    places, contents = Places(), Contents(limits)
+    places, contents, references = Places(), Contents(limits), ClockReferences(limits.clock_relation)
     for item in items:
         if isinstance(item, RecordBatch):
             if len(item):
                 pieces.setdefault(item.topic, []).append(places.of(item))
                 contents.add(item)
+                references.add(item)
         elif isinstance(item, Damage):
             damages.append(item)
         elif isinstance(item, Remark):
@@ -115,6 +117,7 @@ def survey(items: Iterable[Item], *, thresholds: Thresholds | None = None) -> Su
         else:
             header = item
     clock = _clock_of(header, places, [pieces[topic] for topic in sorted(pieces)], limits)
+    clock = replace(clock, relations=references.relations(clock))
     results = _ledgers(places, pieces, contents, clock, limits) if clock.has_times else []
     topics = tuple(ledger for ledger, _lateness in results)
     clock = replace(clock, lateness_ns={ledger.topic: lateness for ledger, lateness in results})

@@ -13,16 +13,19 @@ from groundstation.base.toml_settings import settings_from
 from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings, Interval, SiteData
 from groundstation.estimators.inertial.noise import choose_class
 from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.estimators.latency.settings import LatencySettings
 from groundstation.integrity.limits import Thresholds, thresholds_from
 from groundstation.pipeline import configuration as configured
 from groundstation.pipeline import overview
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.inertial import analyse_inertial
 from groundstation.pipeline.intervals import seconds_of
+from groundstation.pipeline.latency import analyse_latency
 from groundstation.pipeline.leaning import leaning_findings
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
 from groundstation.results.heading import HeadingResult
+from groundstation.results.latency import Latencies
 from groundstation.tables.phases import Phases, flight_phases, ground_mask
 from groundstation.tables.table import Flight
 
@@ -48,6 +51,7 @@ class UserSettings:
 
     heading: HeadingSettings
     inertial: InertialSettings
+    latency: LatencySettings
     aircraft: AircraftData
     site: SiteData
     thresholds: Thresholds
@@ -64,6 +68,7 @@ def user_settings(configuration: Configuration) -> UserSettings:
     settings = UserSettings(
         settings_from(HeadingSettings, configuration.heading, configuration.file_of("heading"), "heading"),
         settings_from(InertialSettings, configuration.inertial, configuration.file_of("inertial"), "inertial"),
+        settings_from(LatencySettings, configuration.latency, configuration.file_of("latency"), "latency"),
         settings_from(AircraftData, configuration.aircraft, configuration.file_of("aircraft"), "aircraft"),
         settings_from(SiteData, configuration.site, configuration.file_of("site"), "site"),
         configured_thresholds(configuration),
@@ -97,7 +102,6 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     findings = list(given.findings)
     not_assessable: list[NotAssessable] = []
     phases = flight_phases(flight)
-    heading = _heading_or_reason(flight, configuration, settings, findings, not_assessable)
     inertial = analyse_inertial(
         flight,
         phases,
@@ -105,9 +109,15 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
         aircraft_class=settings.aircraft.ins_class,
         excluded_s=_excluded(flight, configuration),
     )
-    findings += inertial.findings
-    not_assessable += inertial.not_assessable
-    figures = (*_figures(flight, given, settings, phases, heading), *inertial.figures)
+    latency = analyse_latency(flight, settings.latency, inertial.inertial)
+    heading = _heading_or_reason(flight, configuration, settings, latency.latency, findings, not_assessable)
+    findings += (*inertial.findings, *latency.findings)
+    not_assessable += (*inertial.not_assessable, *latency.not_assessable)
+    figures = (
+        *_figures(flight, given, settings, phases, heading),
+        *inertial.figures,
+        *(latency.latency.figures if latency.latency else ()),
+    )
     findings += leaning_findings(flight, given.ledger, heading, inertial.inertial, settings.thresholds)
     if heading is not None:
         findings += heading_findings(heading)
@@ -127,12 +137,15 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
         heading=heading,
         inertial=inertial.inertial,
         forecast=inertial.forecast,
+        latency=latency.latency,
         figures=figures,
     )
 
 
-def estimate_heading(flight: Flight, configuration: Configuration, settings: UserSettings) -> HeadingResult:
-    """Run system 1 on a flight, with the user's intervals and the proof of ground contact.
+def estimate_heading(
+    flight: Flight, configuration: Configuration, settings: UserSettings, latencies: Latencies | None = None
+) -> HeadingResult:
+    """Run system 1 on a flight, with the user's intervals, the proof of ground contact and what is known of latencies.
 
     Raises
     ------
@@ -150,6 +163,7 @@ def estimate_heading(flight: Flight, configuration: Configuration, settings: Use
         aircraft=settings.aircraft,
         site=settings.site,
         request=HeadingRequest(intervals=_intervals(flight, configuration)),
+        latencies=latencies,
     )
 
 
@@ -157,11 +171,12 @@ def _heading_or_reason(
     flight: Flight,
     configuration: Configuration,
     settings: UserSettings,
+    latencies: Latencies | None,
     findings: list[Finding],
     not_assessable: list[NotAssessable],
 ) -> HeadingResult | None:
     try:
-        return estimate_heading(flight, configuration, settings)
+        return estimate_heading(flight, configuration, settings, latencies)
     except NotAssessableError as error:
         reason, severity = str(error).removeprefix("heading: "), INFO
     except SettingsError as error:  # intervals in UTC for a flight without it: this flight's trouble alone

@@ -1,40 +1,65 @@
-"""Several logs: each in its turn or several at once, one bad log never stopping the others."""
+"""Several logs: each in its turn, several at once or on a cluster, one bad log never stopping the others."""
 
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.pipeline.analyse import user_settings
 from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.convert import convert_log
-from groundstation.pipeline.flight import Job, is_abandoned, place, run_flight
+from groundstation.pipeline.depot import Depot, FarDepot, FolderDepot
+from groundstation.pipeline.elsewhere import far_logs, is_far
+from groundstation.pipeline.far import FarJob, run_far
+from groundstation.pipeline.flight import Job, is_abandoned, run_flight
 from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, collect, is_ours
 from groundstation.pipeline.log import open_log
 from groundstation.pipeline.outcome import Outcome
 from groundstation.pipeline.progress import Event, Listener, silent
-from groundstation.reports.index import INDEX_CSV, INDEX_JSON
-from groundstation.results.files import SUMMARY
+from groundstation.pipeline.publishing import FLEET_FILES, flight_folders, write_beside, write_index_of
+from groundstation.pipeline.resume import Finished, finished_flights, keys_of
+from groundstation.pipeline.shelf import Shelf
+from groundstation.pipeline.workers import AnyJob, Crew, cores, in_turn, side_by_side
 
-TASKS_PER_PROCESS = 32  # Rerun leaves a few threads behind for every recording
+LOCK = ".lock"
+PLANS: Mapping[str, str] = {
+    "everything": "to run",
+    "analysis": "to analyse again: a setting changed, or a file is missing; the MCAP stays",
+    "reports": "to report again",
+    "nothing": "finished, nothing to do",
+}
 
 
 def run_many(
-    paths: Sequence[Path],
-    out: Path,
+    paths: Sequence[Path | str],
+    out: Path | str,
     configuration: Configuration,
     *,
     jobs: int = 0,
+    scheduler: str = "",
     force: bool = False,
     fail_on: str = "none",
+    with_pdf: bool = True,
+    redo: bool = False,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
     """Run logs and folders of logs into ``out``; the index lists every one of them.
 
-    Interrupted, it keeps what was finished, with its index.
+    What an earlier run finished, with the same logs and settings, is not done again unless ``redo`` is set. Interrupted
+    or killed, it keeps what was finished.
+
+    Parameters
+    ----------
+    paths, out
+        Paths, or URLs that fsspec reaches (``s3://bucket/logs``).
+    jobs : int
+        Processes on this machine; 0: one per core.
+    scheduler : str
+        Address of a Dask scheduler, whose workers do the work; they see local paths as this machine does.
 
     Returns
     -------
@@ -44,262 +69,161 @@ def run_many(
     Raises
     ------
     UsageError
-        When an input is missing, there is nothing to run, a setting is wrong, or ``out`` is something else's.
+        When an input is missing, there is nothing to run, a setting is wrong, ``out`` is something else's, another run
+        is writing into it, or there is no such scheduler.
     """
-    user_settings(configuration)  # a wrong setting is told before an hour of work
-    inputs = collect(paths, out)
-    if not inputs:
-        hint = "what groundstation made is no input" if any(path.is_dir() and is_ours(path) for path in paths) else ""
-        raise UsageError(", ".join(map(str, paths)), "no log in it", "", hint)
-    _prepare(out, force)
-    work = [Job(one.path, out, configuration, fail_on, one.is_named, os.getpid()) for one in inputs]
-    listen(Event("begin", total=len(work)))
-    shelf = Shelf(out, work)
+    inputs = _inputs(paths, out, configuration)
+    crew = _crew(scheduler, min(jobs or cores(), len(inputs)), listen)
+    is_elsewhere = any(is_far(str(place)) for place in (out, *paths))
+    make = partial(Job, configuration=configuration, fail_on=fail_on, owner=os.getpid(), with_pdf=with_pdf)
+    listen(Event("begin", total=len(inputs)))
+    if is_elsewhere:
+        work = [FarJob(make(Path(), Path(), is_named=named), log, str(out), redo) for log, named in inputs]
+        return _run_elsewhere(work, str(out), crew, force, listen)
+    out = Path(out)
+    _refuse_foreign(out, force)
+    with _alone_in(out):
+        _prepare(out)
+        known = {} if redo else finished_flights(flight_folders(out))
+        local = [make(Path(log), out, is_named=named) for log, named in inputs]
+
+        def again(number: int) -> Outcome:
+            return run_flight(replace(local[number], add_suffix=True), listen)
+
+        planned = (_with_step(job, known) if known else job for job in local)
+        return _run_into(
+            FolderDepot(out), enumerate(planned), [log for log, _named in inputs], run_flight, again, crew, listen
+        )
+
+
+def _run_elsewhere(work: Sequence[FarJob], out: str, crew: Crew, force: bool, listen: Listener) -> tuple[Outcome, ...]:
+    def again(number: int) -> Outcome:
+        far = work[number]
+        return run_far(replace(far, job=replace(far.job, add_suffix=True), redo=True), listen)
+
+    with tempfile.TemporaryDirectory(prefix="groundstation-") as copy:
+        depot = FarDepot(out, Path(copy))
+        depot.refuse_foreign(force=force)
+        depot.copy_all()
+        try:
+            return _run_into(depot, enumerate(work), [far.log for far in work], run_far, again, crew, listen)
+        finally:
+            depot.publish(FLEET_FILES)
+
+
+def _run_into(
+    depot: Depot,
+    tasks: Iterator[tuple[int, AnyJob]],
+    names: Sequence[str],
+    run: Callable[[AnyJob, Listener], Outcome],
+    run_with_suffix: Callable[[int], Outcome],
+    crew: Crew,
+    listen: Listener,
+) -> tuple[Outcome, ...]:
+    """Carry out jobs and put their flights into the depot; interrupted, the index at least is written."""
+    shelf = Shelf(depot, names)
     try:
-        for number, outcome in _carry_out(work, jobs, listen):
-            listen(Event("end", work[number].path.name, outcome.text))
+        for number, outcome in crew(tasks, run):
+            listen(Event("end", Path(names[number]).name, outcome.text))
             shelf.put(number, outcome)
-        shelf.settle(listen)
-    finally:
-        problems = _write_index(out, shelf.outcomes())
-    return (*shelf.outcomes(), *problems)
+        shelf.settle(run_with_suffix)
+    except BaseException:
+        write_index_of(depot.root, shelf.outcomes())
+        raise
+    return (*shelf.outcomes(), *write_beside(depot.root, shelf.outcomes()))
 
 
-def _prepare(out: Path, force: bool) -> None:
+def _crew(scheduler: str, workers: int, listen: Listener) -> Crew:
+    """Who does the work: a cluster, processes, or this process alone."""
+    if scheduler:
+        from groundstation.pipeline.cluster import on_cluster
+
+        return partial(on_cluster, scheduler=scheduler)
+    return partial(in_turn, listen=listen) if workers <= 1 else partial(side_by_side, workers=workers, listen=listen)
+
+
+def plan_many(
+    paths: Sequence[Path | str],
+    out: Path | str,
+    configuration: Configuration,
+    *,
+    with_pdf: bool = True,
+    redo: bool = False,
+) -> tuple[Outcome, ...]:
+    """Say what :func:`run_many` would do of each log; nothing is written.
+
+    Raises
+    ------
+    UsageError
+        As :func:`run_many`, and for logs or results elsewhere, which would have to be fetched first.
+    """
+    if any(is_far(str(place)) for place in (out, *paths)):
+        raise UsageError("--dry-run", "logs or results elsewhere", "local ones")
+    inputs, out = _inputs(paths, out, configuration), Path(out)
+    _refuse_foreign(out, force=True)
+    known = {} if redo or not out.is_dir() else finished_flights(flight_folders(out))
+    outcomes = []
+    for log, named in inputs:
+        job = _with_step(Job(Path(log), out, configuration, is_named=named, with_pdf=with_pdf), known)
+        flight_id = job.finished.flight_id if job.finished else ""
+        outcomes.append(Outcome(log, "done", PLANS[job.step], flight_id=flight_id))
+    return tuple(outcomes)
+
+
+def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configuration) -> tuple[tuple[str, bool], ...]:
+    """Logs by path or URL, in a stable order, each with whether the user named it."""
+    user_settings(configuration)  # a wrong setting is told before an hour of work
+    near = [Path(path) for path in paths if not is_far(str(path))]
+    found = {log: named for path in paths if is_far(str(path)) for log, named in far_logs(str(path))}
+    found |= {str(one.path): one.is_named for one in collect(near, None if is_far(str(out)) else Path(out))}
+    if not found:
+        hint = "what groundstation made is no input" if any(path.is_dir() and is_ours(path) for path in near) else ""
+        raise UsageError(", ".join(map(str, paths)), "no log in it", "", hint)
+    return tuple(sorted(found.items()))
+
+
+def _refuse_foreign(out: Path, force: bool) -> None:
     if out.exists() and not out.is_dir():
         raise UsageError(str(out), "a file", "a folder for the results")
-    if out.is_dir() and any(out.iterdir()) and not is_ours(out) and not force:
+    if out.is_dir() and any(one.name != LOCK for one in out.iterdir()) and not is_ours(out) and not force:
         raise UsageError(str(out), "a folder that groundstation did not make", "a new or own folder", "-f uses it")
     if (out / FLIGHT_FOLDER_MARK).exists():
         raise UsageError(str(out), "a flight folder", "a folder that holds flight folders", "name another -o")
+
+
+@contextmanager
+def _alone_in(out: Path) -> Iterator[None]:
+    """Keep other runs out of a folder; the system takes the lock off a run that is killed."""
+    from filelock import FileLock, Timeout
+
     out.mkdir(parents=True, exist_ok=True)
+    lock = FileLock(out / LOCK, timeout=0)
+    try:
+        lock.acquire()
+    except Timeout as error:
+        raise UsageError(str(out), "another run is writing into it", "", "wait for it, or name another -o") from error
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def _prepare(out: Path) -> None:
     for left_over in out.iterdir():
         if is_abandoned(left_over):
             shutil.rmtree(left_over, ignore_errors=True)
     if not (out / OUT_FOLDER_MARK).exists():
-        _write_index(out, ())  # from now on the folder is known for ours, whatever happens to the run
+        write_index_of(out, ())  # from now on the folder is known for ours, whatever happens to the run
 
 
-def _carry_out(work: Sequence[Job], jobs: int, listen: Listener) -> Iterator[tuple[int, Outcome]]:
-    """Run the jobs, several at once when there are several; yields number and outcome as each one ends."""
-    workers = min(jobs or os.cpu_count() or 1, len(work))
-    if workers <= 1:
-        for number, job in enumerate(work):
-            yield number, run_flight(job, listen)
-        return
-    import multiprocessing
-    from concurrent.futures import ProcessPoolExecutor, as_completed
-
-    # Spawned, never forked: numba, Arrow and Rerun hold threads that a fork would freeze.
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, max_tasks_per_child=TASKS_PER_PROCESS)
+def _with_step(job: Job, known: Mapping[str, Finished]) -> Job:
+    profile = Path(job.configuration.profile) if job.configuration.profile else None
     try:
-        futures = {pool.submit(run_flight, job): number for number, job in enumerate(work)}
-        for future in as_completed(futures):
-            number = futures[future]
-            try:
-                yield number, future.result()
-            except Exception as error:  # the process died under the log: killed, or out of memory
-                name = work[number].path.name
-                yield number, Outcome(str(work[number].path), "failed", f"{name}: its process ended ({error})")
-    except BaseException:  # interrupted: nobody waits for the rest
-        processes = list((getattr(pool, "_processes", None) or {}).values())
-        pool.shutdown(wait=False, cancel_futures=True)
-        for process in processes:
-            process.terminate()
-        raise
-    pool.shutdown()
-
-
-class Shelf:
-    """Where finished flights are put: into place at once, so that a run that is killed keeps what it had finished.
-
-    Two flights of one id get the digests of their logs into their names; as that is known only when the second one
-    is finished, they are run again at the end. Of logs with the same content the first in the list is kept, whichever
-    was finished first.
-    """
-
-    def __init__(self, out: Path, work: Sequence[Job]) -> None:
-        self._out, self._work = out, work
-        self._outcomes: dict[int, Outcome] = {}
-        self._kept: dict[str, int] = {}  # content -> number of the log that is kept
-        self._owner: dict[str, str] = {}  # flight id -> content
-        self._clashes: set[str] = set()
-
-    def put(self, number: int, outcome: Outcome) -> None:
-        """Take a finished log over."""
-        if not outcome.flight_id:
-            self._outcomes[number] = outcome
-            return
-        twin = self._kept.get(outcome.sha256)
-        if twin is not None and twin < number:
-            self._outcomes[number] = self._as_twin(outcome, twin)
-            return
-        self._kept[outcome.sha256] = number
-        self._outcomes[number] = self._placed(outcome)
-        if twin is not None:
-            self._outcomes[twin] = self._as_twin(replace(self._outcomes[twin], folder=""), number)
-
-    def _as_twin(self, outcome: Outcome, kept: int) -> Outcome:
-        if outcome.folder:
-            shutil.rmtree(outcome.folder, ignore_errors=True)
-        text = f"{Path(outcome.source).name}: same content as {self._work[kept].path}, listed once"
-        return Outcome(outcome.source, "skipped", text, sha256=outcome.sha256)
-
-    def _placed(self, outcome: Outcome) -> Outcome:
-        identity = outcome.flight_id
-        target = self._out / identity
-        owner = self._owner.setdefault(identity, outcome.sha256)
-        had_suffix = (self._out / f"{identity}_{outcome.sha256[:8]}").exists()
-        if owner != outcome.sha256 or had_suffix or _is_of_another_log(target, outcome):
-            self._clashes.add(identity)
-            return outcome
-        place(Path(outcome.folder), target)
-        return replace(outcome, folder=str(target))
-
-    def settle(self, listen: Listener) -> None:
-        """Give flights of one id their digests, once all are put."""
-        for number, outcome in sorted(self._outcomes.items()):
-            if outcome.flight_id in self._clashes:
-                shutil.rmtree(outcome.folder, ignore_errors=True)
-                again = run_flight(replace(self._work[number], add_suffix=True), listen)
-                if again.flight_id:
-                    place(Path(again.folder), self._out / again.flight_id)
-                    again = replace(again, folder=str(self._out / again.flight_id))
-                self._outcomes[number] = again
-
-    def outcomes(self) -> tuple[Outcome, ...]:
-        """What became of the logs put so far, in the order of the inputs."""
-        return tuple(outcome for _, outcome in sorted(self._outcomes.items()))
-
-
-def _is_of_another_log(folder: Path, outcome: Outcome) -> bool:
-    from groundstation.results.files import load
-
-    if not folder.exists():
-        return False
-    try:
-        return str(load(folder).summary["flight"]["source"]["sha256"]) != outcome.sha256
-    except (GroundstationError, KeyError, TypeError):
-        return False
-
-
-def _write_index(
-    out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[dict[str, Any]] = ()
-) -> tuple[Outcome, ...]:
-    """Write index.json and index.csv: every flight in ``out``, and the logs of this run that gave none.
-
-    Returns what could not be listed: flight folders that cannot be read, an index that cannot be written.
-    """
-    from groundstation.reports.index import failed_row, index_row, write_index
-    from groundstation.results.files import load
-
-    problems: list[Outcome] = []
-    rows = list(kept_rows)
-    for folder in flight_folders(out):
-        try:
-            rows.append(index_row(load(folder)))
-        except GroundstationError as error:
-            problems.append(Outcome(str(folder), "failed", str(error)))
-    without_flight = [outcome for outcome in outcomes if not outcome.flight_id]
-    rows += [failed_row(one.source, one.state, one.text) for one in (*without_flight, *problems)]
-    try:
-        write_index(out, rows)
-    except OSError as error:
-        problems.append(Outcome(str(out), "failed", f"{out}: the index cannot be written ({error.strerror or error})"))
-    return tuple(problems)
-
-
-def flight_folders(out: Path) -> list[Path]:
-    """Flight folders in an OUT, in the order of their names."""
-    return sorted(folder for folder in out.iterdir() if folder.name[0] != "." and (folder / SUMMARY).is_file())
-
-
-def convert_many(
-    logs: Sequence[Path],
-    output: Path,
-    *,
-    profile: Path | None = None,
-    force: bool = False,
-    listen: Listener = silent,
-) -> tuple[Outcome, ...]:
-    """Convert logs to MCAP: one to the file ``output``, several into the folder ``output``.
-
-    Raises
-    ------
-    UsageError
-        When a log is missing, or the target exists and ``force`` is not given.
-    """
-    for log in logs:
-        if not log.exists():
-            raise UsageError(str(log), "no such file")
-        if log.is_dir():
-            raise UsageError(str(log), "a folder", "a log", "`run` takes folders")
-    if len(logs) > 1 and output.is_file():
-        raise UsageError(str(output), "a file", "a folder for several logs")
-    into_folder = len(logs) > 1 or output.is_dir()
-    targets = [output / f"{log.stem}.mcap" for log in logs] if into_folder else [output]
-    if len(set(targets)) < len(targets):
-        raise UsageError(str(output), "two logs of one name", "names that differ")
-    for log, target in zip(logs, targets, strict=True):
-        if target.exists() and (not force or target.resolve() == log.resolve()):
-            raise UsageError(str(target), "a file that exists", "a new name", "-f overwrites it")
-        target.parent.mkdir(parents=True, exist_ok=True)
-    listen(Event("begin", total=len(logs)))
-    outcomes = []
-    for log, target in zip(logs, targets, strict=True):
-        listen(Event("stage", log.name, "converting"))
-        outcomes.append(_convert_one(log, target, profile))
-        listen(Event("end", log.name, outcomes[-1].text))
-    return tuple(outcomes)
-
-
-def _convert_one(path: Path, target: Path, profile: Path | None) -> Outcome:
-    try:
-        converted = convert_log(open_log(path, profile), target)
-    except GroundstationError as error:
-        return Outcome(str(path), "failed", str(error))
-    grave = [finding.text for finding in converted.findings if finding.severity != "info"]
-    text = f"-> {target}" + (f" ({'; '.join(grave)})" if grave else "")
-    return Outcome(str(path), "data_lost" if converted.has_lost_data else "done", text, folder=str(target))
-
-
-def report_again(out: Path) -> tuple[list[Path], tuple[Outcome, ...]]:
-    """Make reports and index of an OUT (or the report of one flight folder) again from the saved results.
-
-    Returns
-    -------
-    list of Path, tuple of Outcome
-        What was written, and the flight folders that could not be read.
-
-    Raises
-    ------
-    UsageError
-        When the folder is not one that ``run`` made.
-    """
-    from groundstation.reports.flight_report import write_flight_report
-
-    if (out / FLIGHT_FOLDER_MARK).is_file():
-        return [write_flight_report(out)], ()
-    if not out.is_dir() or not (is_ours(out) or flight_folders(out)):
-        raise UsageError(str(out), "no results", "a folder that `run` made")
-    written = []
-    for folder in flight_folders(out):
-        try:
-            written.append(write_flight_report(folder))
-        except GroundstationError:
-            continue  # the index names it
-    problems = _write_index(out, (), _rows_without_flight(out))
-    return [*written, out / INDEX_JSON, out / INDEX_CSV], problems
-
-
-def _rows_without_flight(out: Path) -> list[dict[str, Any]]:
-    """Rows of the logs that gave no flight, from the index as it stands: nothing else remembers them."""
-    import json
-
-    try:
-        rows = json.loads((out / OUT_FOLDER_MARK).read_text(encoding="utf-8"))["rows"]
-        folders = {str(folder) for folder in flight_folders(out)}
-        return [row for row in rows if row["kind"] != "flight" and row["source"] not in folders]
-    except (OSError, ValueError, KeyError, TypeError):
-        return []
+        source = open_log(job.path, profile).source
+        finished = known.get(source.sha256)
+        if finished is None:
+            return job
+        keys = keys_of(source, job.configuration, with_pdf=job.with_pdf)
+    except (GroundstationError, OSError):
+        return job  # its run tells what is wrong
+    return replace(job, step=finished.step(keys, with_pdf=job.with_pdf), finished=finished)

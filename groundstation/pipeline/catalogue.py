@@ -26,7 +26,14 @@ FORECAST: dict[str, Any] = {
     "title": "forecast of the INS errors without GNSS, replayed all over the flight",
     "needs": "what inertial needs, of an INS that GNSS does not correct; a calibration needs one Schuler period",
 }
-ANALYSES = (HEADING, INERTIAL, FORECAST)
+LATENCY: dict[str, Any] = {
+    "kind": "analysis",
+    "name": "latency",
+    "title": "latency of GNSS, barometer, magnetometer and further INS behind the INS, from ordinary motion",
+    "needs": "ins velocity with gnss velocities, vertical speed with baro, or attitude with a magnetometer; turns and "
+    "climbs",
+}
+ANALYSES = (HEADING, INERTIAL, FORECAST, LATENCY)
 
 
 def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict[str, Any]]:
@@ -49,6 +56,7 @@ def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
     from groundstation.pipeline.convert import convert_log
     from groundstation.pipeline.flight import read_flight
     from groundstation.pipeline.inertial import analyse_inertial
+    from groundstation.pipeline.latency import analyse_latency
     from groundstation.pipeline.log import open_log
     from groundstation.tables.phases import flight_phases
 
@@ -64,7 +72,8 @@ def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
     except NotAssessableError as error:
         reasons["heading"] = str(error).removeprefix("heading: ")
     answers = analyse_inertial(flight, flight_phases(flight), settings.inertial)
-    reasons |= {lacking.analysis: lacking.reason for lacking in answers.not_assessable}
+    latency = analyse_latency(flight, settings.latency, answers.inertial)
+    reasons |= {lacking.analysis: lacking.reason for lacking in (*answers.not_assessable, *latency.not_assessable)}
     if "inertial" in reasons:
         reasons["forecast"] = reasons["inertial"]
     return [

@@ -9,8 +9,9 @@ from typing import Any
 
 from groundstation.base.errors import SettingsError
 
-TABLES = ("heading", "inertial", "aircraft", "site", "thresholds")
+TABLES = ("heading", "inertial", "latency", "aircraft", "site", "thresholds")
 SECTIONS = (*TABLES, "exclude", "force")
+Settings = Path | Mapping[str, Any]  # a TOML file, or its content
 
 
 @dataclass(frozen=True)
@@ -26,12 +27,13 @@ class Interval:
 class Configuration:
     """Everything a user may set for a run, as read from TOML; plain values, so that it travels to worker processes.
 
-    ``heading``, ``inertial``, ``aircraft``, ``site`` and ``thresholds`` are the tables as written; they become
-    dataclasses where used.
+    ``heading``, ``inertial``, ``latency``, ``aircraft``, ``site`` and ``thresholds`` are the tables as written; they
+    become dataclasses where used.
     """
 
     heading: Mapping[str, Any] = field(default_factory=dict)
     inertial: Mapping[str, Any] = field(default_factory=dict)
+    latency: Mapping[str, Any] = field(default_factory=dict)
     aircraft: Mapping[str, Any] = field(default_factory=dict)
     site: Mapping[str, Any] = field(default_factory=dict)
     exclude: tuple[Interval, ...] = ()
@@ -73,45 +75,56 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def load_configuration(
-    config: Path | None = None,
-    aircraft: Path | None = None,
-    site: Path | None = None,
-    intervals: Path | None = None,
+    config: Settings | None = None,
+    aircraft: Settings | None = None,
+    site: Settings | None = None,
+    intervals: Settings | None = None,
     profile: Path | None = None,
-    thresholds: Path | None = None,
+    thresholds: Settings | None = None,
 ) -> Configuration:
-    """Read the user's files into one configuration; a file named for a section wins over that section of ``config``.
+    """Put the user's settings, files or what would stand in them, into one configuration.
+
+    What is given for a section wins over that section of ``config``.
 
     Raises
     ------
     SettingsError
         For an unreadable file, an unknown section, or a value of the wrong kind, naming file and key.
     """
-    document = read_toml(config) if config else {}
-    _refuse_unknown(document, SECTIONS, str(config))
+    document = _content(config) if config else {}
+    _refuse_unknown(document, SECTIONS, _name(config))
     own = {"aircraft": aircraft, "site": site, "thresholds": thresholds}
     files = {name: own.get(name) or config for name in TABLES}
     for name, path in own.items():
         if path:
-            document[name] = read_toml(path)
+            document[name] = _content(path)
     if intervals:
-        listed = read_toml(intervals)
-        _refuse_unknown(listed, ("exclude", "force"), str(intervals))
+        listed = _content(intervals)
+        _refuse_unknown(listed, ("exclude", "force"), _name(intervals))
         document.update(listed)
     for name in TABLES:
-        if not isinstance(document.get(name, {}), dict):
-            raise SettingsError(f"{config}, {name}", repr(document[name]), f"a table [{name}]")
+        if not isinstance(document.get(name, {}), Mapping):
+            raise SettingsError(f"{_name(config)}, {name}", repr(document[name]), f"a table [{name}]")
     return Configuration(
         heading=document.get("heading", {}),
         inertial=document.get("inertial", {}),
+        latency=document.get("latency", {}),
         aircraft=document.get("aircraft", {}),
         site=document.get("site", {}),
         thresholds=document.get("thresholds", {}),
-        exclude=_intervals(document.get("exclude", []), f"{intervals or config}, exclude"),
-        force=_intervals(document.get("force", []), f"{intervals or config}, force"),
+        exclude=_intervals(document.get("exclude", []), f"{_name(intervals or config)}, exclude"),
+        force=_intervals(document.get("force", []), f"{_name(intervals or config)}, force"),
         profile=str(profile) if profile else None,
-        files={name: str(path) for name, path in files.items() if path},
+        files={name: str(path) for name, path in files.items() if isinstance(path, Path)},
     )
+
+
+def _content(settings: Settings) -> dict[str, Any]:
+    return read_toml(settings) if isinstance(settings, Path) else dict(settings)
+
+
+def _name(settings: Settings | None) -> str:
+    return str(settings) if isinstance(settings, Path) else "settings"
 
 
 def _refuse_unknown(document: Mapping[str, Any], known: Iterable[str], where: str) -> None:

@@ -12,16 +12,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UnclaimedLogError
-from groundstation.base.findings import SEVERITIES, worst
+from groundstation.base.findings import SEVERITIES, Severity, worst
 from groundstation.base.records import RecordBatch
 from groundstation.pipeline.analyse import Given, analyse, configured_thresholds
 from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.convert import Converted, convert_log
+from groundstation.pipeline.convert import Converted, convert_log, stored_findings
 from groundstation.pipeline.identity import flight_id
 from groundstation.pipeline.log import Log, open_log
 from groundstation.pipeline.manifest import manifest_of
 from groundstation.pipeline.outcome import Outcome, State
 from groundstation.pipeline.progress import Event, Listener, silent
+from groundstation.pipeline.resume import Finished, Step, keys_of, remember_reports, remembered
 from groundstation.results.files import MANIFEST
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight
@@ -52,7 +53,8 @@ class Stopwatch:
 class Job:
     """One log to run; plain values, so that it travels to a worker process.
 
-    ``owner`` is the process that runs the logs; ``add_suffix``: two flights of one id get ``_<sha8>`` of their logs.
+    ``owner`` is the process that runs the logs; ``add_suffix``: two flights of one id get ``_<sha8>`` of their logs;
+    ``step`` is what has to be done of it, with what the flight that is ``finished`` has for the rest.
     """
 
     path: Path
@@ -62,6 +64,19 @@ class Job:
     is_named: bool = True
     owner: int = 0
     add_suffix: bool = False
+    with_pdf: bool = True
+    step: Step = "everything"
+    finished: Finished | None = None
+
+    @property
+    def log(self) -> str:
+        """Its log as the user would type it."""
+        return str(self.path)
+
+    @property
+    def name(self) -> str:
+        """Name of its log."""
+        return self.path.name
 
 
 def run_flight(job: Job, listen: Listener = silent) -> Outcome:
@@ -74,6 +89,8 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
     name, sha256, trace = job.path.name, "", ""
     partial: Path | None = None
     try:
+        if job.finished is not None and job.step in ("nothing", "reports"):
+            return _run_reports(job, job.finished, watch)
         log = open_log(job.path, Path(job.configuration.profile) if job.configuration.profile else None)
         sha256 = log.source.sha256
         job.out.mkdir(parents=True, exist_ok=True)
@@ -117,8 +134,11 @@ def _run(log: Log, job: Job, partial: Path, watch: Stopwatch) -> Outcome:
     from groundstation.viewer.recording import write_recording
 
     mcap = partial / "flight.mcap"
-    with watch.stage("converting"):
-        converted = convert_log(log, mcap, configured_thresholds(job.configuration))
+    if job.step == "analysis" and job.finished is not None:
+        converted = _taken_over(job.finished.mcap, mcap)
+    else:
+        with watch.stage("converting"):
+            converted = convert_log(log, mcap, configured_thresholds(job.configuration))
     with watch.stage("reading the MCAP"):
         flight = read_flight(mcap, converted)
     start_utc_ns = flight.start_ns if flight.has_utc else None
@@ -129,21 +149,55 @@ def _run(log: Log, job: Job, partial: Path, watch: Stopwatch) -> Outcome:
         results = analyse(flight, given_of(log, converted, identity), job.configuration)
     with watch.stage("saving"):
         mcap.rename(partial / f"{identity}.mcap")
-        save(partial, results, manifest_of(log, results, job.configuration))
+        text = sentence(results)
+        keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf)
+        resume = remembered(keys, text, converted.has_lost_data)
+        save(partial, results, manifest_of(log, results, job.configuration, resume))
     with watch.stage("recording"):
         write_recording(partial / f"{identity}.rrd", flight, results)
     with watch.stage("reporting"):
-        write_flight_report(partial)
-    state = _state(results, converted, job.fail_on)
+        written = write_flight_report(partial, with_pdf=job.with_pdf)
     return Outcome(
         str(job.path),
-        state,
-        sentence(results),
+        _state(worst(results.findings), converted.has_lost_data, job.fail_on),
+        "; ".join(filter(None, (text, written.problem))),
         flight_id=identity,
         folder=str(partial),
         sha256=log.source.sha256,
         times_s=watch.times_s,
     )
+
+
+def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
+    """The outcome of a flight that is finished, its reports made again where that is asked for."""
+    from groundstation.reports.flight_report import write_flight_report
+
+    problem = ""
+    if job.step == "reports":
+        with watch.stage("reporting"):
+            problem = write_flight_report(finished.folder, with_pdf=job.with_pdf).problem
+            remember_reports(finished, with_pdf=job.with_pdf)
+    return Outcome(
+        str(job.path),
+        _state(finished.gravest, finished.has_lost_data, job.fail_on),
+        "; ".join(filter(None, (finished.text, problem))),
+        flight_id=finished.flight_id,
+        folder=str(finished.folder),
+        sha256=finished.sha256,
+        times_s=watch.times_s,
+    )
+
+
+def _taken_over(mcap: Path, target: Path) -> Converted:
+    """The MCAP of a finished flight, as if it had just been converted."""
+    from groundstation.store.reader import read_info
+
+    try:
+        os.link(mcap, target)
+    except OSError:  # no links here, or another file system
+        shutil.copyfile(mcap, target)
+    info = read_info(target)
+    return Converted(info, stored_findings(info), any(entry.get("loses_data") for entry in info.damages))
 
 
 def given_of(log: Log, converted: Converted, identity: str) -> Given:
@@ -162,11 +216,10 @@ def read_flight(mcap: Path, converted: Converted) -> Flight:
     return flight_from_batches(batches, metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name)
 
 
-def _state(results: FlightResults, converted: Converted, fail_on: str) -> State:
-    gravest = worst(results.findings)
+def _state(gravest: Severity | None, has_lost_data: bool, fail_on: str) -> State:
     if fail_on in SEVERITIES and gravest and SEVERITIES.index(gravest) >= SEVERITIES.index(fail_on):
         return "limit_reached"
-    return "data_lost" if converted.has_lost_data else "done"
+    return "data_lost" if has_lost_data else "done"
 
 
 def sentence(results: FlightResults) -> str:
@@ -210,10 +263,13 @@ def _inertial_sentence(results: FlightResults) -> str:
 
 def place(partial: Path, target: Path) -> None:
     """Move a finished flight folder into place; of a folder that is there, only what a run makes is replaced."""
+    from groundstation.reports.flight_report import PDF
+
     if not target.exists():
         partial.rename(target)
         return
     (target / MANIFEST).unlink(missing_ok=True)  # the mark of a whole folder goes first and comes back last
+    (target / PDF).unlink(missing_ok=True)  # this run may have made none
     for entry in sorted(partial.iterdir(), key=lambda path: path.name == MANIFEST):
         old = target / entry.name
         if old.is_dir() and not old.is_symlink():

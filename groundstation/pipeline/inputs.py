@@ -9,6 +9,7 @@ from groundstation.reports.index import INDEX_CSV, INDEX_JSON
 from groundstation.results.files import MANIFEST, SUMMARY
 
 FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, STUDY_MARK = MANIFEST, INDEX_JSON, ".groundstation-study"
+COMPARISON_MARKS = "compare.html", "compare.csv"
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ def collect(paths: Sequence[Path], out: Path | None = None) -> tuple[Input, ...]
 
 def is_ours(folder: Path) -> bool:
     """Whether groundstation made the folder: a flight folder or an OUT."""
-    names = {FLIGHT_FOLDER_MARK, SUMMARY}, {OUT_FOLDER_MARK, INDEX_CSV}, {STUDY_MARK}
+    names = {FLIGHT_FOLDER_MARK, SUMMARY}, {OUT_FOLDER_MARK, INDEX_CSV}, {STUDY_MARK}, set(COMPARISON_MARKS)
     try:
         return any(all((folder / name).is_file() for name in marks) for marks in names)
     except OSError:

@@ -2,20 +2,21 @@
 
 import platform
 import sys
+from collections.abc import Mapping
 from datetime import UTC, datetime
-from importlib import metadata as installed
 from typing import Any
 
 from groundstation import __version__
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.log import Log
+from groundstation.pipeline.resume import versions
 from groundstation.results.flight import FlightResults
 
-PACKAGES = ("mcap", "numpy", "pandas", "numba", "scipy", "pyarrow", "rerun-sdk", "protobuf", "matplotlib", "pygeomag")
 
-
-def manifest_of(log: Log, results: FlightResults, configuration: Configuration) -> dict[str, Any]:
-    """Describe a run: the log, what the user set, versions, host and time."""
+def manifest_of(
+    log: Log, results: FlightResults, configuration: Configuration, resume: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Describe a run: the log, what the user set, versions, host and time, and what a later run need not do again."""
     return {
         "groundstation": __version__,
         "flight_id": results.flight_id,
@@ -34,12 +35,6 @@ def manifest_of(log: Log, results: FlightResults, configuration: Configuration) 
             "machine": platform.machine(),
             "python": sys.version.split()[0],
         },
-        "versions": {name: _version(name) for name in PACKAGES},
+        "versions": versions(),
+        "resume": dict(resume),
     }
-
-
-def _version(package: str) -> str:
-    try:
-        return installed.version(package)
-    except installed.PackageNotFoundError:
-        return ""

@@ -4,7 +4,10 @@ matplotlib is used through its object-oriented interface alone: no pyplot, no gl
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -58,8 +61,8 @@ STYLE: dict[str, Any] = {
     "axes.formatter.useoffset": False,
     "grid.color": "#e4e8ec",
     "grid.linewidth": 0.5,
-    "xtick.labelsize": 7.5,
-    "ytick.labelsize": 7.5,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
     "xtick.color": INK,
     "ytick.color": INK,
     "xtick.major.width": 0.6,
@@ -67,7 +70,7 @@ STYLE: dict[str, Any] = {
     "xtick.major.size": 3.0,
     "ytick.major.size": 3.0,
     "lines.linewidth": 1.0,
-    "legend.fontsize": 7.5,
+    "legend.fontsize": 8.0,
     "legend.frameon": False,
     "legend.handlelength": 1.6,
     "legend.borderaxespad": 0.2,
@@ -85,6 +88,40 @@ _GEOMETRY = re.compile(r'(?<= (?:d|x|y)=")[^"]*|(?<= points=")[^"]*')
 _LONG_DECIMAL = re.compile(r"-?\d+\.\d{3,}")
 _NAME = re.compile(r'((?<= id=")|(?<=url\(#)|(?<=xlink:href="#))')
 _BETWEEN = re.compile(r">\s+<")
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """A figure that is not painted yet: its size and who paints it."""
+
+    height_mm: float
+    paint: Callable[[Any], None]
+    width_mm: float
+
+
+_sketches: ContextVar[dict[str, Sketch] | None] = ContextVar("sketches", default=None)
+
+
+@contextmanager
+def sketching() -> Iterator[dict[str, Sketch]]:
+    """Gather sketches by key in place of drawing: within, :func:`draw` paints nothing and returns the key."""
+    sketches: dict[str, Sketch] = {}
+    token = _sketches.set(sketches)
+    try:
+        yield sketches
+    finally:
+        _sketches.reset(token)
+
+
+@contextmanager
+def report_style() -> Iterator[None]:
+    """Set matplotlib's look to the report's for a while; a user's matplotlibrc does not reach it."""
+    import matplotlib
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(STYLE)  # type: ignore[arg-type]
+        yield
 
 
 def draw(key: str, height_mm: float, paint: Callable[[Any], None], width_mm: float = WIDTH_MM) -> str:
@@ -106,13 +143,14 @@ def draw(key: str, height_mm: float, paint: Callable[[Any], None], width_mm: flo
     """
     import io
 
-    import matplotlib
+    sketches = _sketches.get()
+    if sketches is not None:
+        sketches[key] = Sketch(height_mm, paint, width_mm)
+        return key
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()  # a user's matplotlibrc does not reach the report
-        matplotlib.rcParams.update(STYLE)  # type: ignore[arg-type]
+    with report_style():
         figure = Figure(figsize=(width_mm / MM_PER_INCH, height_mm / MM_PER_INCH))
         FigureCanvasSVG(figure)
         paint(figure)
@@ -208,7 +246,7 @@ def beside(axes: Any, x: float, y: float, text: str, colour: str, transform: Any
         xycoords=transform,
         textcoords="offset points",
         color=colour,
-        fontsize=7,
+        fontsize=8,
         va="bottom",
         ha=ha,
         bbox=ground,

@@ -1,45 +1,78 @@
-"""The report of one flight: one self-contained HTML file, made from the saved results alone."""
+"""The report of one flight: one self-contained HTML file and its PDF, made from the saved results alone."""
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.reports.page import TEMPLATES, render
+from groundstation.reports.parts import Document
+from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.reports.sections import CHAPTERS, front
 from groundstation.reports.sections.saved import mapping
 from groundstation.results.files import SavedFlight, load, write_text
 
 REPORT = "report.html"
+PDF = "report.pdf"
 _NOT_IN_AN_ID = re.compile(r"[^A-Za-z0-9_-]+")
 
 
-def write_flight_report(folder: Path) -> Path:
-    """Write report.html into a flight folder and return its path.
+@dataclass(frozen=True)
+class Written:
+    """The files of a report; ``problem`` says why there is no PDF where one was asked for."""
+
+    paths: tuple[Path, ...]
+    problem: str = ""
+
+
+def write_flight_report(folder: Path, *, with_pdf: bool = True) -> Written:
+    """Write report.html and report.pdf into a flight folder.
 
     Parameters
     ----------
     folder : Path
         Holds summary.json, manifest.json and results.parquet/: nothing else is read, and equal files give equal bytes
         whatever the time, the host or the number of workers.
+    with_pdf : bool
+        Without it there is no report.pdf afterwards: one of an earlier run would tell of other results.
 
     Raises
     ------
     UnreadableLogError
         When the folder has no saved results.
     """
-    path = folder / REPORT
-    write_text(path, flight_report_html(load(folder)))
-    return path
+    document = flight_document(load(folder))
+    return write_pages(folder / REPORT, flight_report_html(document), document, with_pdf=with_pdf)
 
 
-def flight_report_html(saved: SavedFlight) -> str:
-    """Render the report of one saved flight as a complete HTML document."""
-    sections = [section for section in (build(saved) for build in CHAPTERS) if section is not None]
+def write_pages(page: Path, html: str, document: Document, *, with_pdf: bool) -> Written:
+    """Write a page and, beside it, the document as PDF; a PDF of an earlier run is removed."""
+    pdf = page.with_suffix(".pdf")
+    write_text(page, html)
+    pdf.unlink(missing_ok=True)
+    if not with_pdf:
+        return Written((page,))
+    try:
+        write_pdf(document, pdf)
+    except PdfError as error:
+        return Written((page,), str(error))
+    return Written((page, pdf))
+
+
+def flight_document(saved: SavedFlight) -> Document:
+    """Put the report of one saved flight together."""
+    sections = tuple(section for section in (build(saved) for build in CHAPTERS) if section is not None)
     flight_id = str(mapping(saved.summary, "flight").get("id", ""))
+    return Document("Flight report", flight_id, front.build(saved), sections)
+
+
+def flight_report_html(document: Document) -> str:
+    """Render the report of a flight as a complete HTML document."""
     return render(
         "flight.html.j2",
-        front=front.build(saved),
-        sections=sections,
-        flight_id=flight_id,
-        page_label=_NOT_IN_AN_ID.sub("-", flight_id),  # stands inside a CSS string
+        kind=document.kind,
+        label=document.label,
+        front=document.front,
+        sections=document.sections,
+        page_label=_NOT_IN_AN_ID.sub("-", document.label),  # stands inside a CSS string
         style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
     )

@@ -84,8 +84,10 @@ def index_row(saved: SavedFlight) -> dict[str, Any]:
         ],
         source=source.get("name"),
         sha256=source.get("sha256"),
-        # The folder is named by the flight id once the run is finished; until then it may bear another name.
-        **{key: f"{flight_id}/{name}" if (saved.folder / name).exists() else None for key, name in files.items()},
+        **{
+            key: f"{saved.folder.name}/{name}" if (saved.folder / name).exists() else None
+            for key, name in files.items()
+        },
     )
 
 

@@ -1,6 +1,7 @@
-"""What a section of the report is made of: drawings, tables, facts and notes, without a word of HTML.
+"""What a report is made of: a front, sections, and in them drawings, tables, facts and notes, without a word of markup.
 
-A section module builds these; templates/ turns them into a page, and escaping happens there, once, for everything.
+A section module builds these; page.py turns them into HTML and pdf.py into PDF, each with its template, and escaping
+happens there, once, for everything.
 """
 
 from collections.abc import Sequence
@@ -37,7 +38,7 @@ class Drawing:
     title, caption, alt : str
         The caption says what one sees, how many samples, what the lines are; alt is for those who cannot see it.
     svg : str
-        The only text that the templates pass on unescaped: made by reports.drawing alone.
+        The only text that the page passes on unescaped: made by reports.drawing alone.
     numbers : sequence of str
         Names of the figure data; the readable copies are tables/<name>.csv.
     """
@@ -101,3 +102,39 @@ class Section:
     title: str
     lead: str
     parts: Sequence[Part] = field(default_factory=tuple)
+
+
+@dataclass(frozen=True)
+class Front:
+    """What stands above the first chapter; what is empty is left out.
+
+    Parameters
+    ----------
+    title : str
+    pairs : sequence of (str, Cell)
+        Label and value; a label that is the key of a section leads there.
+    verdict : Mark, optional
+        The answer in a word; ``headline`` says what to do, ``sentences`` why.
+    figures : sequence of (str, str, str)
+        Label, value, remark.
+    to_sign : bool
+        Whether room is left for a name and a signature.
+    """
+
+    title: str
+    pairs: Sequence[tuple[str, Cell]] = ()
+    verdict: Mark | None = None
+    headline: str = ""
+    sentences: Sequence[str] = ()
+    figures: Sequence[tuple[str, str, str]] = ()
+    to_sign: bool = False
+
+
+@dataclass(frozen=True)
+class Document:
+    """A whole report; ``kind`` says what of ("Flight report"), ``label`` stands on every page of paper."""
+
+    kind: str
+    label: str
+    front: Front
+    sections: Sequence[Section]

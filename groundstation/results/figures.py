@@ -3,15 +3,18 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import frozen
 
+if TYPE_CHECKING:
+    import pandas as pd
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class FigureData:
     """The numbers of one figure (or of one plain table).
 
@@ -37,5 +40,14 @@ class FigureData:
     def __len__(self) -> int:
         return min((len(values) for values in self.columns.values()), default=0)
 
+    def __repr__(self) -> str:
+        return f"<FigureData {self.name}: {len(self)} rows of {', '.join(self.columns)}>"
+
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.columns[name]
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Pandas frame of the columns, in flight seconds as they are."""
+        import pandas as pd
+
+        return pd.DataFrame({name: values.copy() for name, values in self.columns.items()})

@@ -2,8 +2,9 @@
 
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from os import SEEK_END
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,16 @@ from groundstation.results.summary import digits_of, summary_of
 
 SUMMARY, MANIFEST, ARRAYS, TABLES = "summary.json", "manifest.json", "results.parquet", "tables"
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
+PARQUET_MAGIC = b"PAR1"  # at both ends of a whole file
+PARQUET_LEAST_BYTES = 12  # both, and the length of what describes the file
 
 
 @dataclass(frozen=True)
 class SavedFlight:
     """What a flight folder holds, as the report, ``compare`` and the fleet read it.
 
-    ``summary`` and ``manifest`` are the JSON documents; ``figures`` maps a name to its arrays.
+    ``summary`` and ``manifest`` are the JSON documents; ``figures`` maps a name to its arrays, which are read when they
+    are asked for.
     """
 
     folder: Path
@@ -37,13 +41,18 @@ class SavedFlight:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file under a temporary name and move it into place: a kill never leaves half a file.
+    """Write a text file as :func:`write_bytes` does.
 
     A lone surrogate (a file name that is not UTF-8) is written as its escape, which JSON reads back as it was.
     """
+    write_bytes(path, text.encode("utf-8", "backslashreplace"))
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file under a temporary name and move it into place: a kill never leaves half a file."""
     temporary = path.with_name(f".{path.name}.partial")
     try:
-        temporary.write_bytes(text.encode("utf-8", "backslashreplace"))
+        temporary.write_bytes(content)
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
@@ -78,13 +87,36 @@ def save(folder: Path, results: FlightResults, manifest: Mapping[str, Any]) -> N
     write_text(folder / MANIFEST, json_text(manifest))
 
 
+class _Figures(Mapping[str, FigureData]):
+    """Figures of a flight folder by name; each is read once, when it is first asked for."""
+
+    def __init__(self, paths: Mapping[str, Path]) -> None:
+        self._paths = paths
+        self._read: dict[str, FigureData] = {}
+
+    def __getitem__(self, name: str) -> FigureData:
+        if name not in self._read:
+            self._read[name] = _read_parquet(self._paths[name])
+        return self._read[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._paths
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._paths)
+
+    def __len__(self) -> int:
+        return len(self._paths)
+
+
 def load(folder: Path) -> SavedFlight:
-    """Read a flight folder back.
+    """Read a flight folder back; its figures are read when they are asked for.
 
     Raises
     ------
     UnreadableLogError
-        When the folder has no summary.json, or one that is not a JSON object.
+        When the folder has no summary.json, or one that is not a JSON object; when a file of its figures is cut. A
+        figure that is broken inside raises the same when it is asked for.
     """
     documents: dict[str, dict[str, Any]] = {}
     for name in (SUMMARY, MANIFEST):
@@ -94,8 +126,25 @@ def load(folder: Path) -> SavedFlight:
             raise UnreadableLogError(
                 str(folder / name), type(error).__name__, "the JSON file a run leaves", "run the log again"
             ) from error
-    figures = {path.stem: _read_parquet(path) for path in sorted((folder / ARRAYS).glob("*.parquet"))}
-    return SavedFlight(folder, documents[SUMMARY], documents[MANIFEST], figures)
+    paths = sorted((folder / ARRAYS).glob("*.parquet"))
+    for path in paths:
+        _require_whole(path)
+    return SavedFlight(folder, documents[SUMMARY], documents[MANIFEST], _Figures({path.stem: path for path in paths}))
+
+
+def _require_whole(path: Path) -> None:
+    """Refuse a Parquet file that is cut, by its ends alone."""
+    try:
+        with path.open("rb") as file:
+            begin = file.read(len(PARQUET_MAGIC))
+            size = file.seek(0, SEEK_END)
+            file.seek(max(size - len(PARQUET_MAGIC), 0))
+            end = file.read()
+        found = "" if size >= PARQUET_LEAST_BYTES and begin == end == PARQUET_MAGIC else "no whole file"
+    except OSError as error:
+        found = type(error).__name__
+    if found:
+        raise UnreadableLogError(str(path), found, "a Parquet file of a run", "run the log again")
 
 
 def _write_parquet(path: Path, figure: FigureData) -> None:
@@ -103,7 +152,9 @@ def _write_parquet(path: Path, figure: FigureData) -> None:
     import pyarrow.parquet as pq
 
     arrays = {
-        name: pa.array([_utf8(text) for text in values.tolist()], pa.string()) if values.dtype.kind in "UO" else values
+        name: pa.array([utf8_text(text) for text in values.tolist()], pa.string())
+        if values.dtype.kind in "UO"
+        else values
         for name, values in figure.columns.items()
     }
     digits = {name: str(figure.digits[name]) for name in figure.digits}
@@ -115,7 +166,8 @@ def _read_parquet(path: Path) -> FigureData:
     import pyarrow.parquet as pq
 
     try:
-        table = pq.read_table(path)
+        with pq.ParquetFile(path) as file:  # read_table would import pandas
+            table = file.read(use_threads=False)
     except (OSError, ValueError) as error:
         raise UnreadableLogError(
             str(path), type(error).__name__, "a Parquet file of a run", "run the log again"
@@ -128,7 +180,8 @@ def _read_parquet(path: Path) -> FigureData:
     return FigureData(path.stem, columns, {name: int(places) for name, places in digits.items()})
 
 
-def _utf8(text: Any) -> str:
+def utf8_text(text: Any) -> str:
+    """Text as Parquet takes it: a lone surrogate becomes its escape."""
     return str(text).encode("utf-8", "backslashreplace").decode("utf-8")
 
 

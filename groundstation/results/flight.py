@@ -2,13 +2,18 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from groundstation.base.findings import Finding
 from groundstation.results.figures import FigureData
 from groundstation.results.forecast import ForecastResult
+from groundstation.results.frames import Tabular, no_such_table
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
+from groundstation.results.latency import Latencies
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Status = Literal["ok", "degraded", "failed"]
 
@@ -32,7 +37,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class FlightResults:
+class FlightResults(Tabular):
     """Results of one flight.
 
     Parameters
@@ -53,6 +58,7 @@ class FlightResults:
     heading : HeadingResult, optional
     inertial : InertialResult, optional
     forecast : ForecastResult, optional
+    latency : Latencies, optional
     figures : tuple of FigureData
         Arrays behind every figure, those of the analyses among them.
     """
@@ -71,8 +77,28 @@ class FlightResults:
     heading: HeadingResult | None = None
     inertial: InertialResult | None = None
     forecast: ForecastResult | None = None
+    latency: Latencies | None = None
     figures: tuple[FigureData, ...] = ()
 
     def figure(self, name: str) -> FigureData | None:
         """The figure data of that name, None when the flight has none."""
         return next((figure for figure in self.figures if figure.name == name), None)
+
+    def table_names(self) -> tuple[str, ...]:
+        """Names that :meth:`to_frame` takes: findings, what was not assessable, the arrays behind the figures."""
+        return (*super().table_names(), *(figure.name for figure in self.figures))
+
+    def to_frame(self, table: str = "findings") -> "pd.DataFrame":
+        """A table of the flight as a frame: a list of rows, or the arrays behind a figure.
+
+        Raises
+        ------
+        UsageError
+            When there is no such table.
+        """
+        if table in super().table_names():
+            return super().to_frame(table)
+        figure = self.figure(table)
+        if figure is None:
+            raise no_such_table(table, self.table_names())
+        return figure.to_frame()

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from groundstation.results.figures import FigureData
+from groundstation.results.frames import Tabular
 
 FEWEST_STARTS = 5  # independent ones: with fewer the limits of NEES are so wide that anything passes
 
@@ -109,7 +110,7 @@ class CoupledRow:
 
 
 @dataclass(frozen=True)
-class ForecastResult:
+class ForecastResult(Tabular):
     """Forecast skill on one flight.
 
     Parameters

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from groundstation.results.figures import FigureData
+from groundstation.results.frames import Tabular
 
 GateState = Literal["passed", "failed", "not_measured"]
 Sense = Literal["at_most", "at_least", "between"]
@@ -97,7 +98,7 @@ class OnboardComparison:
 
 
 @dataclass(frozen=True)
-class HeadingResult:
+class HeadingResult(Tabular):
     """INS heading error found on straight taxi (error = INS heading - true heading).
 
     Parameters
@@ -123,6 +124,9 @@ class HeadingResult:
     drift_deg_per_h, drift_sigma_deg_per_h : float
     lever_arm_m, lever_arm_sigma_m, lever_arm_origin
         Longitudinal antenna arm, its sigma, and ``"aircraft file"``, ``"estimated"`` or ``"not observable"``.
+    latency_used_s, latency_used_sigma_s, latency_origin
+        By how much GNSS was taken to be later than the INS and shifted back, and whence: ``"aircraft file"``,
+        ``"motion"``; None and empty where nothing was shifted. ``time_offset_s`` is what the turns then still show.
     uncorrected_error_deg : float
         Plain mean of the differences with the velocity of the antenna as logged: what an on-board computer without arm
         correction would find.
@@ -157,6 +161,9 @@ class HeadingResult:
     lever_arm_origin: str = "not observable"
     time_offset_s: float | None = None
     time_offset_sigma_s: float | None = None
+    latency_used_s: float | None = None
+    latency_used_sigma_s: float | None = None
+    latency_origin: str = ""
     parking_ins_heading_deg: float | None = None
     parking_heading_deg: float | None = None
     parking_sigma_deg: float | None = None

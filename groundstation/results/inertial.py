@@ -3,9 +3,13 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from groundstation.results.figures import FigureData
+from groundstation.results.frames import Tabular, rows_frame
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MISSING: dict[str, str] = {"gnss": "GNSS", "ins": "INS", "both": "both"}  # RealOutage.missing, for people
 NOT_SEEN = 0.01  # observability below which the data said nothing of a state
@@ -84,7 +88,7 @@ class AzimuthEstimate:
 
 
 @dataclass(frozen=True)
-class InertialResult:
+class InertialResult(Tabular):
     """INS errors of one flight.
 
     Parameters
@@ -135,6 +139,19 @@ class InertialResult:
     other_ins: tuple[str, ...] = ()
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
+
+    def table_names(self) -> tuple[str, ...]:
+        """Names that :meth:`to_frame` takes."""
+        return ("states", *super().table_names())
+
+    def to_frame(self, table: str = "states") -> "pd.DataFrame":
+        """A list of rows as a frame (see :class:`Tabular`); ``states`` are those of both channels."""
+        if table != "states":
+            return super().to_frame(table)
+        rows = [(channel.name, state) for channel in self.channels for state in channel.states]
+        frame = rows_frame(StateEstimate, [state for _, state in rows])
+        frame.insert(0, "channel", [name for name, _ in rows])
+        return frame
 
 
 def is_left_alone(name: str, sigma: Any, observability: Any, settings: Mapping[str, Any]) -> bool:

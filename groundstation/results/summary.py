@@ -133,6 +133,8 @@ def summary_of(results: FlightResults) -> dict[str, Any]:
         answers["inertial"] = _inertial(results.inertial)
     if results.forecast is not None:
         answers["forecast"] = _answer(results.forecast)
+    if results.latency is not None:
+        answers["latency"] = _answer(results.latency)
     return {
         "schema_version": SCHEMA_VERSION,
         "flight": plain(flight),

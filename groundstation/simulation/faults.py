@@ -47,6 +47,24 @@ class BackwardStep:
 
 
 @dataclass(frozen=True)
+class ForwardStep:
+    """The recorder's clock is set ahead by ``step_s`` at a log time and runs on from there."""
+
+    kind: ClassVar[str] = "forward_step"
+    at_s: float = required_number(0.0)
+    step_s: float = required_number(0.0)
+
+
+@dataclass(frozen=True)
+class ClockDrift:
+    """The recorder's clock runs fast (negative: slow) from a log time on, beside what it did before."""
+
+    kind: ClassVar[str] = "clock_drift"
+    at_s: float = required_number(0.0)
+    drift_ppm: float = required_number(-1e5, 1e5)
+
+
+@dataclass(frozen=True)
 class Stuck:
     """A field keeps the value it had at ``from_s``."""
 
@@ -126,7 +144,18 @@ class Jitter:
 
 
 Fault: TypeAlias = (
-    Dropout | Duplicate | BackwardStep | Stuck | NotANumber | MissingChannel | Frozen | Jump | Reset | Jitter
+    Dropout
+    | Duplicate
+    | BackwardStep
+    | ForwardStep
+    | ClockDrift
+    | Stuck
+    | NotANumber
+    | MissingChannel
+    | Frozen
+    | Jump
+    | Reset
+    | Jitter
 )
 
 
@@ -148,7 +177,11 @@ def apply_faults(flight: Flight, faults: Iterable[Fault]) -> Flight:
             case Duplicate():
                 flight = _duplicate(flight, fault)
             case BackwardStep():
-                flight = _step_back(flight, fault)
+                flight = _clock_changed(flight, fault.at_s, step_s=-fault.step_s)
+            case ForwardStep():
+                flight = _clock_changed(flight, fault.at_s, step_s=fault.step_s)
+            case ClockDrift():
+                flight = _clock_changed(flight, fault.at_s, rate=fault.drift_ppm * 1e-6)
             case Stuck() | NotANumber():
                 flight = _spoil(flight, fault)
             case Frozen():
@@ -177,6 +210,10 @@ def describe(fault: Fault) -> str:
             return f"every row twice from {fault.from_s:g} to {fault.to_s:g} s"
         case BackwardStep():
             return f"clock set back by {fault.step_s:g} s at {fault.at_s:g} s"
+        case ForwardStep():
+            return f"clock set ahead by {fault.step_s:.12g} s at {fault.at_s:g} s"
+        case ClockDrift():
+            return f"clock {fault.drift_ppm:+g} ppm off from {fault.at_s:g} s on"
         case Stuck():
             return f"{fault.topic}.{fault.field} stuck from {fault.from_s:g} to {fault.to_s:g} s"
         case NotANumber():
@@ -233,11 +270,13 @@ def _duplicate(flight: Flight, fault: Duplicate) -> Flight:
     return replace(flight, tables=tables)
 
 
-def _step_back(flight: Flight, fault: BackwardStep) -> Flight:
+def _clock_changed(flight: Flight, at_s: float, *, step_s: float = 0.0, rate: float = 0.0) -> Flight:
+    """From a log time on the recorder's clock shows another time, and counts at another rate."""
     tables = {}
     for topic, table in flight.tables.items():
-        after = table.time_ns - flight.start_ns >= round(fault.at_s * NS_PER_S)
-        device = table.device_time_ns.values - np.where(after, round(fault.step_s * NS_PER_S), 0)
+        since_ns = table.time_ns - flight.start_ns - round(at_s * NS_PER_S)
+        change_ns = round(step_s * NS_PER_S) + np.rint(rate * since_ns).astype(np.int64)
+        device = table.device_time_ns.values + np.where(since_ns >= 0, change_ns, 0)
         tables[topic] = replace(table, device_time_ns=Column(device, table.device_time_ns.present))
     return replace(flight, tables=tables)
 

@@ -1,13 +1,14 @@
 """A table: the samples of one topic as named numpy columns on the corrected clock."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray, Column, Int64Array, frozen
 from groundstation.base.signals import field_of
 from groundstation.base.units import NS_PER_S
@@ -92,17 +93,17 @@ class Table:
         column = self.columns[name]
         return np.where(column.mask, column.values.astype(np.str_), "")
 
-    def take(self, index: Any) -> "Table":
+    def take(self, index: Any) -> Self:
         """The rows that ``index`` (slice, mask or positions) selects."""
-        return Table(
-            self.topic,
-            self.time_ns[index],
-            {name: column.take(index) for name, column in self.columns.items()},
-            self.record_index[index],
-            self.device_time_ns.take(index),
+        return replace(
+            self,
+            time_ns=self.time_ns[index],
+            columns={name: column.take(index) for name, column in self.columns.items()},
+            record_index=self.record_index[index],
+            device_time_ns=self.device_time_ns.take(index),
         )
 
-    def unique_times(self) -> "Table":
+    def unique_times(self) -> Self:
         """The table without repeated times: of several samples of one time the first is kept."""
         keep = np.ones(len(self), dtype=bool)
         keep[1:] = np.diff(self.time_ns) > 0
@@ -132,6 +133,53 @@ class Table:
                 text[absent] = pd.NA
                 data[name] = pd.array(text, dtype="string")
         return pd.DataFrame(data, index=pd.Index(self.time_ns, name="time_ns"))
+
+
+@dataclass(frozen=True)
+class TimedTable(Table):
+    """A table that knows the flight's clock, so that its frame is indexed by time.
+
+    Parameters
+    ----------
+    start_ns : int
+        Corrected time of flight time zero.
+    has_utc : bool
+        Whether corrected time is UTC.
+    """
+
+    start_ns: int = 0
+    has_utc: bool = False
+
+    def to_frame(self, index: Literal["auto", "utc", "flight_time"] = "auto") -> "pd.DataFrame":
+        """Pandas frame as of :meth:`Table.to_frame`, indexed by time.
+
+        Parameters
+        ----------
+        index : {'auto', 'utc', 'flight_time'}
+            ``utc``: a DatetimeIndex in UTC; ``flight_time``: a TimedeltaIndex since the start of the flight; ``auto``:
+            the first where the flight has UTC.
+
+        Raises
+        ------
+        NotAssessableError
+            When UTC is asked for and the flight has none.
+
+        Examples
+        --------
+        >>> time_ns, nothing = np.array([5_000_000_000, 5_500_000_000]), Column(np.zeros(2))
+        >>> table = TimedTable("baro", time_ns, {}, np.arange(2), nothing, start_ns=5_000_000_000)
+        >>> table.to_frame().index.total_seconds().tolist()
+        [0.0, 0.5]
+        """
+        import pandas as pd
+
+        if index == "utc" and not self.has_utc:
+            raise NotAssessableError(self.topic, "no UTC in this flight", "index='flight_time'")
+        frame = super().to_frame()
+        if index == "flight_time" or not self.has_utc:
+            since = (self.time_ns - self.start_ns).astype("timedelta64[ns]")
+            return frame.set_index(pd.TimedeltaIndex(since, name="flight_time"))
+        return frame.set_index(pd.DatetimeIndex(self.time_ns.astype("datetime64[ns]"), tz="UTC", name="utc"))
 
 
 @dataclass(frozen=True)
@@ -184,3 +232,17 @@ class Flight:
         """Seconds from the first to the last sample of any topic."""
         ends = [int(table.time_ns[-1]) for table in self.tables.values() if len(table)]
         return (max(ends) - self.start_ns) / NS_PER_S if ends else 0.0
+
+
+def timed(flight: Flight, topic: str) -> TimedTable:
+    """The table of a topic with the flight's clock."""
+    table = flight[topic]
+    return TimedTable(
+        topic,
+        table.time_ns,
+        table.columns,
+        table.record_index,
+        table.device_time_ns,
+        start_ns=flight.start_ns,
+        has_utc=flight.has_utc,
+    )

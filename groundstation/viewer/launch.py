@@ -34,9 +34,9 @@ def viewer_executable() -> Path:
 
 
 def viewer_command(
-    path: Path, *, web: bool = False, host: str = LOCAL, port: int | None = None, headless: bool = False
+    path: Path | str, *, web: bool = False, host: str = LOCAL, port: int | None = None, headless: bool = False
 ) -> list[str]:
-    """Command line that opens a recording.
+    """Command line that opens a recording, or what an address offers.
 
     Examples
     --------
@@ -106,9 +106,10 @@ def open_viewer(
         raise GroundstationError(str(path), "no such file", next_step="run the log first")
     try:
         return subprocess.run(
-            viewer_command(path, web=web, host=host, port=port, headless=headless),
+            viewer_command(path.absolute(), web=web, host=host, port=port, headless=headless),
             check=False,
             env=viewer_environment(os.environ),
+            cwd=path.absolute().parent,  # where the links of fleet.rrd begin
         ).returncode
     except KeyboardInterrupt:
         return 0

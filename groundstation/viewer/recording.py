@@ -3,7 +3,7 @@
 import hashlib
 import re
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -45,11 +45,16 @@ def write_recording(path: Path, flight: Flight, results: FlightResults) -> None:
     GroundstationError
         When Rerun refused the data or the file could not be written.
     """
+    save_stream(path, results.flight_id, lambda stream: send_flight(stream, flight, results))
+
+
+def save_stream(path: Path, identity: str, send: Callable[[rr.RecordingStream], object]) -> None:
+    """Write what ``send`` logs as the recording of that name; see :func:`write_recording`."""
     temporary = path.with_name(f".{path.name}.partial")
     try:
-        with _stream(results) as stream:
+        with open_stream(identity) as stream:
             stream.save(temporary)
-            send_flight(stream, flight, results)
+            send(stream)
         temporary.replace(path)
     except (OSError, RuntimeError) as error:  # Rerun's own are RuntimeErrors
         raise GroundstationError(str(path), str(error), next_step="check the folder and the space left") from error
@@ -73,7 +78,7 @@ def stream_recording(flight: Flight, results: FlightResults, *, connect_url: str
         When no viewer took the data.
     """
     _expect_viewer(connect_url)
-    with _stream(results) as stream:
+    with open_stream(results.flight_id) as stream:
         try:
             stream.connect_grpc(connect_url)
             send_flight(stream, flight, results)
@@ -109,9 +114,16 @@ def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResul
         raw(recorder, flight, results),
         log(recorder, flight, results),
     )
+    return send_layout(stream, [tab for tab in tabs if tab is not None])
+
+
+def send_layout(
+    stream: rr.RecordingStream, tabs: Sequence[rrb.Container], *, timeline: str = FLIGHT_TIME
+) -> rrb.Blueprint:
+    """Send the layout of a recording, its panels closed and its time standing still, and wait until all is out."""
     blueprint = rrb.Blueprint(
-        rrb.Tabs(contents=[tab for tab in tabs if tab is not None], active_tab=0),
-        rrb.TimePanel(state="collapsed", timeline=FLIGHT_TIME, play_state="paused"),
+        rrb.Tabs(contents=tabs, active_tab=0),
+        rrb.TimePanel(state="collapsed", timeline=timeline, play_state="paused"),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         auto_layout=False,
@@ -137,13 +149,11 @@ def application_id(flight_id: str) -> str:
 
 
 @contextmanager
-def _stream(results: FlightResults) -> Iterator[rr.RecordingStream]:
+def open_stream(identity: str) -> Iterator[rr.RecordingStream]:
     """Open a stream in strict mode, without Rerun's own timelines; closed, file footer written, on leaving."""
     strict = rr.strict_mode()
     rr.set_strict_mode(True)  # else the SDK drops data with a mere warning
-    stream = rr.RecordingStream(
-        application_id(results.flight_id), recording_id=clean_text(results.flight_id), send_properties=False
-    )
+    stream = rr.RecordingStream(application_id(identity), recording_id=clean_text(identity), send_properties=False)
     try:
         stream.set_log_time_enabled(False)
         stream.set_log_tick_enabled(False)

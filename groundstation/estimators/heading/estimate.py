@@ -7,12 +7,14 @@ import numpy as np
 from groundstation.base.angles import wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.heading.answer import build_answer
+from groundstation.estimators.heading.delay import known_delay
 from groundstation.estimators.heading.gating import gate_samples
 from groundstation.estimators.heading.samples import HeadingOf, OnGround, Samples, choose_topics, pair_samples
 from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings, SiteData
 from groundstation.estimators.heading.solution import solve
 from groundstation.estimators.heading.standstill import find_standstill
 from groundstation.results.heading import HeadingResult
+from groundstation.results.latency import Latencies
 from groundstation.tables.table import Flight
 
 
@@ -25,6 +27,7 @@ def estimate_heading_error(
     aircraft: AircraftData | None = None,
     site: SiteData | None = None,
     request: HeadingRequest | None = None,
+    latencies: Latencies | None = None,
 ) -> HeadingResult:
     """Estimate the INS heading error from straight taxi before take-off.
 
@@ -40,6 +43,8 @@ def estimate_heading_error(
     heading : callable, optional
         True heading of an INS topic, e.g. ``lambda topic: true_heading(flight, topic)``; default: as logged.
     settings, aircraft, site, request : optional
+    latencies : Latencies, optional
+        Where that of GNSS behind the INS is observed, GNSS times are put back by it; the aircraft file's comes first.
 
     Returns
     -------
@@ -64,6 +69,7 @@ def estimate_heading_error(
     settings, aircraft = settings or HeadingSettings(), aircraft or AircraftData()
     site, request = site or SiteData(), request or HeadingRequest()
     ins_topic, gnss_topic = choose_topics(flight, request)
+    delay = known_delay((ins_topic, gnss_topic), latencies, aircraft, settings)
 
     def gated(with_later_runs: bool) -> Samples:
         paired = pair_samples(
@@ -72,6 +78,7 @@ def estimate_heading_error(
             on_ground=on_ground,
             heading=heading,
             with_later_runs=with_later_runs,
+            gnss_latency_s=delay.latency_s if delay else 0.0,
         )
         if aircraft.mounting_deg:
             paired = replace(paired, heading_deg=wrap_360(paired.heading_deg - aircraft.mounting_deg))
@@ -85,8 +92,13 @@ def estimate_heading_error(
     if antenna.is_used.sum() < 2:
         raise NotAssessableError("heading", _why_nothing_is_used(antenna, settings))
     standstill = find_standstill(antenna, settings)
-    solution = solve(antenna, standstill, aircraft, settings)
-    return build_answer(flight, (ins_topic, gnss_topic), solution, standstill, settings, aircraft, site)
+    solution = solve(antenna, standstill, aircraft, delay.narrowed(settings) if delay else settings)
+    result = build_answer(flight, (ins_topic, gnss_topic), solution, standstill, settings, aircraft, site)
+    if delay is None:
+        return result
+    return replace(
+        result, latency_used_s=delay.latency_s, latency_used_sigma_s=delay.sigma_s, latency_origin=delay.origin
+    )
 
 
 def _why_nothing_is_used(samples: Samples, settings: HeadingSettings) -> str:

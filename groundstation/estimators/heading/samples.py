@@ -223,16 +223,19 @@ def pair_samples(
     on_ground: OnGround | None = None,
     heading: HeadingOf | None = None,
     with_later_runs: bool = False,
+    gnss_latency_s: float = 0.0,
 ) -> Samples:
     """Pair each distinct GNSS epoch before lift-off with the INS heading interpolated to its time.
 
-    ``with_later_runs`` adds the epochs after lift-off at which ground contact is proven: landing roll and taxi in.
+    GNSS times are put back by ``gnss_latency_s``, by which GNSS is later than the INS. ``with_later_runs`` adds
+    the epochs after lift-off at which ground contact is proven: landing roll and taxi in.
 
     The heading is interpolated along the shorter arc between INS samples no farther apart than
     ``heading_gap_max_s``; elsewhere it is NaN. The part before lift-off ends where ground contact, once proven, is
     lost for more than 5 s at speed; where nothing is proven, at ``lift_off_speed_mps``.
     """
     gnss = distinct_epochs(flight[gnss_topic])
+    gnss = replace(gnss, time_ns=gnss.time_ns - round(gnss_latency_s * NS_PER_S))
     given = heading(ins_topic) if heading else logged_heading(flight, ins_topic)
     ground: GroundContact = on_ground(gnss.time_ns) if on_ground else logged_ground(flight, gnss.time_ns)
     method = "" if ground.method.startswith("none") else ground.method

@@ -10,6 +10,7 @@ from groundstation.base.toml_settings import check_ranges, number, required_numb
 
 RateKind = Literal["slope", "raw"]
 Runs = Literal["auto", "before_take_off", "all_ground"]
+UseLatency = Literal["when_observed", "never"]
 LEAST_ENTRY_STEP_DEG = 1e-6  # the places an answer is shown with
 LEAST_DRAWS = 100  # of a posterior of eight parameters
 
@@ -65,6 +66,7 @@ class HeadingSettings:
     drift_sigmas_max: float = number(3.0, 0.0)
 
     # Lever arm and time offset
+    use_latency: UseLatency = "when_observed"  # shift GNSS by its latency behind the INS, estimated from motion
     arm_speed_min_mps: float = number(3.0, 0.0)  # turns slower than this are not used to find the arm
     arm_rate_window_s: float = number(0.2, 0.0)
     arm_interval_max_s: float = number(0.5, 0.0)  # slower logs do not show the rate of a turn at the GNSS time
@@ -105,6 +107,8 @@ class AircraftData:
     mounting_deg, mounting_sigma_deg : float
         Heading of the INS case minus heading of the airframe, known, and the sigma of what remains of it
         (steady sideslip included). The sigma widens the interval.
+    gnss_latency_s, gnss_latency_sigma_s : float or None
+        How much later GNSS velocities are logged than the INS shows the same motion, known; None: estimated.
     ins_class : str
         For the record.
     """
@@ -114,6 +118,8 @@ class AircraftData:
     entry_step_deg: float = number(0.1, LEAST_ENTRY_STEP_DEG, 10.0)
     mounting_deg: float = number(0.0, -10.0, 10.0)
     mounting_sigma_deg: float = number(0.0, 0.0)
+    gnss_latency_s: float | None = number(None, -10.0, 10.0)
+    gnss_latency_sigma_s: float = number(0.01, 0.0, 10.0)
     ins_class: str = ""
 
     def __post_init__(self) -> None:

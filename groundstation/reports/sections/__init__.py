@@ -7,13 +7,14 @@ to :data:`CHAPTERS`.
 from collections.abc import Callable
 
 from groundstation.reports.parts import Section
-from groundstation.reports.sections import findings, forecast, heading, inertial, overview, provenance, quality
+from groundstation.reports.sections import findings, forecast, heading, inertial, latency, overview, provenance, quality
 from groundstation.results.files import SavedFlight
 
 CHAPTERS: tuple[Callable[[SavedFlight], Section | None], ...] = (
     heading.build,
     inertial.build,
     forecast.build,
+    latency.build,
     overview.build,
     quality.build,
     findings.build,

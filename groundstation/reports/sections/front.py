@@ -1,10 +1,9 @@
 """The top of the report: which flight this is, and the verdict with the number to type."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
-from groundstation.reports.parts import Mark, Tone
+from groundstation.reports.parts import Front, Mark, Tone
 from groundstation.reports.sections.saved import heading_of, mapping, not_assessable_reason, objects
 from groundstation.reports.wording import ABSENT, clock, interval, is_number, number, step_places, typeset
 from groundstation.results.files import SavedFlight
@@ -30,61 +29,39 @@ ADVICE = {
 }
 
 
-@dataclass(frozen=True)
-class Front:
-    """What stands above the first chapter.
-
-    ``word`` is the verdict, ``headline`` what to do, ``sentences`` why; ``figures`` are label, value, remark.
-    """
-
-    title: str
-    pairs: Sequence[tuple[str, str]]
-    log: str
-    findings: str
-    status: Mark
-    verdict: Mark
-    headline: str
-    sentences: Sequence[str]
-    figures: Sequence[tuple[str, str, str]]
-    to_sign: bool
-
-
 def build(saved: SavedFlight) -> Front:
     """Put the top of the report together."""
     flight = mapping(saved.summary, "flight")
     heading = heading_of(saved)
     start = flight.get("start_utc")
     names = [str(flight.get(key) or "") for key in ("aircraft", "flight")]
+    status = STATUS.get(str(saved.summary.get("status")), Mark("unknown", str(saved.summary.get("status"))))
+    counts = [str(item.get("severity")) for item in objects(saved.summary, "findings")]
+    found = " · ".join(f"{counts.count(name)} {name}" for name in ("fail", "warn", "info") if name in counts) or "none"
     pairs = (
         ("Aircraft", names[0] or "not named in the log"),
         ("Flight", names[1] or "not named in the log"),
         ("Start", f"{str(start)[:10]} {str(start)[11:19]} UTC" if start else "no absolute time"),
         ("Duration", f"{clock(flight.get('duration_s'))} {'h:min:s' if _hours(flight) else 'min:s'}"),
+        ("Status", status),
+        ("Findings", found),
+        ("Log", str(mapping(flight, "source").get("name") or ABSENT)),
     )
-    status = STATUS.get(str(saved.summary.get("status")), Mark("unknown", str(saved.summary.get("status"))))
-    counts = [str(item.get("severity")) for item in objects(saved.summary, "findings")]
-    found = " · ".join(f"{counts.count(name)} {name}" for name in ("fail", "warn", "info") if name in counts) or "none"
     title = " · ".join(filter(None, (names[0], names[1] and f"flight {names[1]}"))) or str(flight.get("id", ""))
-    common: dict[str, Any] = {
-        "title": title,
-        "pairs": pairs,
-        "status": status,
-        "findings": found,
-        "log": str(mapping(flight, "source").get("name") or ABSENT),
-    }
     if not heading:
         reason = not_assessable_reason(saved, "heading") or "the log does not hold what the method needs"
         return Front(
-            **common,
+            title,
+            pairs,
             verdict=Mark("unknown", "Not assessable"),
             headline="Heading correction: not assessable",
             sentences=(_sentence(reason),),
             figures=_of_the_ins(saved),
-            to_sign=False,
         )
     tone, word = VERDICTS.get(str(heading.get("verdict")), ("unknown", str(heading.get("verdict"))))
     return Front(
-        **common,
+        title,
+        pairs,
         verdict=Mark(tone, word),
         headline=_headline(heading),
         sentences=tuple(

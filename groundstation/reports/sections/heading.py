@@ -240,6 +240,7 @@ def _geometry(heading: Mapping[str, Any]) -> Facts:
             _with_sigma(heading.get("lever_arm_m"), heading.get("lever_arm_sigma_m"), 2, "m"),
             str(heading.get("lever_arm_origin") or ""),
         ),
+        *_latency(heading),
         (
             "GNSS time offset",
             _with_sigma(heading.get("time_offset_s"), heading.get("time_offset_sigma_s"), 3, "s"),
@@ -252,6 +253,14 @@ def _geometry(heading: Mapping[str, Any]) -> Facts:
         ),
     )
     return Facts("Lever arm, time offset, drift", pairs)
+
+
+def _latency(heading: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """The latency by which GNSS was put back before all else; nothing where it was not."""
+    if not is_number(heading.get("latency_used_s")):
+        return []
+    value = _with_sigma(heading.get("latency_used_s"), heading.get("latency_used_sigma_s"), 3, "s")
+    return [("GNSS latency taken out", value, f"from the {heading.get('latency_origin')}")]
 
 
 def _by_hand(saved: SavedFlight) -> Facts | None:

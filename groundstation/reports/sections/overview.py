@@ -119,7 +119,7 @@ def profile(saved: SavedFlight) -> Drawing | None:
 
     def paint(figure: Any) -> None:
         base = 12.0 + lane_mm
-        upper, lower = d.place(figure, 27, base + 35, 174, base + 66), d.place(figure, 27, base, 174, base + 31)
+        upper, lower = d.place(figure, 30, base + 35, 174, base + 66), d.place(figure, 30, base, 174, base + 31)
         for axes, column, text, colour in (
             (upper, altitude, f"{words(altitude.removesuffix('_m'))}, m", d.INS),
             (lower, "ground_speed_mps", "ground speed, m/s", d.GNSS),
@@ -137,7 +137,7 @@ def profile(saved: SavedFlight) -> Drawing | None:
         d.time_axis(lower, low, high, title=not states)
         d.legend_above(upper)
         if states and gnss is not None:
-            strip = d.place(figure, 27, 12, 174, 9 + lane_mm)
+            strip = d.place(figure, 30, 12, 174, 9 + lane_mm)
             d.lanes(strip, numbers(gnss, "start_s"), numbers(gnss, "end_s"), texts(gnss, "state"), states, GNSS_COLOURS)
             d.time_axis(strip, low, high)
 
@@ -169,7 +169,7 @@ def states(saved: SavedFlight) -> Drawing | None:
     colours = dict.fromkeys(rows, d.INS) | STATE_COLOURS
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 37, 12, 174, height - 2)
+        axes = d.place(figure, 44, 12, 174, height - 2)
         d.lanes(axes, start[shown], end[shown], named[shown], rows, colours)
         d.time_axis(axes, min(float(times.min()), 0.0), float(times.max()))
 

@@ -8,7 +8,15 @@ import numpy as np
 from groundstation.reports import drawing as d
 from groundstation.reports.parts import Drawing, Facts, Grid, Head, Note, Section
 from groundstation.reports.sections.saved import mapping, numbers, objects, texts
-from groundstation.reports.wording import any_value, named_quantity, number, number_with_unit, significant, words
+from groundstation.reports.wording import (
+    any_value,
+    named_quantity,
+    number,
+    number_with_unit,
+    significant,
+    typeset,
+    words,
+)
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight
 
@@ -34,6 +42,8 @@ def build(saved: SavedFlight) -> Section:
         _ledger(saved),
         _gaps(saved),
         _nested(saved, "clock", "Clock model"),
+        _clock_steps(saved),
+        _other_clocks(saved),
         _damages(saved),
         _nested(saved, "ledger", "Ledger of the log"),
     )
@@ -130,10 +140,70 @@ def _nested(saved: SavedFlight, key: str, title: str) -> Facts | None:
         "remarks",
         "spans",
         "spans_more",
-    }  # the tables of topics and losses; remarks are findings
+        "steps",
+        "relations",
+    }  # in tables of their own; remarks are findings
     document = {name: value for name, value in mapping(saved.summary, key).items() if name not in told_above}
     pairs = [(name, value, "") for name, value in _flat(document)]
     return Facts(title, pairs) if pairs else None
+
+
+def _clock_steps(saved: SavedFlight) -> Grid | None:
+    steps = objects(mapping(saved.summary, "clock"), "steps")
+    rows = [
+        (
+            number(step.get("record_index"), 0),
+            number(step.get("size_s"), 3, signed=True),
+            number(step.get("set_s"), 3, signed=True),
+            number(step.get("records_before"), 0),
+            words(str(step.get("mistake") or "")),
+        )
+        for step in steps[:MOST_ENTRIES]
+    ]
+    titles = ("Record", "Step, s", "Clock set by, s", "Records before it, moved")
+    heads = (*(Head(title, True) for title in titles), Head("What"))
+    return Grid("Steps of the recorder's clock", heads, rows) if rows else None
+
+
+def _other_clocks(saved: SavedFlight) -> Grid | None:
+    """The recorder's clock by the others of the log: segments, the breaks between them, errors that have a name."""
+    rows = []
+    for relation in objects(mapping(saved.summary, "clock"), "relations"):
+        name = f"{str(relation.get('clock')).upper()} · {relation.get('source')}"
+        if relation.get("reason"):
+            rows.append((name, "", "", str(relation["reason"]), "", ""))
+        rows += [
+            (
+                name,
+                str(one.get("start")),
+                number(one.get("length_s"), 1),
+                typeset(str(one.get("offset"))),
+                typeset(str(one.get("drift"))),
+                number(relation.get("residual_s"), 4),
+            )
+            for one in objects(relation, "segments")
+        ]
+        for one in objects(relation, "breaks"):
+            step = number(one.get("step_s"), 3, "s", signed=True) if one.get("kind") == "step" else ""
+            change = number(one.get("drift_change_ppm"), 1, "ppm", signed=True)
+            rows.append((f"{name}: {one.get('kind')} changes", str(one.get("time")), "", step, change, ""))
+        rows += [
+            (f"{name}: error", str(one.get("time") or ""), "", typeset(str(one.get("text"))), "", "")
+            for one in objects(relation, "mistakes")
+        ]
+    heads = (
+        Head("Other clock"),
+        Head("From"),
+        Head("Length, s", True),
+        Head("Other less recorder"),
+        Head("Drift of the recorder"),
+        Head("Scatter, s", True),
+    )
+    caption = (
+        "± is one standard error; positive drift: the recorder is fast. Corrected time is the recorder's, moved where "
+        "its clock was set, and not changed by its drift. UTC of autopilots' logs comes from GNSS time itself."
+    )
+    return Grid("The recorder's clock by others", heads, rows[:MOST_TOPICS], caption) if rows else None
 
 
 def _damages(saved: SavedFlight) -> Grid | Note:

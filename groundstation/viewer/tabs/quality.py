@@ -6,9 +6,10 @@ import rerun.blueprint as rrb
 from groundstation.base.signals import topics_of_kind
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
+from groundstation.results.latency import Latency
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer import colours
-from groundstation.viewer.markdown import markdown_text, table
+from groundstation.viewer.markdown import markdown_text, number, table
 from groundstation.viewer.names import label, path_parts, topic_label, words
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after
@@ -122,9 +123,24 @@ def _ledger_text(results: FlightResults) -> str:
         ]
         parts.append(table(["topic", "share of expected samples"], rows) if rows else "No ledger.")
     if results.clock:
-        clock = [[markdown_text(words(str(name))), markdown_text(str(value))] for name, value in results.clock.items()]
+        plain = {name: value for name, value in results.clock.items() if name != "relations"}
+        for relation in results.clock.get("relations", ()):
+            told = [f"{one['offset']}, {one['drift']}" for one in relation["segments"]] or [relation["reason"]]
+            plain[f"{relation['clock']}: {relation['source']}"] = "; ".join(told)
+        clock = [[markdown_text(words(str(name))), markdown_text(str(value))] for name, value in plain.items()]
         parts += ["## Clock", table(["clock", "value"], clock)]
+    if results.latency:
+        heads = ["sensor", "quantity", "latency, s", "95 % interval, s", "what it rests on, or why not"]
+        parts += ["## Latency behind the INS", table(heads, [_latency(row) for row in results.latency.rows])]
     return "\n\n".join(parts)
+
+
+def _latency(row: Latency) -> list[str]:
+    bounds = "–" if row.confidence95_s is None else " … ".join(f"{end:+.3f}" for end in row.confidence95_s)
+    return [
+        *(markdown_text(f"{row.other} against {row.reference}"), row.quantity, number(row.latency_s, 3, sign=True)),
+        *(bounds, markdown_text(row.reason)),
+    ]
 
 
 def _cell(name: str, value: object) -> str:

@@ -51,8 +51,8 @@ def _plan(
     origin = positions[known][0]
     north, east = north_east_m(positions[:, 0], positions[:, 1], float(origin[0]), float(origin[1]))
     points = np.column_stack([east, -north])  # the axes of a Rerun picture run right and down
-    low, high = _bounds(points[known])
-    recorder.static("plan/grid", _grid(low, high))
+    low, high = bounds_of(points[known])
+    recorder.static("plan/grid", grid(low, high))
     recorder.static(
         "plan/track",
         rr.LineStrips2D(
@@ -81,7 +81,8 @@ def _plan(
     return rrb.Spatial2DView(name=name, origin="/plan", visual_bounds=bounds)
 
 
-def _bounds(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+def bounds_of(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper corner of a plan that shows points, shape (n, 2), with a margin."""
     low, high = points.min(axis=0), points.max(axis=0)
     side = max(float((high - low).max()), SMALLEST_M)
     return low - MARGIN * side, high + MARGIN * side
@@ -110,7 +111,7 @@ def grid_unit(side_m: float) -> tuple[str, float]:
     return ("km", 1000.0) if side_m > LARGEST_IN_M else ("m", 1.0)
 
 
-def _grid(low: FloatArray, high: FloatArray) -> rr.LineStrips2D:
+def grid(low: FloatArray, high: FloatArray) -> rr.LineStrips2D:
     """Lines of equal distance east and north; the label of each stands in its middle."""
     side = float((high - low).max())
     step, (unit, metres) = grid_step_m(side), grid_unit(side)

@@ -1,0 +1,141 @@
+"""The verbs on flights that exist: ``clip`` cuts a part out of one, ``compare`` holds two against each other."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from groundstation.cli.main import (
+    DONE,
+    ConfigFile,
+    Force,
+    Json,
+    Profile,
+    Progress,
+    Quiet,
+    Verbose,
+    answers_with_exit_code,
+    app,
+)
+
+if TYPE_CHECKING:
+    from groundstation.results.comparison import Comparison, Value
+
+Align = Literal["start", "first-movement", "lift-off", "outage", "utc"]
+SIGNIFICANCE = {None: "", True: "beyond", False: "within"}
+
+
+@app.command()
+@answers_with_exit_code
+def clip(
+    flight: Annotated[Path, typer.Argument(help="Flight folder, MCAP or log.", metavar="X", readable=False)],
+    output: Annotated[Path, typer.Option("-o", "--output", help="MCAP to write; its recording stands beside it.")],
+    start: Annotated[
+        str | None, typer.Option("--from", help="Flight seconds, +mm:ss or ISO UTC.", metavar="TIME")
+    ] = None,
+    end: Annotated[str | None, typer.Option("--to", help="The same; records before it.", metavar="TIME")] = None,
+    topics: Annotated[
+        list[str] | None, typer.Option("--topics", help="Topic or pattern to keep; may be repeated.", metavar="GLOB")
+    ] = None,
+    no_recording: Annotated[bool, typer.Option("--no-recording", help="Leave the recording out.")] = False,
+    config: ConfigFile = None,
+    profile: Profile = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+    progress: Progress = "auto",
+) -> int | None:
+    """Cut a part of a flight into a small MCAP, an input of every verb, and its recording."""
+    from groundstation.cli import printing
+    from groundstation.cli.progress import listener
+    from groundstation.pipeline.clip import Wanted
+    from groundstation.pipeline.clip import clip as cut
+    from groundstation.pipeline.configuration import load_configuration
+
+    with listener("none" if quiet else progress) as listen:
+        outcome = cut(
+            flight,
+            output,
+            Wanted(start, end, tuple(topics or ())),
+            configuration=load_configuration(config, profile=profile),
+            with_recording=not no_recording,
+            force=force,
+            listen=listen,
+        )
+    printing.outcomes((outcome,), as_json_text=json, quiet=quiet)
+    return outcome.code
+
+
+@app.command()
+@answers_with_exit_code
+def compare(
+    a: Annotated[Path, typer.Argument(help="Flight folder.", metavar="A", readable=False)],
+    b: Annotated[Path, typer.Argument(help="Flight folder.", metavar="B", readable=False)],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for page, table and recording.", metavar="DIR")
+    ] = None,
+    align: Annotated[
+        Align | None,
+        typer.Option(
+            "--align", help="Event that both clocks are aligned on; left out: utc for one log, else first-movement."
+        ),
+    ] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+) -> int | None:
+    """Compare two flights, or two runs of one flight: what differs, and both in one recording on one time axis."""
+    from groundstation.cli import printing
+    from groundstation.pipeline.compare import compare as held_against
+    from groundstation.pipeline.compare import compare_to
+    from groundstation.results.summary import plain
+
+    found = held_against(a, b, align)[0] if output is None else compare_to(a, b, output, align, force=force)
+    if json:
+        typer.echo(printing.as_json(plain(found.to_dict())))
+    elif not quiet:
+        typer.echo(comparison_text(found, everything=verbose))
+    return DONE
+
+
+def comparison_text(found: "Comparison", *, everything: bool = False) -> str:
+    """Text of ``compare``: who is who, how the clocks are aligned, the answers, settings and findings that differ."""
+    from groundstation.cli.printing import columns, printable
+
+    alignment = found.alignment
+    when = "" if alignment.event == "utc" else f" (A at {alignment.a_s:.1f} s, B at {alignment.b_s:.1f} s)"
+    shared = "; one log: differences come from the settings, the noise is shared" if found.is_same_log else ""
+    sides = [
+        [f"{letter}:", printable(f"{side.flight_id}  {side.source_name}")]
+        for letter, side in zip("AB", (found.a, found.b), strict=True)
+    ]
+    aligned = f"aligned on {alignment.event}{when}: clock of B {alignment.offset_s:+.3f} s{shared}"
+    rows = [["answer", "A", "B", "B - A", "sigma", "1.96 sigma"]]
+    for delta in found.deltas if everything else found.shown:
+        change, sigma = (_text(value) for value in (delta.delta, delta.sigma))
+        rows.append(
+            [printable(delta.name), _text(delta.a), _text(delta.b), change, sigma, SIGNIFICANCE[delta.is_significant]]
+        )
+    parts = [f"{columns(sides)}\n{aligned}", columns(rows, right=(1, 2, 3, 4))]
+    if found.settings:
+        pairs = [[printable(pair.name), _text(pair.a), _text(pair.b)] for pair in found.settings]
+        parts.append(columns([["setting", "A", "B"], *pairs]))
+    for letter, findings, reasons in (
+        ("A", found.findings_a, found.not_assessable_a),
+        ("B", found.findings_b, found.not_assessable_b),
+    ):
+        alone = [[finding.severity, printable(finding.text)] for finding in findings]
+        alone += [["not assessed", printable(f"{entry.analysis}: {entry.reason}")] for entry in reasons]
+        if alone:
+            parts.append(f"{letter} alone\n" + columns(alone))
+    return "\n\n".join(parts)
+
+
+def _text(value: "Value") -> str:
+    from groundstation.cli.printing import printable
+
+    if value is None:
+        return ""
+    return f"{value:.7g}" if isinstance(value, float) else printable(str(value))

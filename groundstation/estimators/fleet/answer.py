@@ -1,0 +1,201 @@
+"""From the table of flights to what they say together: by aircraft, trend, outliers, calibration."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.estimators.fleet.aircraft import mean_over_flights
+from groundstation.estimators.fleet.calibration import calibrate
+from groundstation.estimators.fleet.changes import ChangeSettings, Chart, control_chart
+from groundstation.estimators.fleet.moments import Moments, merged
+from groundstation.estimators.fleet.outliers import FALSE_OUTLIERS, FEWEST, find_outliers
+from groundstation.results.figures import FigureData
+from groundstation.results.fleet import (
+    WHOLE_FLEET,
+    AircraftRow,
+    ChangePoint,
+    FittedNormal,
+    FleetCalibration,
+    OutlierRow,
+    TrendQuantity,
+)
+
+FloatArray = NDArray[np.float64]
+
+# Figures that are positive and skewed are judged by their logarithm.
+POSITIVE = {"standard_error_deg", "estimate_sd_deg", "radial_error_rate_50_nmiph", "forecast_60min_rms_m"}
+TRENDS: tuple[TrendQuantity, ...] = ("error_deg", "radial_error_rate_50_nmiph")
+LOOKED_AT: Mapping[str, str] = {
+    "error_deg": "heading error, deg",
+    "standard_error_deg": "standard error of the heading error, deg",
+    "estimate_sd_deg": "spread of the differences, deg",
+    "onboard_difference_deg": "onboard heading error - ours, deg",
+    "reference_residual_arcmin": "parking heading - reference, arcmin",
+    "radial_error_rate_50_nmiph": "INS radial error rate, nmi/h",
+    "forecast_60min_rms_m": "forecast error after 60 min, m",
+}
+CHECKS: Mapping[str, str] = {
+    "reference": "corrected parking heading against its reference",
+    "runway": "INS heading less its error against the runway",
+    "onboard": "heading error found on board against ours",
+}
+
+
+def stated_rates(settings: ChangeSettings) -> dict[str, float]:
+    """The rates and limits that the statistics keep to, by name."""
+    return {
+        "confidence": 0.95,
+        "false_change_per_aircraft": settings.false_change,
+        "outside_limits_per_flight": settings.false_alarm,
+        "any_false_outlier_in_the_fleet": FALSE_OUTLIERS,
+        "fewest_flights_for_a_trend": settings.fewest,
+        "fewest_flights_for_outliers": FEWEST,
+    }
+
+
+def groups_of(flights: FigureData) -> dict[str, NDArray[np.intp]]:
+    """Rows of each named aircraft, by name."""
+    names = flights["aircraft"]
+    return {name: np.flatnonzero(names == name) for name in np.unique(names).tolist() if name}
+
+
+def normals_of(aircraft: Sequence[str], moments: Sequence[Moments]) -> tuple[FittedNormal, ...]:
+    """Normals fitted to the samples of the whole fleet and of each named aircraft."""
+    named = sorted({name for name in aircraft if name})
+    parts = {name: [one for own, one in zip(aircraft, moments, strict=True) if own == name] for name in named}
+    groups = {WHOLE_FLEET: list(moments)} | parts
+    pooled = [(name, len(group), merged(group)) for name, group in groups.items()]
+    return tuple(
+        FittedNormal(name, flights, total.count, total.mean, total.sigma)
+        for name, flights, total in pooled
+        if total.count > 1
+    )
+
+
+def by_aircraft(flights: FigureData) -> tuple[AircraftRow, ...]:
+    """Heading error of the whole fleet and of each named aircraft."""
+    groups = groups_of(flights)
+    everything = np.arange(len(flights))
+    rows = [_aircraft_row(WHOLE_FLEET, flights, everything)] if len(flights) else []
+    rows += [_aircraft_row(name, flights, own) for name, own in groups.items()]
+    return tuple(rows)
+
+
+def _aircraft_row(name: str, flights: FigureData, rows: NDArray[np.intp]) -> AircraftRow:
+    error = flights["error_deg"][rows]
+    over = mean_over_flights(error, flights["standard_error_deg"][rows])
+    has_interval = over is not None and over.flights > 1
+    is_one = len(np.unique(flights["aircraft"][rows])) == 1
+    sampled = rows[np.isfinite(flights["sample_m2_deg2"][rows])]
+    columns = (flights[key][sampled].tolist() for key in ("samples", "sample_mean_deg", "sample_m2_deg2"))
+    parts = [Moments(int(count), mean, m2) for count, mean, m2 in zip(*columns, strict=True)]
+    pooled, within = merged(parts), sum(part.m2 for part in parts)
+    freedom = pooled.count - len(parts)
+    return AircraftRow(
+        aircraft=name,
+        flights=len(rows),
+        assessed=int(np.isfinite(error).sum()),
+        accepted=int(np.sum(flights["verdict"][rows] == "accept")),
+        samples=pooled.count,
+        mean_deg=None if over is None else over.mean,
+        confidence95_deg=(over.low, over.high) if over is not None and has_interval and is_one else None,
+        sample_mean_deg=pooled.mean if parts else None,
+        sigma_within_deg=math.sqrt(within / freedom) if freedom > 0 else None,
+        sigma_between_deg=over.sigma_between if over is not None and has_interval else None,
+        heterogeneity=over.heterogeneity if over is not None and has_interval else None,
+    )
+
+
+def _scaled(quantity: str, value: FloatArray) -> FloatArray:
+    """The figure, or the logarithm of one that is positive (NaN where it is not)."""
+    if quantity not in POSITIVE:
+        return value
+    return np.log(np.where(value > 0.0, value, np.nan))
+
+
+def _unscaled(quantity: str, value: FloatArray) -> FloatArray:
+    return np.asarray(np.exp(value) if quantity in POSITIVE else value)
+
+
+def trends(flights: FigureData, settings: ChangeSettings) -> tuple[FigureData, tuple[ChangePoint, ...]]:
+    """Control charts of every aircraft and quantity with enough flights that have a time, and their changes."""
+    charted: dict[str, list[NDArray]] = {name: [] for name in TREND_COLUMNS}
+    changes: list[ChangePoint] = []
+    for name, rows in groups_of(flights).items():
+        for quantity in TRENDS:
+            value = _scaled(quantity, flights[quantity][rows])
+            timed = rows[np.isfinite(value) & ~np.isnat(flights["start_utc"][rows])]
+            timed = timed[np.argsort(flights["start_utc"][timed], kind="stable")]
+            value = _scaled(quantity, flights[quantity][timed])
+            chart = control_chart(value, settings=settings)
+            if chart is None:
+                continue
+            own: dict[str, NDArray] = {
+                "aircraft": np.full(len(timed), name),
+                "quantity": np.full(len(timed), quantity),
+                "flight_id": flights["flight_id"][timed],
+                "start_utc": flights["start_utc"][timed],
+                "value": flights[quantity][timed],
+                **{key: _unscaled(quantity, getattr(chart, key)) for key in ("level", "low", "high")},
+                "is_outside": chart.is_outside(value),
+            }
+            for key, values in own.items():
+                charted[key].append(values)
+            changes += _change_points(name, quantity, own, chart)
+    columns = {key: np.concatenate([empty, *charted[key]]) for key, empty in TREND_COLUMNS.items()}
+    return FigureData("trend", columns, {}), tuple(changes)
+
+
+TREND_COLUMNS: Mapping[str, NDArray] = {
+    **{name: np.zeros(0, dtype="U1") for name in ("aircraft", "quantity", "flight_id")},
+    "start_utc": np.zeros(0, dtype="datetime64[ns]"),
+    **{name: np.zeros(0) for name in ("value", "level", "low", "high")},
+    "is_outside": np.zeros(0, dtype=bool),
+}
+
+
+def _change_points(name: str, quantity: TrendQuantity, own: Mapping[str, NDArray], chart: Chart) -> list[ChangePoint]:
+    edges = [0, *(change.index for change in chart.changes), len(own["value"])]
+    return [
+        ChangePoint(
+            aircraft=name,
+            quantity=quantity,
+            flight_id=str(own["flight_id"][change.index]),
+            start_utc_ns=int(own["start_utc"][change.index].astype(np.int64)),
+            flights_before=change.index - before,
+            flights_after=after - change.index,
+            level_before=float(own["level"][change.index - 1]),
+            level_after=float(own["level"][change.index]),
+            p_value=change.p_value,
+        )
+        for change, before, after in zip(chart.changes, edges[:-2], edges[2:], strict=True)
+    ]
+
+
+def outliers(flights: FigureData) -> tuple[OutlierRow, ...]:
+    """Flights with a figure far from those of the same aircraft, by flight id; one test over the whole fleet."""
+    aircraft = groups_of(flights)
+    keys = [(quantity, name) for quantity in LOOKED_AT for name in aircraft]
+    groups = {"\n".join(key): _scaled(key[0], flights[key[0]][aircraft[key[1]]]) for key in keys}
+    found = []
+    for one in find_outliers(groups):
+        quantity, name = one.group.split("\n", 1)
+        row = aircraft[name][one.index]
+        value, typical = float(flights[quantity][row]), float(_unscaled(quantity, np.asarray(one.typical)))
+        reason = (
+            f"{LOOKED_AT[quantity]}: {value:.4g}, usual for this aircraft {typical:.4g} ({one.z:+.1f} robust sigma)"
+        )
+        flight_id = str(flights["flight_id"][row])
+        found.append(OutlierRow(flight_id, name, quantity, value, typical, one.z, reason))
+    return tuple(sorted(found, key=lambda one: (one.flight_id, list(LOOKED_AT).index(one.quantity))))
+
+
+def calibrations(checks: FigureData) -> tuple[FleetCalibration, ...]:
+    """Judge each kind of check, flights with the verdict reject left out."""
+    found = []
+    for quantity, title in CHECKS.items():
+        own = (checks["quantity"] == quantity) & (checks["verdict"] != "reject")
+        found.append(calibrate(quantity, title, checks["z"][own], checks["is_inside"][own]))
+    return tuple(one for one in found if one is not None)

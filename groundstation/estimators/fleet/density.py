@@ -1,0 +1,79 @@
+"""Densities of many flights on one grid, from histograms on a lattice fine enough to be merged into any grid."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.estimators.fleet.moments import Moments
+from groundstation.results.fleet import Densities
+
+FloatArray = NDArray[np.float64]
+LATTICE_DEG = 0.01
+BINS_PER_SIGMA = 5.0
+MOST_BINS = 400
+REACH_SIGMAS = 4.0
+
+
+@dataclass(frozen=True)
+class SampleHistogram:
+    """Counts of samples in cells of the lattice: cell k holds [k, k + 1) * ``LATTICE_DEG``; empty ones are left out."""
+
+    cell: NDArray[np.int32]
+    count: NDArray[np.int32]
+
+
+def histogram_of(value_deg: FloatArray) -> SampleHistogram:
+    """Count samples, degrees, in the cells of the lattice; those that are not finite are left out."""
+    known = value_deg[np.isfinite(value_deg)]
+    cell, count = np.unique(np.floor(known / LATTICE_DEG).astype(np.int32), return_counts=True)
+    return SampleHistogram(cell, count.astype(np.int32))
+
+
+def densities_of(
+    flight_id: Sequence[str], aircraft: Sequence[str], moments: Sequence[Moments], histograms: Sequence[SampleHistogram]
+) -> Densities:
+    """Put the samples of flights on one grid.
+
+    Bins are a fifth of the usual spread within a flight wide (a whole number of cells), and reach from the lowest to
+    the highest flight, four sigmas beyond its mean. Where these are more than four hundred bins, the grid is laid
+    around the median of the flights' means, and a flight far from all others is outside it.
+
+    Parameters
+    ----------
+    flight_id, aircraft, moments, histograms : sequences
+        One entry per flight with samples.
+    """
+    ids, names = np.array(flight_id, dtype=np.str_), np.array(aircraft, dtype=np.str_)
+    samples = np.array([part.count for part in moments], dtype=np.int64)
+    first, cells, bins = _grid(moments)
+    density = np.zeros((len(ids), bins), dtype=np.float32)
+    pooled = np.zeros(bins)
+    width_deg = cells * LATTICE_DEG
+    for row, (histogram, total) in enumerate(zip(histograms, samples, strict=True)):
+        place = (histogram.cell.astype(np.int64) - first) // cells
+        inside = (place >= 0) & (place < bins)
+        counts = np.bincount(place[inside], histogram.count[inside], minlength=bins)
+        density[row] = counts / (total * width_deg)
+        pooled += counts
+    edges = np.asarray((first + cells * np.arange(bins + 1)) * LATTICE_DEG, dtype=np.float64)
+    return Densities(edges, ids, names, samples, density, pooled / (max(int(samples.sum()), 1) * width_deg))
+
+
+def _grid(moments: Sequence[Moments]) -> tuple[int, int, int]:
+    """First cell, cells per bin, number of bins."""
+    if not moments:
+        return 0, 1, 1
+    mean = np.array([part.mean for part in moments])
+    sigma = np.nan_to_num([part.sigma for part in moments], nan=0.0)
+    usual = float(np.median(sigma))
+    cells = max(1, round(usual / BINS_PER_SIGMA / LATTICE_DEG))
+    width = cells * LATTICE_DEG
+    low = int(np.floor(np.min(mean - REACH_SIGMAS * sigma) / width))
+    high = int(np.floor(np.max(mean + REACH_SIGMAS * sigma) / width)) + 1
+    if high - low > MOST_BINS:
+        middle = int(np.floor(np.median(mean) / width))
+        low = min(max(low, middle - MOST_BINS // 2), high - MOST_BINS)
+        high = low + MOST_BINS
+    return low * cells, cells, high - low

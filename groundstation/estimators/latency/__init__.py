@@ -1,0 +1,1 @@
+"""Latency between sensors, from the motion that they all show."""

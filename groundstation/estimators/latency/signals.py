@@ -1,0 +1,263 @@
+"""What is compared: signals of an INS and of another sensor that show the same motion."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import direction_of, unwrap
+from groundstation.base.records import BoolArray
+from groundstation.base.signals import topics_of_kind
+from groundstation.estimators.heading.samples import distinct_epochs
+from groundstation.estimators.latency.settings import LatencySettings
+from groundstation.estimators.latency.windows import Series
+from groundstation.results.latency import Quantity
+from groundstation.tables.table import Flight, Table
+
+FloatArray = NDArray[np.float64]
+VELOCITY = ("velocity_north_mps", "velocity_east_mps")
+ALTITUDES = ("altitude_ellipsoid_m", "altitude_msl_m")
+FIELD = ("field_forward_nt", "field_right_nt", "field_down_nt")
+ATTITUDE = ("roll_deg", "pitch_deg")
+HEADINGS = ("true_heading_deg", "magnetic_heading_deg")
+LEAST_SAMPLES, LEAST_NODES = 10, 3
+SLOW_MPS = 3.0  # the track of a slower aircraft does not show where the nose points
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A reference and the samples of another sensor, on flight seconds: times (n,), values (n, c) in ``unit``.
+
+    ``prior_sigma`` (q,): of the nuisances in the reference.
+    """
+
+    reference: Series
+    time_s: FloatArray
+    values: FloatArray
+    prior_sigma: FloatArray
+    unit: str
+
+
+class NotComparableError(Exception):
+    """Why two topics cannot be compared, in a few words."""
+
+
+def pairs_of(flight: Flight) -> list[tuple[str, str, Quantity]]:
+    """Topics and quantities that may be compared: the first INS that has the signal against every other sensor."""
+    units = [topic for topic in topics_of_kind("ins", flight.topics()) if len(flight[topic])]
+
+    def others(kind: str, *fields: str) -> list[str]:
+        return [topic for topic in topics_of_kind(kind, flight.topics()) if flight[topic].has(*fields)]
+
+    def first(*fields: str) -> str:
+        return next((topic for topic in units if flight[topic].has(*fields)), "")
+
+    pairs: list[tuple[str, str, Quantity]] = []
+    moving = first(*VELOCITY)
+    climbing = first("velocity_down_mps") or next((topic for name in ALTITUDES if (topic := first(name))), "")
+    tilting = next((topic for topic in units if flight[topic].has(*ATTITUDE) and _heading_of(flight[topic])), "")
+    if moving:
+        pairs += [(moving, topic, "velocity") for topic in others("gnss", *VELOCITY)]
+    if climbing:
+        pairs += [(climbing, topic, "altitude") for topic in others("baro", "pressure_altitude_m")]
+    if tilting:
+        pairs += [(tilting, topic, "field") for topic in others("magnetometer", *FIELD)]
+        pairs += [
+            (tilting, topic, "attitude")
+            for topic in units
+            if topic != tilting and flight[topic].has(*ATTITUDE) and _heading_of(flight[topic])
+        ]
+    return pairs
+
+
+def compare(flight: Flight, pair: tuple[str, str, Quantity], settings: LatencySettings) -> Comparison:
+    """Make the signals of a pair comparable.
+
+    Raises
+    ------
+    NotComparableError
+        When rates or time stamps do not allow it.
+    """
+    reference, other, quantity = pair
+    unit = _usable(flight[reference])
+    sensor = flight[other]
+    names = {"velocity": VELOCITY, "altitude": ("pressure_altitude_m",), "field": FIELD, "attitude": ATTITUDE}[quantity]
+    sensor = sensor.take(sensor.valid(*names) & ~(sensor.values("integrity_ok") == 0.0))
+    _check_stamps(other, sensor, settings)
+    if quantity == "velocity":
+        sensor = distinct_epochs(sensor)
+    _check_rates(reference, unit, settings.reference_interval_max_s)
+    _check_rates(other, sensor, settings.other_interval_max_s)
+    maker = {"velocity": _velocity, "altitude": _altitude, "field": _field, "attitude": _attitude}[quantity]
+    made = maker(flight, unit, sensor, settings)
+    samples = round(len(sensor) / max(len(made.time_s), 1))
+    return replace(made, reference=made.reference.smoothed(_nodes(made, samples, settings)))
+
+
+def _nodes(made: Comparison, samples: int, settings: LatencySettings) -> int:
+    """Reference samples to average: as long as the other's means are, and so that their noise does not show."""
+    step_s = float(np.median(np.diff(made.reference.time_s))) if len(made.reference.time_s) > 1 else 1.0
+    width_s = settings.other_step_s if samples > 1 else 0.0
+    return max(LEAST_NODES, 2 * round(0.5 * width_s / step_s) + 1)
+
+
+def _velocity(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> Comparison:
+    """GNSS velocity against INS velocity: azimuth error, scale and the antenna's arm are nuisances."""
+    unit = unit.take(unit.valid(*VELOCITY))
+    names = [name for name in (*VELOCITY, *ATTITUDE, *HEADINGS) if unit.has(name)]
+    time_s, columns = _averaged(flight, unit, names, settings.reference_step_s)
+    north, east = columns[VELOCITY[0]], columns[VELOCITY[1]]
+    arms = np.gradient(_rotation(columns, _nose(columns, north, east))[:, :2, :], time_s, axis=0)
+
+    def build(base: FloatArray) -> FloatArray:
+        velocity = base[..., :2]
+        turned = np.stack([-base[..., 1], base[..., 0]], axis=-1)
+        arm = base[..., 2:].reshape(*base.shape[:-1], 2, 3)
+        return np.concatenate([velocity[..., None], velocity[..., None], turned[..., None], arm], axis=-1)
+
+    base = np.column_stack([north, east, arms.reshape(-1, 6)])
+    at_s, measured = _averaged(flight, sensor, VELOCITY, settings.other_step_s)
+    sigma = [settings.scale_sigma, np.deg2rad(settings.azimuth_sigma_deg), *[settings.arm_sigma_m] * 3]
+    values = np.stack([measured[name] for name in VELOCITY], axis=-1)
+    return Comparison(Series(time_s, base, build, settings.gap_max_s), at_s, values, np.array(sigma), "m/s")
+
+
+def _altitude(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> Comparison:
+    """Pressure altitude against height from the vertical speed of the INS, or its altitude: a scale is the nuisance."""
+    name = next(item for item in ("velocity_down_mps", *ALTITUDES) if unit.has(item))
+    unit = unit.take(unit.valid(name))
+    time_s, columns = _averaged(flight, unit, [name], settings.reference_step_s)
+    height = columns[name]
+    if name == "velocity_down_mps":
+        steps = np.diff(time_s)
+        height = np.concatenate([[0.0], np.cumsum(-0.5 * (height[1:] + height[:-1]) * steps)])
+    at_s, measured = _averaged(flight, sensor, ["pressure_altitude_m"], settings.other_step_s)
+    values = measured["pressure_altitude_m"][:, None]
+    sigma = np.array([3.0 * settings.scale_sigma])  # air that is not standard
+    reference = Series(time_s, height[:, None], lambda base: np.stack([base, base], axis=-1), settings.gap_max_s)
+    return Comparison(reference, at_s, values, sigma, "m")
+
+
+def _field(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> Comparison:
+    """Magnetic field along body axes against a constant field turned by the attitude.
+
+    Soft iron with mounting, and the field itself, are nuisances.
+    """
+    heading = _heading_of(unit)
+    unit = unit.take(unit.valid(*ATTITUDE, heading))
+    time_s, columns = _averaged(flight, unit, [*ATTITUDE, heading], settings.reference_step_s)
+    body_from_n = np.swapaxes(_rotation(columns, columns[heading]), 1, 2)
+    at_s, measured = _averaged(flight, sensor, FIELD, settings.other_step_s)
+    values = np.stack([measured[name] for name in FIELD], axis=-1)
+    base = body_from_n.reshape(-1, 9)
+    bare = Series(time_s, base, lambda base: base, settings.gap_max_s)
+    known = bare.covers(at_s, 0.0)
+    if np.count_nonzero(known) < LEAST_SAMPLES:
+        raise NotComparableError("hardly any sample while the attitude is known")
+    turning, seen = bare.at(at_s[known])[0].reshape(-1, 3, 3), values[known]
+    turning, seen = turning - turning.mean(axis=0), seen - seen.mean(axis=0)
+    constant = np.linalg.lstsq(turning.reshape(-1, 3), seen.reshape(-1), rcond=1e-6)[0]
+    size = max(float(np.linalg.norm(constant)), 1.0)
+
+    def build(base: FloatArray) -> FloatArray:
+        turn = base.reshape(*base.shape[:-1], 3, 3)
+        turned = turn @ constant
+        iron = np.zeros((*turned.shape, 9))
+        for axis in range(3):
+            iron[..., axis, 3 * axis : 3 * axis + 3] = turned
+        return np.concatenate([turned[..., None], iron, size * turn], axis=-1)
+
+    sigma = np.full(12, settings.iron_sigma)
+    return Comparison(Series(time_s, base, build, settings.gap_max_s), at_s, values, sigma, "nT")
+
+
+def _attitude(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> Comparison:
+    """Roll, pitch and heading of two INS."""
+    sides = []
+    heading = next((name for name in HEADINGS if unit.has(name) and sensor.has(name)), "")
+    if not heading:
+        raise NotComparableError("headings of different kinds")
+    for table, step_s in ((unit, settings.reference_step_s), (sensor, settings.other_step_s)):
+        table = table.take(table.valid(*ATTITUDE, heading))
+        time_s, columns = _averaged(flight, table, [*ATTITUDE, heading], step_s)
+        sides.append((time_s, np.stack([columns[name] for name in (*ATTITUDE, heading)], axis=-1)))
+    (time_s, shown), (at_s, values) = sides
+    reference = Series(time_s, shown, lambda base: base[..., None], settings.gap_max_s)
+    return Comparison(reference, at_s, values, np.zeros(0), "deg")
+
+
+def _usable(unit: Table) -> Table:
+    """Rows of an INS that it calls valid, alignment left out; only what is compared."""
+    bad: BoolArray = (unit.values("valid") == 0.0) | (unit.text("mode") == "align")
+    names = (*VELOCITY, "velocity_down_mps", *ALTITUDES, *ATTITUDE, *HEADINGS)
+    unit = replace(unit, columns={name: unit.columns[name] for name in names if name in unit})
+    return (unit.take(~bad) if bad.any() else unit).unique_times()
+
+
+def _heading_of(table: Table) -> str:
+    return next((name for name in HEADINGS if table.has(name)), "")
+
+
+def _check_stamps(topic: str, table: Table, settings: LatencySettings) -> None:
+    if len(table) > 1 and float(np.mean(np.diff(table.time_ns) == 0)) > settings.repeated_share_max:
+        raise NotComparableError(f"time stamps of {topic} are coarser than its rate: many samples share one")
+
+
+def _check_rates(topic: str, table: Table, longest_s: float) -> None:
+    if len(table) < 2:
+        raise NotComparableError(f"{topic} has no samples")
+    interval_s = float(np.median(np.diff(table.time_ns))) * 1e-9
+    if interval_s > longest_s:
+        raise NotComparableError(
+            f"{topic} is too slow: one sample in {interval_s:.2g} s, at least {1 / longest_s:g} Hz"
+        )
+
+
+def _averaged(
+    flight: Flight, table: Table, names: list[str] | tuple[str, ...], step_s: float
+) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Means of a table's rows over ``step_s``, at their mean times; headings and roll continuous."""
+    table = table.unique_times()
+    time_s = flight.seconds(table.time_ns)
+    columns = {
+        name: unwrap(table.values(name)) if name in ("roll_deg", *HEADINGS) else table.values(name) for name in names
+    }
+    cell = np.floor((time_s - time_s[:1]) / max(step_s, 1e-9) + 1e-6).astype(np.int64)
+    starts = np.flatnonzero(np.diff(cell, prepend=-1))
+    if len(starts) < LEAST_SAMPLES:
+        raise NotComparableError(f"{table.topic} has hardly any samples")
+    if len(starts) == len(time_s):
+        return time_s, columns
+    count = np.diff(np.append(starts, len(time_s)))
+    return np.add.reduceat(time_s, starts) / count, {
+        name: np.add.reduceat(values, starts) / count for name, values in columns.items()
+    }
+
+
+def _nose(columns: dict[str, FloatArray], north: FloatArray, east: FloatArray) -> FloatArray:
+    """Heading for the antenna's arm: logged, else the track of a moving aircraft, held while it is slow."""
+    for name in HEADINGS:
+        if name in columns and np.isfinite(columns[name]).all():
+            return columns[name]
+    track = np.where(np.hypot(north, east) > SLOW_MPS, direction_of(north, east), np.nan)
+    known = np.flatnonzero(np.isfinite(track))
+    if not known.size:
+        return np.zeros(len(track))
+    return np.interp(np.arange(len(track)), known, unwrap(track[known]))
+
+
+def _rotation(columns: dict[str, FloatArray], heading_deg: FloatArray) -> FloatArray:
+    """Rotations n_from_b, shape (m, 3, 3); roll and pitch that are not logged are level."""
+    level = np.zeros(len(heading_deg))
+    roll, pitch, yaw = (
+        np.deg2rad(np.nan_to_num(part))
+        for part in (columns.get("roll_deg", level), columns.get("pitch_deg", level), heading_deg)
+    )
+    (sr, cr), (sp, cp), (sy, cy) = ((np.sin(part), np.cos(part)) for part in (roll, pitch, yaw))
+    return np.array(
+        [
+            [cp * cy, sr * sp * cy - cr * sy, cr * sp * cy + sr * sy],
+            [cp * sy, sr * sp * sy + cr * cy, cr * sp * sy - sr * cy],
+            [-sp, sr * cp, cr * cp],
+        ]
+    ).transpose(2, 0, 1)

@@ -1,0 +1,266 @@
+"""Other clocks that a log carries, GNSS time or the INS's own: which fields tell them, how the recorder runs by them.
+
+A field of a raw topic is a clock when the thresholds say so, ``[[clock_relation.references]]``. Some thousand readings
+of each are kept, evenly spread. Corrected time is never changed by what is found.
+"""
+
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.errors import GroundstationError
+from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
+from groundstation.base.timescales import gps_week_to_utc_ns, iso_to_utc_ns
+from groundstation.base.toml_settings import number, required_number
+from groundstation.base.units import NS_PER_S
+from groundstation.integrity.clock import LARGEST_NS, Clock
+from groundstation.integrity.clock_fit import Fitted, fit_relation
+from groundstation.integrity.clock_relation import (
+    ROLLOVER_S,
+    WEEK_S,
+    ClockRelation,
+    Mistake,
+    mistake_of_offset,
+    mistake_of_step,
+)
+from groundstation.integrity.stretches import Sampler
+
+MOST_SAMPLES = 4_096
+MOST_REFERENCES = 8
+_DAY_NS = 86_400 * NS_PER_S
+_FLOAT_NS = 1_000  # of seconds since 1970 in a float64
+
+
+@dataclass(frozen=True)
+class ReferenceField:
+    """A field that tells the time of another clock.
+
+    Parameters
+    ----------
+    clock : str
+        Whose time it is: ``gnss``, ``ins``.
+    topic : str
+        Raw topic, * for any text.
+    field : str
+        Time in units of ``unit_ns``, or ISO 8601 text.
+    scale : {'utc', 'gps', 'day', 'free'}
+        UTC since 1970; time of the GPS week, whose number is in the field ``week``; UTC time of day; time since the
+        clock's own zero.
+    unit_ns : int
+    week : str
+        Field with the GPS week since 1980, for ``gps``.
+    fix : str
+        Field that must be at least ``fewest_fix`` for the time to be believed; empty for none.
+    is_sampled : bool
+        The recorder reads the clock when it writes a row, rather than stamps the message when it comes: the reading is
+        as old as its last digit may be.
+    earliest_year : int
+        Nothing was recorded so before this year.
+    """
+
+    clock: str
+    topic: str
+    field: str
+    scale: Literal["utc", "gps", "day", "free"]
+    unit_ns: int = number(1_000_000_000, 1, 3_600_000_000_000)
+    week: str = ""
+    fix: str = ""
+    fewest_fix: int = number(0, 0)
+    is_sampled: bool = False
+    earliest_year: int = number(1980, 1980, 2261)
+
+    def serves(self, batch: RecordBatch) -> bool:
+        """Whether the batch has the fields."""
+        wanted = {name for name in (self.field, self.week) if name}
+        return fnmatchcase(batch.topic, self.topic) and wanted.issubset(batch.columns)
+
+
+@dataclass(frozen=True)
+class RelationSettings:
+    """What is said of a clock by another; the file explains each number."""
+
+    references: tuple[ReferenceField, ...]
+    fewest_samples: int = required_number(10)
+    step_s: float = required_number(0.001)
+    observable_ppm: float = required_number(0.001)
+    drift_ppm: float = required_number(0.0)
+
+
+@dataclass
+class _Readings:
+    """Readings of one reference: each time that it tells once, when it told it first."""
+
+    topic: str
+    reference: ReferenceField
+    sampler: Sampler = field(default_factory=lambda: Sampler(MOST_SAMPLES))
+    rows: int = 0
+    times: int = 0
+    first_ns: int = 0
+    last_ns: int = 0
+    _last: Any = None
+
+    def add(self, batch: RecordBatch) -> None:
+        reference, device = self.reference, batch.device_time_ns
+        time = batch.columns[reference.field]
+        good = time.mask & device.mask
+        if reference.week:
+            good = good & batch.columns[reference.week].mask
+        if reference.fix in batch.columns:
+            fix = batch.columns[reference.fix]
+            good = good & fix.mask & (fix.values.astype(np.float64) >= reference.fewest_fix)
+        rows = np.flatnonzero(good)
+        if not len(rows):
+            return
+        values = time.values[rows]
+        is_new = np.ones(len(rows), dtype=bool)
+        is_new[1:] = values[1:] != values[:-1]
+        is_new[0] = self._last is None or bool(values[0] != self._last)
+        self.first_ns = self.first_ns if self.rows else int(device.values[rows[0]])
+        self.rows, self.last_ns, self._last = self.rows + len(rows), int(device.values[rows[-1]]), values[-1]
+        rows = rows[is_new]
+        self.times += len(rows)
+        rows = rows[self.sampler.rows(len(rows))]
+        kept = {"device": np.array(device.values[rows]), "time": np.array(time.values[rows])}
+        if reference.week:
+            kept["week"] = np.array(batch.columns[reference.week].values[rows])
+        self.sampler.put(np.array(batch.record_index[rows]), kept)
+
+    @property
+    def every_s(self) -> float:
+        """Mean time between readings."""
+        return max(self.last_ns - self.first_ns, 0) / NS_PER_S / max(self.rows - 1, 1)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether a time is usually told several times: it may be older than its first reading by one of them."""
+        return self.times < 0.75 * self.rows
+
+
+class ClockReferences:
+    """Takes readings of other clocks from the batches of a log."""
+
+    def __init__(self, settings: RelationSettings) -> None:
+        self._settings = settings
+        self._readings: dict[str, list[_Readings]] = {}
+
+    def add(self, batch: RecordBatch) -> None:
+        """Take what a batch holds of them; which fields do is settled by the first batch of a topic."""
+        found = self._readings.get(batch.topic)
+        if found is None:
+            found = [_Readings(batch.topic, one) for one in self._settings.references if one.serves(batch)]
+            self._readings[batch.topic] = found
+        for readings in found:
+            if readings.reference.serves(batch):
+                readings.add(batch)
+
+    def relations(self, clock: Clock) -> tuple[ClockRelation, ...]:
+        """How the recorder's corrected clock runs by each of them, in the order of their topics."""
+        known = [one for topic in sorted(self._readings) for one in self._readings[topic]]
+        return tuple(_relation(one, clock, self._settings) for one in known[:MOST_REFERENCES])
+
+
+def _relation(readings: _Readings, clock: Clock, settings: RelationSettings) -> ClockRelation:
+    reference, source = readings.reference, f"{readings.topic}.{readings.reference.field}"
+    index, columns = readings.sampler.all()
+    if not len(index):
+        return ClockRelation(reference.clock, source, reason="no reading that could be believed")
+    told_ns, good = _told(reference, columns)
+    own_ns = clock.time_ns(index, Column(columns["device"]))[good]
+    told_ns = told_ns[good]
+    order = np.argsort(own_ns, kind="stable")
+    own_ns, told_ns = own_ns[order], told_ns[order]
+    if len(own_ns) < settings.fewest_samples:
+        return ClockRelation(reference.clock, source, samples=len(own_ns), reason=f"{len(own_ns)} readings are too few")
+    if reference.scale == "day":
+        told_ns = _unfolded(told_ns, own_ns)
+    bound_s = min(_last_digit_s(told_ns), readings.every_s) if reference.is_sampled else reference.unit_ns / NS_PER_S
+    held_s = readings.every_s if readings.is_held else 0.0
+    fitted = fit_relation(
+        own_ns, told_ns, step_s=settings.step_s, observable_ppm=settings.observable_ppm, bound_s=bound_s
+    )
+    return ClockRelation(
+        reference.clock,
+        source,
+        samples=len(own_ns),
+        segments=tuple(
+            replace(one, offset_sigma_s=float(np.hypot(one.offset_sigma_s, held_s / 12**0.5)))
+            for one in fitted.segments
+        ),
+        breaks=fitted.breaks,
+        residual_s=fitted.residual_s,
+        resolution_s=bound_s,
+        is_utc=reference.scale != "free",
+        is_absolute=reference.scale in ("utc", "gps"),
+        mistakes=_mistakes(reference, fitted, clock, told_ns),
+    )
+
+
+def _told(reference: ReferenceField, columns: dict[str, NDArray[Any]]) -> tuple[Int64Array, BoolArray]:
+    """Times that a clock told, nanoseconds, and which of them can be times, shape (n,) each."""
+    time_ns, good = _nanoseconds(columns["time"], reference.unit_ns)
+    if reference.scale == "gps":
+        week, has_week = _nanoseconds(columns["week"], 1)
+        good &= has_week & (week > 0) & (week < 2**14) & (time_ns >= 0) & (time_ns < WEEK_S * NS_PER_S)
+        week, time_ns = np.where(good, week, 0), np.where(good, time_ns, 0)
+        return gps_week_to_utc_ns(week, time_ns // 1_000_000) + time_ns % 1_000_000, good
+    if reference.scale == "day":
+        good &= (time_ns >= 0) & (time_ns <= _DAY_NS)
+    return time_ns, good & (time_ns > 0 if reference.scale == "utc" else time_ns >= 0)
+
+
+def _nanoseconds(values: NDArray[Any], unit_ns: int) -> tuple[Int64Array, BoolArray]:
+    """Values of whatever type in nanoseconds, and which of them are numbers that 62 bits hold."""
+    if values.dtype.kind == "U":
+        texts = [_utc_of(str(value)) for value in values]
+        return np.array([text or 0 for text in texts], dtype=np.int64), np.array([text is not None for text in texts])
+    if values.dtype.kind == "f":
+        with np.errstate(over="ignore", invalid="ignore"):
+            scaled = values.astype(np.float64) * unit_ns
+        good = np.abs(scaled) < LARGEST_NS  # False of NaN
+        step = _FLOAT_NS if unit_ns > 1 else 1
+        return np.rint(np.where(good, scaled, 0.0) / step).astype(np.int64) * step, good
+    good = np.asarray(values <= LARGEST_NS // unit_ns)
+    if values.dtype.kind == "i":
+        good &= values >= 0
+    return np.where(good, values, 0).astype(np.int64) * unit_ns, good
+
+
+def _utc_of(text: str) -> int | None:
+    try:
+        return iso_to_utc_ns(text)[0]
+    except GroundstationError:
+        return None
+
+
+def _unfolded(told_ns: Int64Array, own_ns: Int64Array) -> Int64Array:
+    """Times of day on the days that bring them next to the recorder's clock, all as the first one."""
+    half = _DAY_NS // 2
+    first = (int(told_ns[0] - own_ns[0]) + half) % _DAY_NS - half
+    return np.asarray(own_ns + first + (told_ns - own_ns - first + half) % _DAY_NS - half, dtype=np.int64)
+
+
+def _last_digit_s(time_ns: Int64Array) -> float:
+    """The largest power of ten, at most a second, that all times are multiples of."""
+    step = NS_PER_S
+    while step > 1 and (time_ns % step).any():
+        step //= 10
+    return step / NS_PER_S
+
+
+def _mistakes(reference: ReferenceField, fitted: Fitted, clock: Clock, told_ns: Int64Array) -> tuple[Mistake, ...]:
+    """Errors that have a name, of steps and of what stands at the end."""
+    if reference.scale == "free":
+        return ()
+    last_ns = int(told_ns[-1])
+    named = [(one, mistake_of_step(one.step_s, last_ns)) for one in fitted.breaks if one.kind == "step"]
+    found = [Mistake(kind, one.step_s, one.time_ns) for one, kind in named if kind]
+    if clock.is_absolute:
+        offset_s = fitted.segments[-1].offset_ns / NS_PER_S
+        kind = mistake_of_offset(offset_s)
+        found += [Mistake(kind, offset_s)] if kind else []
+    if reference.scale != "day" and last_ns < iso_to_utc_ns(f"{reference.earliest_year}-01-01T00:00:00Z")[0]:
+        found.append(Mistake("week_number", -float(ROLLOVER_S)))
+    return tuple(found)

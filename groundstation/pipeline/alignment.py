@@ -1,0 +1,102 @@
+"""Events by which the clocks of two saved flights are aligned, read off their saved results."""
+
+import math
+from typing import get_args
+
+import numpy as np
+
+from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.base.timescales import duration_text, iso_to_utc_ns
+from groundstation.base.units import NS_PER_S
+from groundstation.pipeline.clip import zero_s
+from groundstation.reports.sections.saved import mapping, numbers, objects, texts
+from groundstation.results.comparison import Alignment, Event
+from groundstation.results.files import SavedFlight
+
+EVENTS: tuple[Event, ...] = get_args(Event)
+AT_REST, UNKNOWN, AIRBORNE = "standstill", "unknown", "airborne"
+NO_GNSS = "no GNSS"
+
+
+def align(a: SavedFlight, b: SavedFlight, event: Event | None, *, is_same_log: bool) -> Alignment:
+    """Align two flights on an event that both have.
+
+    Parameters
+    ----------
+    a, b : SavedFlight
+    event : str, optional
+        Left out: UTC for two runs of one log (its start where it has no UTC), else the first movement where both show
+        it, else the start.
+
+    Raises
+    ------
+    UsageError
+        When one of the flights does not have the event.
+    """
+    if event is None:
+        event = _default(a, b, is_same_log)
+    if event == "utc":
+        start_a_ns, start_b_ns = (_start_utc_ns(saved) for saved in (a, b))
+        if start_a_ns is None or start_b_ns is None:
+            raise _missing(a if start_a_ns is None else b, event)
+        return Alignment(event, 0.0, (start_a_ns - start_b_ns) / NS_PER_S)
+    moments = []
+    for saved in (a, b):
+        found = events_of(saved)
+        if event not in found:
+            raise _missing(saved, event)
+        moments.append(found[event])
+    if event == "start" and is_same_log:  # a part of a flight begins where it was cut
+        moments = [-zero_s(mapping(saved.summary, "flight", "metadata")) for saved in (a, b)]
+    return Alignment(event, moments[0], moments[1])
+
+
+def events_of(saved: SavedFlight) -> dict[Event, float]:
+    """Events of a flight that others can be aligned on, in flight seconds; ``utc`` is no moment and not among them.
+
+    The first movement follows a standstill and the lift-off something else than an unknown phase: a log that begins
+    later shows neither. An outage is the first interval without GNSS.
+    """
+    found: dict[Event, float] = {"start": 0.0}
+    phases = saved.figure("phases")
+    if phases is not None:
+        start_s, names = numbers(phases, "start_s").tolist(), texts(phases, "phase").tolist()
+        moving = next((row for row, name in enumerate(names) if name not in (AT_REST, UNKNOWN)), 0)
+        if moving and names[moving - 1] == AT_REST and math.isfinite(start_s[moving]):
+            found["first-movement"] = start_s[moving]
+        flying = names.index(AIRBORNE) if AIRBORNE in names else 0
+        if flying and names[flying - 1] != UNKNOWN and math.isfinite(start_s[flying]):
+            found["lift-off"] = start_s[flying]
+    outage_s = _first_outage_s(saved)
+    if outage_s is not None:
+        found["outage"] = outage_s
+    return found
+
+
+def _first_outage_s(saved: SavedFlight) -> float | None:
+    outages = objects(mapping(saved.summary, "results", "inertial"), "outages")
+    starts = [one.get("start_s") for one in outages if one.get("missing") in ("gnss", "both")]
+    lanes = saved.figure("gnss_lanes")
+    if lanes is not None:
+        starts += numbers(lanes, "start_s")[texts(lanes, "state") == NO_GNSS].tolist()
+    known = [float(start) for start in starts if isinstance(start, int | float) and np.isfinite(start)]
+    return min(known, default=None)
+
+
+def _default(a: SavedFlight, b: SavedFlight, is_same_log: bool) -> Event:
+    if is_same_log:
+        return "start" if None in (_start_utc_ns(a), _start_utc_ns(b)) else "utc"
+    return "first-movement" if all("first-movement" in events_of(saved) for saved in (a, b)) else "start"
+
+
+def _start_utc_ns(saved: SavedFlight) -> int | None:
+    try:
+        return iso_to_utc_ns(str(mapping(saved.summary, "flight").get("start_utc")))[0]
+    except GroundstationError:
+        return None
+
+
+def _missing(saved: SavedFlight, event: Event) -> UsageError:
+    has = [f"{name} (+{duration_text(moment)})" for name, moment in events_of(saved).items()]
+    has += ["utc"] if _start_utc_ns(saved) is not None else []
+    return UsageError(saved.folder.name, f"no {event}", f"one of {', '.join(has)}", "choose another --align")

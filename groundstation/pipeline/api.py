@@ -1,0 +1,265 @@
+"""The Python API: a flight opened from a log or from a flight folder, everything computed when first asked for."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.integrity.limits import Thresholds
+from groundstation.pipeline.analyse import analyse, user_settings
+from groundstation.pipeline.configuration import SECTIONS, Configuration, load_configuration
+from groundstation.pipeline.convert import Converted, convert_log
+from groundstation.pipeline.describe import facts_of
+from groundstation.pipeline.flight import given_of, read_flight
+from groundstation.pipeline.identity import flight_id
+from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK
+from groundstation.pipeline.log import Log, open_log
+from groundstation.pipeline.notebook import AnyPath, OpenFlight, told_in_a_line
+from groundstation.results.files import SavedFlight, load
+from groundstation.results.flight import FlightResults, Source
+from groundstation.results.restore import restored
+from groundstation.tables.table import Flight
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Settings = AnyPath | Mapping[str, Any]
+
+
+def open_flight(
+    path: AnyPath,
+    *,
+    config: Settings | None = None,
+    aircraft: Settings | None = None,
+    site: Settings | None = None,
+    intervals: Settings | None = None,
+    profile: AnyPath | None = None,
+    thresholds: Settings | None = None,
+) -> "OpenFlight":
+    """Open a flight: a recorded log, an MCAP that groundstation wrote, or a flight folder that ``run`` made.
+
+    Parameters
+    ----------
+    path : str or Path
+    config, aircraft, site, intervals, thresholds : str, Path or mapping, optional
+        Settings as of the verb ``run``: a TOML file, or its content as a mapping. Not for a flight folder.
+    profile : str or Path, optional
+        Layout of a log that no reader knows.
+
+    Returns
+    -------
+    OpenFlight
+        Nothing is computed yet, but the format is known and the settings are checked.
+
+    Raises
+    ------
+    GroundstationError
+        When there is nothing to open, no reader claims it, or a setting is wrong.
+    """
+    where, layout = Path(path), None if profile is None else Path(profile)
+    given = {"config": config, "aircraft": aircraft, "site": site, "intervals": intervals, "thresholds": thresholds}
+    files = {name: _file_or_content(value) for name, value in given.items()}
+    with told_in_a_line(where.name):
+        if not where.exists():
+            raise UsageError(str(where), "no such file or folder")
+        if where.is_dir():
+            if layout or any(value is not None for value in given.values()):
+                raise UsageError(str(where), "settings for saved results", next_step="open it, then with_settings()")
+            return SavedRun(_flight_folder(where))
+        return OpenLog(Conversion(open_log(where, layout)), load_configuration(profile=layout, **files))
+
+
+def open_fleet(out: AnyPath) -> "pd.DataFrame":
+    """The table of a folder of flights that ``run`` made, one row a flight.
+
+    Raises
+    ------
+    UsageError
+        When the folder has none.
+    GroundstationError
+        When it cannot be read.
+    """
+    import pandas as pd
+
+    from groundstation.pipeline.fleet import FLEET_PARQUET
+
+    table = Path(out) / FLEET_PARQUET
+    if not table.is_file():
+        raise UsageError(str(out), f"no {FLEET_PARQUET}", "a folder of flights that `run` made")
+    with told_in_a_line(str(table)):
+        try:
+            return pd.read_parquet(table)
+        except ValueError as error:
+            raise GroundstationError(str(table), f"unreadable ({error})", next_step="run the logs again") from error
+
+
+def simulate(scenario: str, folder: AnyPath, *, seed: int | None = None) -> Path:
+    """Simulate a flight with known truth into ``<folder>/<scenario>.csv``, whatever is there, and return that path.
+
+    Raises
+    ------
+    GroundstationError
+        When there is no such scenario.
+    """
+    from groundstation.pipeline.synthesis import simulate_to
+
+    with told_in_a_line(str(folder)):
+        return simulate_to(scenario, Path(folder), seed=seed, force=True)[0]
+
+
+class Conversion:
+    """A log and what becomes of it when read: done once, shared by all settings it is analysed with."""
+
+    def __init__(self, log: Log) -> None:
+        self.log = log
+        self._done: dict[str, tuple[Converted, Flight]] = {}  # by the thresholds of the ledger
+
+    def read(self, thresholds: Thresholds) -> tuple[Converted, Flight]:
+        """Convert the log to an MCAP and read its tables back, as a run does."""
+        if thresholds.sha256 not in self._done:
+            with told_in_a_line(self.log.path.name), TemporaryDirectory(prefix="groundstation-") as folder:
+                mcap = Path(folder) / "flight.mcap"
+                converted = convert_log(self.log, mcap, thresholds)
+                self._done[thresholds.sha256] = converted, read_flight(mcap, converted)
+        return self._done[thresholds.sha256]
+
+
+class OpenLog(OpenFlight):
+    """A flight from a log or MCAP, with settings; nothing is written but by :meth:`save` and :meth:`recording`."""
+
+    def __init__(self, conversion: Conversion, configuration: Configuration) -> None:
+        self.configuration = configuration
+        self._conversion = conversion
+        self._settings = user_settings(configuration)
+
+    @property
+    def _converted(self) -> Converted:
+        return self._conversion.read(self._settings.thresholds)[0]
+
+    @property
+    def source(self) -> Source:
+        return self._conversion.log.source
+
+    @property
+    def ledger(self) -> Mapping[str, Any]:
+        return {key: value for key, value in self._converted.info.ledger.items() if key != "findings"}
+
+    @property
+    def clock(self) -> Mapping[str, Any]:
+        return self._converted.info.clock
+
+    @property
+    def info(self) -> dict[str, str]:
+        return facts_of(self._conversion.log, self.flight.metadata, self.ledger)
+
+    @cached_property
+    def flight(self) -> Flight:
+        return self._conversion.read(self._settings.thresholds)[1]
+
+    @cached_property
+    def results(self) -> FlightResults:
+        flight = self.flight
+        start_utc_ns = flight.start_ns if flight.has_utc else None
+        identity = flight_id(start_utc_ns, flight.metadata, self.source.sha256)
+        return analyse(flight, given_of(self._conversion.log, self._converted, identity), self.configuration)
+
+    def with_settings(self, **sections: Any) -> "OpenLog":
+        document = _laid_over(self.configuration.to_dict(), sections)
+        profile = self.configuration.profile
+        return OpenLog(self._conversion, load_configuration(document, profile=Path(profile) if profile else None))
+
+    def save(self, out: AnyPath, *, force: bool = False) -> "SavedRun":
+        """Run the log into ``out`` as the verb ``run`` does, and open the flight folder.
+
+        Raises
+        ------
+        GroundstationError
+            When ``out`` is something else's, or the log cannot be run.
+        """
+        from groundstation.pipeline.batch import run_many
+
+        with told_in_a_line(str(out)):
+            outcome = run_many([self._conversion.log.path], Path(out), self.configuration, jobs=1, force=force)[0]
+            if not outcome.folder:
+                raise GroundstationError(str(out), outcome.text)
+            return SavedRun(Path(outcome.folder))
+
+    def _saved(self) -> SavedFlight:
+        from groundstation.results.summary import summary_of
+
+        manifest = {"configuration": self.configuration.to_dict()}
+        figures = {figure.name: figure for figure in self.results.figures}
+        return SavedFlight(Path(), summary_of(self.results), manifest, figures)
+
+
+class SavedRun(OpenFlight):
+    """A flight folder that a run made: its answers as they were saved, its tables from the MCAP in it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.saved = load(folder)
+
+    @cached_property
+    def results(self) -> FlightResults:
+        return restored(self.saved)
+
+    @property
+    def source(self) -> Source:
+        return self.results.source
+
+    @property
+    def ledger(self) -> Mapping[str, Any]:
+        return self.results.ledger
+
+    @property
+    def clock(self) -> Mapping[str, Any]:
+        return self.results.clock
+
+    @property
+    def info(self) -> dict[str, str]:
+        return facts_of(Log(self.folder, self.source, is_store=True), self.results.metadata, self.ledger)
+
+    @cached_property
+    def flight(self) -> Flight:
+        return self._log.flight
+
+    @cached_property
+    def _log(self) -> OpenLog:
+        """The flight anew, from the MCAP, with the settings of the run."""
+        found = sorted(self.folder.glob("*.mcap"))
+        if len(found) != 1:
+            raise UsageError(str(self.folder), f"{len(found)} MCAPs", "the one of the flight", "run the log again")
+        told = self.saved.manifest.get("configuration")
+        known = {name: value for name, value in told.items() if name in SECTIONS} if isinstance(told, dict) else {}
+        with told_in_a_line(found[0].name):
+            return OpenLog(Conversion(open_log(found[0])), load_configuration(known))
+
+    def with_settings(self, **sections: Any) -> OpenLog:
+        return self._log.with_settings(**sections)
+
+    def _saved(self) -> SavedFlight:
+        return self.saved
+
+
+def _flight_folder(folder: Path) -> Path:
+    if not (folder / FLIGHT_FOLDER_MARK).is_file():
+        is_out = (folder / OUT_FOLDER_MARK).is_file()
+        hint = "open one of the flight folders in it, or all with open_fleet()" if is_out else ""
+        found = "a folder of flights" if is_out else "a folder that is no flight"
+        raise UsageError(str(folder), found, "a log or a flight folder that `run` made", hint)
+    return folder
+
+
+def _file_or_content(settings: Settings | None) -> Path | Mapping[str, Any] | None:
+    return settings if settings is None or isinstance(settings, Mapping) else Path(settings)
+
+
+def _laid_over(document: Mapping[str, Any], sections: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings with some sections changed: mappings key by key, lists as a whole."""
+    out = {name: value for name, value in document.items() if name != "profile"}
+    for name, value in sections.items():
+        known = out.get(name, {})
+        out[name] = {**known, **value} if isinstance(value, Mapping) and isinstance(known, Mapping) else value
+    return out

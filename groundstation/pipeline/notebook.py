@@ -1,0 +1,236 @@
+"""What a notebook does with one flight, whether it comes from a log or from a flight folder."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from functools import cached_property
+from html import escape
+from os import PathLike
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from groundstation.base.errors import GroundstationError, NotAssessableError, UsageError
+from groundstation.pipeline.flight import sentence
+from groundstation.results.files import SavedFlight
+from groundstation.results.flight import FlightResults, Source
+from groundstation.results.forecast import ForecastResult
+from groundstation.results.heading import HeadingResult
+from groundstation.results.inertial import InertialResult
+from groundstation.results.latency import Latencies
+from groundstation.tables.table import Flight, TimedTable, timed
+
+if TYPE_CHECKING:
+    from groundstation.pipeline.api import OpenLog
+    from groundstation.reports.drawing import Sketch
+    from groundstation.reports.parts import Drawing
+
+AnyPath = str | PathLike[str]
+MOST_TOPICS = 12  # named in the card of a flight
+
+
+@contextmanager
+def told_in_a_line(where: str) -> Iterator[None]:
+    """Tell what the machine refuses in one line, as everything else is told."""
+    try:
+        yield
+    except OSError as error:
+        raise GroundstationError(where, error.strerror or str(error)) from error
+    except MemoryError as error:
+        raise GroundstationError(where, "not enough memory") from error
+
+
+class OpenFlight(ABC):
+    """One flight. What stands here works alike for a log and for a flight folder."""
+
+    @property
+    @abstractmethod
+    def source(self) -> Source:
+        """The log it comes from: name, SHA-256, size, reader."""
+
+    @property
+    @abstractmethod
+    def ledger(self) -> Mapping[str, Any]:
+        """Integrity ledger: rates, gaps, losses and odd values of every topic."""
+
+    @property
+    @abstractmethod
+    def clock(self) -> Mapping[str, Any]:
+        """How the recorder's clock was read and repaired."""
+
+    @property
+    @abstractmethod
+    def info(self) -> dict[str, str]:
+        """What the log is: file, format, first and last sample, metadata."""
+
+    @property
+    @abstractmethod
+    def flight(self) -> Flight:
+        """Every topic on the corrected clock, as the estimators take it."""
+
+    @property
+    @abstractmethod
+    def results(self) -> FlightResults:
+        """All answers; ``results.to_frame(name)`` gives findings and the arrays behind the figures."""
+
+    @abstractmethod
+    def with_settings(self, **sections: Any) -> "OpenLog":
+        """The same flight with other settings; the log is read again only for other ``thresholds`` of the ledger.
+
+        Parameters
+        ----------
+        **sections
+            ``heading``, ``inertial``, ``latency``, ``aircraft``, ``site``, ``thresholds``: mappings laid over what is
+            set; ``exclude``, ``force``: lists of intervals (``from``, ``to``, ``reason``) in place of those set.
+
+        Raises
+        ------
+        SettingsError
+            For an unknown key or a value that cannot be used.
+        """
+
+    @abstractmethod
+    def _saved(self) -> SavedFlight:
+        """The flight as the report reads it."""
+
+    @cached_property
+    def tables(self) -> Mapping[str, TimedTable]:
+        """Tables by topic; ``tables["ins"].to_frame()`` is indexed by UTC, or by flight time where there is none."""
+        flight = self.flight
+        return MappingProxyType({topic: timed(flight, topic) for topic in flight.topics()})
+
+    def heading(self) -> HeadingResult:
+        """The heading correction (system 1).
+
+        Raises
+        ------
+        NotAssessableError
+            When the data does not allow it; the message says why.
+        """
+        found: HeadingResult = self._answer("heading")
+        return found
+
+    def inertial(self) -> InertialResult:
+        """The errors of the INS (system 2); raises as :meth:`heading`."""
+        found: InertialResult = self._answer("inertial")
+        return found
+
+    def forecast(self) -> ForecastResult:
+        """How far the INS can be trusted without GNSS; raises as :meth:`heading`."""
+        found: ForecastResult = self._answer("forecast")
+        return found
+
+    def latency(self) -> Latencies:
+        """How much later each sensor shows the motion that the INS shows; raises as :meth:`heading`."""
+        found: Latencies = self._answer("latency")
+        return found
+
+    def _answer(self, analysis: str) -> Any:
+        results = self.results
+        found = getattr(results, analysis)
+        if found is not None:
+            return found
+        reasons = {entry.analysis: entry.reason for entry in results.not_assessable}
+        reason = reasons.get(analysis) or reasons.get("inertial") or "the log does not hold what it needs"
+        raise NotAssessableError(analysis, reason)
+
+    @property
+    def figures(self) -> dict[str, str]:
+        """Names that :meth:`figure` takes, with their titles."""
+        return {name: drawing.title for name, (drawing, _) in self._sketches.items()}
+
+    def figure(self, name: str) -> Any:
+        """A figure of the report, painted by the same code.
+
+        Parameters
+        ----------
+        name : str
+            One of :attr:`figures`, or the name of arrays that one shows (``heading_distribution``).
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            A cell that ends with it shows it; it may be changed and saved.
+
+        Raises
+        ------
+        UsageError
+            When this flight has no such figure.
+        """
+        from groundstation.reports.notebook_figure import figure_from
+
+        showing = (sketch for drawing, sketch in self._sketches.values() if name in drawing.numbers)
+        sketch = self._sketches[name][1] if name in self._sketches else next(showing, None)
+        if sketch is None:
+            raise UsageError("figure", repr(name), "one of " + ", ".join(self._sketches))
+        return figure_from(sketch)
+
+    @cached_property
+    def _sketches(self) -> "dict[str, tuple[Drawing, Sketch]]":
+        from groundstation.reports.notebook_figure import sketches_of
+
+        return sketches_of(self._saved())
+
+    def recording(self, path: AnyPath) -> Path:
+        """Write the Rerun recording to a file and return its path; `groundstation view` and Rerun open it."""
+        from groundstation.viewer.recording import write_recording
+
+        target = Path(path)
+        with told_in_a_line(str(target)):
+            write_recording(target, self.flight, self.results)
+        return target
+
+    def show(self, *, inline: bool | None = None, width: int | str = "auto", height: int | str = 700) -> Any:
+        """Show the recording: in a notebook in the cell, elsewhere in the Rerun viewer.
+
+        Parameters
+        ----------
+        inline : bool, optional
+            Where; left out, in the cell if this is a notebook. The viewer's own window is waited for.
+        width, height : int or "auto"
+            Pixels, in the cell.
+
+        Returns
+        -------
+        rerun.notebook.Viewer or None
+            A cell that ends with it shows it.
+
+        Raises
+        ------
+        GroundstationError
+            When rerun-notebook is not installed (``pip install 'groundstation[notebook]'``), or no viewer starts.
+        """
+        from groundstation.viewer.inline import inline_viewer, is_notebook
+        from groundstation.viewer.launch import open_viewer
+
+        if is_notebook() if inline is None else inline:
+            return inline_viewer(self.flight, self.results, width=width, height=height)
+        with told_in_a_line(self.source.name), TemporaryDirectory(prefix="groundstation-") as folder:
+            code = open_viewer(self.recording(Path(folder) / "flight.rrd"))
+        if code:
+            raise GroundstationError("the Rerun viewer", f"ended with code {code}", next_step="is there a display?")
+        return None
+
+    def __repr__(self) -> str:
+        done = self.__dict__.get("results")
+        told = f": {sentence(done)}" if done is not None else ""
+        return f"<{type(self).__name__} {self.source.name} ({self.source.reader}){told}>"
+
+    def _repr_html_(self) -> str:
+        """The top of the report as a short table: verdict, correction, span, topics."""
+        from groundstation.reports.sections import front
+
+        told = front.build(self._saved())
+        rows = [(name, value if isinstance(value, str) else value.text) for name, value in told.pairs]
+        if told.verdict is not None:
+            rows.insert(0, ("Verdict", told.verdict.text))
+        rows += [(name, f"{value}, {remark}" if remark else value) for name, value, remark in told.figures]
+        counted = self.ledger.get("topics") or {}
+        topics = [f"{name} ({entry['rows']})" for name, entry in sorted(counted.items())]
+        more = f" and {len(topics) - MOST_TOPICS} more" if len(topics) > MOST_TOPICS else ""
+        rows.append(("Topics (rows)", ", ".join(topics[:MOST_TOPICS]) + more))
+        left = 'style="text-align:left"'
+        cells = [f"<tr><th {left}>{escape(name)}</th><td {left}>{escape(value)}</td></tr>" for name, value in rows]
+        why = " ".join(told.sentences)
+        return f"<table><caption {left}><b>{escape(told.headline)}</b> {escape(why)}</caption>{''.join(cells)}</table>"

@@ -1,0 +1,112 @@
+"""What stands beside the flight folders of an OUT: the index and what the flights say together."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, is_ours
+from groundstation.pipeline.outcome import Outcome
+from groundstation.reports.index import INDEX_CSV, INDEX_JSON
+from groundstation.results.files import SUMMARY
+
+FLEET_RECORDING = "fleet.rrd"
+FLEET_FILES = (INDEX_JSON, INDEX_CSV, "fleet.parquet", "samples.parquet", FLEET_RECORDING)
+
+
+def write_beside(
+    out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[dict[str, Any]] = ()
+) -> tuple[Outcome, ...]:
+    """Write everything that stands beside the flight folders; returns what could not be written or read."""
+    from groundstation.pipeline.fleet import write_fleet
+    from groundstation.viewer.fleet import write_fleet_recording
+
+    problems = write_index_of(out, outcomes, kept_rows)
+    fleet, unwritten = write_fleet(out)
+    try:
+        write_fleet_recording(out / FLEET_RECORDING, fleet)
+    except OSError as error:
+        text = f"{out}: {FLEET_RECORDING} cannot be written ({error.strerror or error})"
+        unwritten = (*unwritten, Outcome(str(out), "failed", text))
+    return (*problems, *unwritten)
+
+
+def write_index_of(
+    out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[dict[str, Any]] = ()
+) -> tuple[Outcome, ...]:
+    """Write index.json and index.csv: every flight in ``out``, and the logs of this run that gave none.
+
+    Returns what could not be listed: flight folders that cannot be read, an index that cannot be written.
+    """
+    from groundstation.reports.index import failed_row, index_row, write_index
+    from groundstation.results.files import load
+
+    problems: list[Outcome] = []
+    rows = list(kept_rows)
+    for folder in flight_folders(out):
+        try:
+            rows.append(index_row(load(folder)))
+        except GroundstationError as error:
+            problems.append(Outcome(str(folder), "failed", str(error)))
+    without_flight = [outcome for outcome in outcomes if not outcome.flight_id]
+    rows += [failed_row(one.source, one.state, one.text) for one in (*without_flight, *problems)]
+    try:
+        write_index(out, rows)
+    except OSError as error:
+        problems.append(Outcome(str(out), "failed", f"{out}: the index cannot be written ({error.strerror or error})"))
+    return tuple(problems)
+
+
+def flight_folders(out: Path) -> list[Path]:
+    """Flight folders in an OUT, in the order of their names."""
+    return sorted(folder for folder in out.iterdir() if folder.name[0] != "." and (folder / SUMMARY).is_file())
+
+
+def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple[Outcome, ...]]:
+    """Make reports and index of an OUT (or the report of one flight folder) again from the saved results.
+
+    Returns
+    -------
+    list of Path, tuple of Outcome
+        What was written, and the flight folders that could not be read or have no PDF though one was asked for.
+
+    Raises
+    ------
+    UsageError
+        When the folder is not one that ``run`` made.
+    """
+    from groundstation.reports.flight_report import write_flight_report
+
+    is_flight = (out / FLIGHT_FOLDER_MARK).is_file()
+    if not is_flight and (not out.is_dir() or not (is_ours(out) or flight_folders(out))):
+        raise UsageError(str(out), "no results", "a folder that `run` made")
+    paths: list[Path] = []
+    problems: list[Outcome] = []
+    for folder in [out] if is_flight else flight_folders(out):
+        try:
+            written = write_flight_report(folder, with_pdf=with_pdf)
+        except GroundstationError as error:
+            if is_flight:
+                raise
+            problems.append(Outcome(str(folder), "failed", str(error)))
+            continue
+        paths += written.paths
+        if written.problem:
+            problems.append(Outcome(str(folder), "done", f"{folder.name}: {written.problem}"))
+    if is_flight:
+        return paths, tuple(problems)
+    told = {one.source for one in problems}
+    unread = [one for one in write_beside(out, (), _rows_without_flight(out)) if one.source not in told]
+    return [*paths, *(out / name for name in FLEET_FILES if (out / name).exists())], (*problems, *unread)
+
+
+def _rows_without_flight(out: Path) -> list[dict[str, Any]]:
+    """Rows of the logs that gave no flight, from the index as it stands: nothing else remembers them."""
+    import json
+
+    try:
+        rows = json.loads((out / OUT_FOLDER_MARK).read_text(encoding="utf-8"))["rows"]
+        folders = {str(folder) for folder in flight_folders(out)}
+        return [row for row in rows if row["kind"] != "flight" and row["source"] not in folders]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []

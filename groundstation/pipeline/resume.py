@@ -1,0 +1,165 @@
+"""What a run need not do again. A flight's manifest keeps a key for each stage; equal keys, equal results.
+
+A key is a digest of everything that goes into a stage: the content of the log and of its profile, the settings that the
+stage reads, and the versions. The conversion reads the thresholds, the analysis everything else that a user sets, the
+reports whether there is a PDF.
+"""
+
+import hashlib
+import json
+import platform
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from importlib import metadata as installed
+from pathlib import Path
+from typing import Any, Literal
+
+from groundstation import __version__
+from groundstation.base.errors import GroundstationError
+from groundstation.base.findings import SEVERITIES, Severity
+from groundstation.pipeline.configuration import Configuration
+from groundstation.reports.flight_report import PDF, REPORT
+from groundstation.results.files import MANIFEST, SUMMARY, json_text, write_text
+from groundstation.results.flight import Source
+
+Step = Literal["everything", "analysis", "reports", "nothing"]  # what has to be done for a log
+KEYS = "keys"
+PACKAGES = (
+    *("mcap", "numpy", "pandas", "numba", "scipy", "pyarrow", "rerun-sdk"),
+    *("protobuf", "matplotlib", "typst", "pygeomag"),
+)
+
+
+@dataclass(frozen=True)
+class Keys:
+    """Keys of the stages of one log's run, hexadecimal; each one covers those before it."""
+
+    conversion: str
+    analysis: str
+    reports: str
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A flight folder that is whole.
+
+    Parameters
+    ----------
+    folder : Path
+    files : frozenset of str
+        Names of what is in it.
+    flight_id, sha256 : str
+        ``sha256`` of the log that the flight came from.
+    keys : Keys
+    text : str
+        What was found, in one line.
+    has_lost_data : bool
+    gravest : {'info', 'warn', 'fail'} or None
+        Severity of its gravest finding.
+    """
+
+    folder: Path
+    files: frozenset[str]
+    flight_id: str
+    sha256: str
+    keys: Keys
+    text: str
+    has_lost_data: bool
+    gravest: Severity | None
+
+    @property
+    def mcap(self) -> Path:
+        """Its store file."""
+        return self.folder / f"{self.flight_id}.mcap"
+
+    def step(self, keys: Keys, *, with_pdf: bool) -> Step:
+        """What has to be done for the results to be those of ``keys``; a file that somebody took away is made again."""
+        if keys.conversion != self.keys.conversion or self.mcap.name not in self.files:
+            return "everything"
+        if keys.analysis != self.keys.analysis or f"{self.flight_id}.rrd" not in self.files:
+            return "analysis"
+        wanted = {REPORT, PDF} if with_pdf else {REPORT}
+        return "nothing" if keys.reports == self.keys.reports and wanted <= self.files else "reports"
+
+
+def versions() -> dict[str, str]:
+    """Versions of what results depend on."""
+    return {"groundstation": __version__, **{name: _version(name) for name in PACKAGES}}
+
+
+def _version(package: str) -> str:
+    try:
+        return installed.version(package)
+    except installed.PackageNotFoundError:
+        return ""
+
+
+def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool) -> Keys:
+    """Keys of the run of a log: its name counts too, as it stands in the results.
+
+    Raises
+    ------
+    GroundstationError
+        When the profile cannot be read.
+    """
+    settings = {**asdict(configuration), "files": None, "profile": None}
+    thresholds = settings.pop("thresholds")
+    conversion = _digest(asdict(source), _profile_of(configuration), thresholds, versions(), platform.python_version())
+    analysis = _digest(conversion, settings)
+    return Keys(conversion, analysis, _digest(analysis, with_pdf))
+
+
+def _digest(*parts: Any) -> str:
+    return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def _profile_of(configuration: Configuration) -> str:
+    if not configuration.profile:
+        return ""
+    try:
+        return hashlib.sha256(Path(configuration.profile).read_bytes()).hexdigest()
+    except OSError as error:
+        raise GroundstationError(configuration.profile, error.strerror or "cannot be read", "a profile") from error
+
+
+def remembered(keys: Keys, text: str, has_lost_data: bool) -> dict[str, Any]:
+    """What a manifest keeps so that a later run knows what it need not do."""
+    return {KEYS: asdict(keys), "text": text, "has_lost_data": has_lost_data}
+
+
+def remember_reports(flight: "Finished", *, with_pdf: bool) -> None:
+    """Take down that the reports of a finished flight were made again."""
+    path = flight.folder / MANIFEST
+    manifest = json.loads(path.read_text(encoding="utf-8"))
+    manifest["resume"][KEYS]["reports"] = _digest(flight.keys.analysis, with_pdf)
+    write_text(path, json_text(manifest))
+
+
+def finished_flights(folders: Iterable[Path]) -> dict[str, Finished]:
+    """Whole flights among flight folders, by the digest of the log they came from."""
+    found = (finished(folder) for folder in folders)
+    return {one.sha256: one for one in found if one is not None}
+
+
+def finished(folder: Path) -> Finished | None:
+    """What a flight folder remembers; None when it is not whole, or was not made by such a run."""
+    try:
+        manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+        return _finished(folder, frozenset(path.name for path in folder.iterdir()), manifest, summary)
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _finished(folder: Path, files: frozenset[str], manifest: Mapping[str, Any], summary: Mapping[str, Any]) -> Finished:
+    found = {str(finding["severity"]) for finding in summary["findings"]}
+    return Finished(
+        folder,
+        files,
+        folder.name,
+        str(manifest["source"]["sha256"]),
+        Keys(**manifest["resume"][KEYS]),
+        str(manifest["resume"]["text"]),
+        bool(manifest["resume"]["has_lost_data"]),
+        next((severity for severity in reversed(SEVERITIES) if severity in found), None),
+    )

@@ -1,0 +1,252 @@
+"""The page of a comparison: what differs between two flights, and their figures over each other."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from groundstation.base.findings import Finding
+from groundstation.base.geodesy import north_east_m
+from groundstation.reports import drawing as d
+from groundstation.reports.page import TEMPLATES, render
+from groundstation.reports.parts import Cell, Drawing, Grid, Head, Mark, Note, Part, Section
+from groundstation.reports.sections.findings import MARKS
+from groundstation.reports.sections.inertial_figures import plain_log
+from groundstation.reports.sections.saved import mapping, numbers
+from groundstation.reports.wording import ABSENT, any_value, number, significant
+from groundstation.results.comparison import Comparison, Delta, Value
+from groundstation.results.figures import FigureData
+from groundstation.results.files import SavedFlight
+
+A, B = d.INS, d.GNSS
+BAND = 1.96
+MOST = 3000  # points of a line
+NEAR_M = 200_000.0  # flights that begin no further apart share one map
+SHARED = (
+    "Both come from one log: they share its noise, and what differs follows from the settings alone. A difference "
+    "within the stated sigmas is no proof that the settings do not matter."
+)
+LINES = (  # figure, column, column of the half width and what it is multiplied by, axis, title
+    ("overview", "altitude_m", None, "altitude, m", "Altitude"),
+    ("overview", "ground_speed_mps", None, "ground speed, m/s", "Ground speed"),
+    ("overview", "heading_deg", None, "true heading, °", "INS heading"),
+    ("heading_running", "mean_deg", ("honest_half_width_deg", 1.0), "heading error, °", "Heading error, running mean"),
+    ("inertial_track", "ins_error_m", None, "radial error, m", "Radial error of the INS against GNSS"),
+    ("inertial_states", "north_position_m", ("north_position_sigma_m", BAND), "north, m", "North position error"),
+    ("inertial_states", "east_position_m", ("east_position_sigma_m", BAND), "east, m", "East position error"),
+)
+
+
+def comparison_html(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> str:
+    """Render the page of a comparison as a complete HTML document."""
+    sections = (_answers(comparison), _figures(comparison, a, b), _settings(comparison), _findings(comparison))
+    return render(
+        "compare.html.j2",
+        title=f"{comparison.a.flight_id} and {comparison.b.flight_id}",
+        opening=_opening(comparison),
+        sections=[section for section in sections if section is not None],
+        style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
+    )
+
+
+def _opening(comparison: Comparison) -> list[Part]:
+    sides = comparison.a, comparison.b
+    rows = [
+        ("Aircraft, flight", *(f"{side.aircraft} {side.flight}".strip() or ABSENT for side in sides)),
+        ("Source", *(side.source_name for side in sides)),
+        ("SHA-256", *(side.source_sha256[:16] for side in sides)),
+        ("Start, UTC", *(side.start_utc or "unknown" for side in sides)),
+    ]
+    alignment = comparison.alignment
+    when = "" if alignment.event == "utc" else f", A at {alignment.a_s:.1f} s, B at {alignment.b_s:.1f} s"
+    told = f"Clocks aligned on {alignment.event}{when}: clock of B {number(alignment.offset_s, 3, 's', signed=True)}."
+    heads = (Head(""), Head(f"A: {comparison.a.flight_id}"), Head(f"B: {comparison.b.flight_id}"))
+    opening: list[Part] = [Grid("", heads, rows), Note(f"{told} Times in the figures are flight times of A.")]
+    return [*opening, Note(SHARED, "warn")] if comparison.is_same_log else opening
+
+
+def _answers(comparison: Comparison) -> Section:
+    heads = (
+        Head("Answer"),
+        Head("A", True),
+        Head("B", True),
+        Head("B − A", True),
+        Head("σ", True),
+        Head("Beyond 1.96 σ"),
+    )
+    rows = [_row(delta) for delta in comparison.shown]
+    differing = sum(delta.is_different for delta in comparison.deltas)
+    caption = (
+        f"The main answers, and any other that differs beyond its sigma; {differing} of {len(comparison.deltas)} "
+        "common answers differ at all: compare.csv. σ of the difference from the sigmas that both state, taken as "
+        "independent; empty where one states none."
+    )
+    lead = "Answers that both flights have; names as in summary.json."
+    return Section("answers", "Answers", lead, (Grid("", heads, rows, caption),))
+
+
+def _row(delta: Delta) -> tuple[Cell, ...]:
+    change = "" if delta.delta is None else significant(delta.delta, 6)
+    sigma = "" if delta.sigma is None else significant(delta.sigma, 3)
+    marks: dict[bool | None, Cell] = {None: "", True: Mark("warn", "beyond"), False: "within"}
+    return (delta.name, _value(delta.a), _value(delta.b), change, sigma, marks[delta.is_significant])
+
+
+def _value(value: Value) -> str:
+    return ABSENT if value is None else any_value(value)
+
+
+def _settings(comparison: Comparison) -> Section | None:
+    if not comparison.settings:
+        return None
+    rows = [(pair.name, _value(pair.a), _value(pair.b)) for pair in comparison.settings]
+    lead = "What was set, what each analysis used, and versions, where they are not the same."
+    grid = Grid("", (Head("Setting"), Head("A", True), Head("B", True)), rows)
+    return Section("settings", "Settings that differ", lead, (grid,))
+
+
+def _findings(comparison: Comparison) -> Section | None:
+    sides = (
+        ("A", comparison.findings_a, comparison.not_assessable_a),
+        ("B", comparison.findings_b, comparison.not_assessable_b),
+    )
+    grids = [
+        Grid(f"{letter} alone", (Head("Severity"), Head("Finding"), Head("Code")), rows)
+        for letter, findings, reasons in sides
+        if (
+            rows := [
+                *_finding_rows(findings),
+                *((Mark("unknown", "not assessed"), f"{one.analysis}: {one.reason}", "") for one in reasons),
+            ]
+        )
+    ]
+    lead = "What was noticed in only one of the two, by severity, code and topic."
+    return Section("findings", "Findings of one alone", lead, grids) if grids else None
+
+
+def _finding_rows(findings: Sequence[Finding]) -> list[tuple[Cell, ...]]:
+    return [(MARKS[finding.severity], finding.text, finding.code) for finding in findings]
+
+
+# ---------------------------------------------------------------------------------------------------- figures
+
+
+def _figures(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> Section | None:
+    sides = (_Side("A", a, A), _Side("B", b, B, comparison.alignment.offset_s))
+    drawings = [_tracks(sides), *(_overlay(sides, *row) for row in LINES), _growth(sides)]
+    parts = [drawing for drawing in drawings if drawing is not None]
+    lead = "A blue, B orange; thin lines are 95 % bands."
+    return Section("figures", "Figures", lead, parts) if parts else None
+
+
+class _Side(NamedTuple):
+    letter: str
+    saved: SavedFlight
+    colour: str
+    offset_s: float = 0.0
+
+    @property
+    def width(self) -> float:
+        """Of its lines: where both agree, A is seen behind B."""
+        return 2.4 if self.letter == "A" else 1.0
+
+    def figure(self, name: str, *columns: str) -> FigureData | None:
+        """Figure data that has numbers in every column named."""
+        data = self.saved.figure(name)
+        has_all = data is not None and all(np.isfinite(numbers(data, column)).any() for column in columns)
+        return data if has_all else None
+
+
+def _overlay(
+    sides: Sequence[_Side], name: str, column: str, width: tuple[str, float] | None, axis: str, title: str
+) -> Drawing | None:
+    """A column of both flights over the flight time of A, with its band; ``width``: its half width and a factor."""
+    drawn = [(side, data) for side in sides if (data := side.figure(name, "time_s", column)) is not None]
+    if not drawn:
+        return None
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 20, 12, 174, 54)
+        times, shown = [], []
+        for side, data in drawn:
+            values = d.broken_at_wrap(numbers(data, column)) if column == "heading_deg" else numbers(data, column)
+            half = np.full(len(data), np.nan) if width is None else width[1] * numbers(data, width[0])
+            time, values, half = d.broken_at_gaps(numbers(data, "time_s") + side.offset_s, values, half)
+            for edge in (values - half, values + half):
+                d.line(axes, time, edge, side.colour, 0.5, MOST, alpha=0.7)
+                shown.append(edge)
+            d.line(axes, time, values, side.colour, side.width, MOST, label=side.letter, zorder=3)
+            times.append(time)
+            shown.append(values)
+        # The bands of the first samples may leave the picture.
+        low, high = np.percentile(d.finite(*shown), (0.0, 100.0) if width is None else (0.5, 99.5))
+        axes.set_ylim(*d.padded(float(low), float(high)))
+        axes.set_ylabel(axis)
+        every = d.finite(*times)
+        d.time_axis(axes, float(every.min()), float(every.max()))
+        d.legend_above(axes)
+
+    caption = f"{title} of both flights." if len(drawn) == len(sides) else f"{title}: only {drawn[0][0].letter} has it."
+    return Drawing(title, caption, f"{title} of A and B over flight time.", d.draw(f"{name}-{column}", 60, paint))
+
+
+def _tracks(sides: Sequence[_Side]) -> Drawing | None:
+    drawn = []
+    for side in sides:
+        data = side.figure("overview", "latitude_deg", "longitude_deg")
+        if data is not None:
+            latitude, longitude = numbers(data, "latitude_deg"), numbers(data, "longitude_deg")
+            first = int(np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))[0])
+            drawn.append((side, latitude, longitude, (latitude[first], longitude[first])))
+    if not drawn:
+        return None
+    shared = drawn[0][-1]
+    is_shared = bool(np.hypot(*north_east_m(*drawn[-1][-1], *shared)) <= NEAR_M)
+    tracks = [
+        (side, *north_east_m(latitude, longitude, *(shared if is_shared else own)))
+        for side, latitude, longitude, own in drawn
+    ]
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 20, 12, 174, 96)
+        axes.set_aspect("equal", adjustable="datalim")
+        for side, north, east in tracks:
+            d.line(axes, east / 1000.0, north / 1000.0, side.colour, side.width, MOST, label=side.letter)
+        axes.set_xlabel("east, km")
+        axes.set_ylabel("north, km")
+        d.legend_above(axes)
+
+    origin = "the first position of A" if is_shared else "the first position of each"
+    caption = f"Distances north and east of {origin}, equal scales."
+    return Drawing("Tracks", caption, "Map of the tracks of A and B.", d.draw("tracks", 102, paint))
+
+
+def _growth(sides: Sequence[_Side]) -> Drawing | None:
+    """RMS of the forecast by horizon, the shipped method and the INS without one."""
+    curves = []
+    for side in sides:
+        default = str(mapping(side.saved.summary, "results", "forecast").get("default_method", ""))
+        for method, style in ((default, "-"), ("raw_ins", ":")):
+            data = side.figure("forecast_growth", "horizon_min", f"{method}_rms_m")
+            if data is not None:
+                name = f"{side.letter}: {d.label(method.replace('_', ' '))}"
+                curves.append(
+                    (numbers(data, "horizon_min"), numbers(data, f"{method}_rms_m"), name, side.colour, style)
+                )
+    if not curves:
+        return None
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 20, 12, 174, 64)
+        for horizon, rms, name, colour, style in curves:
+            d.line(axes, horizon, np.where(rms > 0.0, rms, np.nan), colour, 1.2, label=name, linestyle=style)
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        plain_log(axes.xaxis)
+        plain_log(axes.yaxis)
+        axes.set_xlabel("horizon, min")
+        axes.set_ylabel("RMS radial error, m")
+        d.legend_above(axes, 4)
+
+    caption = "Root mean square of the radial error over all replayed starts; dotted: the INS without a forecast."
+    return Drawing("Forecast", caption, "RMS of the forecast error of A and B by horizon.", d.draw("growth", 70, paint))

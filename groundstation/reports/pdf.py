@@ -1,0 +1,80 @@
+"""Reports on paper: a document handed to typst as data, so that nothing a log says is ever markup."""
+
+import json
+import shutil
+import tempfile
+from collections.abc import Sequence
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+from groundstation.base.errors import GroundstationError
+from groundstation.reports.page import TEMPLATES
+from groundstation.reports.parts import Document, Drawing, Mark
+from groundstation.reports.wording import clean
+from groundstation.results.files import write_bytes
+
+TEMPLATE = TEMPLATES / "report.typ"
+# A page inherits both from elsewhere: the name space from HTML, the joins from its style sheet.
+SVG_ALONE = '<svg xmlns="http://www.w3.org/2000/svg" stroke-linejoin="round" '
+
+
+class PdfError(GroundstationError):
+    """The PDF could not be made; everything else of the report was."""
+
+
+def write_pdf(document: Document, path: Path) -> None:
+    """Write a report as PDF: A4, equal documents give equal bytes.
+
+    Raises
+    ------
+    PdfError
+        When typst cannot be imported or cannot set the document.
+    OSError
+        When the file cannot be written.
+    """
+    try:
+        content = pdf_bytes(document)
+    except BaseException as error:
+        # A panic inside typst arrives as a PanicException, which is no Exception.
+        if not isinstance(error, ImportError | RuntimeError) and type(error).__name__ != "PanicException":
+            raise
+        raise PdfError(path.name, f"not written, typst failed ({error})") from error
+    write_bytes(path, content)
+
+
+def pdf_bytes(document: Document) -> bytes:
+    """Set a report and return the bytes of its PDF.
+
+    The template imports and reads nothing: the document comes as one JSON text in ``sys.inputs``, whose strings typst
+    shows as they are. Its root is a folder that holds the template alone, its fonts are those in its package, its time
+    is 1970.
+    """
+    import typst
+
+    text = json.dumps(_plain(document), ensure_ascii=False).encode("utf-8", "replace").decode("utf-8")
+    with tempfile.TemporaryDirectory(prefix="groundstation-") as root:
+        return typst.compile(
+            shutil.copy(TEMPLATE, root),
+            root=root,
+            ignore_system_fonts=True,
+            sys_inputs={"document": text},
+            timestamp=0,
+            format="pdf",
+        )
+
+
+def _plain(value: Any) -> Any:
+    """A part of a document as JSON holds it; each says what kind it is."""
+    if isinstance(value, str):
+        return clean(value).replace(" %", "\u00a0%")  # a number keeps its sign on its line
+    if isinstance(value, Sequence):
+        return [_plain(item) for item in value]
+    if not is_dataclass(value):
+        return value
+    known = {item.name: _plain(getattr(value, item.name)) for item in fields(value)}
+    if isinstance(value, Mark):
+        return known | {"symbol": value.symbol}
+    if isinstance(value, Drawing):
+        known["svg"] = value.svg.replace("<svg ", SVG_ALONE, 1)
+    return {"kind": getattr(value, "kind", "")} | known

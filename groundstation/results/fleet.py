@@ -1,0 +1,390 @@
+"""Answers over a fleet: what many flights say together, for the fleet report, fleet.rrd and notebooks."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.records import frozen
+from groundstation.base.timescales import utc_ns_to_iso
+from groundstation.results.figures import FigureData
+from groundstation.results.frames import no_such_table, row_fields, rows_frame
+from groundstation.results.summary import plain
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Kind = Literal["text", "category", "number", "count", "time", "flag"]
+TrendQuantity = Literal["error_deg", "radial_error_rate_50_nmiph"]
+WHOLE_FLEET = ""  # where an aircraft is named and all of them are meant
+
+
+@dataclass(frozen=True)
+class FlightColumn:
+    """A column of the table of flights: name with unit, kind, and what it is in plain words.
+
+    In memory ``number`` and ``count`` are float64 (NaN where missing), ``flag`` is bool, ``time`` datetime64[ns] in UTC
+    (NaT where missing), the rest text (empty where missing). In fleet.parquet a missing value is null.
+    """
+
+    name: str
+    kind: Kind
+    meaning: str
+
+
+FLIGHT_COLUMNS: tuple[FlightColumn, ...] = (
+    FlightColumn("flight_id", "text", "name of the flight and of its folder"),
+    FlightColumn("aircraft", "category", "as the log or the aircraft file says"),
+    FlightColumn("flight", "text", "flight number as logged"),
+    FlightColumn("start_utc", "time", "first corrected time; missing for a log without absolute time"),
+    FlightColumn("month", "category", "year and month of start_utc: 2026-05"),
+    FlightColumn("duration_s", "number", "from the first sample of any topic to the last"),
+    FlightColumn("status", "category", "ok, degraded (data lost or a grave finding) or failed"),
+    FlightColumn("has_lost_data", "flag", "the log is cut or damaged"),
+    FlightColumn("verdict", "category", "of the heading correction: accept, reject, extend, undecided"),
+    FlightColumn("verdict_reason", "text", "why, in words"),
+    FlightColumn("error_deg", "number", "heading error, INS - true, corrected by"),
+    FlightColumn("standard_error_deg", "number", "of error_deg, errors correlated over seconds allowed for"),
+    FlightColumn("confidence95_low_deg", "number", "lower end of the 95 % interval of error_deg"),
+    FlightColumn("confidence95_high_deg", "number", "its upper end"),
+    FlightColumn("correction_deg", "number", "the number to type; missing unless accepted"),
+    FlightColumn("paper_error_deg", "number", "plain running mean of the paper"),
+    FlightColumn("precision_deg", "number", "the paper's e"),
+    FlightColumn("quality_deg", "number", "spread of the running mean"),
+    FlightColumn("estimate_sd_deg", "number", "standard deviation of the differences"),
+    FlightColumn("samples", "count", "distinct GNSS epochs used"),
+    FlightColumn("sample_mean_deg", "number", "mean of the used differences INS heading - track"),
+    FlightColumn("sample_m2_deg2", "number", "sum of squares of the used differences about their mean"),
+    FlightColumn("taxi_seconds", "number", "straight taxi used"),
+    FlightColumn("drift_deg_per_h", "number", "azimuth drift during taxi"),
+    FlightColumn("drift_sigma_deg_per_h", "number", "its sigma"),
+    FlightColumn("standstill_speed_of_mean_mps", "number", "length of the mean GNSS velocity at standstill"),
+    FlightColumn("lever_arm_m", "number", "GNSS antenna ahead of the main gear"),
+    FlightColumn("time_offset_s", "number", "age of the GNSS velocity against the INS heading"),
+    FlightColumn("parking_heading_deg", "number", "INS heading at the stand, corrected"),
+    FlightColumn("parking_sigma_deg", "number", "its sigma"),
+    FlightColumn("reference_residual_arcmin", "number", "corrected parking heading - reference"),
+    FlightColumn("onboard_error_deg", "number", "heading error the aircraft found itself"),
+    FlightColumn("onboard_difference_deg", "number", "onboard - ours"),
+    FlightColumn("ins_kind", "category", "unaided, gnss_aided or unknown"),
+    FlightColumn("radial_error_rate_50_nmiph", "number", "INS radial position error rate, half of the time below"),
+    FlightColumn("radial_error_rate_95_nmiph", "number", "the same, 95 % of the time below"),
+    FlightColumn("forecast_method", "category", "method the forecast figures belong to"),
+    FlightColumn("forecast_30min_rms_m", "number", "radial error of the forecast after 30 min, RMS over starts"),
+    FlightColumn("forecast_60min_rms_m", "number", "after 60 min"),
+    FlightColumn("forecast_120min_rms_m", "number", "after 120 min"),
+    FlightColumn("findings_fail", "count", "findings of severity fail"),
+    FlightColumn("findings_warn", "count", "findings of severity warn"),
+    FlightColumn("findings_info", "count", "findings of severity info"),
+    FlightColumn("not_assessable", "text", "analyses that could not be carried out and why, joined by '; '"),
+    FlightColumn("source", "text", "name of the log"),
+    FlightColumn("sha256", "text", "of the log"),
+    FlightColumn("summary", "text", "file, relative to the folder of flights; empty when it is not there"),
+    FlightColumn("report", "text", "file, the same"),
+    FlightColumn("recording", "text", "file, the same"),
+    FlightColumn("mcap", "text", "file, the same"),
+)
+
+
+@dataclass(frozen=True)
+class Densities:
+    """Density of the heading error (INS heading - track, used samples) of every flight, on one grid.
+
+    Parameters
+    ----------
+    edge_deg : ndarray, shape (m + 1,)
+        Bin edges, evenly spaced.
+    flight_id : ndarray of str, shape (k,)
+        Flights with samples, by flight id; ``aircraft`` and ``samples`` go with them.
+    density_per_deg : ndarray, shape (k, m)
+        Each row sums to the share of the flight's samples inside the grid, divided by the bin width.
+    pooled_per_deg : ndarray, shape (m,)
+        The same of all samples together.
+    """
+
+    edge_deg: NDArray[np.float64]
+    flight_id: NDArray[np.str_]
+    aircraft: NDArray[np.str_]
+    samples: NDArray[np.int64]
+    density_per_deg: NDArray[np.float32]
+    pooled_per_deg: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        for part in fields(self):
+            object.__setattr__(self, part.name, frozen(getattr(self, part.name)))
+
+    def __len__(self) -> int:
+        return len(self.flight_id)
+
+    @property
+    def center_deg(self) -> NDArray[np.float64]:
+        """Bin centres, shape (m,)."""
+        return np.asarray(0.5 * (self.edge_deg[1:] + self.edge_deg[:-1]))
+
+
+@dataclass(frozen=True)
+class FittedNormal:
+    """Normal distribution fitted to samples of the heading error; ``aircraft`` is empty for the whole fleet.
+
+    Merged from n, mean and M2 of the flights: exactly what all samples in one array would give.
+    """
+
+    aircraft: str
+    flights: int
+    samples: int
+    mean_deg: float
+    sigma_deg: float
+
+
+@dataclass(frozen=True)
+class AircraftRow:
+    """Heading error of one aircraft over its flights; the whole fleet where ``aircraft`` is :data:`WHOLE_FLEET`.
+
+    Parameters
+    ----------
+    flights, assessed, accepted : int
+        Flights, those with a heading error, those with the verdict accept.
+    samples : int
+        Used samples of the flights that have their samples.
+    mean_deg, confidence95_deg
+        Mean error over the flights and its 95 % interval, from the spread between flights: each counts as one, however
+        many samples it has. No interval with fewer than two flights, nor for several aircraft together: flights of
+        one aircraft are alike, and those of a fleet are not so many independent ones.
+    sample_mean_deg : float or None
+        Mean of all samples.
+    sigma_within_deg : float or None
+        Spread of the samples about the mean of their flight.
+    sigma_between_deg : float or None
+        Spread of the flights' true errors about the aircraft's mean, what their standard errors explain taken away.
+    heterogeneity : float or None
+        Share of the variance of the flights' errors that their standard errors do not explain, 0 to 1.
+    """
+
+    aircraft: str
+    flights: int
+    assessed: int
+    accepted: int
+    samples: int
+    mean_deg: float | None
+    confidence95_deg: tuple[float, float] | None
+    sample_mean_deg: float | None
+    sigma_within_deg: float | None
+    sigma_between_deg: float | None
+    heterogeneity: float | None
+
+
+@dataclass(frozen=True)
+class ChangePoint:
+    """A flight from which on a quantity of an aircraft has another level.
+
+    ``flight_id`` is the first flight of the new level; ``level_before`` and ``level_after`` are medians, in the unit of
+    ``quantity``; ``p_value`` the chance of so large a step anywhere in a steady series.
+    """
+
+    aircraft: str
+    quantity: TrendQuantity
+    flight_id: str
+    start_utc_ns: int
+    flights_before: int
+    flights_after: int
+    level_before: float
+    level_after: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class FleetSkill:
+    """Forecast skill of a method at a horizon over all flights: mean squares and coverage merged by starts.
+
+    ``rms_m`` is over all starts of all flights; ``median_flight_rms_m``, ``highest_flight_rms_m`` over the flights'
+    own RMS; ``coverage95`` over the ``coverage_starts`` starts that had a band, None without any.
+    """
+
+    method: str
+    horizon_min: float
+    flights: int
+    starts: int
+    rms_m: float
+    median_flight_rms_m: float
+    highest_flight_rms_m: float
+    coverage95: float | None
+    coverage_starts: int
+
+
+@dataclass(frozen=True)
+class FleetCalibration:
+    """How often something independent was inside the stated 95 % interval, flights with verdict reject left out.
+
+    Parameters
+    ----------
+    quantity : {'reference', 'runway', 'onboard'}
+        Corrected parking heading against its reference, INS heading against the runway, the aircraft's own figure.
+    checks, inside : int
+    share_inside, confidence95 : float, (float, float)
+        Share and its exact (Clopper and Pearson) interval: honest sigmas have ``stated`` inside it.
+    z_mean, z_sigma : float
+        Of residual / sigma: honest are 0 and 1.
+    pit : tuple of int
+        Checks per tenth of the probability integral transform; honest is flat.
+    """
+
+    quantity: str
+    title: str
+    checks: int
+    inside: int
+    share_inside: float
+    confidence95: tuple[float, float]
+    z_mean: float
+    z_sigma: float | None
+    pit: tuple[int, ...]
+    stated: float = 0.95
+
+
+@dataclass(frozen=True)
+class OutlierRow:
+    """A flight whose figure is far from those of the same aircraft.
+
+    ``typical`` is their median, ``z`` the distance in robust sigmas (of the logarithm for figures that are positive),
+    ``reason`` one line for people.
+    """
+
+    flight_id: str
+    aircraft: str
+    quantity: str
+    value: float
+    typical: float
+    z: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class NotInFleet:
+    """A log that gave no flight, or a flight folder that cannot be read; ``kind`` is ``failed`` or ``skipped``."""
+
+    kind: Literal["failed", "skipped"]
+    source: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class FleetResults:
+    """Everything the fleet report, fleet.rrd and notebooks show.
+
+    Parameters
+    ----------
+    flights : FigureData
+        One row per flight by flight id, columns :data:`FLIGHT_COLUMNS`.
+    densities : Densities
+    normals : tuple of FittedNormal
+        The whole fleet first, then each named aircraft with samples.
+    by_aircraft : tuple of AircraftRow
+        The whole fleet first, then each aircraft by name; flights whose log names none count for the former alone, and
+        have no trend and no outliers.
+    trend : FigureData
+        Control chart, one row per flight, quantity and aircraft with enough flights that have a time, in order of time:
+        ``aircraft``, ``quantity``, ``flight_id``, ``start_utc`` (datetime64[ns]), ``value``, ``level`` (median between
+        change points), ``low``, ``high`` (control limits), ``is_outside``.
+    change_points : tuple of ChangePoint
+    skill : tuple of FleetSkill
+        By method in the order of ``METHODS``, then horizon.
+    skill_flights : FigureData
+        The shipped method of every flight: ``flight_id``, ``aircraft``, ``start_utc``, ``method``, ``horizon_min``,
+        ``starts``, ``rms_m``, ``coverage95``.
+    calibration : tuple of FleetCalibration
+    calibration_checks : FigureData
+        Every check, those of rejected flights too: ``quantity``, ``flight_id``, ``aircraft``, ``verdict``,
+        ``residual_deg``, ``sigma_deg``, ``z``, ``is_inside``.
+    outliers : tuple of OutlierRow
+    not_in_fleet : tuple of NotInFleet
+        What failed or was skipped and why, failed first, by source.
+    stated : mapping of str to number
+        Rates and limits the statistics keep to, by name: chance of a false change point per aircraft, and so on.
+    """
+
+    flights: FigureData
+    densities: Densities
+    normals: tuple[FittedNormal, ...]
+    by_aircraft: tuple[AircraftRow, ...]
+    trend: FigureData
+    change_points: tuple[ChangePoint, ...]
+    skill: tuple[FleetSkill, ...]
+    skill_flights: FigureData
+    calibration: tuple[FleetCalibration, ...]
+    calibration_checks: FigureData
+    outliers: tuple[OutlierRow, ...]
+    not_in_fleet: tuple[NotInFleet, ...]
+    stated: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stated", MappingProxyType(dict(self.stated)))
+
+    def __len__(self) -> int:
+        return len(self.flights)
+
+    @property
+    def aircraft(self) -> tuple[str, ...]:
+        """Names of the aircraft in order; an empty name stands for flights whose log names none."""
+        return tuple(sorted(set(self.flights["aircraft"].tolist())))
+
+    def normal(self, aircraft: str | None = None) -> FittedNormal | None:
+        """The fitted normal of the whole fleet (which stands first), or of one aircraft; None without samples."""
+        candidates = self.normals[:1] if aircraft is None else self.normals[1:]
+        return next((one for one in candidates if aircraft is None or one.aircraft == aircraft), None)
+
+    def to_frame(self, name: str = "flights") -> "pd.DataFrame":
+        """A table as a pandas DataFrame, by the name of its field; ``densities`` in long form.
+
+        Times are datetime64[ns, UTC].
+
+        Raises
+        ------
+        UsageError
+            When there is no such table.
+        """
+        import pandas as pd
+
+        rows = row_fields(FleetResults)
+        if name in rows:
+            return rows_frame(rows[name], getattr(self, name))
+        if name == "densities":
+            bins = len(self.densities.pooled_per_deg)
+            return pd.DataFrame(
+                {
+                    "flight_id": np.repeat(self.densities.flight_id, bins),
+                    "aircraft": np.repeat(self.densities.aircraft, bins),
+                    "heading_error_deg": np.tile(self.densities.center_deg, len(self.densities)),
+                    "density_per_deg": self.densities.density_per_deg.ravel(),
+                }
+            )
+        found = getattr(self, name, None)
+        if not isinstance(found, FigureData):
+            known = [part.name for part in fields(self) if part.name != "stated"]
+            raise no_such_table(name, known)
+        frame = found.to_frame()
+        for key, values in found.columns.items():
+            if values.dtype.kind == "M":
+                frame[key] = frame[key].dt.tz_localize("UTC")
+        return frame
+
+    def to_dict(self) -> dict[str, Any]:
+        """Every table as plain JSON values, rounded by its names: lists of rows, columns for the densities."""
+        out: dict[str, Any] = {}
+        for part in fields(self):
+            found = getattr(self, part.name)
+            out[part.name] = _rows(found) if isinstance(found, FigureData) else plain(found)
+        return out
+
+
+def _rows(table: FigureData) -> list[dict[str, Any]]:
+    columns = {name: _values(name, values) for name, values in table.columns.items()}
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _values(name: str, values: NDArray[Any]) -> list[Any]:
+    if values.dtype.kind == "M":
+        return [None if np.isnat(one) else utc_ns_to_iso(int(one.astype(np.int64))) for one in values]
+    found: list[Any] = plain(values, name)
+    return found

@@ -1,0 +1,65 @@
+"""Answer of the latency estimator: how much later each sensor shows the motion that the INS shows."""
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from groundstation.results.figures import FigureData
+from groundstation.results.frames import Tabular
+
+Quantity = Literal["velocity", "altitude", "field", "attitude"]
+LatencyState = Literal["observed", "not_observable"]
+
+
+@dataclass(frozen=True)
+class Latency:
+    """Latency of one sensor behind the reference.
+
+    Parameters
+    ----------
+    reference, other : str
+        Topics; the reference is an INS.
+    quantity : {'velocity', 'altitude', 'field', 'attitude'}
+        What of the other is compared with the reference.
+    state : {'observed', 'not_observable'}
+    reason : str
+        Why it is not observable, or what it rests on.
+    latency_s, sigma_s, confidence95_s
+        Positive: the other shows a motion later, by its time stamps, than the reference. None where not observable.
+    samples, windows, effective_windows
+        What it rests on; the last is the degrees of freedom of the interval.
+    motion, residual : float or None
+        RMS rate of the reference in the windows, slow motion taken away, and RMS of what is left unexplained, in
+        ``unit`` per second and ``unit``.
+    explained : float or None
+        Share of the other's motion that the reference explains, of the component explained worst.
+    """
+
+    reference: str
+    other: str
+    quantity: Quantity
+    state: LatencyState
+    reason: str
+    latency_s: float | None = None
+    sigma_s: float | None = None
+    confidence95_s: tuple[float, float] | None = None
+    samples: int = 0
+    windows: int = 0
+    effective_windows: float | None = None
+    motion: float | None = None
+    residual: float | None = None
+    unit: str = ""
+    explained: float | None = None
+
+
+@dataclass(frozen=True)
+class Latencies(Tabular):
+    """Latencies of all pairs of a flight; ``settings`` by name."""
+
+    rows: tuple[Latency, ...]
+    settings: dict[str, Any] = field(default_factory=dict)
+    figures: tuple[FigureData, ...] = ()
+
+    def observed(self, reference: str, other: str) -> Latency | None:
+        """The row of a pair where it is observed, else None."""
+        found = (row for row in self.rows if (row.reference, row.other) == (reference, other))
+        return next((row for row in found if row.state == "observed"), None)

@@ -1,0 +1,93 @@
+"""Saved answers as dataclasses again: what summary.json tells, rounded as it was written."""
+
+import types
+import typing
+from collections.abc import Mapping
+from dataclasses import MISSING, fields, is_dataclass
+from typing import Any
+
+from groundstation.base.errors import GroundstationError, UnreadableLogError
+from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.results.files import SUMMARY, SavedFlight
+from groundstation.results.flight import FlightResults
+
+
+def restored(saved: SavedFlight) -> FlightResults:
+    """Results of a flight folder as the run had them, but for the digits that summary.json leaves out.
+
+    Returns
+    -------
+    FlightResults
+        Every array stands in its ``figures``; those of the analyses are empty.
+
+    Raises
+    ------
+    UnreadableLogError
+        When the summary lacks what a result needs.
+    """
+    try:
+        summary = saved.summary
+        flight, answers = summary["flight"], dict(summary["results"])
+        if "inertial" in answers:
+            answers["inertial"] = _with_channels(answers["inertial"])
+        start = flight["start_utc"]
+        document = {
+            **summary,
+            **answers,
+            "flight_id": flight["id"],
+            "source": flight["source"],
+            "metadata": flight["metadata"],
+            "start_utc_ns": None if start is None else iso_to_utc_ns(start)[0],
+            "duration_s": flight["duration_s"],
+            "figures": tuple(saved.figures.values()),
+        }
+        result: FlightResults = _value(FlightResults, document)
+    except (KeyError, TypeError, ValueError, AttributeError, GroundstationError) as error:
+        what = f"a summary that cannot be used ({type(error).__name__}: {error})"
+        raise UnreadableLogError(
+            str(saved.folder / SUMMARY), what, "one that this version writes", "run the log again"
+        ) from error
+    return result
+
+
+def _with_channels(inertial: Mapping[str, Any]) -> dict[str, Any]:
+    """INS errors with the channels as a list: in the summary each stands under its own name."""
+    return {**inertial, "channels": [inertial[name] for name in ("north", "east") if name in inertial]}
+
+
+def _value(hint: Any, value: Any) -> Any:
+    """A JSON value as a type says; null where a number is meant is NaN."""
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin in (typing.Union, types.UnionType):
+        if value is None and type(None) in arguments:
+            return None
+        kind = tuple if isinstance(value, list) else None
+        members = [member for member in arguments if member is not type(None)]
+        return _value(next((one for one in members if typing.get_origin(one) is kind), members[0]), value)
+    if hint is float:
+        return float("nan") if value is None else float(value)
+    if origin is typing.Literal:
+        if value not in arguments:
+            raise ValueError(f"{value!r} is none of {arguments}")
+        return value
+    if hint in (int, str, bool):
+        if not isinstance(value, hint):
+            raise TypeError(f"{value!r} is no {hint.__name__}")
+        return value
+    if origin is tuple:
+        item = arguments if arguments[-1] is not Ellipsis else arguments[:1] * len(value)
+        return tuple(_value(one, part) for one, part in zip(item, value, strict=True))
+    if is_dataclass(hint) and isinstance(value, Mapping):
+        return _instance(typing.cast(type, hint), value)
+    return value
+
+
+def _instance(cls: type, document: Mapping[str, Any]) -> Any:
+    hints = typing.get_type_hints(cls)
+    values = {}
+    for part in fields(cls):
+        if part.name in document:
+            values[part.name] = _value(hints[part.name], document[part.name])
+        elif part.default is MISSING and part.default_factory is MISSING:
+            raise KeyError(part.name)
+    return cls(**values)

@@ -1,0 +1,268 @@
+"""Two saved flights in one recording: entities ``A/`` and ``B/``, the clock of B moved onto that of A."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from groundstation.base.geodesy import north_east_m, on_earth
+from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.results.comparison import Comparison
+from groundstation.results.figures import FigureData
+from groundstation.results.files import SavedFlight
+from groundstation.viewer import colours
+from groundstation.viewer.chart import Axis, Chart, unbroken
+from groundstation.viewer.colours import Colour
+from groundstation.viewer.comparison_text import comparison_text
+from groundstation.viewer.names import clean_text
+from groundstation.viewer.recorder import Line, Recorder
+from groundstation.viewer.recording import save_stream, send_layout
+from groundstation.viewer.series import FloatArray, gap_after, wraps_after
+from groundstation.viewer.tabs.track import bounds_of, grid, grid_unit
+from groundstation.viewer.views import document, lanes, numbers, plot
+
+THIN, MARK = 1.0, 5.0
+WIDTHS = {"A": 3.5, "B": 1.5}  # where both agree, A is seen behind B
+MARGIN_DEG = 10.0  # beyond 0 and 360
+BAND = 1.96  # half width of a 95 % band in sigmas
+BAND_QUANTILES = (5.0, 95.0)  # the bands of the first samples may leave the picture
+MARGIN = 0.1
+NEAR_M = 200_000.0  # flights that begin no further apart share one plan
+GROWTH_HEIGHT = 90.0
+
+
+@dataclass(frozen=True)
+class Half:
+    """One of the two flights: its letter, what it saved, its colour, and the seconds its clock is moved by."""
+
+    letter: str
+    saved: SavedFlight
+    colour: Colour
+    offset_s: float = 0.0
+
+    @property
+    def width(self) -> float:
+        """Of its lines, in points."""
+        return WIDTHS[self.letter]
+
+    def figure(self, name: str, *columns: str) -> FigureData | None:
+        """Figure data with all the columns, a number in the last of them at least; None otherwise."""
+        found = self.saved.figure(name)
+        if found is None or not set(columns) <= set(found.columns):
+            return None
+        return found if np.isfinite(numbers(found, columns[-1])).any() else None
+
+    def time_s(self, figure: FigureData, column: str = "time_s") -> FloatArray:
+        """Flight seconds of a column on the clock of A."""
+        return np.asarray(numbers(figure, column) + self.offset_s)
+
+
+def write_comparison(path: Path, comparison: Comparison, a: SavedFlight, b: SavedFlight) -> None:
+    """Write the recording that holds both flights.
+
+    Raises
+    ------
+    GroundstationError
+        When Rerun refused the data or the file could not be written.
+    """
+    identity = f"compare {comparison.a.flight_id} {comparison.b.flight_id}"
+    save_stream(path, identity, lambda stream: send_comparison(stream, comparison, a, b))
+
+
+def send_comparison(
+    stream: rr.RecordingStream, comparison: Comparison, a: SavedFlight, b: SavedFlight
+) -> rrb.Blueprint:
+    """Log both flights to a stream that has its sink, send the layout; returns it.
+
+    There is a timeline ``utc`` only where the clocks are aligned by UTC: otherwise one of them is moved.
+    """
+    has_utc = comparison.alignment.event == "utc" and comparison.a.start_utc is not None
+    start_ns = iso_to_utc_ns(str(comparison.a.start_utc))[0] if has_utc else 0
+    recorder = Recorder(stream, start_ns, has_utc)
+    stream.send_recording_name(clean_text(f"{comparison.a.flight_id} | {comparison.b.flight_id}"))
+    halves = (Half("A", a, colours.INS), Half("B", b, colours.GNSS, comparison.alignment.offset_s))
+    recorder.document("comparison", comparison_text(comparison))
+    tabs = [_overview(recorder, halves), _heading(recorder, halves), _inertial(recorder, halves)]
+    return send_layout(stream, [tab for tab in (*tabs, _forecast(recorder, halves)) if tab is not None])
+
+
+def _overview(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container:
+    views = [
+        _overlay(recorder, halves, "overview", "altitude_m", "Altitude, m"),
+        _overlay(recorder, halves, "overview", "pressure_altitude_m", "Pressure altitude, m"),
+        _overlay(recorder, halves, "overview", "ground_speed_mps", "Ground speed, m/s"),
+        _overlay(recorder, halves, "overview", "heading_deg", "INS true heading, deg", is_direction=True),
+        _phases(recorder, halves),
+    ]
+    right = [view for view in views if view is not None]
+    ground = _plan(recorder, halves)
+    text = document("A and B", "comparison")
+    left = text if ground is None else rrb.Vertical(contents=[ground, text], row_shares=[1.0, 1.0])
+    return rrb.Horizontal(
+        contents=[left, *([rrb.Vertical(contents=right)] if right else [])], name="Overview of A and B"
+    )
+
+
+def _overlay(
+    recorder: Recorder,
+    halves: Sequence[Half],
+    name: str,
+    column: str,
+    title: str,
+    *,
+    half_width: tuple[str, float] | None = None,
+    is_direction: bool = False,
+) -> rrb.View | None:
+    """Log a column of both flights, and the band around it where there is a half width; one view for both.
+
+    ``half_width``: its column, and what it is multiplied by.
+    """
+    paths, shown, edges = [], [], []
+    for half in halves:
+        figure = half.figure(name, "time_s", column)
+        if figure is None:
+            continue
+        time_ns, values = recorder.time_ns(half.time_s(figure)), numbers(figure, column)
+        series, lines = [values], [Line(f"{half.letter}: {title}", half.colour, half.width)]
+        if half_width is not None and half_width[0] in figure.columns:
+            width = half_width[1] * numbers(figure, half_width[0])
+            band = [values - width, values + width]
+            edges += band
+            series = [*band, values]
+            lines = [Line(f"{half.letter}: 95 %", half.colour, THIN)] * 2 + lines
+        breaks = gap_after(time_ns) | wraps_after(values) if is_direction else gap_after(time_ns)
+        paths.append(f"{half.letter}/{name}/{column}")
+        shown.append(values)
+        recorder.lines(paths[-1], time_ns, np.column_stack(series), lines, breaks)
+    if not paths:
+        return None
+    axis_range = (-MARGIN_DEG, 360.0 + MARGIN_DEG) if is_direction else _range(shown, edges)
+    return plot(f"{title}, A and B", paths, axis_range=axis_range)
+
+
+def _range(shown: Sequence[FloatArray], edges: Sequence[FloatArray]) -> tuple[float, float] | None:
+    """Axis for series with bands: all of the series, and the bands most of the time; None without bands."""
+    known = [edge[np.isfinite(edge)] for edge in edges]
+    ends = [float(end) for edge in known if edge.size for end in np.percentile(edge, BAND_QUANTILES)]
+    if not ends:
+        return None
+    values = np.concatenate([series[np.isfinite(series)] for series in shown])
+    low, high = min(float(values.min()), *ends), max(float(values.max()), *ends)
+    margin = max(MARGIN * (high - low), 1e-6)
+    return low - margin, high + margin
+
+
+def _phases(recorder: Recorder, halves: Sequence[Half]) -> rrb.View | None:
+    paths = []
+    for half in halves:
+        figure = half.figure("phases", "phase", "start_s", "end_s")
+        if figure is not None:
+            paths.append(f"{half.letter}/phase")
+            ends_s = half.time_s(figure, "start_s"), half.time_s(figure, "end_s")
+            recorder.spans(paths[-1], *ends_s, figure["phase"].astype(np.str_), colours.PHASES)
+    return lanes("Flight phase of A and B", paths) if paths else None
+
+
+def _plan(recorder: Recorder, halves: Sequence[Half]) -> rrb.View | None:
+    """Both tracks from above, each with a marker at the cursor; of flights far apart each from its own beginning."""
+    tracks = []
+    for half in halves:
+        figure = half.figure("overview", "time_s", "latitude_deg", "longitude_deg")
+        if figure is None:
+            continue
+        positions = np.column_stack(on_earth(numbers(figure, "latitude_deg"), numbers(figure, "longitude_deg")))
+        known = np.asarray(np.isfinite(positions).all(axis=1))
+        if known.any():
+            tracks.append((half, half.time_s(figure), positions, known))
+    if not tracks:
+        return None
+    origins = [positions[known][0] for _, _, positions, known in tracks]
+    apart_m = np.hypot(*north_east_m(origins[-1][0], origins[-1][1], *origins[0]))
+    is_shared = bool(apart_m <= NEAR_M)
+    places = []
+    for (half, time_s, positions, known), origin in zip(tracks, origins, strict=True):
+        north, east = north_east_m(positions[:, 0], positions[:, 1], *(origins[0] if is_shared else origin))
+        points = np.column_stack([east, -north])  # the axes of a Rerun picture run right and down
+        places.append(points[known])
+        _track(recorder, half, time_s, points, known)
+    low, high = bounds_of(np.concatenate(places))
+    recorder.static("plan/grid", grid(low, high))
+    bounds = rrb.VisualBounds2D(x_range=[low[0], high[0]], y_range=[low[1], high[1]])
+    unit, start = grid_unit(float((high - low).max()))[0], "the first position" if is_shared else "each one's own start"
+    contents = ["+ /plan/**", *(f"+ /{half.letter}/plan/**" for half, *_ in tracks)]
+    name = f"Tracks of A (blue) and B (orange), {unit} east and north of {start}"
+    return rrb.Spatial2DView(name=name, origin="/", contents=contents, visual_bounds=bounds)
+
+
+def _track(recorder: Recorder, half: Half, time_s: FloatArray, points: FloatArray, known: np.ndarray) -> None:
+    strips = unbroken(points)
+    recorder.static(
+        f"{half.letter}/plan/track",
+        rr.LineStrips2D(
+            strips,
+            colors=[half.colour] * len(strips),
+            radii=rr.Radius.ui_points(0.5 * half.width),
+            draw_order=1.0 if half.letter == "A" else 2.0,
+        ),
+    )
+    style = rr.Points2D.from_fields(
+        colors=[half.colour], labels=[half.letter], radii=rr.Radius.ui_points(MARK), draw_order=3.0
+    )
+    recorder.static(f"{half.letter}/plan/now", style)
+    rows = rr.Points2D.columns(positions=points[known].astype(np.float32))
+    recorder.stream.send_columns(f"{half.letter}/plan/now", recorder.indexes(recorder.time_ns(time_s[known])), rows)
+
+
+def _heading(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | None:
+    """Running mean of the heading difference with its interval."""
+    width = ("honest_half_width_deg", 1.0)
+    title = "Heading error, running mean ± 95 %, deg"
+    view = _overlay(recorder, halves, "heading_running", "mean_deg", title, half_width=width)
+    speed = _overlay(recorder, halves, "heading_samples", "ground_speed_mps", "Ground speed at the samples, m/s")
+    views = [one for one in (view, speed) if one is not None]
+    return None if view is None else rrb.Vertical(contents=views, row_shares=[2.0, 1.0], name="Heading")
+
+
+def _inertial(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | None:
+    """Errors of position and velocity that the filter estimated, and the radial error against GNSS."""
+    rows = []
+    for state, suffix, unit in (("position", "m", "m"), ("velocity", "mps", "m/s")):
+        views = []
+        for channel in ("north", "east"):
+            width = (f"{channel}_{state}_sigma_{suffix}", BAND)
+            title = f"{channel.capitalize()} {state} error, {unit}"
+            column = f"{channel}_{state}_{suffix}"
+            views.append(_overlay(recorder, halves, "inertial_states", column, title, half_width=width))
+        shown = [view for view in views if view is not None]
+        if shown:
+            rows.append(rrb.Horizontal(contents=shown))
+    radial = _overlay(recorder, halves, "inertial_track", "ins_error_m", "Radial error of the INS against GNSS, m")
+    contents: list[rrb.View | rrb.Container] = [*rows, *([] if radial is None else [radial])]
+    return rrb.Vertical(contents=contents, name="INS errors") if contents else None
+
+
+def _forecast(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | None:
+    """RMS of the forecast by horizon, the shipped method and the INS without one; both axes logarithmic."""
+    curves: list[tuple[FloatArray, FloatArray, Line]] = []
+    for half in halves:
+        results = half.saved.summary.get("results", {})
+        default = str(results.get("forecast", {}).get("default_method", ""))
+        for method, width in ((default, half.width), ("raw_ins", THIN)):
+            figure = half.figure("forecast_growth", "horizon_min", f"{method}_rms_m")
+            if figure is not None:
+                name = f"{half.letter}: {'raw INS' if method == 'raw_ins' else method.replace('_', ' ')}"
+                drawn = numbers(figure, "horizon_min"), numbers(figure, f"{method}_rms_m")
+                curves.append((*drawn, Line(clean_text(name), half.colour, width)))
+    ends = [np.concatenate([one[axis] for one in curves] or [np.zeros(0)]) for axis in (0, 1)]
+    ends = [values[np.isfinite(values) & (values > 0.0)] for values in ends]
+    if not all(values.size for values in ends):
+        return None
+    x = Axis("horizon, min", float(ends[0].min()) / 1.1, float(ends[0].max()) * 1.1, True)
+    y = Axis("RMS radial error over all starts, m,", float(ends[1].min()) / 1.3, float(ends[1].max()) * 1.3, True)
+    chart = Chart(recorder, "growth", x, y, GROWTH_HEIGHT)
+    chart.curves("methods", curves)
+    chart.legend([line for _, _, line in curves])
+    return rrb.Horizontal(contents=[chart.view()], name="Forecast")

@@ -1,0 +1,156 @@
+"""Offer recordings through Rerun's own catalog server, each data set with the layout its recordings embed."""
+
+import socket
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import rerun as rr
+from rerun.catalog import CatalogClient, DatasetEntry
+from rerun.chunk import RrdReader
+from rerun.server import Server
+from rerun_bindings import CatalogClientInternal
+
+from groundstation.base.errors import GroundstationError
+from groundstation.viewer.fleet import FLEET, FLIGHTS_TEXT
+from groundstation.viewer.recording import open_stream
+
+FLIGHTS = "flights"
+VIEWS = "/view/"  # where a layout keeps its views
+LINKS_LAYER = "links"
+MOST_LAYOUTS = 16  # looked at, some 0.1 s each
+FAULTS = (ValueError, RuntimeError, OSError)  # what Rerun raises over a damaged file
+
+
+@dataclass(frozen=True)
+class Catalog:
+    """A running catalog.
+
+    Parameters
+    ----------
+    url : str
+        Where clients and viewers find it: ``rerun+http://host:port``.
+    flights : tuple of str
+        Segment ids of the data set ``flights``: flight ids.
+    has_fleet : bool
+        Whether there is a data set ``fleet``.
+    refused : tuple of (Path, str)
+        Recordings that the server could not read, and why.
+    """
+
+    url: str
+    flights: tuple[str, ...]
+    has_fleet: bool
+    refused: tuple[tuple[Path, str], ...]
+
+
+@contextmanager
+def catalog_server(flights: Sequence[Path], fleet: Path | None, *, host: str, port: int) -> Iterator[Catalog]:
+    """Serve recordings until the context is left: the data set ``flights``, a segment each, and ``fleet``.
+
+    Raises
+    ------
+    GroundstationError
+        When the port is taken or the address is not of this machine.
+    """
+    try:
+        server = Server(host=host, port=port)
+    except ValueError as error:
+        reason = str(error).rpartition(": ")[2]
+        raise GroundstationError(f"{host}:{port}", reason, next_step="choose another --port or --host") from error
+    with server, tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
+        # the public constructor asks for datafusion (43 MB), which listing and registering do not use
+        client = CatalogClient._from_internal(CatalogClientInternal(server.url(), None, None))
+        url = reachable(server.url())
+        dataset = client.create_dataset(FLIGHTS)
+        offered, refused = _register(dataset, flights)
+        has_fleet = False
+        if fleet is not None:
+            links = {name: dataset.segment_url(name).replace(server.url(), url) for name in offered}
+            dataset = client.create_dataset(FLEET)
+            segments, problems = _register(dataset, [fleet])
+            refused += problems
+            has_fleet = bool(segments)
+            if has_fleet:
+                _link(dataset, fleet, links, Path(folder) / "links.rrd")
+        yield Catalog(url, tuple(sorted(offered)), has_fleet, tuple(refused))
+
+
+def reachable(url: str) -> str:
+    """Address for others: a server that listens on every address is found by the name of its machine.
+
+    Examples
+    --------
+    >>> reachable("rerun+http://127.0.0.1:51234")
+    'rerun+http://127.0.0.1:51234'
+    """
+    for wildcard in ("//0.0.0.0:", "//[::]:"):
+        url = url.replace(wildcard, f"//{socket.gethostname()}:")
+    return url
+
+
+def _register(dataset: DatasetEntry, paths: Sequence[Path]) -> tuple[dict[str, Path], list[tuple[Path, str]]]:
+    """Register recordings, those at fault left out: segment ids with their files, files refused with the reason."""
+    by_uri = {path.absolute().as_uri(): path for path in paths}
+    offered: dict[str, Path] = {}
+    refused: list[tuple[Path, str]] = []
+    batches = [list(by_uri)] if by_uri else []
+    while batches:
+        batch = batches.pop()
+        try:
+            results = list(dataset.register(batch).iter_results())
+        except FAULTS as error:  # one unreadable file refuses its whole batch
+            if len(batch) == 1:
+                refused.append((by_uri[batch[0]], str(error).splitlines()[0]))
+            else:
+                middle = len(batch) // 2
+                batches += [batch[middle:], batch[:middle]]
+            continue
+        offered |= {one.segment_id: by_uri[one.uri] for one in results if one.is_success}
+        refused += [(by_uri[one.uri], str(one.error).splitlines()[0]) for one in results if one.is_error]
+    _lay_out(dataset, offered.values())
+    return offered, refused
+
+
+def _lay_out(dataset: DatasetEntry, recordings: Iterable[Path]) -> None:
+    """Give a data set the one layout it can have: the fullest of its recordings serves the most flights."""
+    largest = sorted(recordings, key=lambda path: path.stat().st_size)[-MOST_LAYOUTS:]
+    views = {path: _views(path) for path in largest}
+    if any(views.values()):
+        dataset.register_blueprint(max(largest, key=lambda path: views[path]).absolute().as_uri())
+
+
+def _views(path: Path) -> int:
+    """Number of views in the layout of a recording; none in a damaged one."""
+    try:
+        reader = RrdReader(path)
+        entities = {chunk.entity_path for store in reader.blueprints() for chunk in reader.stream(store=store)}
+    except FAULTS:
+        return 0
+    return sum(entity.startswith(VIEWS) and entity.count("/") == VIEWS.count("/") for entity in entities)
+
+
+def _link(dataset: DatasetEntry, fleet: Path, links: dict[str, str], layer: Path) -> None:
+    """Let the links in the table of flights lead into the catalog: a layer over the text that the file holds."""
+    text = _text(fleet)
+    for name, url in links.items():
+        text = text.replace(f"]({name}/{name}.rrd)", f"]({url})")
+    if not text:
+        return
+    with open_stream(FLEET) as stream:
+        stream.save(layer)
+        stream.log(FLIGHTS_TEXT, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+    dataset.register([layer.absolute().as_uri()], layer_name=LINKS_LAYER).wait()
+
+
+def _text(fleet: Path) -> str:
+    """The table of flights in the recording of a fleet; empty without one or in a damaged file."""
+    try:
+        for chunk in RrdReader(fleet).stream():
+            if chunk.entity_path == f"/{FLIGHTS_TEXT}":
+                return str(chunk.to_record_batch().column("TextDocument:text")[0].as_py()[0])
+    except (*FAULTS, KeyError):
+        pass
+    return ""

@@ -1,0 +1,89 @@
+"""Send the rows of a fleet to Rerun: a row is a flight, with its place on the timelines of the fleet."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from groundstation.base.records import Int64Array
+from groundstation.results.fleet import FleetResults
+from groundstation.viewer.colours import Colour, for_states
+from groundstation.viewer.names import clean_text
+from groundstation.viewer.recorder import UTC, Line, Recorder
+from groundstation.viewer.series import FloatArray
+
+FLIGHT_NUMBER = "flight_number"
+
+
+class FleetRecorder(Recorder):
+    """A recorder whose rows are flights: where the one of a flight takes times, this one takes numbers of flights.
+
+    Flights are numbered from 1 in order of their start (``utc``); those without a time come after them and have no
+    place but their number.
+
+    Parameters
+    ----------
+    stream : rerun.RecordingStream
+    fleet : FleetResults
+    """
+
+    def __init__(self, stream: rr.RecordingStream, fleet: FleetResults) -> None:
+        starts = fleet.flights["start_utc"].astype("datetime64[ns]")
+        ids = fleet.flights["flight_id"].astype(np.str_)
+        self.order: Int64Array = np.lexsort((ids, starts.astype(np.int64), np.isnat(starts)))
+        self.starts, self.timed = starts[self.order], int((~np.isnat(starts)).sum())
+        self._number = {name: place + 1 for place, name in enumerate(ids[self.order].tolist())}
+        super().__init__(stream, 0, self.timed > 0)
+
+    @property
+    def timeline(self) -> str:
+        """The timeline to begin on."""
+        return UTC if self.has_utc else FLIGHT_NUMBER
+
+    def numbers(self, flight_ids: NDArray[np.str_]) -> Int64Array:
+        """Numbers of flights."""
+        return np.array([self._number[name] for name in flight_ids.tolist()], dtype=np.int64)
+
+    def set_flight(self, number: int) -> None:
+        """Let what is logged next stand at a flight; ``stream.reset_time`` ends it."""
+        self.stream.reset_time()
+        self.stream.set_time(FLIGHT_NUMBER, sequence=number)
+        if number <= self.timed:
+            self.stream.set_time(UTC, timestamp=self.starts[number - 1])
+
+    def indexes(self, time_ns: Int64Array) -> list[rr.TimeColumn]:
+        """Time columns of flights that all have a time, or all have none."""
+        columns = [rr.TimeColumn(FLIGHT_NUMBER, sequence=time_ns)]
+        if len(time_ns) and time_ns[0] <= self.timed:
+            columns.append(rr.TimeColumn(UTC, timestamp=self.starts[time_ns - 1]))
+        return columns
+
+    def points(self, path: str, numbers: Int64Array, values: FloatArray, lines: Sequence[Line]) -> None:
+        """Log series that share their rows, ``values`` of shape (n, k), as points that no line joins."""
+        style = rr.SeriesPoints(
+            names=[line.name for line in lines],
+            colors=[line.colour for line in lines],
+            marker_sizes=[line.width for line in lines],
+            markers=["circle"] * len(lines),
+        )
+        self.static(path, style)
+        self._scalars(path, numbers, values)
+
+    def lane(self, path: str, time_ns: Int64Array, states: Sequence[str], colours: Mapping[str, Colour]) -> None:
+        """Log one lane of states, a flight each."""
+        shown = np.array([clean_text(state) for state in states])
+        shades = for_states((state for state in shown.tolist() if state), colours)
+        self.static(path, rr.StateConfiguration(values=list(shades), colors=list(shades.values())))
+        for part in self._parts(time_ns):
+            rows = rr.StateChange.columns(state=shown[part].tolist())
+            self.stream.send_columns(path, self.indexes(time_ns[part]), rows)
+
+    def _scalars(self, path: str, time_ns: Int64Array, values: FloatArray) -> None:
+        for part in self._parts(time_ns):
+            super()._scalars(path, time_ns[part], values[part])
+
+    def _parts(self, numbers: Int64Array) -> list[Int64Array]:
+        """Rows of flights with a time, and of those without."""
+        has_time = numbers <= self.timed
+        return [rows for rows in (np.flatnonzero(has_time), np.flatnonzero(~has_time)) if len(rows)]

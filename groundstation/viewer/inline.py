@@ -1,0 +1,64 @@
+"""The recording inside a notebook, in the viewer of the package rerun-notebook."""
+
+import contextlib
+import importlib.util
+import io
+import os
+import sys
+from typing import Any
+
+from groundstation.base.errors import GroundstationError
+from groundstation.results.flight import FlightResults
+from groundstation.tables.table import Flight
+
+ASSET = "RERUN_NOTEBOOK_ASSET"
+
+
+def is_notebook() -> bool:
+    """Whether this process is the kernel of a Jupyter notebook."""
+    ipython = sys.modules.get("IPython")
+    return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
+
+
+def inline_viewer(flight: Flight, results: FlightResults, *, width: int | str, height: int | str) -> Any:
+    """A viewer for a notebook cell with the recording of one flight in it: the same logging as into a file.
+
+    The viewer's own files come from this machine, not from the Internet, unless ``RERUN_NOTEBOOK_ASSET`` says
+    otherwise.
+
+    Parameters
+    ----------
+    flight, results
+        As for :func:`write_recording`.
+    width, height : int or "auto"
+        Pixels.
+
+    Returns
+    -------
+    rerun.notebook.Viewer
+        What a cell ends with is shown.
+
+    Raises
+    ------
+    GroundstationError
+        When rerun-notebook is not installed, or Rerun refused the data.
+    """
+    if importlib.util.find_spec("rerun_notebook") is None:
+        raise GroundstationError(
+            "the recording in a notebook",
+            "rerun-notebook is not installed",
+            next_step="pip install 'groundstation[notebook]', or show(inline=False) for a window",
+        )
+    os.environ.setdefault(ASSET, "serve-local")
+    with contextlib.redirect_stdout(io.StringIO()):  # it tells where it serves, which is nobody's business here
+        from rerun.notebook import Viewer
+
+    from groundstation.viewer.recording import open_stream, send_flight
+
+    with open_stream(results.flight_id) as stream:
+        try:
+            viewer = Viewer(width=width, height=height, recording=stream)  # type: ignore[arg-type]
+            send_flight(stream, flight, results)
+        except (ValueError, RuntimeError) as error:
+            raise GroundstationError("the recording in a notebook", str(error)) from error
+    return viewer

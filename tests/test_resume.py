@@ -1,0 +1,183 @@
+"""A run that is continued: what is finished is not done again, and the results are those of one run from scratch."""
+
+import json
+import multiprocessing
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from filelock import FileLock
+
+from groundstation.base.errors import UsageError
+from groundstation.pipeline.batch import LOCK, plan_many, run_many
+from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.outcome import Outcome
+from groundstation.pipeline.progress import Event
+
+SAMPLES = Path(__file__).parents[1] / "sample_logs"
+SHORT = SAMPLES / "taxi-short.csv"
+SETTINGS = Configuration(heading={"standstill_min_s": 12.0}, files={"heading": "ours.toml"})
+PROMISED = ("summary.json", "report.html", "report.pdf")  # equal to the byte, and so are tables/ and index.*
+
+
+def promised_files(out: Path) -> dict[str, bytes]:
+    """Files of an OUT that are byte-identical in equal runs."""
+    paths = [path for path in out.rglob("*") if path.name in PROMISED or path.suffix == ".csv"]
+    return {str(path.relative_to(out)): path.read_bytes() for path in (*paths, out / "index.json")}
+
+
+def assert_equal_runs(one: Path, other: Path) -> None:
+    first, second = promised_files(one), promised_files(other)
+    assert first.keys() == second.keys()
+    assert [name for name in first if first[name] != second[name]] == []
+    assert sorted(path.name for path in one.iterdir()) == sorted(path.name for path in other.iterdir())
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("finished") / "out"
+    run_many([SHORT], out, Configuration())
+    return out
+
+
+def copied(finished: Path, target: Path) -> Path:
+    return Path(shutil.copytree(finished, target, copy_function=shutil.copy2))
+
+
+def times(folder: Path) -> dict[str, int]:
+    return {path.name: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+
+
+def flight_in(out: Path) -> Path:
+    (folder,) = (path.parent for path in out.glob("*/summary.json"))
+    return folder
+
+
+def stages(
+    paths: list[Path], out: Path, configuration: Configuration, with_pdf: bool = True
+) -> tuple[Outcome, set[str]]:
+    """The outcome of one log, and which stages were gone through."""
+    told: set[str] = set()
+
+    def listen(event: Event) -> None:
+        told.update({event.text} if event.kind == "stage" else set())
+
+    (outcome,) = run_many(paths, out, configuration, with_pdf=with_pdf, listen=listen)
+    return outcome, told
+
+
+def test_what_is_finished_is_not_done_again(finished: Path, tmp_path: Path) -> None:
+    out = copied(finished, tmp_path / "out")
+    before = times(flight_in(out))
+    (planned,) = plan_many([SHORT], out, Configuration())
+    outcome, told = stages([SHORT], out, Configuration())
+    assert (planned.text, told) == ("finished, nothing to do", set())
+    assert times(flight_in(out)) == before
+    assert_equal_runs(out, finished)
+    (first,) = run_many([SHORT], tmp_path / "new", Configuration())
+    assert (outcome.text, outcome.state, outcome.flight_id) == (first.text, first.state, first.flight_id)
+
+
+def test_a_changed_setting_keeps_the_mcap_and_gives_what_a_new_run_gives(finished: Path, tmp_path: Path) -> None:
+    out = copied(finished, tmp_path / "out")
+    mcap = next(flight_in(out).glob("*.mcap"))
+    before = mcap.stat().st_ino
+    (planned,) = plan_many([SHORT], out, SETTINGS)
+    _outcome, told = stages([SHORT], out, SETTINGS)
+    assert planned.text.startswith("to analyse again")
+    assert "converting" not in told and {"estimating", "recording", "reporting"} <= told
+    assert mcap.stat().st_ino == before
+    run_many([SHORT], tmp_path / "new", SETTINGS)
+    assert_equal_runs(out, tmp_path / "new")
+    assert plan_many([SHORT], out, SETTINGS)[0].text == "finished, nothing to do"
+
+
+def test_a_limit_of_the_ledger_redoes_everything(finished: Path) -> None:
+    changed = Configuration(thresholds={"version": 1, "gaps": {"min_s": 0.7}}, files={"thresholds": "ours.toml"})
+    (planned,) = plan_many([SHORT], finished, changed)
+    assert planned.text == "to run"
+
+
+def test_the_pdf_alone_is_made_again(finished: Path, tmp_path: Path) -> None:
+    out = copied(finished, tmp_path / "out")
+    _outcome, told = stages([SHORT], out, Configuration(), with_pdf=False)
+    assert told == {"reporting"} and not (flight_in(out) / "report.pdf").exists()
+    _outcome, told = stages([SHORT], out, Configuration())
+    assert told == {"reporting"}
+    assert_equal_runs(out, finished)
+
+
+@pytest.mark.parametrize(
+    ("lost", "plan"), [("*.mcap", "to run"), ("*.rrd", "to analyse"), ("report.html", "to report")]
+)
+def test_a_file_that_was_taken_away_is_made_again(finished: Path, tmp_path: Path, lost: str, plan: str) -> None:
+    out = copied(finished, tmp_path / "out")
+    next(flight_in(out).glob(lost)).unlink()
+    (planned,) = plan_many([SHORT], out, Configuration())
+    assert planned.text.startswith(plan)
+
+
+def test_a_changed_log_is_run_again_and_a_dry_run_writes_nothing(finished: Path, tmp_path: Path) -> None:
+    log = tmp_path / SHORT.name
+    log.write_bytes(SHORT.read_bytes() + b"\n")
+    (planned,) = plan_many([log], tmp_path / "none", Configuration())
+    assert planned.text == "to run" and not (tmp_path / "none").exists()
+    assert plan_many([log], finished, Configuration())[0].text == "to run"
+    shutil.copy(SHORT, log)
+    assert plan_many([log], finished, Configuration())[0].text == "finished, nothing to do"
+    assert plan_many([log], finished, Configuration(), redo=True)[0].text == "to run"
+
+
+def test_a_broken_manifest_means_that_nothing_is_finished(finished: Path, tmp_path: Path) -> None:
+    out = copied(finished, tmp_path / "out")
+    manifest = flight_in(out) / "manifest.json"
+    for text in ("{", json.dumps({"resume": {}}), json.dumps({"source": {"sha256": "0"}, "resume": None})):
+        manifest.write_text(text)
+        assert plan_many([SHORT], out, Configuration())[0].text == "to run"
+
+
+def test_two_runs_do_not_write_into_one_folder(finished: Path) -> None:
+    with FileLock(finished / LOCK), pytest.raises(UsageError, match="another run is writing"):
+        run_many([SHORT], finished, Configuration())
+
+
+def test_a_process_that_dies_takes_its_own_log_alone(tmp_path: Path) -> None:
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    for number, name in enumerate(("a", "killer", "z")):
+        (logs / f"{name}.csv").write_bytes(SHORT.read_bytes().replace(b"# flight: ", b"# flight: %d" % number))
+
+    def kill(event: Event) -> None:
+        if event.kind == "stage" and event.name == "killer.csv" and event.text == "estimating":
+            for child in multiprocessing.active_children():
+                os.kill(child.pid or 0, signal.SIGKILL)
+
+    first, killer, last = run_many([logs], tmp_path / "out", Configuration(), jobs=2, with_pdf=False, listen=kill)
+    assert (first.state, last.state) == ("done", "done")
+    assert killer.state == "failed" and killer.text == "killer.csv: its process died (killed, or out of memory)"
+
+
+def killed_and_continued(moments_s: list[float], folder: Path) -> None:
+    """Kill a run with all its processes at each moment, then let it finish."""
+    command = [sys.executable, "-m", "groundstation", "run", str(SAMPLES), "-o", str(folder), "-j", "2", "-q"]
+    for moment_s in moments_s:
+        process = subprocess.Popen(command, start_new_session=True, stderr=subprocess.DEVNULL)
+        time.sleep(moment_s)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    subprocess.run(command, check=False, timeout=300)
+
+
+@pytest.mark.slow
+def test_killed_at_ten_moments_the_result_is_that_of_one_run(tmp_path: Path) -> None:
+    run_many([SAMPLES], tmp_path / "whole", Configuration(), jobs=2)
+    rng = random.Random(17)
+    for number in range(5):
+        killed_and_continued([rng.uniform(1.0, 12.0) for _ in range(2)], tmp_path / f"killed-{number}")
+        assert_equal_runs(tmp_path / f"killed-{number}", tmp_path / "whole")

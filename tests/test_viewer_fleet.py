@@ -1,0 +1,282 @@
+"""The recording of a fleet as a file, read back and held against the results; and every tab of it in the viewer."""
+
+import os
+import re
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from rerun.chunk import RrdReader
+from rerun.experimental import ViewerClient
+
+from groundstation.pipeline.fleet import gather
+from groundstation.results.figures import FigureData
+from groundstation.results.fleet import Densities, FleetResults, NotInFleet
+from groundstation.viewer.fleet import write_fleet_recording
+from groundstation.viewer.fleet_density import MOST_STEPS, PATH, steps
+from tests.fleet_example import save_flight, skill
+from tests.viewer_shots import NoViewerError, colourful, pages, picture, settled, viewer
+
+STEADY, STEPPING, HOSTILE = "A12", "B3", "![x](http://127.0.0.1/x)|<b>/../"
+FLIGHTS, NEW_LEVEL = 48, 27  # the flight from which on B3 is 1 deg off
+LEAST_PIXELS = 40
+DRAWN_IN_COLOUR = {"TimeSeries", "StateTimeline", "BarChart", "2D"}
+
+
+class Contents:
+    """What a recording holds, by entity."""
+
+    def __init__(self, path: Path) -> None:
+        reader = RrdReader(path)
+        self.store, self.blueprints = reader.recordings()[0], reader.blueprints()
+        self.timelines: set[str] = set()
+        self.batches: dict[str, list[pa.RecordBatch]] = {}
+        self.fixed: dict[str, list[pa.RecordBatch]] = {}
+        for chunk in reader.stream():
+            self.timelines |= set(chunk.timeline_names)
+            place = self.fixed if chunk.is_static else self.batches
+            place.setdefault(chunk.entity_path, []).append(chunk.to_record_batch())
+
+    def scalars(self, entity: str) -> tuple[np.ndarray, np.ndarray]:
+        """Flight numbers and values, shapes (n,) and (n, k), in order."""
+        places, values = [], []
+        for batch in self.batches[entity]:
+            places.append(np.asarray(batch.column("flight_number")))
+            flat = batch.column("Scalars:scalars").flatten().to_numpy(zero_copy_only=False)
+            values.append(flat.reshape(batch.num_rows, -1))
+        order = np.argsort(np.concatenate(places), kind="stable")
+        return np.concatenate(places)[order], np.concatenate(values)[order]
+
+    def text(self, entity: str) -> str:
+        """Text of a document."""
+        return str(self.fixed[entity][0].column("TextDocument:text")[0].as_py()[0])
+
+
+def changed(fleet: FleetResults, **columns: np.ndarray) -> FleetResults:
+    """The same fleet with other columns in its table of flights."""
+    return replace(fleet, flights=replace(fleet.flights, columns={**fleet.flights.columns, **columns}))
+
+
+def untimed(fleet: FleetResults, first: int) -> FleetResults:
+    """The same fleet, flights from ``first`` on without a time, and so without a trend."""
+    starts = fleet.flights["start_utc"].copy()
+    starts[first:] = np.datetime64("NaT")
+    kept = ~np.isin(fleet.trend["flight_id"], fleet.flights["flight_id"][first:])
+    trend = FigureData("trend", {name: values[kept] for name, values in fleet.trend.columns.items()}, {})
+    changes = tuple(one for one in fleet.change_points if one.flight_id in set(trend["flight_id"].tolist()))
+    return replace(changed(fleet, start_utc=starts), trend=trend, change_points=changes)
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> FleetResults:
+    out = tmp_path_factory.mktemp("out")
+    rng = np.random.default_rng(11)
+    for number in range(FLIGHTS):
+        name = (STEADY, STEPPING, HOSTILE)[number % 3]
+        error = 0.4 + float(name == STEPPING and number >= NEW_LEVEL) + float(rng.normal(0.0, 0.05))
+        rms_m = 250.0 + 10.0 * number
+        save_flight(out, number, aircraft=name, error_deg=error, samples=200, forecast=skill(rms_m=rms_m))
+    found = gather(out)
+    recordings = np.array([f"{name}/{name}.rrd" for name in found.flights["flight_id"].tolist()])
+    failed = (NotInFleet("failed", "logs/a|b.ulg", "found <nothing>"), NotInFleet("skipped", "c.txt", "no reader"))
+    return replace(changed(found, recording=recordings), not_in_fleet=failed)
+
+
+@pytest.fixture(scope="module")
+def path(fleet: FleetResults, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recording") / "fleet.rrd"
+    write_fleet_recording(path, fleet)
+    assert [entry.name for entry in path.parent.iterdir()] == ["fleet.rrd"], "a temporary file stayed behind"
+    return path
+
+
+@pytest.fixture(scope="module")
+def contents(path: Path) -> Contents:
+    return Contents(path)
+
+
+def test_every_row_is_a_flight_at_its_start(contents: Contents, fleet: FleetResults) -> None:
+    assert contents.timelines == {"utc", "flight_number"}
+    starts = np.sort(fleet.flights["start_utc"]).astype(np.int64)
+    for entity, batches in contents.batches.items():
+        for batch in batches:
+            places = np.asarray(batch.column("flight_number"))
+            utc_ns = np.asarray(batch.column("utc").cast(pa.int64()))
+            assert (utc_ns == starts[places - 1]).all(), entity
+
+
+def test_identity_and_embedded_layout(contents: Contents) -> None:
+    assert contents.store.recording_id == "fleet"
+    assert [one.application_id for one in contents.blueprints] == [contents.store.application_id]
+
+
+@pytest.mark.parametrize("name", [STEADY, STEPPING])
+def test_errors_and_intervals_are_those_of_the_flights(contents: Contents, fleet: FleetResults, name: str) -> None:
+    flights = fleet.flights
+    mine = flights["aircraft"] == name
+    places, values = contents.scalars(f"/aircraft/{name}/heading_error/flights")
+    assert (places == np.flatnonzero(mine) + 1).all() and (values[:, 0] == flights["error_deg"][mine]).all()
+    _, ends = contents.scalars(f"/aircraft/{name}/heading_error/interval95")
+    joined = np.column_stack([np.nanmax(ends[:, edge::2], axis=1) for edge in (0, 1)])
+    assert (joined[:, 0] == flights["confidence95_low_deg"][mine]).all()
+    assert (joined[:, 1] == flights["confidence95_high_deg"][mine]).all()
+
+
+def test_lines_are_interrupted_where_the_level_changes(contents: Contents, fleet: FleetResults) -> None:
+    change = next(one for one in fleet.change_points if one.aircraft == STEPPING)
+    first = fleet.flights["flight_id"].tolist().index(change.flight_id) + 1
+    places, values = contents.scalars(f"/aircraft/{STEPPING}/heading_error/limits")
+    before = places < first
+    assert values.shape[1] == 6 and before.any() and not before.all()
+    assert np.isnan(values[before][:, 3:]).all() and np.isnan(values[~before][:, :3]).all()
+    assert np.allclose(values[before][:, 0], change.level_before)
+    assert np.allclose(values[~before][:, 3], change.level_after)
+    place, level = contents.scalars(f"/aircraft/{STEPPING}/heading_error/change")
+    assert place.tolist() == [first] and level[0, 0] == pytest.approx(change.level_after)
+
+
+def test_an_aircraft_without_changes_has_none(contents: Contents) -> None:
+    assert f"/aircraft/{STEADY}/heading_error/change" not in contents.batches
+    assert contents.scalars(f"/aircraft/{STEADY}/heading_error/limits")[1].shape[1] == 3
+
+
+def test_the_growing_density_is_that_of_all_flights_so_far(contents: Contents, fleet: FleetResults) -> None:
+    densities = fleet.densities
+    drawn = {
+        place: np.asarray(tensor[0]["buffer"])
+        for batch in contents.batches[f"/{PATH}/fleet_so_far"]
+        for place, tensor in zip(
+            batch.column("flight_number").to_pylist(), batch.column("BarChart:values").to_pylist(), strict=True
+        )
+    }
+    assert sorted(drawn) == list(range(1, FLIGHTS + 1))
+    for upto, (place, so_far) in enumerate(steps_of(densities), start=1):
+        expected = np.average(densities.density_per_deg[:upto], axis=0, weights=densities.samples[:upto])
+        assert place == upto - 1 and np.allclose(so_far, expected, rtol=1e-6)
+        assert (drawn[upto] == so_far).all() or not drawn[upto].any(), "left out only when far too high"
+    assert np.allclose(drawn[FLIGHTS], densities.pooled_per_deg, rtol=1e-6, atol=1e-9)
+
+
+def steps_of(densities: Densities) -> list[tuple[int, np.ndarray]]:
+    return list(steps(densities, np.arange(len(densities))))
+
+
+def test_many_flights_are_drawn_in_some_200_steps(fleet: FleetResults) -> None:
+    one, times = fleet.densities, 30
+    many = Densities(
+        one.edge_deg,
+        *(np.tile(values, times) for values in (one.flight_id, one.aircraft, one.samples)),  # type: ignore[arg-type]
+        np.tile(one.density_per_deg, (times, 1)),
+        one.pooled_per_deg,
+    )
+    found = steps_of(many)
+    assert len(many) > MOST_STEPS and len(found) == MOST_STEPS and found[-1][0] == len(many) - 1
+    assert np.allclose(found[-1][1], one.pooled_per_deg, rtol=1e-6, atol=1e-9)
+
+
+def test_skill_of_every_flight_by_horizon(contents: Contents, fleet: FleetResults) -> None:
+    places, values = contents.scalars("/forecast/rms_by_flight")
+    rms, horizons = fleet.skill_flights["rms_m"], fleet.skill_flights["horizon_min"]
+    assert (places == np.arange(1, FLIGHTS + 1)).all()
+    for column, horizon in enumerate(np.unique(horizons).tolist()):
+        assert (values[:, column] == rms[horizons == horizon]).all()
+    assert "900" not in contents.text("/forecast/skill") and "last estimate" in contents.text("/forecast/skill")
+
+
+def test_names_from_logs_are_neither_paths_nor_markup(contents: Contents) -> None:
+    own = {entity.split("/")[2] for entity in contents.batches if entity.startswith("/aircraft/")}
+    assert len(own) == 3 and all(re.fullmatch(r"[\w.-]+", part) for part in own)
+    for document in ("/by_aircraft", "/flights", "/failed"):
+        text = contents.text(document)
+        assert "![" not in text and "<" not in text.replace("\\<", "")
+        for line in text.splitlines():
+            if line.startswith("|"):
+                cells = len(re.findall(r"(?<!\\)\|", line))
+                assert cells == len(re.findall(r"(?<!\\)\|", next(one for one in text.splitlines() if one[:1] == "|")))
+
+
+def test_links_name_the_recordings_and_nothing_else(fleet: FleetResults, tmp_path: Path) -> None:
+    recordings = fleet.flights["recording"].copy().astype("U80")
+    recordings[:3] = ["", "a b/(c).rrd", "http://127.0.0.1/x.rrd"]
+    write_fleet_recording(tmp_path / "fleet.rrd", changed(fleet, recording=recordings))
+    links = re.findall(r"(?<!\\)\]\(([^)]*)\)", Contents(tmp_path / "fleet.rrd").text("/flights"))
+    assert links == recordings[3:].tolist()
+
+
+def test_logs_without_a_flight_are_told(contents: Contents) -> None:
+    text = contents.text("/failed")
+    assert "no reader" in text and "nothing" in text and "2 logs" in text
+
+
+@pytest.mark.parametrize("first", [0, 30])
+def test_flights_without_a_time_have_a_number_alone(fleet: FleetResults, tmp_path: Path, first: int) -> None:
+    write_fleet_recording(tmp_path / "fleet.rrd", untimed(fleet, first))
+    found = Contents(tmp_path / "fleet.rrd")
+    assert found.timelines == ({"utc", "flight_number"} if first else {"flight_number"})
+    for batches in found.batches.values():
+        for batch in batches:
+            places = np.asarray(batch.column("flight_number"))
+            assert ((places <= first) == ("utc" in batch.schema.names)).all()
+    places, _ = found.scalars(f"/aircraft/{STEADY}/heading_error/flights")
+    assert len(places) == FLIGHTS // 3, "all of them have a place on flight_number"
+    assert f"# {FLIGHTS - first} without absolute time" in found.text("/flights")
+
+
+def test_one_flight_and_none(tmp_path: Path) -> None:
+    (tmp_path / "none").mkdir()
+    write_fleet_recording(tmp_path / "none.rrd", gather(tmp_path / "none"))
+    assert "# 0 flights" in Contents(tmp_path / "none.rrd").text("/flights")
+    save_flight(tmp_path / "one", 0)
+    write_fleet_recording(tmp_path / "one.rrd", gather(tmp_path / "one"))
+    found = Contents(tmp_path / "one.rrd")
+    assert found.scalars("/aircraft/A12/heading_error/flights")[1].tolist() == [[1.0]]
+    assert found.scalars("/aircraft/A12/heading_error/interval95")[1].shape == (1, 2)
+
+
+def test_flights_without_any_heading_leave_the_charts_out(fleet: FleetResults, tmp_path: Path) -> None:
+    unknown = np.full(FLIGHTS, np.nan)
+    bare = changed(fleet, error_deg=unknown, radial_error_rate_50_nmiph=unknown, verdict=np.full(FLIGHTS, ""))
+    none = FigureData("trend", {name: values[:0] for name, values in fleet.trend.columns.items()}, {})
+    empty = gather_nothing(tmp_path).densities
+    write_fleet_recording(
+        tmp_path / "fleet.rrd", replace(bare, trend=none, change_points=(), densities=empty, normals=())
+    )
+    found = Contents(tmp_path / "fleet.rrd")
+    assert not [entity for entity in found.batches if "heading_error" in entity or "radial" in entity]
+    states = found.batches[f"/aircraft/{STEADY}/verdict"][0].column("StateChange:state").to_pylist()
+    assert states == [["not assessed"]] * (FLIGHTS // 3)
+
+
+def gather_nothing(folder: Path) -> FleetResults:
+    (folder / "nothing").mkdir()
+    return gather(folder / "nothing")
+
+
+@pytest.fixture(scope="module")
+def client(path: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[ViewerClient]:
+    with ExitStack() as stack:
+        try:
+            yield stack.enter_context(viewer(path, tmp_path_factory.mktemp("home")))
+        except NoViewerError as error:
+            reason = f"the headless viewer did not start (Debian: mesa-vulkan-drivers, libvulkan1): {error}"
+            if os.environ.get("CI") == "true":
+                pytest.fail(reason)
+            pytest.skip(reason)
+
+
+@pytest.mark.viewer
+def test_every_view_of_every_tab_draws_and_complains_of_nothing(client: ViewerClient) -> None:
+    client.set_time("flight_number", sequence=FLIGHTS // 2)
+    seen = []
+    for name, views in pages(client):
+        seen.append(name)
+        for view in views:
+            kind = view.view_class
+            pixels = picture(settled(client, view.view_id))
+            assert kind not in DRAWN_IN_COLOUR or colourful(pixels) > LEAST_PIXELS, (name, kind)
+        assert not [view.reports for view in client.get_state().views if view.reports], name
+    assert [tab for tab in ("Fleet", "Aircraft", "Forecast", "Flights", "Failed") if any(tab in one for one in seen)]
