@@ -1,5 +1,7 @@
 """The command line: what it imports, what it prints where, and its exit codes."""
 
+import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -7,7 +9,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from groundstation.cli.main import LATER_VERBS, app
+from groundstation.cli.main import LATER_VERBS, VERBS, app
 
 HEAVY = (
     *("numpy", "pandas", "pyarrow", "numba", "scipy", "rerun", "matplotlib", "mcap", "google.protobuf"),
@@ -44,10 +46,28 @@ def test_a_verb_of_a_later_version_says_so(verb: str) -> None:
 
 def test_every_verb_has_help() -> None:
     _, text, _ = groundstation("--help")
-    for verb in ("info", "check", "convert", "run", "report", "view", "simulate", "study", "list"):
-        assert verb in text
+    assert re.findall(r"^\W (\w+)  ", text[text.index("Commands") :], re.MULTILINE) == list(VERBS)
+    for verb in VERBS:
         code, verb_text, _ = groundstation(verb, "--help")
         assert code == 0 and "Usage" in verb_text
+
+
+def test_a_name_does_not_drive_the_terminal(tmp_path: Path) -> None:
+    code, _, err = groundstation("info", str(tmp_path / "a\x1b[2J.csv"))
+    assert code == 2 and "a?[2J.csv" in err and "\x1b" not in err
+
+
+def test_a_code_page_that_lacks_a_sign_loses_no_answer(tmp_path: Path) -> None:
+    log = tmp_path / "a.csv"
+    log.write_text("# aircraft: 飛 σ\ntime_s,ins.true_heading_deg\n0,1\n1,1\n2,1\n", encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "groundstation", "info", str(log)],
+        capture_output=True,
+        env=os.environ | {"PYTHONIOENCODING": "cp1251"},
+        check=False,
+    )
+    assert done.returncode == 0 and done.stderr == b""
+    assert b"\\u98db \\u03c3" in done.stdout
 
 
 def test_wrong_usage_is_exit_2() -> None:

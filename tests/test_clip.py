@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from errno import ENOSPC
 from pathlib import Path
 
 import numpy as np
@@ -248,6 +249,16 @@ def test_nothing_is_overwritten_without_force(whole: Path, tmp_path: Path) -> No
         assert code == 2 and err.count("\n") == 1
     assert groundstation("clip", str(tmp_path / "none.mcap"), "-o", str(part))[0] == 2
     assert groundstation("clip", str(tmp_path), "-o", str(part))[0] == 2
+
+
+def test_a_full_disk_is_told_with_the_file(whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("groundstation.store.writer.StoreWriter.write", refuse)
+    code, _, err = groundstation("clip", str(whole), "--to", "5", "-o", str(tmp_path / "part.mcap"))
+    assert (code, err) == (1, f"error: {tmp_path / 'part.mcap'}: No space left on device\n")
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_recording_stands_beside_it(whole: Path, tmp_path: Path) -> None:

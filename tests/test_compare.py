@@ -168,6 +168,7 @@ def test_a_setting_and_its_effect_are_told(folders: dict[str, Path]) -> None:
     assert error.delta == pytest.approx(after["error_deg"] - before["error_deg"])
     assert error.sigma == pytest.approx(np.hypot(before["standard_error_deg"], after["standard_error_deg"]), abs=1e-9)
     assert comparison.is_same_log and comparison.alignment.event == "utc" and comparison.alignment.offset_s == 0.0
+    assert comparison.cause == "the settings"
 
 
 def test_findings_and_reasons_of_one_alone(folders: dict[str, Path]) -> None:
@@ -193,7 +194,7 @@ def test_first_movement_and_lift_off_align_the_same_manoeuvre(folders: dict[str,
 
 def test_a_part_is_known_for_the_flight_it_was_cut_from(folders: dict[str, Path]) -> None:
     comparison = compared(folders["good"], folders["part"])
-    assert comparison.is_same_log
+    assert comparison.is_same_log and comparison.cause == "the parts they hold and the settings"
     assert comparison.alignment.event == "utc" and comparison.alignment.offset_s == pytest.approx(30.0)
     assert compared(folders["good"], folders["part"], "start").alignment.offset_s == pytest.approx(30.0)
 
@@ -350,12 +351,35 @@ def test_only_flight_folders_are_taken_and_nothing_is_overwritten(folders: dict[
     assert groundstation("compare", good, good, "-o", str(out))[0] == 2
     assert groundstation("compare", good, good, "-o", str(out), "-f")[0] == 0
     assert groundstation("compare", good, good, "-o", good, "-f")[0] == 2
+    for name in ("compare.csv", "compare.rrd"):
+        (tmp_path / f"with {name}").mkdir()
+        mine = tmp_path / f"with {name}" / name
+        mine.write_text("mine", encoding="utf-8")
+        assert groundstation("compare", good, good, "-o", str(mine.parent))[0] == 2
+        assert mine.read_text(encoding="utf-8") == "mine"
+        shutil.rmtree(mine.parent)
+    flights = tmp_path / "flights"
+    flights.mkdir()
+    for name in ("index.json", "index.csv"):
+        (flights / name).touch()
+    assert groundstation("compare", good, good, "-o", str(flights), "-f")[0] == 2
     assert collect([tmp_path]) == (), "what groundstation made is no input"
     broken = tmp_path / "broken"
     shutil.copytree(folders["good"], broken)
     (broken / "summary.json").write_text("{", encoding="utf-8")
     code, _, err = groundstation("compare", good, str(broken))
     assert code == 1 and err.count("\n") == 1 and "Traceback" not in err
+
+
+@pytest.mark.parametrize("forecast", [[], "none", 1.0])
+def test_a_forecast_of_another_kind_is_none(tmp_path: Path, forecast: Any) -> None:
+    save(tmp_path / "a", make_results(make_flight()), {})
+    shutil.copytree(tmp_path / "a", tmp_path / "b")
+    summary = json.loads((tmp_path / "b" / "summary.json").read_text(encoding="utf-8"))
+    summary["results"]["forecast"] = forecast
+    (tmp_path / "b" / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    compare_to(tmp_path / "a", tmp_path / "b", tmp_path / "out")
+    assert (tmp_path / "out" / "compare.rrd").is_file()
 
 
 @pytest.mark.viewer

@@ -1,8 +1,11 @@
 """Logs and results in a bucket, and work on a cluster: the results are those of a run on this machine."""
 
+import json
 import os
 import shutil
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -10,13 +13,16 @@ from pathlib import Path
 
 import fsspec
 import pytest
+from distributed import Client
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.pipeline.batch import plan_many, run_many
+from groundstation.pipeline.cluster import on_cluster
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.elsewhere import FarFolder, far_logs
+from groundstation.pipeline.flight import Job
 from groundstation.pipeline.progress import Event
-from tests.test_resume import SETTINGS, SHORT, assert_equal_runs
+from tests.test_resume import SETTINGS, SHORT, assert_equal_runs, tell_and_sleep
 
 SAMPLES = SHORT.parent
 FEW = ("taxi-short.csv", "taxi-notime.csv")
@@ -93,6 +99,19 @@ def test_what_is_finished_elsewhere_is_not_done_again(memory: str, tmp_path: Pat
     copy = fetched(out, tmp_path / "copy")
     (copy / ".lock").touch()
     assert_equal_runs(copy, tmp_path / "here")
+
+
+def test_a_flight_elsewhere_loses_its_pdf_and_keeps_what_somebody_put_there(memory: str) -> None:
+    out, source = f"{memory}out", f"{memory}logs"
+    far = FarFolder(out)
+    FarFolder(source).write(SHORT.name, SHORT.read_bytes())
+    (done,) = run_many([source], out, Configuration(), jobs=1)
+    far.write(f"{done.flight_id}/notes.txt", b"mine")
+    assert json.loads(far.read(f"{done.flight_id}/manifest.json") or b"")["source"]["path"] == f"{source}/{SHORT.name}"
+    run_many([source], out, Configuration(), jobs=1, with_pdf=False)  # the reports alone
+    assert not {"report.pdf", "summary.pdf"} & {name.rpartition("/")[2] for name in far.files()}
+    run_many([source], out, SETTINGS, jobs=1, with_pdf=False)  # the analysis
+    assert far.read(f"{done.flight_id}/notes.txt") == b"mine"
 
 
 def test_places_that_cannot_be_reached_are_told_in_one_line(memory: str, tmp_path: Path) -> None:
@@ -177,6 +196,38 @@ def test_a_cluster_loses_nothing_when_a_worker_is_killed(bucket: str, logs: Path
         (copy / name).write_text((copy / name).read_text().replace(f"{source}/", f"{logs}/"))
     (copy / ".lock").touch()
     assert_equal_runs(copy, whole)
+
+
+def test_a_scheduler_that_goes_away_is_told_in_one_line(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
+    scheduler_file = tmp_path / "scheduler.json"
+    scheduler = subprocess.Popen(
+        [*command, "--no-dashboard", "--scheduler-file", str(scheduler_file)], stderr=subprocess.DEVNULL
+    )
+    deadline = time.monotonic() + 60.0
+    while not scheduler_file.exists() or not scheduler_file.read_text():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    address = json.loads(scheduler_file.read_text())["address"]
+    worker = subprocess.Popen(
+        [sys.executable, "-m", "distributed.cli.dask_worker", address, "--no-nanny", "--no-dashboard"],
+        stderr=subprocess.DEVNULL,
+        cwd=SAMPLES.parent,
+    )
+    killer = threading.Timer(0.0, scheduler.kill)
+    try:
+        with Client(address, timeout=60, set_as_default=False) as client:
+            client.wait_for_workers(1, timeout=60)
+        job = Job(tmp_path / "x", tmp_path, Configuration())
+        waiting = on_cluster(iter([(0, job)]), tell_and_sleep, scheduler=address)
+        killer = threading.Timer(5.0, scheduler.kill)
+        killer.start()
+        with pytest.raises(GroundstationError, match="the scheduler is gone"):
+            list(waiting)
+    finally:
+        killer.cancel()
+        scheduler.kill()
+        worker.kill()
 
 
 def test_a_scheduler_that_does_not_answer_is_told(tmp_path: Path) -> None:

@@ -199,6 +199,15 @@ def test_hostile_summaries_end_in_a_row_or_a_reason(tmp_path: Path, hostile: Any
     json.dumps(results.to_dict(), allow_nan=False)
 
 
+def test_metadata_that_is_broken_is_told_and_stops_nothing(tmp_path: Path) -> None:
+    broken, _whole = (save_flight(tmp_path, number) for number in range(2))
+    path = broken / "results.parquet" / "heading_samples.parquet"
+    for digits in (b"{", b"\xff", b"[1]", b'{"heading_deg": {}}'):
+        table = pq.read_table(path).replace_schema_metadata({b"digits": digits})
+        pq.write_table(table, path)
+        assert [Path(one.source).name for one in write(tmp_path).not_in_fleet] == [broken.name]
+
+
 def test_a_full_disk_is_told_and_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     save_flight(tmp_path, 1)
     write(tmp_path)

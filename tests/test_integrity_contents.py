@@ -297,3 +297,12 @@ def test_a_sampler_keeps_a_bounded_part_evenly() -> None:
     index, columns = sampler.all()
     assert 50 <= len(index) <= 100 and np.array_equal(index, columns["x"])
     assert index[0] == 0 and len(np.unique(np.diff(index))) == 1
+
+
+def test_numbers_at_the_ends_of_a_float_give_no_warning() -> None:
+    rng = np.random.default_rng(4)
+    wild = np.array([1.7e308, -1.7e308, np.inf, -np.inf, np.nan, 5e-324, 0.0, 1.0])
+    fields = {name: rng.choice(wild, len(TIME_S)) for name in flight()}
+    ends = {name: np.where(np.arange(len(TIME_S)) % 2, 1.7e308, -1.7e308) for name in flight()}
+    found = survey([LogHeader("test"), *batches("gnss", fields), *batches("ins", ends)])
+    assert all("\n" not in finding.text for finding in ledger_findings(found.ledger))

@@ -30,6 +30,7 @@ from tests.simulated_flights import FLIGHT_LEGS, QUIET_GNSS, QUIET_INS, scenario
 
 EXACT_S = 0.002  # interpolation between samples 0.1 s apart, and means over 0.4 s
 NOISY_S = 0.05
+TICK_NS = 200_000_000  # time stamps rounded up to it would make the INS late
 SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
 
 
@@ -176,6 +177,7 @@ def every(step: int) -> Callable[[Table], Table]:
         ("ins", every(50), "ins is too slow"),
         ("gnss", every(50), "gnss is too slow"),
         ("gnss", lambda table: replace(table, time_ns=table.time_ns // NS_PER_S * NS_PER_S), "coarser than its rate"),
+        ("ins", lambda table: replace(table, time_ns=-(-table.time_ns // TICK_NS) * TICK_NS), "coarser than its rate"),
         ("gnss", lambda table: table.take(slice(0, 1)), "no samples"),
         ("gnss", lambda table: table.take(slice(0, 300)), "fewer than two stretches"),
         ("ins", lambda table: table.take(slice(0, 2)), "hardly any samples"),

@@ -1,5 +1,6 @@
 """The Python API: lazy, the same for a log and a flight folder, one line for every error."""
 
+import json
 import re
 import shutil
 import subprocess
@@ -17,6 +18,7 @@ import pytest
 import groundstation
 from groundstation.base.errors import GroundstationError, NotAssessableError, UnreadableLogError, UsageError
 from groundstation.pipeline.api import OpenLog, SavedRun
+from groundstation.pipeline.clip import Wanted, clip
 from groundstation.reports import drawing
 from groundstation.results.files import SavedFlight, load, save
 from groundstation.results.flight import FlightResults
@@ -287,8 +289,28 @@ def test_a_folder_without_its_mcap_still_has_its_answers(folder: Path, tmp_path:
     next(copy.glob("*.mcap")).unlink()
     saved = groundstation.open(copy)
     assert saved.heading().verdict == "accept" and saved.figures and "Accept" in saved._repr_html_()
-    with pytest.raises(UsageError, match="0 MCAPs"):
+    with pytest.raises(UsageError, match="0 files"):
         _ = saved.tables
+
+
+def test_a_part_beside_the_flight_is_not_taken_for_it(folder: Path, tmp_path: Path) -> None:
+    copy = tmp_path / folder.name
+    shutil.copytree(folder, copy)
+    clip(copy, copy / "part.mcap", Wanted("60", "90"))
+    assert set(groundstation.open(copy).tables) == set(groundstation.open(folder).tables)
+    assert len(groundstation.open(copy).tables["ins"]) == len(groundstation.open(folder).tables["ins"])
+
+
+@pytest.mark.parametrize(("ledger", "expected"), [({"topics": True}, ""), ({"topics": {"ins": 1}}, "ins (None)")])
+def test_an_odd_ledger_leaves_the_card(folder: Path, tmp_path: Path, ledger: dict[str, Any], expected: str) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    summary = json.loads((copy / "summary.json").read_text(encoding="utf-8"))
+    (copy / "summary.json").write_text(json.dumps(summary | {"ledger": ledger}), encoding="utf-8")
+    assert f'<td style="text-align:left">{expected}</td>' in groundstation.open(copy)._repr_html_()
+    (copy / "summary.json").write_text(json.dumps(summary | {"ledger": True}), encoding="utf-8")
+    with pytest.raises(UnreadableLogError, match="no mapping"):
+        groundstation.open(copy)._repr_html_()
 
 
 def test_a_broken_folder_is_one_line(folder: Path, tmp_path: Path) -> None:

@@ -293,9 +293,22 @@ def test_repeated_headers_and_comments_inside_lose_nothing(write: Write) -> None
     assert log.damage("repeated_header").count == 2 and log.damage("comment_line").count == 1
 
 
+def test_whole_seconds_beside_the_recorder_time_are_right_when_they_change(write: Write) -> None:
+    rows = [f"{0.2 * row:.1f},1970-01-01T00:01:{(0.2 * row + 0.6) // 1:02.0f}Z,{row}" for row in range(40)]
+    log = Read(write("time_s,time_utc,ins.roll_deg\n" + "\n".join(rows) + "\n"))
+    assert log.header.utc_of_zero_ns == 60_600_000_000  # the first row tells a second that began 0.6 s before it
+
+
 def test_trailing_delimiter_in_every_row(write: Write) -> None:
     log = Read(write("time_s,ins.roll_deg\n1,1,\n2,2,\n3,3\n"))
     assert log.rows("ins") == [2, 3] and log.damage("dropped_rows").count == 1
+
+
+def test_a_first_row_that_is_cut_or_joined_does_not_judge_the_others(write: Write) -> None:
+    cut = Read(write("time_s,ins.roll_deg,ins.pitch_deg\n1,1,\n2,2,2,\n3,3,3,\n"))
+    assert cut.rows("ins") == [3, 4] and cut.damage("dropped_rows").count == 1
+    longer = Read(write("time_s,ins.roll_deg\n1,1,\n2,2\n3,3\n"))
+    assert longer.rows("ins") == [3, 4] and longer.damage("dropped_rows").count == 1
 
 
 def test_quoted_cells(write: Write) -> None:

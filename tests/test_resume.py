@@ -17,8 +17,10 @@ from filelock import FileLock
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.batch import LOCK, plan_many, run_many
 from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.flight import Job
 from groundstation.pipeline.outcome import Outcome
-from groundstation.pipeline.progress import Event
+from groundstation.pipeline.progress import Event, Listener
+from groundstation.pipeline.workers import _teller
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 SHORT = SAMPLES / "taxi-short.csv"
@@ -140,6 +142,107 @@ def test_a_broken_manifest_means_that_nothing_is_finished(finished: Path, tmp_pa
     for text in ("{", json.dumps({"resume": {}}), json.dumps({"source": {"sha256": "0"}, "resume": None})):
         manifest.write_text(text)
         assert plan_many([SHORT], out, Configuration())[0].text == "to run"
+
+
+def test_a_twin_of_a_finished_log_is_not_run(finished: Path, tmp_path: Path) -> None:
+    out, logs = copied(finished, tmp_path / "out"), tmp_path / "logs"
+    logs.mkdir()
+    for name in (SHORT.name, "twin.csv"):
+        shutil.copy(SHORT, logs / name)
+    told: list[Event] = []
+    assert [one.text for one in plan_many([logs], out, Configuration())] == [
+        "finished, nothing to do",
+        f"same content as {logs / SHORT.name}, listed once",
+    ]
+    done = run_many([logs], out, Configuration(), jobs=1, listen=told.append)
+    assert [one.state for one in done] == ["done", "skipped"]
+    assert [event.kind for event in told] == ["begin", "end", "end"]
+    assert done[1].text == f"twin.csv: same content as {logs / SHORT.name}, listed once"
+
+
+def test_a_log_that_is_written_to_while_it_is_read_has_failed(tmp_path: Path) -> None:
+    log = tmp_path / SHORT.name
+    shutil.copy(SHORT, log)
+
+    def grow(event: Event) -> None:
+        if event.text == "converting":
+            with log.open("ab") as stream:
+                stream.write(b"\n")
+
+    (outcome,) = run_many([log], tmp_path / "out", Configuration(), jobs=1, listen=grow)
+    assert outcome.text == "taxi-short.csv: changed while it was read: run it again once it is complete"
+    assert [path.name for path in (tmp_path / "out").iterdir() if path.is_dir()] == []
+
+
+def test_a_log_that_is_merely_touched_is_run(tmp_path: Path) -> None:
+    log = tmp_path / SHORT.name
+    shutil.copy(SHORT, log)
+    (outcome,) = run_many(
+        [log], tmp_path / "out", Configuration(), jobs=1, with_pdf=False, listen=lambda _event: os.utime(log)
+    )
+    assert outcome.state == "done"
+
+
+def test_an_interrupted_run_stops_at_once(tmp_path: Path) -> None:
+    def interrupt(event: Event) -> None:
+        if event.kind == "end":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        run_many([SAMPLES], tmp_path / "out", Configuration(), jobs=2, with_pdf=False, listen=interrupt)
+    deadline = time.monotonic() + 10.0
+    while multiprocessing.active_children() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert caught.value is not None  # the frames of the run are alive: its processes ended all the same
+    assert multiprocessing.active_children() == []
+
+
+def tell_and_sleep(job: Job, listen: Listener) -> Outcome:
+    """What a worker of :func:`test_workers_end_with_a_run_that_is_killed` does."""
+    (job.out / "worker").write_text(str(os.getpid()))
+    time.sleep(120.0)
+    return Outcome(job.log, "done", "")
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no /proc to look for processes")
+def test_workers_end_with_a_run_that_is_killed(tmp_path: Path) -> None:
+    program = (
+        "import sys; from pathlib import Path; from groundstation.pipeline.configuration import Configuration;"
+        "from groundstation.pipeline.flight import Job; from groundstation.pipeline.progress import silent;"
+        "from groundstation.pipeline.workers import side_by_side; from tests.test_resume import tell_and_sleep;"
+        "job = Job(Path('x'), Path(sys.argv[1]), Configuration());"
+        "list(side_by_side([(0, job)], tell_and_sleep, workers=1, listen=silent))"
+    )
+    run = subprocess.Popen([sys.executable, "-c", program, str(tmp_path)], cwd=SAMPLES.parent)
+    deadline = time.monotonic() + 60.0
+    while not (tmp_path / "worker").exists() or not (tmp_path / "worker").read_text():
+        assert run.poll() is None and time.monotonic() < deadline
+        time.sleep(0.05)
+    run.kill()
+    run.wait()
+    worker = int((tmp_path / "worker").read_text())
+    while is_alive(worker):
+        assert time.monotonic() < deadline, "the worker outlived its run"
+        time.sleep(0.05)
+
+
+def is_alive(process: int) -> bool:
+    """Whether there is such a process, and not merely its entry that nobody has fetched."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_an_event_of_a_worker_is_one_write_to_a_pipe() -> None:
+    sent: list[bytes] = []
+
+    class Pipe:
+        def send_bytes(self, data: bytes) -> None:
+            sent.append(data)
+
+    _teller(Pipe())(Event("stage", "\U0001f6e9" * 5000, "\U0001f6e9" * 5000))
+    assert len(sent[0]) + 4 <= 4096 and json.loads(sent[0])["kind"] == "stage"
 
 
 def test_two_runs_do_not_write_into_one_folder(finished: Path) -> None:

@@ -180,7 +180,7 @@ def test_serves_until_ctrl_c(out: Path) -> None:
     try:
         url = process.stdout.readline().strip()
         assert sorted(client_of(url).get_dataset(FLIGHTS).segment_ids()) == sorted(IDS)
-        assert f"rerun {url}" in process.stderr.readline()
+        assert f"groundstation view {url}" in process.stderr.readline()
         assert "Ctrl-C" in process.stderr.readline()
         process.send_signal(signal.SIGINT)
         _, rest = process.communicate(timeout=PATIENCE_S)

@@ -14,6 +14,7 @@ from mcap.records import Header
 from mcap.stream_reader import StreamReader
 
 from groundstation.base.records import Column, Damage, RecordBatch
+from groundstation.pipeline.describe import describe
 from groundstation.pipeline.log import open_log
 from groundstation.store.channel import CHUNK_SPAN_NS
 from groundstation.store.framing import MAGIC, to_bytes
@@ -161,6 +162,23 @@ def test_archives_random_bytes_and_texts_are_not_ours(sound: bytes, tmp_path: Pa
         path = tmp_path / "a"
         path.write_bytes(content)
         assert not is_groundstation_mcap(path)
+
+
+@pytest.mark.parametrize(
+    ("log", "reader"), [(flat_csv(), "flat-csv"), (dataflash(), "dataflash"), (ulog(), "px4-ulog")]
+)
+def test_another_log_that_begins_with_the_magic_number_is_described_as_what_it_is(
+    log: bytes, reader: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.log"
+    path.write_bytes(MAGIC + log[len(MAGIC) :])
+    assert describe(path).facts["format"].startswith(reader)
+
+
+def test_an_mcap_of_another_program_is_described_as_foreign(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(MAGIC + to_bytes(Header("", "another program")) + MAGIC)
+    assert describe(path).facts["format"].startswith("MCAP of another program")
 
 
 @pytest.mark.parametrize(

@@ -302,6 +302,14 @@ def test_utc_of_power_up_is_the_median_over_good_fixes(tmp_path: Path) -> None:
     assert read(tmp_path, gps_log([(10**15, 3)])).header.utc_of_zero_ns is None, "before 2004: no date"
 
 
+def test_whole_seconds_are_right_when_they_are_told_first(tmp_path: Path) -> None:
+    """Five messages tell each second: only the first of them tells it when it begins."""
+    begun_us = 1_500_000_000_000_000
+    old = [(begun_us + 10**6 * (late // 5) - T0_US - 200_000 * row, 3) for row, late in enumerate(range(3, 43))]
+    found = read(tmp_path, gps_log(old))
+    assert found.header.utc_of_zero_ns == (begun_us + 10**6 - T0_US - 400_000) * 1000
+
+
 def test_mode_follows_the_satellite_fix(tmp_path: Path) -> None:
     log = gps_log([(UTC_US, 3)]).format(ATTITUDE).subscribe(5, "vehicle_attitude").row(5, "Q4f", T0_US, 1, 0, 0, 0)
     assert read(tmp_path, log).values("ins", "mode") == ["gnss_aided"]

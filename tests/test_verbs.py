@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -121,6 +122,19 @@ def test_fail_on_reaches_exit_4(tmp_path: Path) -> None:
     assert groundstation(*arguments, "--fail-on", "warn")[0] == 4
 
 
+def test_a_report_that_cannot_be_written_stops_no_other(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert groundstation("run", str(SAMPLES / "taxi-short.csv"), "-o", str(out), "--no-pdf")[0] == 0
+    (flight,) = (path.parent for path in out.glob("*/summary.json"))
+    first = shutil.copytree(flight, out / "0")
+    (first / "report.html").unlink()
+    (first / "report.html").mkdir()
+    (flight / "report.html").unlink()
+    code, text, err = groundstation("report", str(out), "--no-pdf")
+    assert code == 1 and err == f"error: {first / 'report.html'}: Is a directory\n"
+    assert str(flight / "report.html") in text and (flight / "report.html").is_file()
+
+
 def test_results_go_to_stdout_and_nothing_else_does(tmp_path: Path) -> None:
     arguments = ["run", str(SAMPLES), "-o", str(tmp_path / "out"), "--json", "-j", "1"]
     code, out, err = groundstation(*arguments)
@@ -135,4 +149,4 @@ def test_a_closed_pipe_is_no_error(tmp_path: Path) -> None:
     done = subprocess.run(
         ["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True, env=dict(os.environ)
     )
-    assert done.stderr == "" and done.stdout.startswith("heading")
+    assert done.stderr == "" and done.stdout.startswith("analyses")

@@ -243,6 +243,23 @@ def test_growing_density_stands_below_an_axis_that_stands_still(contents: Conten
     assert heights(contents.fixed["/distribution/samples_all"][0]) <= top
 
 
+def test_bars_stand_where_their_bins_are(contents: Contents, flight: Flight) -> None:
+    """Rerun takes the abscissa of a bar for its left edge."""
+
+    def spans(batch: pa.RecordBatch) -> np.ndarray:
+        left = np.array(batch.column("BarChart:abscissa").to_pylist()[0][0]["buffer"])
+        return np.stack([left, left + np.array(batch.column("BarChart:widths").to_pylist()[0])])
+
+    figures = {figure.name: figure for figure in make_results(flight).figures}
+    bins, normal, growth = (figures[f"heading_{name}"] for name in ("distribution", "normal", "growth"))
+    whole = spans(contents.fixed["/distribution/samples_all"][0])
+    assert whole == pytest.approx(np.stack([bins["bin_low_deg"], bins["bin_high_deg"]]), abs=1e-5)
+    fitted = spans(contents.fixed["/distribution/fitted_normal"][0])
+    assert fitted.mean(axis=0) == pytest.approx(normal["difference_deg"], abs=1e-5)
+    grown = spans(contents.batches["/distribution/samples_so_far"][0])
+    assert grown.mean(axis=0) == pytest.approx(growth["bin_center_deg"][: grown.shape[1]], abs=1e-5)
+
+
 def test_findings_and_events_stand_in_the_log_with_severity_and_time(contents: Contents) -> None:
     batch = contents.batches["/log/findings"][0]
     at = {row: level[0] for row, level in enumerate(batch.column("TextLog:level").to_pylist())}

@@ -1,5 +1,8 @@
 """Errors that say where, what was found, what was expected and what to do next."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class GroundstationError(Exception):
     """Report a failure in one line a user can act on.
@@ -53,3 +56,15 @@ class NotAssessableError(GroundstationError):
 
 class SettingsError(UsageError):
     """A settings, profile, aircraft or site file has a value that cannot be used."""
+
+
+@contextmanager
+def told_in_a_line(where: str) -> Iterator[None]:
+    """Tell what the machine refuses in one line, as everything else is told: of its file, where it is known."""
+    try:
+        yield
+    except OSError as error:
+        place = where if error.filename is None else str(error.filename)
+        raise GroundstationError(place, error.strerror or str(error)) from error
+    except MemoryError as error:
+        raise GroundstationError(where, "not enough memory") from error

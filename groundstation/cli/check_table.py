@@ -7,7 +7,8 @@ import typer
 
 from groundstation.base.findings import Finding
 from groundstation.base.signals import is_canonical
-from groundstation.cli.printing import as_json, columns, printable, totals
+from groundstation.cli.main import printable
+from groundstation.cli.printing import as_json, columns, totals
 from groundstation.pipeline.check import Checked
 
 MOST_LISTED = 8  # gaps or stretches of one topic; all are in the JSON

@@ -16,6 +16,7 @@ from groundstation.cli.main import (
     Verbose,
     answers_with_exit_code,
     app,
+    printable,
 )
 
 if TYPE_CHECKING:
@@ -29,11 +30,15 @@ SIGNIFICANCE = {None: "", True: "beyond", False: "within"}
 @answers_with_exit_code
 def clip(
     flight: Annotated[Path, typer.Argument(help="Flight folder, MCAP or log.", metavar="X", readable=False)],
-    output: Annotated[Path, typer.Option("-o", "--output", help="MCAP to write; its recording stands beside it.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="MCAP to write; its recording stands beside it.", metavar="FILE")
+    ],
     start: Annotated[
         str | None, typer.Option("--from", help="Flight seconds, +mm:ss or ISO UTC.", metavar="TIME")
     ] = None,
-    end: Annotated[str | None, typer.Option("--to", help="The same; records before it.", metavar="TIME")] = None,
+    end: Annotated[
+        str | None, typer.Option("--to", help="The same; what is recorded before it.", metavar="TIME")
+    ] = None,
     topics: Annotated[
         list[str] | None, typer.Option("--topics", help="Topic or pattern to keep; may be repeated.", metavar="GLOB")
     ] = None,
@@ -78,7 +83,9 @@ def compare(
     align: Annotated[
         Align | None,
         typer.Option(
-            "--align", help="Event that both clocks are aligned on; left out: utc for one log, else first-movement."
+            "--align",
+            help="Event that both clocks are aligned on; left out: utc for one log, else first-movement where "
+            "both show it, else start.",
         ),
     ] = None,
     force: Force = False,
@@ -102,11 +109,11 @@ def compare(
 
 def comparison_text(found: "Comparison", *, everything: bool = False) -> str:
     """Text of ``compare``: who is who, how the clocks are aligned, the answers, settings and findings that differ."""
-    from groundstation.cli.printing import columns, printable
+    from groundstation.cli.printing import columns
 
     alignment = found.alignment
     when = "" if alignment.event == "utc" else f" (A at {alignment.a_s:.1f} s, B at {alignment.b_s:.1f} s)"
-    shared = "; one log: differences come from the settings, the noise is shared" if found.is_same_log else ""
+    shared = f"; one log: differences come from {found.cause}, the noise is shared" if found.is_same_log else ""
     sides = [
         [f"{letter}:", printable(f"{side.flight_id}  {side.source_name}")]
         for letter, side in zip("AB", (found.a, found.b), strict=True)
@@ -134,8 +141,6 @@ def comparison_text(found: "Comparison", *, everything: bool = False) -> str:
 
 
 def _text(value: "Value") -> str:
-    from groundstation.cli.printing import printable
-
     if value is None:
         return ""
     return f"{value:.7g}" if isinstance(value, float) else printable(str(value))

@@ -1,12 +1,14 @@
 """The command ``groundstation``: its verbs, options and exit codes. Heavy imports happen inside the verbs."""
 
+import io
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any, Literal, ParamSpec
 
 import typer
+import typer.core
 
 from groundstation import __version__
 from groundstation.base.errors import GroundstationError, UsageError
@@ -18,8 +20,24 @@ EXIT_CODES = (
     "channels dropped); 4 done, and --fail-on reached. For several logs the worst wins (1, 4, 3, 0)."
 )
 
+VERBS = (
+    *("info", "check", "convert", "run", "report", "view", "clip", "compare", "serve"),
+    *("simulate", "study", "list"),
+)
+
+
+class InOrder(typer.core.TyperGroup):
+    """The verbs in the order of a flight's way, wherever they are defined."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Names, those without a place at the end."""
+        places = {name: place for place, name in enumerate(VERBS)}
+        return sorted(super().list_commands(ctx), key=lambda name: places.get(name, len(VERBS)))
+
+
 app = typer.Typer(
     name="groundstation",
+    cls=InOrder,
     help="Ground station for post-flight navigation analysis: recorded logs become MCAP, a heading correction, a "
     "Rerun recording and a report.",
     epilog=EXIT_CODES,
@@ -66,9 +84,31 @@ ThresholdsFile = Annotated[
 ]
 
 
+def printable(text: str) -> str:
+    """Text of a log without control characters: a log must not drive the terminal.
+
+    Examples
+    --------
+    >>> printable("L-39\\x1b[2J")
+    'L-39?[2J'
+    """
+    return "".join(character if character.isprintable() else "?" for character in text)
+
+
 def say(text: str) -> None:
     """Print a line on stderr."""
-    typer.echo(text, err=True)
+    typer.echo(printable(text), err=True)
+
+
+def tell_written(paths: Iterable[object], *, as_json_text: bool, quiet: bool) -> None:
+    """Print the files that were written."""
+    from groundstation.cli.printing import as_json
+
+    written = [str(path) for path in paths]
+    if as_json_text:
+        typer.echo(as_json({"written": written}))
+    elif not quiet:
+        typer.echo("\n".join(map(printable, written)))
 
 
 def answers_with_exit_code(verb: Callable[Parameters, int | None]) -> Callable[Parameters, None]:
@@ -138,7 +178,7 @@ def info(
 @app.command()
 @answers_with_exit_code
 def check(
-    logs: Annotated[list[Path], typer.Argument(help="Recorded logs or MCAPs.", metavar="LOG...", readable=False)],
+    logs: Annotated[list[Path], typer.Argument(help="Recorded logs or MCAPs.", metavar="LOG", readable=False)],
     thresholds: ThresholdsFile = None,
     config: ConfigFile = None,
     profile: Profile = None,
@@ -164,8 +204,10 @@ def check(
 @app.command()
 @answers_with_exit_code
 def convert(
-    logs: Annotated[list[Path], typer.Argument(help="Recorded logs.", metavar="LOG...", readable=False)],
-    output: Annotated[Path, typer.Option("-o", "--output", help="MCAP to write; a folder for several logs.")],
+    logs: Annotated[list[Path], typer.Argument(help="Recorded logs.", metavar="LOG", readable=False)],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="MCAP to write; a folder for several logs.", metavar="FILE")
+    ],
     thresholds: ThresholdsFile = None,
     config: ConfigFile = None,
     profile: Profile = None,
@@ -191,7 +233,7 @@ def convert(
 @app.command()
 @answers_with_exit_code
 def run(
-    paths: Annotated[list[str], typer.Argument(help="Logs or folders of logs, or URLs of them.", metavar="PATH...")],
+    paths: Annotated[list[str], typer.Argument(help="Logs or folders of logs, or URLs of them.", metavar="PATH")],
     output: Annotated[str, typer.Option("-o", "--output", help="Folder for the results, or its URL.", metavar="OUT")],
     config: ConfigFile = None,
     aircraft: AircraftFile = None,
@@ -258,21 +300,29 @@ def report(
     from groundstation.pipeline.publishing import report_again
 
     paths, problems = report_again(out, with_pdf=not no_pdf)
-    written = [str(path) for path in paths]
-    if not quiet:
-        typer.echo(printing.as_json({"written": written}) if json else "\n".join(written))
+    tell_written(paths, as_json_text=json, quiet=quiet)
     for problem in problems:
-        say(f"{'error' if problem.code else 'warning'}: {printing.printable(problem.text)}")
+        say(f"{'error' if problem.code else 'warning'}: {problem.text}")
     return printing.worst_code(problems)
 
 
 @app.command()
 @answers_with_exit_code
 def view(
-    flight: Annotated[Path, typer.Argument(help="Flight folder, recording, MCAP or log.", metavar="FLIGHT")],
-    web: Annotated[bool, typer.Option("--web", help="Serve the viewer to a browser.")] = False,
-    host: Annotated[str, typer.Option("--host", help="Address that --web listens on.")] = "127.0.0.1",
-    port: Annotated[int | None, typer.Option("--port", help="Port for --web.", min=1, max=65535)] = None,
+    flight: Annotated[
+        str,
+        typer.Argument(
+            help="Folder that `run` or `compare` made, flight folder, recording, MCAP or log; or the address that "
+            "`serve` tells.",
+            metavar="FLIGHT",
+        ),
+    ],
+    web: Annotated[bool, typer.Option("--web", help="Open it in the browser.")] = False,
+    host: Annotated[str, typer.Option("--host", help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[
+        int | None,
+        typer.Option("--port", help="Port; left out: 9090 for --web, or any free one.", min=1, max=65535),
+    ] = None,
     profile: Profile = None,
     verbose: Verbose = False,
 ) -> int | None:
@@ -295,12 +345,9 @@ def simulate(
     json: Json = False,
 ) -> int | None:
     """Simulate a flight as a flat CSV, with the truth beside it. `groundstation list` names the scenarios."""
-    from groundstation.cli import printing
     from groundstation.pipeline.synthesis import simulate_to
 
-    written = [str(path) for path in simulate_to(scenario, output, seed=seed, force=force)]
-    if not quiet:
-        typer.echo(printing.as_json({"written": written}) if json else "\n".join(written))
+    tell_written(simulate_to(scenario, output, seed=seed, force=force), as_json_text=json, quiet=quiet)
     return DONE
 
 
@@ -331,7 +378,7 @@ def study(
 @answers_with_exit_code
 def list_(
     log: Annotated[
-        Path | None, typer.Argument(help="A log: would each analysis run on it?", metavar="[LOG]", readable=False)
+        Path | None, typer.Argument(help="A log: would each analysis run on it?", metavar="LOG", readable=False)
     ] = None,
     profile: Profile = None,
     json: Json = False,
@@ -373,4 +420,7 @@ from groundstation.cli import flights as flights  # noqa: E402
 
 def main(arguments: Any = None) -> None:
     """Run the command line; the exit code is raised as SystemExit."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a code page that lacks a sign loses no answer
     app(arguments)

@@ -6,6 +6,7 @@ from typing import Any
 
 import typer
 
+from groundstation.cli.main import printable
 from groundstation.pipeline.describe import Description
 from groundstation.pipeline.outcome import Outcome, worst_code
 
@@ -16,17 +17,6 @@ def as_json(document: Any) -> str:
     """Render a document as JSON text."""
     text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
     return text.encode("utf-8", "backslashreplace").decode()  # file names need not be UTF-8
-
-
-def printable(text: str) -> str:
-    """Text of a log without control characters: a log must not drive the terminal.
-
-    Examples
-    --------
-    >>> printable("L-39\\x1b[2J")
-    'L-39?[2J'
-    """
-    return "".join(character if character.isprintable() else "?" for character in text)
 
 
 def columns(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
@@ -122,12 +112,20 @@ def _plain(outcome: Outcome) -> dict[str, Any]:
     }
 
 
+KINDS = {"analysis": "analyses", "format": "formats", "scenario": "scenarios", "study": "studies"}
+
+
 def catalogue(entries: Sequence[Mapping[str, Any]], is_about_a_log: bool) -> str:
     """Text of ``list``."""
-    lines = []
+    lines: list[str] = []
+    kind = ""
     for entry in entries:
-        lines.append(f"{entry['name']}  {entry['title']}")
-        lines.append(f"    needs: {entry['needs']}")
+        if entry["kind"] != kind:
+            kind = entry["kind"]
+            lines += [*([""] if lines else []), KINDS[kind]]
+        lines.append(f"  {entry['name']}  {entry['title']}")
+        if entry["needs"] != "nothing":
+            lines.append(f"    needs: {entry['needs']}")
         if is_about_a_log and "would_run" in entry:
             lines.append("    would run" if entry["would_run"] else f"    would not run: {printable(entry['reason'])}")
     return "\n".join(lines)

@@ -3,7 +3,7 @@
 import json
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Literal
 
 from groundstation.pipeline.progress import Event, Listener, silent
@@ -25,7 +25,9 @@ def _as_json(event: Event) -> None:
     document: dict[str, str | int] = {"event": event.kind, "name": event.name, "text": event.text}
     if event.kind == "begin":
         document["total"] = event.total
-    print(json.dumps(document, ensure_ascii=False), file=sys.stderr, flush=True)
+    with suppress(OSError):  # nobody reads any more: the run goes on
+        sys.stderr.write(json.dumps(document, ensure_ascii=False) + "\n")  # one write: events come from two threads
+        sys.stderr.flush()
 
 
 @contextmanager

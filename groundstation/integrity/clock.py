@@ -20,6 +20,7 @@ from groundstation.integrity.clock_relation import ClockRelation, mistake_of_ste
 from groundstation.integrity.clock_steps import ClockSettings, ClockStep, Steps
 
 LARGEST_NS = 2**62  # of a time and of what is added to it: sums fit 64 bits
+FIRST_NS = iso_to_utc_ns("1980-01-08T00:00:00Z")[0]  # a clock before it was not set: 1970, or the zero of GPS
 Start = Literal["utc", "unset", "own_zero"]
 
 
@@ -232,7 +233,6 @@ def estimate_clock(
     )
 
 
-_FIRST_NS = iso_to_utc_ns("1980-01-08T00:00:00Z")[0]  # clocks begin at 1970, or as GPS does on 6 January 1980
 _END_NS = iso_to_utc_ns("2262-01-01T00:00:00Z")[0]
 
 
@@ -250,7 +250,7 @@ def zero_of(earliest_ns: int, latest_ns: int, utc_of_zero_ns: int | None) -> Zer
     1980 was never set.
     """
     if utc_of_zero_ns is not None and 0 <= earliest_ns + utc_of_zero_ns <= latest_ns + utc_of_zero_ns < _END_NS:
-        is_set = latest_ns + utc_of_zero_ns >= _FIRST_NS
+        is_set = latest_ns + utc_of_zero_ns >= FIRST_NS
         return Zero(is_set, utc_of_zero_ns if is_set else max(0, -earliest_ns))
     return Zero(False, max(0, -earliest_ns))
 
@@ -265,7 +265,7 @@ def start_of(first_device_ns: int, utc_of_zero_ns: int | None) -> Start:
     """
     if utc_of_zero_ns is None:
         return "own_zero"
-    return "utc" if first_device_ns + utc_of_zero_ns >= _FIRST_NS else "unset"
+    return "utc" if first_device_ns + utc_of_zero_ns >= FIRST_NS else "unset"
 
 
 def interpolated(wanted: Int64Array, index: Int64Array, time: Int64Array, period_ns: float) -> Int64Array:

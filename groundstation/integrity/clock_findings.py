@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import Clock
+from groundstation.integrity.clock import FIRST_NS, Clock
 from groundstation.integrity.clock_fit import Z95
 from groundstation.integrity.clock_relation import ClockRelation, Mistake
 from groundstation.integrity.clock_steps import ClockStep
@@ -111,7 +111,8 @@ def _absolute(clock: Clock) -> Iterator[Finding]:
         text += f", the first record at {first_s:.3f} s"
         if _UNIX_SECONDS[0] <= first_s < _UNIX_SECONDS[1]:
             text += f" (if these are seconds since 1970, {utc_ns_to_iso(clock.first_device_ns)}: state start_utc)"
-    known = next((one for one in clock.relations if one.is_absolute and one.segments), None)
+    dated = (one for one in clock.relations if one.is_absolute and one.segments)
+    known = next((one for one in dated if one.segments[-1].offset_ns >= FIRST_NS), None)  # else it was not set either
     if known is not None:
         zero = known.offset_text(known.segments[-1], has_utc=False)
         text += f"; by {known.name} the log's {zero}, which start_utc can state"

@@ -16,7 +16,7 @@ from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatc
 from groundstation.base.timescales import gps_week_to_utc_ns, iso_to_utc_ns
 from groundstation.base.toml_settings import number, required_number
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import LARGEST_NS, Clock
+from groundstation.integrity.clock import FIRST_NS, LARGEST_NS, Clock
 from groundstation.integrity.clock_fit import Fitted, fit_relation
 from groundstation.integrity.clock_relation import (
     ROLLOVER_S,
@@ -106,6 +106,8 @@ class _Readings:
         reference, device = self.reference, batch.device_time_ns
         time = batch.columns[reference.field]
         good = time.mask & device.mask
+        if time.values.dtype.kind == "f":
+            good = good & np.isfinite(time.values)
         if reference.week:
             good = good & batch.columns[reference.week].mask
         if reference.fix in batch.columns:
@@ -165,9 +167,9 @@ class ClockReferences:
 def _relation(readings: _Readings, clock: Clock, settings: RelationSettings) -> ClockRelation:
     reference, source = readings.reference, f"{readings.topic}.{readings.reference.field}"
     index, columns = readings.sampler.all()
-    if not len(index):
+    told_ns, good = _told(reference, columns) if len(index) else (index, np.zeros(0, dtype=bool))
+    if not good.any():
         return ClockRelation(reference.clock, source, reason="no reading that could be believed")
-    told_ns, good = _told(reference, columns)
     own_ns = clock.time_ns(index, Column(columns["device"]))[good]
     told_ns = told_ns[good]
     order = np.argsort(own_ns, kind="stable")
@@ -261,6 +263,7 @@ def _mistakes(reference: ReferenceField, fitted: Fitted, clock: Clock, told_ns: 
         offset_s = fitted.segments[-1].offset_ns / NS_PER_S
         kind = mistake_of_offset(offset_s)
         found += [Mistake(kind, offset_s)] if kind else []
-    if reference.scale != "day" and last_ns < iso_to_utc_ns(f"{reference.earliest_year}-01-01T00:00:00Z")[0]:
+    earliest_ns = iso_to_utc_ns(f"{reference.earliest_year}-01-01T00:00:00Z")[0]
+    if reference.scale != "day" and FIRST_NS <= last_ns < earliest_ns:  # before that it was never set
         found.append(Mistake("week_number", -float(ROLLOVER_S)))
     return tuple(found)

@@ -246,8 +246,8 @@ def _is_rollover(size_s: float) -> bool:
 
 
 def _places(sigma: float) -> int:
-    """Decimals that show two figures of a standard error, at most 6."""
-    return next((places for places in range(6) if sigma * 10**places >= 9.5), 6)
+    """Decimals that show two figures of a standard error, at most 9."""
+    return next((places for places in range(9) if sigma * 10**places >= 9.5), 9)
 
 
 def _figure(value: float) -> str:

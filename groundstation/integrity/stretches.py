@@ -91,7 +91,8 @@ class Constancy:
         self._open = found[-1:]
         if 0 < changes < count - 1:
             at = np.flatnonzero(differs)[:CHANGES_MEASURED]
-            smallest = float(np.abs(values[at + 1] - values[at]).min())
+            with np.errstate(over="ignore"):  # from one end of a float to the other
+                smallest = float(np.abs(values[at + 1] - values[at]).min())
             self.resolution = min(self.resolution or smallest, smallest)
 
     def stretches(self) -> list[Stretch]:

@@ -97,8 +97,10 @@ class Motion:
             index, columns = index[order], {name: values[order] for name, values in columns.items()}
             if {"velocity_north_mps", "velocity_east_mps"} <= columns.keys():
                 north, east = columns["velocity_north_mps"], columns["velocity_east_mps"]
-                columns.setdefault("ground_speed_mps", np.hypot(north, east))
-                columns.setdefault("track_deg", np.where(np.isfinite(north + east), direction_of(north, east), np.nan))
+                with np.errstate(over="ignore"):
+                    columns.setdefault("ground_speed_mps", np.hypot(north, east))
+                known = np.isfinite(north) & np.isfinite(east)
+                columns.setdefault("track_deg", np.where(known, direction_of(north, east), np.nan))
             found += [_Seen(topic, name, index, values) for name, values in columns.items()]
         return found
 

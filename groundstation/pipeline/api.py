@@ -6,7 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
 from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.analyse import analyse, user_settings
 from groundstation.pipeline.configuration import SECTIONS, Configuration, load_configuration
@@ -14,9 +14,9 @@ from groundstation.pipeline.convert import Converted, convert_log
 from groundstation.pipeline.describe import facts_of
 from groundstation.pipeline.flight import given_of, read_flight
 from groundstation.pipeline.identity import flight_id
-from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK
+from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, file_in
 from groundstation.pipeline.log import Log, open_log
-from groundstation.pipeline.notebook import AnyPath, OpenFlight, told_in_a_line
+from groundstation.pipeline.notebook import AnyPath, OpenFlight
 from groundstation.results.files import SavedFlight, load
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.restore import restored
@@ -228,13 +228,11 @@ class SavedRun(OpenFlight):
     @cached_property
     def _log(self) -> OpenLog:
         """The flight anew, from the MCAP, with the settings of the run."""
-        found = sorted(self.folder.glob("*.mcap"))
-        if len(found) != 1:
-            raise UsageError(str(self.folder), f"{len(found)} MCAPs", "the one of the flight", "run the log again")
+        mcap = file_in(self.folder, ".mcap")
         told = self.saved.manifest.get("configuration")
         known = {name: value for name, value in told.items() if name in SECTIONS} if isinstance(told, dict) else {}
-        with told_in_a_line(found[0].name):
-            return OpenLog(Conversion(open_log(found[0])), load_configuration(known))
+        with told_in_a_line(mcap.name):
+            return OpenLog(Conversion(open_log(mcap)), load_configuration(known))
 
     def with_settings(self, **sections: Any) -> OpenLog:
         return self._log.with_settings(**sections)

@@ -1,21 +1,20 @@
 """Several logs: each in its turn, several at once or on a cluster, one bad log never stopping the others."""
 
-import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
+from pathlib import Path, PurePath
 
-from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.base.errors import UsageError
 from groundstation.pipeline.analyse import user_settings
 from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.depot import Depot, FarDepot, FolderDepot
+from groundstation.pipeline.depot import FarDepot, FolderDepot
 from groundstation.pipeline.elsewhere import far_logs, is_far
 from groundstation.pipeline.far import FarJob, run_far
-from groundstation.pipeline.flight import Job, is_abandoned, run_flight
+from groundstation.pipeline.flight import PARTIAL_PREFIX, Job, run_flight
 from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, collect, is_ours
 from groundstation.pipeline.log import open_log
 from groundstation.pipeline.outcome import Outcome
@@ -23,7 +22,7 @@ from groundstation.pipeline.progress import Event, Listener, silent
 from groundstation.pipeline.publishing import FLEET_FILES, flight_folders, write_beside, write_index_of
 from groundstation.pipeline.resume import Finished, finished_flights, keys_of
 from groundstation.pipeline.shelf import Shelf
-from groundstation.pipeline.workers import AnyJob, Crew, cores, in_turn, side_by_side
+from groundstation.pipeline.workers import TASKS_PER_PROCESS, AnyJob, Crew, cores, in_turn, side_by_side
 
 LOCK = ".lock"
 PLANS: Mapping[str, str] = {
@@ -73,73 +72,95 @@ def run_many(
         is writing into it, or there is no such scheduler.
     """
     inputs = _inputs(paths, out, configuration)
-    crew = _crew(scheduler, min(jobs or cores(), len(inputs)), listen)
-    is_elsewhere = any(is_far(str(place)) for place in (out, *paths))
-    make = partial(Job, configuration=configuration, fail_on=fail_on, owner=os.getpid(), with_pdf=with_pdf)
+    crew = _crew(scheduler, jobs or cores(), len(inputs), listen)
+    make = partial(Job, configuration=configuration, fail_on=fail_on, with_pdf=with_pdf)
     listen(Event("begin", total=len(inputs)))
-    if is_elsewhere:
-        work = [FarJob(make(Path(), Path(), is_named=named), log, str(out), redo) for log, named in inputs]
-        return _run_elsewhere(work, str(out), crew, force, listen)
-    out = Path(out)
+    if any(is_far(str(place)) for place in (out, *paths)):
+        far = [FarJob(make(Path(), Path(), is_named=named), log, str(out), redo) for log, named in inputs]
+        return _run_elsewhere(far, str(out), crew, force, listen)
+    near = [make(Path(log), Path(out), is_named=named) for log, named in inputs]
+    return _run_here(near, Path(out), crew, force, redo, listen)
+
+
+def _run_here(
+    work: Sequence[Job], out: Path, crew: Crew, force: bool, redo: bool, listen: Listener
+) -> tuple[Outcome, ...]:
     _refuse_foreign(out, force)
     with _alone_in(out):
         _prepare(out)
         known = {} if redo else finished_flights(flight_folders(out))
-        local = [make(Path(log), out, is_named=named) for log, named in inputs]
+        shelf = Shelf(FolderDepot(out), [job.log for job in work])
 
-        def again(number: int) -> Outcome:
-            return run_flight(replace(local[number], add_suffix=True), listen)
+        def left() -> Iterator[tuple[int, Job]]:
+            for number, job, twin in _with_steps(work, known):
+                if twin is None:
+                    yield number, job
+                else:
+                    shelf.put_twin(number, Outcome(job.log, "skipped", ""), twin)
+                    listen(Event("end", job.name, "same content as another log"))
 
-        planned = (_with_step(job, known) if known else job for job in local)
-        return _run_into(
-            FolderDepot(out), enumerate(planned), [log for log, _named in inputs], run_flight, again, crew, listen
-        )
+        def suffixed(number: int) -> Job:
+            return replace(work[number], add_suffix=True)
+
+        _run_into(shelf, out, left(), run_flight, suffixed, crew, listen)
+        return (*shelf.outcomes(), *write_beside(out, shelf.outcomes(), with_pdf=work[0].with_pdf))
 
 
 def _run_elsewhere(work: Sequence[FarJob], out: str, crew: Crew, force: bool, listen: Listener) -> tuple[Outcome, ...]:
-    def again(number: int) -> Outcome:
-        far = work[number]
-        return run_far(replace(far, job=replace(far.job, add_suffix=True), redo=True), listen)
+    def suffixed(number: int) -> FarJob:
+        return replace(work[number], job=replace(work[number].job, add_suffix=True), redo=True)
 
-    with tempfile.TemporaryDirectory(prefix="groundstation-") as copy:
-        depot = FarDepot(out, Path(copy))
+    with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
+        copy = Path(folder)
+        depot = FarDepot(out, copy)
         depot.refuse_foreign(force=force)
         depot.copy_all()
+        shelf = Shelf(depot, [far.log for far in work])
+        is_whole = False
         try:
-            return _run_into(depot, enumerate(work), [far.log for far in work], run_far, again, crew, listen)
+            _run_into(shelf, copy, enumerate(work), run_far, suffixed, crew, listen)
+            problems = write_beside(copy, shelf.outcomes(), with_pdf=work[0].job.with_pdf)
+            is_whole = True
         finally:
-            depot.publish(FLEET_FILES)
+            depot.publish(FLEET_FILES, is_whole=is_whole)
+        return (*shelf.outcomes(), *problems)
 
 
 def _run_into(
-    depot: Depot,
-    tasks: Iterator[tuple[int, AnyJob]],
-    names: Sequence[str],
+    shelf: Shelf,
+    out: Path,
+    tasks: Iterable[tuple[int, AnyJob]],
     run: Callable[[AnyJob, Listener], Outcome],
-    run_with_suffix: Callable[[int], Outcome],
+    suffixed: Callable[[int], AnyJob],
     crew: Crew,
     listen: Listener,
-) -> tuple[Outcome, ...]:
-    """Carry out jobs and put their flights into the depot; interrupted, the index at least is written."""
-    shelf = Shelf(depot, names)
+) -> None:
+    """Carry out jobs and put their flights on the shelf; interrupted, the index at least is written."""
     try:
-        for number, outcome in crew(tasks, run):
-            listen(Event("end", Path(names[number]).name, outcome.text))
-            shelf.put(number, outcome)
-        shelf.settle(run_with_suffix)
+        with closing(crew(tasks, run)) as ended:  # closed at once when something is wrong here: its processes end
+            for number, outcome in ended:
+                listen(Event("end", PurePath(outcome.source).name, outcome.text))
+                shelf.put(number, outcome)
+        clashing = shelf.clashing()
+        if clashing:
+            with closing(crew(((number, suffixed(number)) for number in clashing), run)) as ended:
+                for number, outcome in ended:
+                    shelf.put_again(number, outcome)
+        shelf.sweep()
     except BaseException:
-        write_index_of(depot.root, shelf.outcomes())
+        write_index_of(out, shelf.outcomes())
         raise
-    return (*shelf.outcomes(), *write_beside(depot.root, shelf.outcomes()))
 
 
-def _crew(scheduler: str, workers: int, listen: Listener) -> Crew:
-    """Who does the work: a cluster, processes, or this process alone."""
+def _crew(scheduler: str, workers: int, logs: int, listen: Listener) -> Crew:
+    """Who does the work: a cluster, processes, or this process alone, where there is little."""
     if scheduler:
         from groundstation.pipeline.cluster import on_cluster
 
         return partial(on_cluster, scheduler=scheduler)
-    return partial(in_turn, listen=listen) if workers <= 1 else partial(side_by_side, workers=workers, listen=listen)
+    if min(workers, logs) <= 1 and logs <= TASKS_PER_PROCESS:
+        return partial(in_turn, listen=listen)
+    return partial(side_by_side, workers=min(workers, logs), listen=listen)
 
 
 def plan_many(
@@ -162,11 +183,12 @@ def plan_many(
     inputs, out = _inputs(paths, out, configuration), Path(out)
     _refuse_foreign(out, force=True)
     known = {} if redo or not out.is_dir() else finished_flights(flight_folders(out))
+    work = [Job(Path(log), out, configuration, is_named=named, with_pdf=with_pdf) for log, named in inputs]
     outcomes = []
-    for log, named in inputs:
-        job = _with_step(Job(Path(log), out, configuration, is_named=named, with_pdf=with_pdf), known)
+    for _number, job, twin in _with_steps(work, known):
+        text = PLANS[job.step] if twin is None else f"same content as {work[twin].log}, listed once"
         flight_id = job.finished.flight_id if job.finished else ""
-        outcomes.append(Outcome(log, "done", PLANS[job.step], flight_id=flight_id))
+        outcomes.append(Outcome(job.log, "done", text, flight_id=flight_id))
     return tuple(outcomes)
 
 
@@ -210,10 +232,19 @@ def _alone_in(out: Path) -> Iterator[None]:
 
 def _prepare(out: Path) -> None:
     for left_over in out.iterdir():
-        if is_abandoned(left_over):
+        if left_over.name.startswith(PARTIAL_PREFIX):  # of a run that is no more: this one is alone in here
             shutil.rmtree(left_over, ignore_errors=True)
     if not (out / OUT_FOLDER_MARK).exists():
         write_index_of(out, ())  # from now on the folder is known for ours, whatever happens to the run
+
+
+def _with_steps(jobs: Sequence[Job], known: Mapping[str, Finished]) -> Iterator[tuple[int, Job, int | None]]:
+    """Jobs by number, with what is to be done of each, and the number of an earlier one with the same finished log."""
+    first: dict[str, int] = {}
+    for number, job in enumerate(jobs):
+        planned = _with_step(job, known) if known else job
+        kept = first.setdefault(planned.finished.sha256, number) if planned.finished else number
+        yield number, planned, kept if kept != number else None
 
 
 def _with_step(job: Job, known: Mapping[str, Finished]) -> Job:
@@ -224,6 +255,7 @@ def _with_step(job: Job, known: Mapping[str, Finished]) -> Job:
         if finished is None:
             return job
         keys = keys_of(source, job.configuration, with_pdf=job.with_pdf)
-    except (GroundstationError, OSError):
+    except Exception:
         return job  # its run tells what is wrong
-    return replace(job, step=finished.step(keys, with_pdf=job.with_pdf), finished=finished)
+    step = finished.step(keys, with_pdf=job.with_pdf)
+    return replace(job, step=step, finished=finished, add_suffix=step == "analysis" and finished.has_suffix)

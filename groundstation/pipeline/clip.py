@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from groundstation.base.errors import SettingsError, UnreadableLogError, UsageError
+from groundstation.base.errors import SettingsError, UnreadableLogError, UsageError, told_in_a_line
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
@@ -20,6 +20,7 @@ from groundstation.pipeline.convert import Converted, census_of, convert_log, re
 from groundstation.pipeline.describe import facts_of
 from groundstation.pipeline.flight import given_of, read_flight
 from groundstation.pipeline.identity import flight_id
+from groundstation.pipeline.inputs import file_in
 from groundstation.pipeline.intervals import flight_seconds
 from groundstation.pipeline.log import Log, open_log
 from groundstation.pipeline.outcome import Outcome
@@ -95,35 +96,21 @@ def clip(
     """
     settings = configuration or Configuration()
     limits = configured_thresholds(settings)
-    source = mcap_in(path) if path.is_dir() else path
+    source = file_in(path, ".mcap") if path.is_dir() else path
     _expect_free(source, target, with_recording, force)
     log = open_log(source, Path(settings.profile) if settings.profile else None)
-    target.parent.mkdir(parents=True, exist_ok=True)
     listen(Event("begin", total=1))
     listen(Event("stage", path.name, "cutting"))
-    with _as_mcap(log, target.parent, limits) as mcap:
-        done = _cut(log, mcap, target, wanted, limits)
+    with told_in_a_line(str(target)):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with _as_mcap(log, target.parent, limits) as mcap:
+            done = _cut(log, mcap, target, wanted, limits)
     if with_recording:
         listen(Event("stage", path.name, "recording"))
         _record(target, done, settings)
     text = f"-> {target} ({_told(done.info)}, {target.stat().st_size / 1e6:.2f} MB)"
     listen(Event("end", path.name, text))
     return Outcome(str(path), "data_lost" if done.has_lost_data else "done", text, folder=str(target))
-
-
-def mcap_in(folder: Path) -> Path:
-    """The MCAP of a flight folder: the one of its name, else the only one.
-
-    Raises
-    ------
-    UsageError
-        When there is none, or several of other names.
-    """
-    own = folder / f"{folder.resolve().name}.mcap"
-    found = [own] if own.is_file() else sorted(folder.glob("*.mcap"))
-    if len(found) != 1:
-        raise UsageError(str(folder), f"{len(found)} MCAPs", "a flight folder that `run` made", "name the .mcap")
-    return found[0]
 
 
 def _expect_free(source: Path, target: Path, with_recording: bool, force: bool) -> None:
@@ -206,7 +193,8 @@ def _nothing_in(log: Log, info: "StoreInfo", wanted: Wanted) -> UsageError:
     """Why a part is empty: no topic is wanted, or the flight has no record of them then."""
     topics = info.ledger.get("topics", {})
     if topics and not any(wanted.wants(topic) for topic in topics):
-        return UsageError(log.path.name, f"no topic {', '.join(wanted.topics)}", f"some of {', '.join(topics)}")
+        asked = ", ".join(map(repr, wanted.topics))
+        return UsageError(log.path.name, f"no topic {asked}", f"some of {', '.join(topics)}")
     expected = ""
     if topics:
         first, last = (facts_of(log, {}, info.ledger)[f"{end} sample"] for end in ("first", "last"))

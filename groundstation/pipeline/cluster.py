@@ -1,13 +1,15 @@
 """Jobs on a cluster of Dask, which schedules and repeats them; groundstation must be installed on its workers."""
 
+import logging
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from itertools import islice
 from typing import TYPE_CHECKING
 
 from groundstation import __version__
-from groundstation.base.errors import UsageError
+from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.pipeline.outcome import Outcome
 from groundstation.pipeline.progress import Listener, silent
 from groundstation.pipeline.workers import AnyJob, Work
@@ -22,7 +24,7 @@ _one_at_a_time = threading.Lock()  # a worker may have several threads; figures 
 
 def on_cluster(
     tasks: Iterable[tuple[int, AnyJob]], run: Callable[[AnyJob, Listener], Outcome], *, scheduler: str
-) -> Iterator[tuple[int, Outcome]]:
+) -> Generator[tuple[int, Outcome]]:
     """Run jobs on the workers of a scheduler; yields number and outcome as each one ends.
 
     A job whose worker dies is run again by another; one that has killed several has failed.
@@ -39,6 +41,8 @@ def on_cluster(
     ------
     UsageError
         When there is no scheduler, no worker, or one with another version.
+    GroundstationError
+        When the scheduler goes away.
     """
     with _connected(scheduler) as client:
         from distributed import as_completed
@@ -56,7 +60,11 @@ def on_cluster(
         ended = as_completed(handed_over(AHEAD * sum(client.nthreads().values())), loop=client.loop)
         for future in ended:
             number, job = running.pop(future.key)
-            error = future.exception()
+            try:
+                error = future.exception()
+            except CancelledError as lost:
+                hint = "start it, and run again: what was finished is kept"
+                raise GroundstationError(scheduler, "the scheduler is gone", "", hint) from lost
             yield number, future.result() if error is None else _failed(job, error)
             ended.update(handed_over(1))
 
@@ -76,6 +84,7 @@ def _connected(scheduler: str) -> Iterator["Client"]:
         from distributed import Client
     except ImportError as error:
         raise UsageError(scheduler, "no package distributed", "", "pip install 'groundstation[cluster]'") from error
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # its tracebacks: what is wrong is told in one line
     try:
         client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:

@@ -13,15 +13,15 @@ from groundstation.base.findings import SEVERITIES, Finding
 from groundstation.base.signals import is_canonical
 from groundstation.pipeline.alignment import align
 from groundstation.pipeline.clip import CUT_SHA256
-from groundstation.pipeline.inputs import COMPARISON_MARKS
+from groundstation.pipeline.inputs import COMPARISON_MARKS, COMPARISON_RECORDING, is_ours
 from groundstation.reports.sections.saved import mapping, objects
 from groundstation.reports.wording import is_number
 from groundstation.results.comparison import Comparison, Delta, Event, SettingPair, Side, Value
-from groundstation.results.files import MANIFEST, SUMMARY, SavedFlight, csv_text, load, write_text
+from groundstation.results.files import MANIFEST, SavedFlight, csv_text, load, write_text
 from groundstation.results.flight import NotAssessable
 from groundstation.results.noticed import grouped
 
-(PAGE, TABLE), RECORDING = COMPARISON_MARKS, "compare.rrd"
+(PAGE, TABLE), RECORDING = COMPARISON_MARKS, COMPARISON_RECORDING
 IDENTITY = (  # what tells the rows of a table in the results apart
     *("name", "reference", "other", "quantity", "method", "phase"),
     *("start_h", "horizon_min", "length_min", "length_s"),
@@ -94,10 +94,11 @@ def compare_to(a: Path, b: Path, folder: Path, event: Event | None = None, *, fo
 
     if folder.exists() and not folder.is_dir():
         raise UsageError(str(folder), "a file", "a folder for the results")
-    if (folder / SUMMARY).exists():
-        raise UsageError(str(folder), "a flight folder", "a folder of its own", "name another -o")
-    if (folder / PAGE).exists() and not force:
-        raise UsageError(str(folder / PAGE), "a file that exists", "a new folder", "-f overwrites it")
+    if is_ours(folder) and not (folder / PAGE).exists():
+        raise UsageError(str(folder), "a folder of flights, or one flight", "a folder of its own", "name another -o")
+    there = [path for name in (PAGE, TABLE, RECORDING) if (path := folder / name).exists()]
+    if there and not force:
+        raise UsageError(str(there[0]), "a file that exists", "a new folder", "-f overwrites it")
     comparison, saved_a, saved_b = compare(a, b, event)
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / TABLE, csv_text(comparison.to_figure()))

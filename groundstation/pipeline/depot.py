@@ -1,14 +1,15 @@
 """Where the flights of a run finally stand: a folder here, or one elsewhere with a small copy of it here."""
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.elsewhere import FarFolder
 from groundstation.pipeline.far import BY_LOG, STAGING, array_files
-from groundstation.pipeline.flight import place
+from groundstation.pipeline.flight import is_made, place, remove
 from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK
 from groundstation.pipeline.outcome import Outcome
 from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY
@@ -34,7 +35,7 @@ class Depot(Protocol):
         """Move a finished flight to its place, which is told."""
 
     def discard(self, folder: str) -> None:
-        """Throw a flight folder away."""
+        """Throw a flight folder away; what somebody else put into one that is in place stays."""
 
 
 class FolderDepot:
@@ -54,8 +55,11 @@ class FolderDepot:
         return str(target)
 
     def discard(self, folder: str) -> None:
-        """Throw a flight folder away."""
-        shutil.rmtree(folder, ignore_errors=True)
+        """Throw a flight folder away; what somebody else put into one that is in place stays."""
+        if Path(folder).name.startswith("."):
+            shutil.rmtree(folder, ignore_errors=True)
+        else:
+            remove(self.root / Path(folder).name)
 
 
 class FarDepot:
@@ -113,23 +117,36 @@ class FarDepot:
 
     def place(self, outcome: Outcome) -> str:
         """Move a finished flight to its place, which is told."""
-        self._out.replace(outcome.folder, outcome.flight_id)
+        self._out.replace(outcome.folder, outcome.flight_id, partial(is_made, identity=outcome.flight_id))
         self._out.write(f"{BY_LOG}/{outcome.sha256}", outcome.flight_id.encode())
         self._copy(outcome.flight_id)
         return outcome.flight_id
 
     def discard(self, folder: str) -> None:
-        """Throw a flight folder away."""
-        self._out.remove(folder)
-        shutil.rmtree(self.root / folder, ignore_errors=True)
+        """Throw a flight folder away; what somebody else put into one that is in place stays."""
+        if folder.startswith("."):
+            self._out.remove(folder)
+        else:
+            self._out.remove_where(folder, partial(is_made, identity=folder))
+            shutil.rmtree(self.root / folder, ignore_errors=True)
 
-    def publish(self, names: Sequence[str]) -> None:
-        """Send files and folders of the copy that stand beside the flight folders; clear what is left of staging."""
+    def publish(self, names: Sequence[str], *, is_whole: bool) -> None:
+        """Send files and folders of the copy that stand beside the flight folders; clear what is left of staging.
+
+        What a run that came to its end did not make is removed there too.
+        """
         for name in names:
             path = self.root / name
             if path.is_dir():
                 self._out.send(path, name)
-                self._out.keep_only(name, {one.relative_to(path).as_posix() for one in path.rglob("*")})
+                there = {one.relative_to(path).as_posix() for one in path.rglob("*")}
+                self._out.remove_where(name, partial(_is_missing, there))
             elif path.is_file():
                 self._out.write(name, path.read_bytes())
+            elif is_whole:
+                self._out.remove(name)
         self._out.remove(STAGING)
+
+
+def _is_missing(there: Collection[str], name: str) -> bool:
+    return name not in there

@@ -45,16 +45,30 @@ def describe(path: Path, profile: Path | None = None) -> Description:
         When the file is missing, or nothing can be said about it.
     """
     from groundstation.base.errors import UsageError
-    from groundstation.store.recognition import is_groundstation_mcap, is_mcap
 
     if not path.exists():
         raise UsageError(str(path), "no such file")
     if path.is_dir():
         raise UsageError(str(path), "a folder", "a log", "`run` takes folders")
-    if is_mcap(path) and not is_groundstation_mcap(path):
+    if _is_foreign(path, profile):
         return _foreign(path)
     log = open_log(path, profile)
     return _stored(log) if log.is_store else _recorded(log)
+
+
+def _is_foreign(path: Path, profile: Path | None) -> bool:
+    """Whether a file is an MCAP of another program, and not another log whose first bytes are damaged."""
+    from groundstation.base.errors import GroundstationError
+    from groundstation.readers.registry import identify
+    from groundstation.store.recognition import is_groundstation_mcap, is_mcap
+
+    if not is_mcap(path) or is_groundstation_mcap(path):
+        return False
+    try:
+        identify(path, profile)
+    except GroundstationError:
+        return True
+    return False
 
 
 def _recorded(log: Log) -> Description:

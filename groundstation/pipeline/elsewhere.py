@@ -1,6 +1,6 @@
 """Places elsewhere, in a bucket or on a server: folders named by URL, reached through fsspec."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
@@ -108,8 +108,10 @@ class FarFolder:
                 self._make_parent(target)
                 self._fs.put_file(str(path), self._path(target))
 
-    def replace(self, source: str, target: str, *, last: str = FLIGHT_FOLDER_MARK) -> None:
-        """Put the files of a folder in the place of those of another, one of them last; the source is gone then."""
+    def replace(
+        self, source: str, target: str, is_old: Callable[[str], bool], *, last: str = FLIGHT_FOLDER_MARK
+    ) -> None:
+        """Put the files of a folder in the place of old ones of another, one of them last; the source is gone then."""
         with self._told(target):
             old = self._relative(target)
             if last in old:
@@ -118,14 +120,14 @@ class FarFolder:
             for name in sorted(new, key=lambda name: name == last):
                 self._make_parent(f"{target}/{name}")
                 self._fs.cp_file(self._path(f"{source}/{name}"), self._path(f"{target}/{name}"))
-            for name in set(old) - set(new):
+            for name in filter(is_old, set(old) - set(new)):
                 self._fs.rm_file(self._path(f"{target}/{name}"))
         self.remove(source)
 
-    def keep_only(self, name: str, kept: set[str]) -> None:
-        """Remove the other files of a folder."""
+    def remove_where(self, name: str, is_old: Callable[[str], bool], *, first: str = FLIGHT_FOLDER_MARK) -> None:
+        """Remove the old files of a folder, one of them first."""
         with self._told(name):
-            for one in set(self._relative(name)) - kept:
+            for one in sorted(filter(is_old, self._relative(name)), key=lambda one: one != first):
                 self._fs.rm_file(self._path(f"{name}/{one}"))
 
     def _relative(self, name: str) -> list[str]:

@@ -16,6 +16,7 @@ from groundstation.pipeline.log import open_log
 from groundstation.pipeline.outcome import Outcome
 from groundstation.pipeline.progress import Listener, silent
 from groundstation.pipeline.resume import Finished, finished, keys_of
+from groundstation.reports.flight_report import PDF
 from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY
 
 STAGING, BY_LOG = ".staging", ".logs"  # in an OUT elsewhere: what is on its way; flight ids by digest of the log
@@ -54,7 +55,7 @@ def run_far(far: FarJob, listen: Listener = silent) -> Outcome:
         outcome = Outcome(far.log, "failed", str(error))
     except OSError as error:
         outcome = Outcome(far.log, "failed", f"{far.name}: {error.strerror or error}")
-    return replace(outcome, source=far.log)
+    return outcome
 
 
 def _run_in(scratch: Path, far: FarJob, listen: Listener) -> Outcome:
@@ -64,7 +65,7 @@ def _run_in(scratch: Path, far: FarJob, listen: Listener) -> Outcome:
         parent, _, _name = far.log.rpartition("/")
         path = scratch / "log" / far.name
         FarFolder(parent).fetch(far.name, path)
-    job = replace(far.job, path=path, out=scratch / "out")
+    job = replace(far.job, path=path, out=scratch / "out", url=far.log if is_far(far.log) else "")
     if not far.redo:
         job = _planned(job, out, scratch / "finished")
     outcome = run_flight(job, listen)
@@ -74,6 +75,8 @@ def _run_in(scratch: Path, far: FarJob, listen: Listener) -> Outcome:
         return replace(outcome, folder=outcome.flight_id)
     if job.step == "reports" and job.finished is not None:
         out.send(job.finished.folder, outcome.flight_id)
+        if not (job.finished.folder / PDF).exists():
+            out.remove(f"{outcome.flight_id}/{PDF}")
         return replace(outcome, folder=outcome.flight_id)
     staged = f"{STAGING}/{outcome.sha256}-{uuid.uuid4().hex[:8]}"
     out.send(Path(outcome.folder), staged)
@@ -85,7 +88,7 @@ def _planned(job: Job, out: FarFolder, scratch: Path) -> Job:
     try:
         source = open_log(job.path, Path(job.configuration.profile) if job.configuration.profile else None).source
         keys = keys_of(source, job.configuration, with_pdf=job.with_pdf)
-    except (GroundstationError, OSError):
+    except Exception:
         return job  # its run tells what is wrong
     flight_id = (out.read(f"{BY_LOG}/{source.sha256}") or b"").decode()
     found = _fetched(out, flight_id, scratch) if flight_id else None
@@ -97,7 +100,7 @@ def _planned(job: Job, out: FarFolder, scratch: Path) -> Job:
     elif step == "reports":
         for name in array_files(out, flight_id):
             out.fetch(f"{flight_id}/{name}", found.folder / name)
-    return replace(job, step=step, finished=found)
+    return replace(job, step=step, finished=found, add_suffix=step == "analysis" and found.has_suffix)
 
 
 def array_files(out: FarFolder, flight_id: str) -> list[str]:

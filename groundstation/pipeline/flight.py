@@ -1,7 +1,6 @@
 """One log from beginning to end: MCAP, answers, recording and report in a folder of its own."""
 
 import os
-import re
 import shutil
 import tempfile
 import time
@@ -9,25 +8,26 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
-from groundstation.base.errors import GroundstationError, UnclaimedLogError
+from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
 from groundstation.base.findings import SEVERITIES, Severity, worst
 from groundstation.base.records import RecordBatch
 from groundstation.pipeline.analyse import Given, analyse, configured_thresholds
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.convert import Converted, convert_log, stored_findings
-from groundstation.pipeline.identity import flight_id
+from groundstation.pipeline.identity import flight_id, sha256_of
 from groundstation.pipeline.log import Log, open_log
 from groundstation.pipeline.manifest import manifest_of
 from groundstation.pipeline.outcome import Outcome, State
 from groundstation.pipeline.progress import Event, Listener, silent
 from groundstation.pipeline.resume import Finished, Step, keys_of, remember_reports, remembered
-from groundstation.results.files import MANIFEST
+from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
+from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight
 
-PARTIAL_PREFIX = ".partial-"  # then the process that runs the logs, and a name of its own
+PARTIAL_PREFIX = ".partial-"
 
 
 @dataclass
@@ -53,8 +53,8 @@ class Stopwatch:
 class Job:
     """One log to run; plain values, so that it travels to a worker process.
 
-    ``owner`` is the process that runs the logs; ``add_suffix``: two flights of one id get ``_<sha8>`` of their logs;
-    ``step`` is what has to be done of it, with what the flight that is ``finished`` has for the rest.
+    ``add_suffix``: two flights of one id get ``_<sha8>`` of their logs; ``step`` is what has to be done, with what the
+    flight that is ``finished`` has for the rest; ``url`` is where the log is, if ``path`` is but a copy of it.
     """
 
     path: Path
@@ -62,16 +62,16 @@ class Job:
     configuration: Configuration
     fail_on: str = "none"
     is_named: bool = True
-    owner: int = 0
     add_suffix: bool = False
     with_pdf: bool = True
     step: Step = "everything"
     finished: Finished | None = None
+    url: str = ""
 
     @property
     def log(self) -> str:
         """Its log as the user would type it."""
-        return str(self.path)
+        return self.url or str(self.path)
 
     @property
     def name(self) -> str:
@@ -91,14 +91,15 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
     try:
         if job.finished is not None and job.step in ("nothing", "reports"):
             return _run_reports(job, job.finished, watch)
+        version = _version(job.path)
         log = open_log(job.path, Path(job.configuration.profile) if job.configuration.profile else None)
         sha256 = log.source.sha256
         job.out.mkdir(parents=True, exist_ok=True)
-        partial = Path(tempfile.mkdtemp(prefix=f"{PARTIAL_PREFIX}{job.owner or os.getpid()}-", dir=job.out))
+        partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=job.out))
         partial.chmod(0o755)  # mkdtemp's folders are private
-        return _run(log, job, partial, watch)
+        return _run(log, version, job, partial, watch)
     except UnclaimedLogError as error:
-        return Outcome(str(job.path), "failed" if job.is_named else "skipped", str(error))
+        return Outcome(job.log, "failed" if job.is_named else "skipped", str(error))
     except GroundstationError as error:
         reason = str(error)
     except OSError as error:
@@ -111,25 +112,22 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
         reason = f"{name}: internal error ({type(error).__name__}: {error}); please report it"
     if partial is not None:
         shutil.rmtree(partial, ignore_errors=True)
-    return Outcome(str(job.path), "failed", reason, sha256=sha256, times_s=watch.times_s, trace=trace)
+    return Outcome(job.log, "failed", reason, sha256=sha256, times_s=watch.times_s, trace=trace)
 
 
-def is_abandoned(folder: Path) -> bool:
-    """Whether a partial folder was left by a run that is no more."""
-    match = re.fullmatch(re.escape(PARTIAL_PREFIX) + r"(\d+)-\w+", folder.name)
-    if match is None:
-        return False
-    try:
-        os.kill(int(match.group(1)), 0)
-    except (ProcessLookupError, OverflowError):
-        return True
-    except PermissionError:  # somebody else's process
-        return False
-    return int(match.group(1)) == os.getpid()
+def _version(path: Path) -> tuple[int, int]:
+    """What tells that a file was written to: time and size."""
+    found = path.stat()
+    return found.st_mtime_ns, found.st_size
 
 
-def _run(log: Log, job: Job, partial: Path, watch: Stopwatch) -> Outcome:
-    from groundstation.reports.flight_report import write_flight_report
+def _require_unchanged(log: Log, version: tuple[int, int]) -> None:
+    """Refuse a log that was written to while it was read: the digest is not of what was converted."""
+    if _version(log.path) != version and (log.is_store or sha256_of(log.path) != log.source.sha256):
+        raise UnreadableLogError(log.path.name, "changed while it was read", "", "run it again once it is complete")
+
+
+def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Stopwatch) -> Outcome:
     from groundstation.results.files import save
     from groundstation.viewer.recording import write_recording
 
@@ -139,6 +137,7 @@ def _run(log: Log, job: Job, partial: Path, watch: Stopwatch) -> Outcome:
     else:
         with watch.stage("converting"):
             converted = convert_log(log, mcap, configured_thresholds(job.configuration))
+        _require_unchanged(log, version)
     with watch.stage("reading the MCAP"):
         flight = read_flight(mcap, converted)
     start_utc_ns = flight.start_ns if flight.has_utc else None
@@ -152,13 +151,13 @@ def _run(log: Log, job: Job, partial: Path, watch: Stopwatch) -> Outcome:
         text = sentence(results)
         keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf)
         resume = remembered(keys, text, converted.has_lost_data)
-        save(partial, results, manifest_of(log, results, job.configuration, resume))
+        save(partial, results, manifest_of(log, job.url, results, job.configuration, resume))
     with watch.stage("recording"):
         write_recording(partial / f"{identity}.rrd", flight, results)
     with watch.stage("reporting"):
         written = write_flight_report(partial, with_pdf=job.with_pdf)
     return Outcome(
-        str(job.path),
+        job.log,
         _state(worst(results.findings), converted.has_lost_data, job.fail_on),
         "; ".join(filter(None, (text, written.problem))),
         flight_id=identity,
@@ -170,15 +169,13 @@ def _run(log: Log, job: Job, partial: Path, watch: Stopwatch) -> Outcome:
 
 def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
     """The outcome of a flight that is finished, its reports made again where that is asked for."""
-    from groundstation.reports.flight_report import write_flight_report
-
     problem = ""
     if job.step == "reports":
         with watch.stage("reporting"):
             problem = write_flight_report(finished.folder, with_pdf=job.with_pdf).problem
             remember_reports(finished, with_pdf=job.with_pdf)
     return Outcome(
-        str(job.path),
+        job.log,
         _state(finished.gravest, finished.has_lost_data, job.fail_on),
         "; ".join(filter(None, (finished.text, problem))),
         flight_id=finished.flight_id,
@@ -261,10 +258,31 @@ def _inertial_sentence(results: FlightResults) -> str:
     return f"INS {', '.join(parts)}" if parts else "INS errors estimated"
 
 
+def is_made(name: str, identity: str) -> bool:
+    """Whether a run makes that file of a flight folder; anything else in it is somebody's own.
+
+    Examples
+    --------
+    >>> is_made("tables/heading.csv", "NOTIME_abababab"), is_made("notes.txt", "NOTIME_abababab")
+    (True, False)
+    """
+    made = SUMMARY, MANIFEST, ARRAYS, TABLES, REPORT, PDF, f"{identity}.mcap", f"{identity}.rrd"
+    return PurePosixPath(name).parts[0] in made
+
+
+def remove(folder: Path) -> None:
+    """Remove what a run made of a flight folder, its marks first, and the folder unless something else is in it."""
+    for name in (SUMMARY, MANIFEST):
+        (folder / name).unlink(missing_ok=True)
+    for entry in folder.iterdir():
+        if is_made(entry.name, folder.name):
+            shutil.rmtree(entry) if entry.is_dir() and not entry.is_symlink() else entry.unlink()
+    if not any(folder.iterdir()):
+        folder.rmdir()
+
+
 def place(partial: Path, target: Path) -> None:
     """Move a finished flight folder into place; of a folder that is there, only what a run makes is replaced."""
-    from groundstation.reports.flight_report import PDF
-
     if not target.exists():
         partial.rename(target)
         return

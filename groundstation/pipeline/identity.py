@@ -9,6 +9,7 @@ from groundstation.base.timescales import utc_ns_to_stamp
 
 _NOT_ALLOWED = re.compile(r"[^A-Za-z0-9_-]+")
 MAX_PART_CHARACTERS = 60
+NOTIME = "NOTIME"
 
 
 def sha256_of(path: Path) -> str:
@@ -40,6 +41,18 @@ def flight_id(start_utc_ns: int | None, metadata: Mapping[str, str], sha256: str
     'NOTIME_abababab'
     """
     if start_utc_ns is None:
-        return f"NOTIME_{sha256[:8]}"
+        return f"{NOTIME}_{sha256[:8]}"
     parts = [utc_ns_to_stamp(start_utc_ns), *(safe_part(metadata.get(key, "")) for key in ("aircraft", "flight"))]
     return "_".join(part for part in parts if part)
+
+
+def plain_id(identity: str, sha256: str) -> str:
+    """Name of a flight without the digest that it got because another had the same name.
+
+    Examples
+    --------
+    >>> plain_id("20260504T060000Z_A12_abababab", "ab" * 32), plain_id("NOTIME_abababab", "ab" * 32)
+    ('20260504T060000Z_A12', 'NOTIME_abababab')
+    """
+    plain = identity.removesuffix(f"_{sha256[:8]}")
+    return identity if plain == NOTIME else plain

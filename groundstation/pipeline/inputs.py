@@ -10,6 +10,7 @@ from groundstation.results.files import MANIFEST, SUMMARY
 
 FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, STUDY_MARK = MANIFEST, INDEX_JSON, ".groundstation-study"
 COMPARISON_MARKS = "compare.html", "compare.csv"
+COMPARISON_RECORDING = "compare.rrd"
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,22 @@ def is_ours(folder: Path) -> bool:
         return any(all((folder / name).is_file() for name in marks) for marks in names)
     except OSError:
         return False
+
+
+def file_in(folder: Path, ending: str, *others: str) -> Path:
+    """The file with an ending in a folder that ``run`` made: that of its name, of ``others``, or the only one.
+
+    Raises
+    ------
+    UsageError
+        When there is none, or several of other names.
+    """
+    named = (folder / name for name in (f"{folder.resolve().name}{ending}", *others))
+    found = [path for path in named if path.is_file()][:1] or sorted(folder.glob(f"*{ending}"))
+    if len(found) != 1:
+        what = f"{len(found)} files *{ending}"
+        raise UsageError(str(folder), what, "a flight folder that `run` made", f"name the {ending}")
+    return found[0]
 
 
 def _walk(folder: Path, out: Path | None) -> list[Path]:

@@ -14,15 +14,18 @@ from groundstation.results.flight import FlightResults
 
 
 def manifest_of(
-    log: Log, results: FlightResults, configuration: Configuration, resume: Mapping[str, Any]
+    log: Log, url: str, results: FlightResults, configuration: Configuration, resume: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Describe a run: the log, what the user set, versions, host and time, and what a later run need not do again."""
+    """Describe a run: the log, what the user set, versions, host and time, and what a later run need not do again.
+
+    ``url`` is where the log is, if this machine has but a copy of it.
+    """
     return {
         "groundstation": __version__,
         "flight_id": results.flight_id,
         "made_utc": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
         "source": {
-            "path": str(log.path),
+            "path": url or str(log.path.absolute()),
             "name": log.source.name,
             "sha256": log.source.sha256,
             "size_bytes": log.source.size_bytes,

@@ -1,8 +1,7 @@
 """What a notebook does with one flight, whether it comes from a log or from a flight folder."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from functools import cached_property
 from html import escape
 from os import PathLike
@@ -11,9 +10,9 @@ from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from groundstation.base.errors import GroundstationError, NotAssessableError, UsageError
+from groundstation.base.errors import GroundstationError, NotAssessableError, UsageError, told_in_a_line
 from groundstation.pipeline.flight import sentence
-from groundstation.results.files import SavedFlight
+from groundstation.results.files import SavedFlight, mapping
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.heading import HeadingResult
@@ -28,17 +27,6 @@ if TYPE_CHECKING:
 
 AnyPath = str | PathLike[str]
 MOST_TOPICS = 12  # named in the card of a flight
-
-
-@contextmanager
-def told_in_a_line(where: str) -> Iterator[None]:
-    """Tell what the machine refuses in one line, as everything else is told."""
-    try:
-        yield
-    except OSError as error:
-        raise GroundstationError(where, error.strerror or str(error)) from error
-    except MemoryError as error:
-        raise GroundstationError(where, "not enough memory") from error
 
 
 class OpenFlight(ABC):
@@ -226,8 +214,8 @@ class OpenFlight(ABC):
         if told.verdict is not None:
             rows.insert(0, ("Verdict", told.verdict.text))
         rows += [(name, f"{value}, {remark}" if remark else value) for name, value, remark in told.figures]
-        counted = self.ledger.get("topics") or {}
-        topics = [f"{name} ({entry['rows']})" for name, entry in sorted(counted.items())]
+        counted = mapping(self.ledger, "topics")
+        topics = [f"{name} ({mapping(counted, name).get('rows')})" for name in sorted(counted)]
         more = f" and {len(topics) - MOST_TOPICS} more" if len(topics) > MOST_TOPICS else ""
         rows.append(("Topics (rows)", ", ".join(topics[:MOST_TOPICS]) + more))
         left = 'style="text-align:left"'

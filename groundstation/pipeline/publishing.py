@@ -4,31 +4,45 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
 from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, is_ours
 from groundstation.pipeline.outcome import Outcome
 from groundstation.reports.index import INDEX_CSV, INDEX_JSON
 from groundstation.results.files import SUMMARY
 
 FLEET_RECORDING = "fleet.rrd"
-FLEET_FILES = (INDEX_JSON, INDEX_CSV, "fleet.parquet", "samples.parquet", FLEET_RECORDING)
+FLEET_FILES = (
+    INDEX_JSON,
+    INDEX_CSV,
+    "fleet.parquet",
+    "samples.parquet",
+    FLEET_RECORDING,
+    "summary.html",
+    "summary.pdf",
+)
 
 
 def write_beside(
-    out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[dict[str, Any]] = ()
+    out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[dict[str, Any]] = (), *, with_pdf: bool = True
 ) -> tuple[Outcome, ...]:
     """Write everything that stands beside the flight folders; returns what could not be written or read."""
     from groundstation.pipeline.fleet import write_fleet
+    from groundstation.reports.fleet_report import write_fleet_report
     from groundstation.viewer.fleet import write_fleet_recording
 
-    problems = write_index_of(out, outcomes, kept_rows)
+    problems = list(write_index_of(out, outcomes, kept_rows))
     fleet, unwritten = write_fleet(out)
+    problems += unwritten
     try:
+        problem = write_fleet_report(out, fleet, with_pdf=with_pdf).problem
         write_fleet_recording(out / FLEET_RECORDING, fleet)
     except OSError as error:
-        text = f"{out}: {FLEET_RECORDING} cannot be written ({error.strerror or error})"
-        unwritten = (*unwritten, Outcome(str(out), "failed", text))
-    return (*problems, *unwritten)
+        name = Path(error.filename).name if error.filename else "the fleet's report or recording"
+        problem = f"{name} cannot be written ({error.strerror or error})"
+        problems.append(Outcome(str(out), "failed", f"{out}: {problem}"))
+    else:
+        problems += [Outcome(str(out), "skipped", f"{out}: {problem}")] if problem else []
+    return tuple(problems)
 
 
 def write_index_of(
@@ -84,7 +98,8 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
     problems: list[Outcome] = []
     for folder in [out] if is_flight else flight_folders(out):
         try:
-            written = write_flight_report(folder, with_pdf=with_pdf)
+            with told_in_a_line(str(folder)):
+                written = write_flight_report(folder, with_pdf=with_pdf)
         except GroundstationError as error:
             if is_flight:
                 raise
@@ -96,7 +111,9 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
     if is_flight:
         return paths, tuple(problems)
     told = {one.source for one in problems}
-    unread = [one for one in write_beside(out, (), _rows_without_flight(out)) if one.source not in told]
+    unread = [
+        one for one in write_beside(out, (), _rows_without_flight(out), with_pdf=with_pdf) if one.source not in told
+    ]
     return [*paths, *(out / name for name in FLEET_FILES if (out / name).exists())], (*problems, *unread)
 
 

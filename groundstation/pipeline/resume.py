@@ -18,6 +18,7 @@ from groundstation import __version__
 from groundstation.base.errors import GroundstationError
 from groundstation.base.findings import SEVERITIES, Severity
 from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.identity import plain_id
 from groundstation.reports.flight_report import PDF, REPORT
 from groundstation.results.files import MANIFEST, SUMMARY, json_text, write_text
 from groundstation.results.flight import Source
@@ -71,6 +72,11 @@ class Finished:
     def mcap(self) -> Path:
         """Its store file."""
         return self.folder / f"{self.flight_id}.mcap"
+
+    @property
+    def has_suffix(self) -> bool:
+        """Whether the digest of the log was put into the id, because another flight had the same."""
+        return plain_id(self.flight_id, self.sha256) != self.flight_id
 
     def step(self, keys: Keys, *, with_pdf: bool) -> Step:
         """What has to be done for the results to be those of ``keys``; a file that somebody took away is made again."""

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.pipeline.inputs import file_in
 from groundstation.pipeline.publishing import FLEET_RECORDING, flight_folders
 
 
@@ -51,7 +52,7 @@ def serve(
             raise GroundstationError(str(out), "no recording can be read", next_step="run the logs again")
         fleet_too = ", and fleet.rrd" if catalog.has_fleet else ""
         tell(catalog.url)
-        say(f"{len(catalog.flights)} recordings{fleet_too}; open them with: rerun {catalog.url}")
+        say(f"{len(catalog.flights)} recordings{fleet_too}; open them with: groundstation view {catalog.url}")
         say("Ctrl-C ends")
         try:
             _serve_page(catalog.url, host) if web else threading.Event().wait()
@@ -71,11 +72,10 @@ def recordings_in(out: Path, say: Callable[[str], None]) -> tuple[list[Path], Pa
         raise UsageError(str(out), "no such folder")
     flights = []
     for folder in flight_folders(out):
-        recording = folder / f"{folder.name}.rrd"
-        if recording.is_file():
-            flights.append(recording)
-        else:
-            say(f"warning: {folder}: left out (no recording)")
+        try:
+            flights.append(file_in(folder, ".rrd"))
+        except UsageError as error:
+            say(f"warning: left out: {error}")
     fleet = out / FLEET_RECORDING
     if not flights and not fleet.is_file():
         raise UsageError(str(out), "no recordings", "a folder that `run` made")

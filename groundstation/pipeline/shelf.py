@@ -1,12 +1,26 @@
 """Where finished flights are put, one after the other, so that a run that is killed keeps what it had finished."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError
 from groundstation.pipeline.depot import Depot
+from groundstation.pipeline.elsewhere import is_far
+from groundstation.pipeline.identity import plain_id
 from groundstation.pipeline.outcome import Outcome
+from groundstation.pipeline.publishing import flight_folders
+from groundstation.results.files import MANIFEST
+
+
+@dataclass(frozen=True)
+class _Origin:
+    """Which log a flight folder came from: where it was, and the digest of its content."""
+
+    path: str
+    sha256: str
 
 
 class Shelf:
@@ -14,7 +28,8 @@ class Shelf:
 
     Two flights of one id get the digests of their logs into their names; as that is known only when the second one
     is finished, they are run again at the end. Of logs with the same content the first in the list is kept, whichever
-    was finished first.
+    was finished first. At the end flights of these logs under ids that they have no longer, from other settings or
+    another version, are removed, and so is what an older version of a log gave for the same flight.
 
     Parameters
     ----------
@@ -37,54 +52,86 @@ class Shelf:
             return
         twin = self._kept.get(outcome.sha256)
         if twin is not None and twin < number:
-            self._outcomes[number] = self._as_twin(outcome, twin)
+            self.put_twin(number, outcome, twin)
             return
         self._kept[outcome.sha256] = number
         self._outcomes[number] = self._placed(outcome)
         if twin is not None:
-            self._outcomes[twin] = self._as_twin(replace(self._outcomes[twin], folder=""), number)
+            self.put_twin(twin, self._outcomes[twin], number)
 
-    def _as_twin(self, outcome: Outcome, kept: int) -> Outcome:
+    def put_twin(self, number: int, outcome: Outcome, kept: int) -> None:
+        """Take over a log whose content is that of the log with the number ``kept``."""
         if outcome.folder and not self._depot.has_in_place(outcome):
             self._depot.discard(outcome.folder)
         text = f"{Path(outcome.source).name}: same content as {self._names[kept]}, listed once"
-        return Outcome(outcome.source, "skipped", text, sha256=outcome.sha256)
+        self._outcomes[number] = Outcome(outcome.source, "skipped", text, sha256=outcome.sha256)
 
     def _placed(self, outcome: Outcome) -> Outcome:
-        identity, suffix = outcome.flight_id, f"_{outcome.sha256[:8]}"
-        is_in_place = self._depot.has_in_place(outcome)
-        plain = identity.removesuffix(suffix) if is_in_place else identity
+        identity, plain = outcome.flight_id, plain_id(outcome.flight_id, outcome.sha256)
         owner = self._owner.setdefault(plain, outcome.sha256)
-        is_taken = owner != outcome.sha256 or _is_of_another_log(self._depot.root / identity, outcome)
-        if plain != identity:  # finished in an earlier run, in which two flights had this id
-            self._clashes |= {plain} if is_taken else set()
-            return outcome
-        if is_taken or (self._depot.root / f"{identity}{suffix}").exists():
-            self._clashes.add(identity)
-            return outcome
-        return outcome if is_in_place else replace(outcome, folder=self._depot.place(outcome))
+        is_taken = owner != outcome.sha256 or self._is_of_another_log(identity, outcome)
+        was_taken = plain != identity  # in an earlier run
+        if is_taken or (not was_taken and (self._depot.root / f"{plain}_{outcome.sha256[:8]}").exists()):
+            self._clashes.add(plain)
+            if not was_taken:
+                return outcome
+        return outcome if self._depot.has_in_place(outcome) else self._put_in_place(outcome)
 
-    def settle(self, run_with_suffix: Callable[[int], Outcome]) -> None:
-        """Give flights of one id their digests, once all are put; logs are run again by their numbers."""
-        for number, outcome in sorted(self._outcomes.items()):
-            if outcome.flight_id in self._clashes:
-                again = run_with_suffix(number)
-                self._depot.discard(outcome.folder)
-                if again.flight_id:
-                    again = replace(again, folder=self._depot.place(again))
-                self._outcomes[number] = again
+    def _put_in_place(self, outcome: Outcome) -> Outcome:
+        try:
+            return replace(outcome, folder=self._depot.place(outcome))
+        except GroundstationError as error:
+            reason = str(error)
+        except OSError as error:
+            reason = f"{outcome.flight_id}: cannot be put into place ({error.strerror or error})"
+        with suppress(OSError, GroundstationError):
+            self._depot.discard(outcome.folder)
+        return Outcome(outcome.source, "failed", reason, sha256=outcome.sha256, times_s=outcome.times_s)
+
+    def clashing(self) -> tuple[int, ...]:
+        """Numbers of the logs, once all are put, that must be run again with their digests in their names."""
+        return tuple(number for number, outcome in sorted(self._outcomes.items()) if outcome.flight_id in self._clashes)
+
+    def put_again(self, number: int, outcome: Outcome) -> None:
+        """Take over what was run again; if that failed, what stood in place stays."""
+        former = self._outcomes[number]
+        if not self._depot.has_in_place(former):
+            self._depot.discard(former.folder)
+        self._outcomes[number] = self._put_in_place(outcome) if outcome.flight_id else outcome
+
+    def sweep(self) -> None:
+        """Remove flights of these logs that stand under another id, and those of older versions of the logs."""
+        flights = [outcome for outcome in self._outcomes.values() if outcome.flight_id]
+        now = {outcome.sha256: outcome.flight_id for outcome in flights}
+        versions = {(_place_of(outcome), plain_id(outcome.flight_id, outcome.sha256)) for outcome in flights}
+        for folder in flight_folders(self._depot.root):
+            origin = _origin_of(folder)
+            if origin is None or now.get(origin.sha256) == folder.name:
+                continue
+            if origin.sha256 in now or (origin.path, plain_id(folder.name, origin.sha256)) in versions:
+                self._depot.discard(folder.name)
 
     def outcomes(self) -> tuple[Outcome, ...]:
         """What became of the logs put so far, in the order of the inputs."""
         return tuple(outcome for _, outcome in sorted(self._outcomes.items()))
 
+    def _is_of_another_log(self, flight_id: str, outcome: Outcome) -> bool:
+        """Whether a flight folder came from another log than an earlier version of this one."""
+        origin = _origin_of(self._depot.root / flight_id)
+        if origin is None or origin.sha256 == outcome.sha256:
+            return False
+        return origin.path != _place_of(outcome)
 
-def _is_of_another_log(folder: Path, outcome: Outcome) -> bool:
-    from groundstation.results.files import load
 
-    if not folder.exists():
-        return False
+def _place_of(outcome: Outcome) -> str:
+    """Where the log is, as manifests tell it."""
+    return outcome.source if is_far(outcome.source) else str(Path(outcome.source).absolute())
+
+
+def _origin_of(folder: Path) -> _Origin | None:
+    """None for a folder that is not whole."""
     try:
-        return str(load(folder).summary["flight"]["source"]["sha256"]) != outcome.sha256
-    except (GroundstationError, KeyError, TypeError):
-        return False
+        source = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["source"]
+        return _Origin(str(source["path"]), str(source["sha256"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

@@ -4,18 +4,19 @@ import json
 import multiprocessing
 import os
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from multiprocessing.connection import Connection
+from multiprocessing.connection import wait as wait_for
 from typing import Any, Protocol, TypeVar
 
 from groundstation.pipeline.outcome import Outcome
 from groundstation.pipeline.progress import Event, Listener, silent
 
 TASKS_PER_PROCESS = 32  # Rerun leaves a few threads behind for every recording
-MOST_EVENT_CHARACTERS = 200  # of a name or a text: an event is one write to a pipe, which nothing cuts in two
+MOST_EVENT_CHARACTERS = 160  # of a name or a text: an event is one write to a pipe, 4096 bytes that nothing cuts in two
 _END = b""
 
 
@@ -37,7 +38,7 @@ class Crew(Protocol):
 
     def __call__(
         self, tasks: Iterable[tuple[int, AnyJob]], run: Callable[[AnyJob, Listener], Outcome], /
-    ) -> Iterator[tuple[int, Outcome]]: ...
+    ) -> Generator[tuple[int, Outcome]]: ...
 
 
 # Spawned, never forked: numba, Arrow and Rerun hold threads that a fork would freeze.
@@ -47,7 +48,7 @@ _tell: Listener = silent  # of a worker process: how it tells the run of its sta
 
 def in_turn(
     tasks: Iterable[tuple[int, AnyJob]], run: Callable[[AnyJob, Listener], Outcome], *, listen: Listener
-) -> Iterator[tuple[int, Outcome]]:
+) -> Generator[tuple[int, Outcome]]:
     """Run jobs in this process, one after the other; yields the number and the outcome of each."""
     for number, job in tasks:
         yield number, run(job, listen)
@@ -59,7 +60,7 @@ def side_by_side(
     *,
     workers: int,
     listen: Listener,
-) -> Iterator[tuple[int, Outcome]]:
+) -> Generator[tuple[int, Outcome]]:
     """Run jobs in several processes; yields number and outcome as each one ends.
 
     A process that is killed (by the system when memory runs out) breaks the pool with everything in it. What was in it
@@ -86,7 +87,7 @@ def _until_broken(
     workers: int,
     sender: Connection,
     broken: list[tuple[int, AnyJob]],
-) -> Iterator[tuple[int, Outcome]]:
+) -> Generator[tuple[int, Outcome]]:
     """Run jobs until there are none, or until a process dies: then those that were in the pool are ``broken``."""
     pool = ProcessPoolExecutor(
         workers, mp_context=_CONTEXT, initializer=_begin, initargs=(sender,), max_tasks_per_child=TASKS_PER_PROCESS
@@ -128,9 +129,17 @@ def _run(run: Callable[[AnyJob, Listener], Outcome], job: AnyJob) -> Outcome:
 
 
 def _begin(sender: Connection) -> None:
-    """Set up a worker process: its stages are told through the pipe."""
+    """Set up a worker process: its stages are told through the pipe, and it ends with the run, however that ends."""
     global _tell
     _tell = _teller(sender)
+    threading.Thread(target=_end_with_the_run, name="parent", daemon=True).start()
+
+
+def _end_with_the_run() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait_for([parent.sentinel])
+        os._exit(1)
 
 
 def _teller(sender: Connection) -> Callable[[Event], None]:

@@ -143,12 +143,18 @@ def uses_decimal_comma(rows: Sequence[str], delimiter: str) -> bool:
 
 
 def trailing_cells(rows: Sequence[str], delimiter: str, names: int) -> int:
-    """1 where rows end with a delimiter that the header row does not have, else 0; the first row decides.
+    """1 where most rows end with a delimiter that the header row does not have, else 0; of a tie the first row decides.
 
     Examples
     --------
-    >>> trailing_cells(["1,2,"], ",", 2), trailing_cells(["1,"], ",", 2)
-    (1, 0)
+    >>> trailing_cells(["1,2,"], ",", 2), trailing_cells(["1,"], ",", 2), trailing_cells(["1", "1,2,", "3,4,"], ",", 2)
+    (1, 0, 1)
     """
-    first = next((row.rstrip(" ") for row in rows if row.strip()), "")
-    return int(first.endswith(delimiter) and len(split_cells(first, delimiter)) == names + 1)
+    votes = []
+    for row in rows:
+        cells = len(split_cells(row, delimiter))
+        if cells == names:
+            votes.append(-1)
+        elif cells == names + 1 and row.rstrip(" ").endswith(delimiter):
+            votes.append(1)
+    return int(bool(votes) and (sum(votes) or votes[0]) > 0)

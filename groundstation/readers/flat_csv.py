@@ -8,6 +8,8 @@ the file is one, else as text.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Item, LogHeader, Remark
 from groundstation.base.signals import RAW_PREFIX, field_of
@@ -24,10 +26,11 @@ from groundstation.readers.dialect import (
 )
 from groundstation.readers.layout import Derivation, Layout, Rule, TimeRule, rule_for
 from groundstation.readers.source import Claim, Source
-from groundstation.readers.start import unusable_references, utc_of_zero
+from groundstation.readers.start import told_at_zero, unusable_references, utc_of_zero
 
 NAME = "flat-csv"
 TIME_COLUMNS = {"time_ns": "nanoseconds", "time_s": "seconds", "time_utc": "iso"}  # the recorder's own clock first
+_MOST_NS = 9e18  # 64 bits hold such differences
 FEWEST_ROWS = 3  # below a header row that does not stand on top
 
 
@@ -161,17 +164,19 @@ def _utc_of_zero(
 
 
 def _utc_from_rows(source: Source, dialect: Dialect, layout: Layout, column: int) -> tuple[int | None, list[Remark]]:
-    """UTC of device time zero from the first row that has both a recorder time and a ``time_utc``."""
+    """UTC of device time zero by the first rows that have both a recorder time and a ``time_utc``."""
     from groundstation.readers.table_reader import first_times
 
     device, _none = first_times(source, dialect, layout)
     utc, zoneless = first_times(source, dialect, replace(layout, time=TimeRule("iso", (column,), ("time_utc",))))
-    both = (device.mask & utc.mask).nonzero()[0]
+    fits = np.abs(utc.values.astype(np.float64) - device.values) < _MOST_NS
+    both = (device.mask & utc.mask & fits).nonzero()[0]
     if not len(both):
         return None, []
-    remarks = [Remark("derived", "UTC taken from the first row that has both recorder time and time_utc")]
+    zero_ns, zeros = told_at_zero(utc.values[both], device.values[both])
+    remarks = [Remark("derived", f"UTC of the recorder's zero from time_utc: median over its first {len(zeros)} times")]
     remarks += [Remark("assumed_utc", "time_utc names no zone: read as UTC")] if zoneless else []
-    return int(utc.values[both[0]] - device.values[both[0]]), remarks
+    return zero_ns, remarks
 
 
 def _layout(top: _Top) -> tuple[Layout, list[Remark]]:

@@ -1,10 +1,12 @@
-"""UTC of a recorder's time zero, from the metadata of a log."""
+"""UTC of a recorder's time zero, from the metadata of a log or a clock that it carries."""
 
 import math
 from collections.abc import Mapping
 
+import numpy as np
+
 from groundstation.base.errors import GroundstationError
-from groundstation.base.records import Remark
+from groundstation.base.records import Int64Array, Remark
 from groundstation.base.timescales import iso_to_utc_ns
 
 _FIRST_UTC_NS = iso_to_utc_ns("1678-01-01T00:00:00Z")[0]  # what 64 bits of nanoseconds hold
@@ -58,3 +60,26 @@ def utc_of_zero(metadata: Mapping[str, str]) -> tuple[int | None, list[Remark]]:
     except GroundstationError as error:
         return None, [Remark("unreadable_metadata", f"start_utc: {error}; the flight has no absolute time")]
     return utc_ns, [] if named_zone else [Remark("assumed_utc", f"start_utc {text} names no zone: read as UTC")]
+
+
+def told_at_zero(told: Int64Array, device: Int64Array) -> tuple[int, Int64Array]:
+    """What another clock told when the recorder's was at zero: the median, and what each reading says, shape (m,).
+
+    Of readings that repeat a time only the first counts, for the others are older than they say: a clock may tell whole
+    seconds. When the log's first time was told first is not known where times repeat.
+
+    Parameters
+    ----------
+    told, device : ndarray of int64, shape (n,)
+        Times by both clocks in the order of the log, in one unit; n at least 1.
+
+    Examples
+    --------
+    >>> told_at_zero(np.array([70, 70, 80, 80, 80, 90]), np.array([5, 7, 12, 14, 16, 22]))
+    (68, array([68, 68]))
+    """
+    is_first = np.append(True, told[1:] != told[:-1])
+    if not is_first.all():
+        is_first[0] = not is_first[1:].any()
+    zeros = (told - device)[is_first]
+    return int(np.sort(zeros)[len(zeros) // 2]), zeros  # a float has no room for microseconds since 1970

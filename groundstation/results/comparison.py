@@ -108,7 +108,7 @@ class Comparison:
     ----------
     a, b : Side
     is_same_log : bool
-        Both are of one log: their noise is shared, and differences come from the settings alone.
+        Both are of one log, or of parts of it: their noise is shared.
     alignment : Alignment
     deltas : tuple of Delta
         Every answer both have.
@@ -129,6 +129,14 @@ class Comparison:
     findings_b: tuple[Finding, ...] = ()
     not_assessable_a: tuple[NotAssessable, ...] = ()
     not_assessable_b: tuple[NotAssessable, ...] = ()
+
+    @property
+    def cause(self) -> str:
+        """What the differences between two flights of one log follow from; empty where they are of two."""
+        if not self.is_same_log:
+            return ""
+        is_whole = self.a.source_sha256 == self.b.source_sha256
+        return "the settings" if is_whole else "the parts they hold and the settings"
 
     @property
     def shown(self) -> tuple[Delta, ...]:

@@ -40,6 +40,13 @@ class SavedFlight:
         return found if found is not None and len(found) else None
 
 
+def mapping(document: Any, *keys: str) -> Mapping[str, Any]:
+    """The object at a path of keys, empty when it is missing or something else."""
+    for key in keys:
+        document = document.get(key) if isinstance(document, Mapping) else None
+    return document if isinstance(document, Mapping) else {}
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file as :func:`write_bytes` does.
 
@@ -54,6 +61,8 @@ def write_bytes(path: Path, content: bytes) -> None:
     try:
         temporary.write_bytes(content)
         temporary.replace(path)
+    except OSError as error:  # a full disk does not say which file
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -165,19 +174,19 @@ def _write_parquet(path: Path, figure: FigureData) -> None:
 def _read_parquet(path: Path) -> FigureData:
     import pyarrow.parquet as pq
 
+    columns = {}
     try:
         with pq.ParquetFile(path) as file:  # read_table would import pandas
             table = file.read(use_threads=False)
-    except (OSError, ValueError) as error:
+        for name in table.column_names:
+            values = table.column(name).to_numpy()
+            columns[name] = values.astype(np.str_) if values.dtype.kind == "O" else values
+        digits = json.loads((table.schema.metadata or {}).get(b"digits", b"{}"))
+        return FigureData(path.stem, columns, {name: int(places) for name, places in digits.items()})
+    except (OSError, ValueError, TypeError, AttributeError, LookupError, NotImplementedError) as error:
         raise UnreadableLogError(
             str(path), type(error).__name__, "a Parquet file of a run", "run the log again"
         ) from error
-    digits = json.loads((table.schema.metadata or {}).get(b"digits", b"{}"))
-    columns = {}
-    for name in table.column_names:
-        values = table.column(name).to_numpy()
-        columns[name] = values.astype(np.str_) if values.dtype.kind == "O" else values
-    return FigureData(path.stem, columns, {name: int(places) for name, places in digits.items()})
 
 
 def utf8_text(text: Any) -> str:

@@ -70,6 +70,8 @@ def _value(hint: Any, value: Any) -> Any:
         if value not in arguments:
             raise ValueError(f"{value!r} is none of {arguments}")
         return value
+    if origin is Mapping and not isinstance(value, Mapping):
+        raise TypeError(f"{value!r} is no mapping")
     if hint in (int, str, bool):
         if not isinstance(value, hint):
             raise TypeError(f"{value!r} is no {hint.__name__}")

@@ -8,6 +8,8 @@ import numpy as np
 
 from groundstation.base.records import Column, Int64Array
 from groundstation.base.units import NS_PER_S
+from groundstation.simulation.deviation import scenario_deviation
+from groundstation.simulation.electric import electric_readings
 from groundstation.simulation.faults import apply_faults
 from groundstation.simulation.flight_errors import flight_errors
 from groundstation.simulation.magnetometer import magnetometer_readings
@@ -95,7 +97,9 @@ def scenario_truth(simulated: Simulated) -> dict[str, float]:
 
     ``heading_error_deg`` is INS heading minus nose at log second 0 (azimuth error + mounting); ``taxi_difference_deg``
     what heading minus track shows there on straights (sideslip added); ``drift_deg_per_h`` its drift, the mean one
-    where the errors are those of an INS class.
+    where the errors are those of an INS class. ``deviation_a_deg`` to ``deviation_e_deg`` are the coefficients A to E
+    of the magnetometer levelled with the INS (heading shown minus magnetic heading) in level flight, NaN where iron
+    outweighs the field.
     """
     scenario = simulated.scenario
     ins, gnss = scenario.ins, scenario.gnss
@@ -117,7 +121,15 @@ def scenario_truth(simulated: Simulated) -> dict[str, float]:
         "antenna_forward_m": gnss.antenna_forward_m,
         "antenna_right_m": gnss.antenna_right_m,
         "latency_s": gnss.latency_s,
-    }
+    } | _magnetic_truth(simulated)
+
+
+def _magnetic_truth(simulated: Simulated) -> dict[str, float]:
+    deviation = scenario_deviation(simulated)
+    if deviation is None:
+        return {}
+    letters = {f"deviation_{letter.lower()}_deg": value for letter, value in deviation.coefficients_deg.items()}
+    return letters | {"declination_deg": deviation.declination_deg, "horizontal_nt": deviation.horizontal_nt}
 
 
 def _all_readings(scenario: Scenario, trajectory: Trajectory) -> list[Readings]:
@@ -135,6 +147,8 @@ def _all_readings(scenario: Scenario, trajectory: Trajectory) -> list[Readings]:
     if scenario.magnetometer is not None:
         rng = generator(seed, "magnetometer")
         readings.append(magnetometer_readings(trajectory, scenario, scenario.magnetometer, rng))
+    if scenario.electric is not None:
+        readings.append(electric_readings(trajectory, scenario.electric, generator(seed, "electric")))
     if scenario.baro is not None:
         readings.append(baro_readings(trajectory, scenario.baro, generator(seed, "baro")))
     if scenario.air is not None:

@@ -42,8 +42,8 @@ def flight_errors(motion: Trajectory, settings: InsSettings, seed: int) -> Fligh
     time_s = motion.time_ns / NS_PER_S
     north, east = (schuler_error(time_s, settings, channel) for channel in (0, 1))
     heading = heading_error_deg(time_s, settings)
-    level = np.zeros(len(motion))
-    return FlightErrors((north[0], east[0]), (north[1], east[1]), heading, level, level)
+    roll, pitch = (np.full(len(motion), error) for error in (settings.roll_error_deg, settings.pitch_error_deg))
+    return FlightErrors((north[0], east[0]), (north[1], east[1]), heading, roll, pitch)
 
 
 def heading_error_deg(time_s: FloatArray, settings: InsSettings) -> FloatArray:
@@ -96,12 +96,14 @@ def _full_errors(motion: Trajectory, settings: InsSettings, seed: int) -> Flight
     between = _reader(motion.time_ns / NS_PER_S, time_s)
     heading_rad = np.deg2rad(motion.heading_deg)
     phi_north, phi_east = between(errors.tilt_rad[0, :, 1]), between(-errors.tilt_rad[0, :, 0])
+    about_forward = phi_north * np.cos(heading_rad) + phi_east * np.sin(heading_rad)
+    about_right = phi_east * np.cos(heading_rad) - phi_north * np.sin(heading_rad)
     return FlightErrors(
         position_m=(between(errors.position_m[0, :, 0]), between(errors.position_m[0, :, 1])),
         velocity_mps=(between(errors.velocity_mps[0, :, 0]), between(errors.velocity_mps[0, :, 1])),
         heading_deg=settings.boresight_deg + between(np.rad2deg(errors.azimuth_rad[0]) + wander),
-        roll_deg=-np.rad2deg(phi_north * np.cos(heading_rad) + phi_east * np.sin(heading_rad)),
-        pitch_deg=-np.rad2deg(phi_east * np.cos(heading_rad) - phi_north * np.sin(heading_rad)),
+        roll_deg=settings.roll_error_deg - np.rad2deg(about_forward),
+        pitch_deg=settings.pitch_error_deg - np.rad2deg(about_right),
     )
 
 

@@ -86,11 +86,20 @@ class ClimbTo:
 
 @dataclass(frozen=True)
 class AirTurn:
-    """Coordinated turn (right positive) at constant airspeed and altitude; the bank is rolled in and out smoothly."""
+    """Coordinated turn (right positive) at constant airspeed and altitude; the bank is rolled in and out smoothly.
+
+    ``bank_change_deg`` is how much more bank there is at the end of the turn than at its start, ``bank_deg`` between.
+    """
 
     kind: ClassVar[str] = "air_turn"
     angle_deg: float = required_number(-1080.0, 1080.0)
     bank_deg: float = number(20.0, 1.0, 60.0)
+    bank_change_deg: float = number(0.0, -40.0, 40.0)
+
+    def __post_init__(self) -> None:
+        if abs(self.bank_change_deg) >= 2.0 * self.bank_deg:
+            found = f"{self.bank_change_deg:g} at a bank of {self.bank_deg:g}"
+            raise SettingsError("bank_change_deg", found, "a change below twice the bank")
 
 
 @dataclass(frozen=True)
@@ -197,9 +206,13 @@ def pieces_of(leg: Leg, state: MotionState, place: str) -> tuple[Piece, ...]:
         case ClimbTo():
             return _climb_to(leg.altitude_m, leg.airspeed_mps, leg.climb_rate_mps, state, place)
         case AirTurn():
-            rate = float(np.rad2deg(MPS2_PER_G * np.tan(np.deg2rad(leg.bank_deg)) / state.speed_mps))
+            rate, first, last = (
+                float(np.rad2deg(MPS2_PER_G * np.tan(np.deg2rad(leg.bank_deg + change)) / state.speed_mps))
+                for change in (0.0, -0.5 * leg.bank_change_deg, 0.5 * leg.bank_change_deg)
+            )
             level = () if state.climb_rate_mps == 0.0 else (_level(state),)
-            return level + _turn(leg.angle_deg, rate, BANK_RAMP_S, state.speed_mps, state)
+            growth = (last - first) / (2.0 * rate)
+            return level + _turn(leg.angle_deg, rate, BANK_RAMP_S, state.speed_mps, state, growth)
         case Landing():
             return _climb_to(leg.runway_altitude_m, leg.airspeed_mps, leg.descent_rate_mps, state, place)
 
@@ -224,12 +237,17 @@ def _taxi(leg: Taxi, state: MotionState, place: str) -> tuple[Piece, ...]:
     return (*ramp, Piece(state.whole_steps((leg.length_m - used_m) / leg.speed_mps), leg.speed_mps))
 
 
-def _turn(angle_deg: float, rate_dps: float, ramp_s: float, speed_mps: float, state: MotionState) -> tuple[Piece, ...]:
-    """Rate up, hold, rate down; the rate is adjusted so that whole steps give exactly the angle."""
+def _turn(
+    angle_deg: float, rate_dps: float, ramp_s: float, speed_mps: float, state: MotionState, growth: float = 0.0
+) -> tuple[Piece, ...]:
+    """Rate up, hold, rate down; the rate is adjusted so that whole steps give exactly the angle.
+
+    ``growth`` is the share by which the rate at the end of the hold lies above its mean, and below it at the start.
+    """
     hold_s = state.whole_steps(max(abs(angle_deg) / rate_dps - ramp_s, 0.0))
     ramp_s = state.whole_steps(ramp_s)
     rate = angle_deg / (hold_s + ramp_s)  # each ramp contributes half its length at full rate
-    rates_and_times = ((rate, ramp_s), (rate, hold_s), (0.0, ramp_s))
+    rates_and_times = ((rate * (1.0 - growth), ramp_s), (rate * (1.0 + growth), hold_s), (0.0, ramp_s))
     return tuple(Piece(time, speed_mps, rate, 0.0, state.airborne) for rate, time in rates_and_times)
 
 

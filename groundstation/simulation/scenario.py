@@ -69,8 +69,9 @@ class GroundMotion:
 class InsSettings:
     """Inertial navigator. Error = reading - truth; horizontal channels north, east.
 
-    ``boresight_deg`` is a mounting error: the unit's forward axis to the right of the aircraft's. ``tilt_arcsec`` is
-    positive where it makes the velocity error fall (design of system 2), ``drift_dph`` likewise.
+    ``boresight_deg`` is a mounting error: the unit's forward axis to the right of the aircraft's. ``roll_error_deg``
+    and ``pitch_error_deg`` are constant; ``attitude_wander_deg`` is the sigma of a Gauss-Markov process of each.
+    ``tilt_arcsec`` is positive where it makes the velocity error fall (design of system 2), ``drift_dph`` likewise.
     ``error_model`` "schuler" is the closed solution of the figures given here; "full" draws all errors from
     ``ins_class`` and propagates them along the flight: azimuth, velocity, tilt, drift and position given here are then
     not read, mounting and noise are.
@@ -82,6 +83,10 @@ class InsSettings:
     azimuth_error_deg: float = number(1.0, -180.0, 180.0)
     azimuth_drift_dph: float = number(0.05, -600.0, 600.0)
     boresight_deg: float = number(0.0, -10.0, 10.0)
+    roll_error_deg: float = number(0.0, -10.0, 10.0)
+    pitch_error_deg: float = number(0.0, -10.0, 10.0)
+    attitude_wander_deg: float = number(0.0, 0.0, 5.0)
+    attitude_wander_s: float = number(300.0, 0.0, 100_000.0)
     heading_noise_deg: float = number(0.005, 0.0, 5.0)
     attitude_noise_deg: float = number(0.005, 0.0, 5.0)
     velocity_noise_mps: float = number(0.01, 0.0, 5.0)
@@ -143,17 +148,48 @@ class GnssSettings:
 
 @dataclass(frozen=True)
 class MagnetometerSettings:
-    """Three-axis magnetometer: reading = soft iron @ field in body axes + hard iron + noise.
+    """Three-axis magnetometer: see :func:`groundstation.simulation.magnetometer.sensed_nt`; vectors are of body axes.
 
-    The field is the World Magnetic Model's of the date (``decimal_year``, or that of ``start_utc``) and place.
+    The field is the World Magnetic Model's of the date (``decimal_year``, or that of ``start_utc``) and place, or
+    ``world_field_nt`` (north, east, down) everywhere. ``misalignment_deg`` are roll, pitch, heading of the sensor in
+    the aircraft. ``bank_odd_nt`` and ``bank_even_nt`` move with the bank (control rods, fuel), as sin(roll) and its
+    square. ``latency_s`` delays the record behind the time of validity. Noise per axis: white + first-order
+    Gauss-Markov.
     """
 
     rate_hz: float = number(10.0, 0.01, 1000.0)
     hard_iron_nt: Vector = (300.0, -200.0, 100.0)
     soft_iron: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    misalignment_deg: Vector = ZERO
+    scale: Vector = (1.0, 1.0, 1.0)
+    current_nt_per_a: Vector = ZERO
+    bank_odd_nt: Vector = ZERO
+    bank_even_nt: Vector = ZERO
     noise_nt: float = number(30.0, 0.0, 10_000.0)
+    correlated_nt: float = number(0.0, 0.0, 10_000.0)
+    correlation_s: float = number(60.0, 0.0, 100_000.0)
+    latency_s: float = number(0.0, 0.0, 10.0)
     resolution_nt: float = number(1.0, 1e-3, 1000.0)
     decimal_year: float | None = number(None, 2010.0, 2030.0)
+    world_field_nt: Vector | None = None
+
+
+@dataclass(frozen=True)
+class Load(Interval):
+    """A consumer that is on for an interval."""
+
+    current_a: float = required_number(-10_000.0, 10_000.0)
+
+
+@dataclass(frozen=True)
+class ElectricSettings:
+    """Electric system: ``base_a`` all the time, ``loads`` on top. Its magnetic field is the magnetometer's affair."""
+
+    rate_hz: float = number(5.0, 0.01, 1000.0)
+    base_a: float = number(0.0, -10_000.0, 10_000.0)
+    loads: tuple[Load, ...] = ()
+    noise_a: float = number(0.2, 0.0, 1000.0)
+    resolution_a: float = number(0.1, 1e-4, 100.0)
 
 
 @dataclass(frozen=True)
@@ -252,6 +288,7 @@ class Scenario:
     gnss: GnssSettings = field(default_factory=GnssSettings)
     discrete: DiscreteSettings = field(default_factory=DiscreteSettings)
     magnetometer: MagnetometerSettings | None = None
+    electric: ElectricSettings | None = None
     baro: BaroSettings | None = None
     air: AirSettings | None = None
     onboard: OnboardSettings | None = None
@@ -324,6 +361,10 @@ def scenario_from_table(table: dict[str, Any], name: str, where: str) -> Scenari
         raise SettingsError(f"{where}, key ins.ins_class", found, expected)
     _check_intervals(scenario.gnss.outages, f"{where}, key gnss.outages")
     _check_intervals(scenario.gnss.low_integrity, f"{where}, key gnss.low_integrity")
+    if scenario.magnetometer and any(scenario.magnetometer.current_nt_per_a) and scenario.electric is None:
+        place, expected = f"{where}, key magnetometer.current_nt_per_a", "a table [electric] beside it"
+        raise SettingsError(place, "a coupling and no current", expected)
+    _check_intervals(scenario.electric.loads if scenario.electric else (), f"{where}, key electric.loads")
     _check_intervals([fault for fault in scenario.faults if hasattr(fault, "to_s")], f"{where}, key faults")
     return scenario
 

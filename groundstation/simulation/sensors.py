@@ -48,14 +48,18 @@ def ins_readings(trajectory: Trajectory, settings: InsSettings, rng: np.random.G
     (north_m, east_m), (north_mps, east_mps) = errors.position_m, errors.velocity_mps
     meridian, prime_vertical = curvature_radii_m(motion.latitude_deg)
     east_radius = (prime_vertical + motion.altitude_m) * np.cos(np.deg2rad(motion.latitude_deg))
+    wander = np.zeros((2, n))
+    if settings.attitude_wander_deg > 0.0:
+        sigma, tau = settings.attitude_wander_deg, settings.attitude_wander_s
+        wander = gauss_markov(rng, (2, n), 1.0 / settings.rate_hz, sigma, tau)
     values = {name: getattr(motion, name) for name in Trajectory.__dataclass_fields__} | {
         "latitude_deg": motion.latitude_deg + np.rad2deg(north_m / (meridian + motion.altitude_m)),
         "longitude_deg": wrap_180(motion.longitude_deg + np.rad2deg(east_m / east_radius)),
         "velocity_north_mps": motion.velocity_north_mps + north_mps + settings.velocity_noise_mps * noise[0],
         "velocity_east_mps": motion.velocity_east_mps + east_mps + settings.velocity_noise_mps * noise[1],
         "velocity_down_mps": motion.velocity_down_mps + settings.velocity_noise_mps * noise[2],
-        "roll_deg": motion.roll_deg + errors.roll_deg + settings.attitude_noise_deg * noise[3],
-        "pitch_deg": motion.pitch_deg + errors.pitch_deg + settings.attitude_noise_deg * noise[4],
+        "roll_deg": motion.roll_deg + errors.roll_deg + wander[0] + settings.attitude_noise_deg * noise[3],
+        "pitch_deg": motion.pitch_deg + errors.pitch_deg + wander[1] + settings.attitude_noise_deg * noise[4],
     }
     heading = motion.heading_deg + errors.heading_deg + settings.heading_noise_deg * noise[5]
     readings = _motion_readings(

@@ -28,17 +28,21 @@ class Declination:
         East positive, in [-180, 180); NaN where the position is not known.
     horizontal_nt : ndarray, shape (n,)
         Horizontal intensity H.
+    down_nt : ndarray, shape (n,)
+        Vertical intensity Z, down positive.
     model : str
         Name of the model: ``WMM-2020``.
     """
 
     values_deg: FloatArray
     horizontal_nt: FloatArray
+    down_nt: FloatArray
     model: str
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values_deg", frozen(self.values_deg))
         object.__setattr__(self, "horizontal_nt", frozen(self.horizontal_nt))
+        object.__setattr__(self, "down_nt", frozen(self.down_nt))
 
     @property
     def sigma_deg(self) -> FloatArray:
@@ -84,7 +88,7 @@ def declination_along(
     """
     model, year = _model_of(utc_ns)
     known = np.flatnonzero(np.isfinite(latitude_deg) & np.isfinite(longitude_deg))
-    values, horizontal = np.full(len(latitude_deg), np.nan), np.full(len(latitude_deg), np.nan)
+    values, horizontal, down = np.full((3, len(latitude_deg)), np.nan)
     if known.size:
         path = _path_m(latitude_deg[known], longitude_deg[known])
         knot = np.flatnonzero(np.diff(path // KNOT_SPACING_M, prepend=-1.0, append=-1.0)[:-1])
@@ -99,7 +103,8 @@ def declination_along(
         continuous = unwrap(np.array([field.d for field in fields]))
         values[known] = wrap_180(np.interp(path, path[knot], continuous))
         horizontal[known] = np.interp(path, path[knot], [field.h for field in fields])
-    return Declination(values, horizontal, str(model.model))
+        down[known] = np.interp(path, path[knot], [field.z for field in fields])
+    return Declination(values, horizontal, down, str(model.model))
 
 
 def _path_m(latitude_deg: FloatArray, longitude_deg: FloatArray) -> FloatArray:

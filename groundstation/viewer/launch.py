@@ -34,7 +34,7 @@ def viewer_executable() -> Path:
 
 
 def viewer_command(
-    path: Path | str, *, web: bool = False, host: str = LOCAL, port: int | None = None, headless: bool = False
+    what: Path | str, *, web: bool = False, host: str = LOCAL, port: int | None = None, headless: bool = False
 ) -> list[str]:
     """Command line that opens a recording, or what an address offers.
 
@@ -43,7 +43,7 @@ def viewer_command(
     >>> viewer_command(Path("a.rrd"), web=True, port=9091)[1:]
     ['a.rrd', '--bind', '127.0.0.1', '--port', 'auto', '--web-viewer', '--web-viewer-port', '9091']
     """
-    command = [str(viewer_executable()), str(path), "--bind", host]
+    command = [str(viewer_executable()), str(what), "--bind", host]
     if web:
         # headless: serve the pages, let the user open the address in a browser of his own
         command += ["--port", "auto", "--serve-web" if headless else "--web-viewer"]
@@ -74,14 +74,14 @@ def _web_port(host: str) -> int:
 
 
 def open_viewer(
-    path: Path, *, web: bool = False, host: str = LOCAL, port: int | None = None, headless: bool = False
+    what: Path | str, *, web: bool = False, host: str = LOCAL, port: int | None = None, headless: bool = False
 ) -> int:
-    """Open a recording and wait until the viewer is closed; Ctrl-C closes it.
+    """Open a recording, or what an address offers, and wait until the viewer is closed; Ctrl-C closes it.
 
     Parameters
     ----------
-    path : Path
-        An .rrd file (or an .mcap, which Rerun decodes).
+    what : Path or str
+        An .rrd file (or an .mcap, which Rerun decodes), or the address of a catalog.
     web : bool
         Serve the web viewer and open it in a browser instead of a window.
     host : str
@@ -102,14 +102,14 @@ def open_viewer(
     GroundstationError
         When there is no such file, or no viewer.
     """
-    if not path.is_file():
-        raise GroundstationError(str(path), "no such file", next_step="run the log first")
+    folder = None
+    if isinstance(what, Path):
+        if not what.is_file():
+            raise GroundstationError(str(what), "no such file", next_step="run the log first")
+        what = what.absolute()
+        folder = what.parent  # where the links of fleet.rrd begin
+    command = viewer_command(what, web=web, host=host, port=port, headless=headless)
     try:
-        return subprocess.run(
-            viewer_command(path.absolute(), web=web, host=host, port=port, headless=headless),
-            check=False,
-            env=viewer_environment(os.environ),
-            cwd=path.absolute().parent,  # where the links of fleet.rrd begin
-        ).returncode
+        return subprocess.run(command, check=False, env=viewer_environment(os.environ), cwd=folder).returncode
     except KeyboardInterrupt:
         return 0

@@ -10,6 +10,7 @@ from urllib.parse import urlsplit
 
 import rerun as rr
 import rerun.blueprint as rrb
+import rerun_bindings
 
 from groundstation.base.errors import GroundstationError
 from groundstation.results.flight import FlightResults
@@ -52,14 +53,19 @@ def save_stream(path: Path, identity: str, send: Callable[[rr.RecordingStream], 
     """Write what ``send`` logs as the recording of that name; see :func:`write_recording`."""
     temporary = path.with_name(f".{path.name}.partial")
     try:
-        with open_stream(identity) as stream:
-            stream.save(temporary)
-            send(stream)
+        _save(temporary, identity, send)
+        rerun_bindings.flush_and_cleanup_orphaned_recordings()  # else the threads and buffers of each one stay
         temporary.replace(path)
     except (OSError, RuntimeError) as error:  # Rerun's own are RuntimeErrors
         raise GroundstationError(str(path), str(error), next_step="check the folder and the space left") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _save(path: Path, identity: str, send: Callable[[rr.RecordingStream], object]) -> None:
+    with open_stream(identity) as stream:
+        stream.save(path)
+        send(stream)
 
 
 def stream_recording(flight: Flight, results: FlightResults, *, connect_url: str = DEFAULT_VIEWER_URL) -> None:

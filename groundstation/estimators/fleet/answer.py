@@ -116,7 +116,8 @@ def _scaled(quantity: str, value: FloatArray) -> FloatArray:
 
 
 def _unscaled(quantity: str, value: FloatArray) -> FloatArray:
-    return np.asarray(np.exp(value) if quantity in POSITIVE else value)
+    with np.errstate(over="ignore"):  # a limit of absurd figures may be infinite
+        return np.asarray(np.exp(value) if quantity in POSITIVE else value)
 
 
 def trends(flights: FigureData, settings: ChangeSettings) -> tuple[FigureData, tuple[ChangePoint, ...]]:

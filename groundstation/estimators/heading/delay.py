@@ -3,9 +3,8 @@
 from dataclasses import dataclass, replace
 
 from groundstation.estimators.heading.settings import AircraftData, HeadingSettings
+from groundstation.estimators.latency.settings import BOUND95
 from groundstation.results.latency import Latencies
-
-BOUND95 = 1.959963984540054
 
 
 @dataclass(frozen=True)

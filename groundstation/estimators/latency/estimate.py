@@ -8,7 +8,7 @@ import numpy as np
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.inertial.kind import AIDED, HALF
 from groundstation.estimators.latency.fit import DelayFit, fit_delay
-from groundstation.estimators.latency.settings import LatencySettings
+from groundstation.estimators.latency.settings import BOUND95, LatencySettings
 from groundstation.estimators.latency.signals import NotComparableError, compare, pairs_of
 from groundstation.estimators.latency.windows import cut_windows
 from groundstation.results.figures import FigureData
@@ -16,7 +16,6 @@ from groundstation.results.latency import Latencies, Latency, Quantity
 from groundstation.tables.table import Flight, Table
 
 Pair = tuple[str, str, Quantity]
-BOUND95 = 1.959963984540054
 MOTIONS: Mapping[Quantity, str] = {
     "velocity": "turns, accelerations",
     "altitude": "climbs, descents and level-offs",

@@ -1,5 +1,6 @@
 """What is compared: signals of an INS and of another sensor that show the same motion."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -79,19 +80,35 @@ def compare(flight: Flight, pair: tuple[str, str, Quantity], settings: LatencySe
         When rates or time stamps do not allow it.
     """
     reference, other, quantity = pair
-    unit = _usable(flight[reference])
-    sensor = flight[other]
-    names = {"velocity": VELOCITY, "altitude": ("pressure_altitude_m",), "field": FIELD, "attitude": ATTITUDE}[quantity]
-    sensor = sensor.take(sensor.valid(*names) & ~(sensor.values("integrity_ok") == 0.0))
-    _check_stamps(other, sensor, settings)
+    unit, sensor = _usable(flight[reference]), flight[other]
+    shown, seen = _columns(unit, sensor, quantity)
+    unit = unit.take(unit.valid(*shown))
+    sensor = _usable(sensor) if quantity == "attitude" else sensor.take(~(sensor.values("integrity_ok") == 0.0))
+    sensor = sensor.take(sensor.valid(*seen))
+    for topic, table in ((reference, unit), (other, sensor)):
+        _check_stamps(topic, table, settings)
     if quantity == "velocity":
         sensor = distinct_epochs(sensor)
-    _check_rates(reference, unit, settings.reference_interval_max_s)
+    _check_rates(reference, unit.unique_times(), settings.reference_interval_max_s)
     _check_rates(other, sensor, settings.other_interval_max_s)
     maker = {"velocity": _velocity, "altitude": _altitude, "field": _field, "attitude": _attitude}[quantity]
     made = maker(flight, unit, sensor, settings)
     samples = round(len(sensor) / max(len(made.time_s), 1))
     return replace(made, reference=made.reference.smoothed(_nodes(made, samples, settings)))
+
+
+def _columns(unit: Table, sensor: Table, quantity: Quantity) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Fields that are compared, of the reference and of the other."""
+    if quantity == "velocity":
+        return VELOCITY, VELOCITY
+    if quantity == "altitude":
+        return (next(name for name in ("velocity_down_mps", *ALTITUDES) if unit.has(name)),), ("pressure_altitude_m",)
+    if quantity == "field":
+        return (*ATTITUDE, _heading_of(unit)), FIELD
+    heading = next((name for name in HEADINGS if unit.has(name) and sensor.has(name)), "")
+    if not heading:
+        raise NotComparableError("headings of different kinds")
+    return (*ATTITUDE, heading), (*ATTITUDE, heading)
 
 
 def _nodes(made: Comparison, samples: int, settings: LatencySettings) -> int:
@@ -103,7 +120,6 @@ def _nodes(made: Comparison, samples: int, settings: LatencySettings) -> int:
 
 def _velocity(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> Comparison:
     """GNSS velocity against INS velocity: azimuth error, scale and the antenna's arm are nuisances."""
-    unit = unit.take(unit.valid(*VELOCITY))
     names = [name for name in (*VELOCITY, *ATTITUDE, *HEADINGS) if unit.has(name)]
     time_s, columns = _averaged(flight, unit, names, settings.reference_step_s)
     north, east = columns[VELOCITY[0]], columns[VELOCITY[1]]
@@ -124,8 +140,7 @@ def _velocity(flight: Flight, unit: Table, sensor: Table, settings: LatencySetti
 
 def _altitude(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> Comparison:
     """Pressure altitude against height from the vertical speed of the INS, or its altitude: a scale is the nuisance."""
-    name = next(item for item in ("velocity_down_mps", *ALTITUDES) if unit.has(item))
-    unit = unit.take(unit.valid(name))
+    (name,), _seen = _columns(unit, sensor, "altitude")
     time_s, columns = _averaged(flight, unit, [name], settings.reference_step_s)
     height = columns[name]
     if name == "velocity_down_mps":
@@ -143,10 +158,9 @@ def _field(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings
 
     Soft iron with mounting, and the field itself, are nuisances.
     """
-    heading = _heading_of(unit)
-    unit = unit.take(unit.valid(*ATTITUDE, heading))
-    time_s, columns = _averaged(flight, unit, [*ATTITUDE, heading], settings.reference_step_s)
-    body_from_n = np.swapaxes(_rotation(columns, columns[heading]), 1, 2)
+    shown, _seen = _columns(unit, sensor, "field")
+    time_s, columns = _averaged(flight, unit, shown, settings.reference_step_s)
+    body_from_n = np.swapaxes(_rotation(columns, columns[shown[-1]]), 1, 2)
     at_s, measured = _averaged(flight, sensor, FIELD, settings.other_step_s)
     values = np.stack([measured[name] for name in FIELD], axis=-1)
     base = body_from_n.reshape(-1, 9)
@@ -174,13 +188,10 @@ def _field(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings
 def _attitude(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> Comparison:
     """Roll, pitch and heading of two INS."""
     sides = []
-    heading = next((name for name in HEADINGS if unit.has(name) and sensor.has(name)), "")
-    if not heading:
-        raise NotComparableError("headings of different kinds")
+    names, _seen = _columns(unit, sensor, "attitude")
     for table, step_s in ((unit, settings.reference_step_s), (sensor, settings.other_step_s)):
-        table = table.take(table.valid(*ATTITUDE, heading))
-        time_s, columns = _averaged(flight, table, [*ATTITUDE, heading], step_s)
-        sides.append((time_s, np.stack([columns[name] for name in (*ATTITUDE, heading)], axis=-1)))
+        time_s, columns = _averaged(flight, table, names, step_s)
+        sides.append((time_s, np.stack([columns[name] for name in names], axis=-1)))
     (time_s, shown), (at_s, values) = sides
     reference = Series(time_s, shown, lambda base: base[..., None], settings.gap_max_s)
     return Comparison(reference, at_s, values, np.zeros(0), "deg")
@@ -191,7 +202,7 @@ def _usable(unit: Table) -> Table:
     bad: BoolArray = (unit.values("valid") == 0.0) | (unit.text("mode") == "align")
     names = (*VELOCITY, "velocity_down_mps", *ALTITUDES, *ATTITUDE, *HEADINGS)
     unit = replace(unit, columns={name: unit.columns[name] for name in names if name in unit})
-    return (unit.take(~bad) if bad.any() else unit).unique_times()
+    return unit.take(~bad) if bad.any() else unit
 
 
 def _heading_of(table: Table) -> str:
@@ -214,7 +225,7 @@ def _check_rates(topic: str, table: Table, longest_s: float) -> None:
 
 
 def _averaged(
-    flight: Flight, table: Table, names: list[str] | tuple[str, ...], step_s: float
+    flight: Flight, table: Table, names: Sequence[str], step_s: float
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
     """Means of a table's rows over ``step_s``, at their mean times; headings and roll continuous."""
     table = table.unique_times()

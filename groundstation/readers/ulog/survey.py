@@ -8,6 +8,7 @@ import numpy as np
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Int64Array, Remark
 from groundstation.readers.source import Source
+from groundstation.readers.start import told_at_zero
 from groundstation.readers.ulog.blocks import Block, Topic, Walk
 from groundstation.readers.ulog.canonical import ARMING, FIX_3D, ROLES, UTC_SOURCES, Rule
 from groundstation.readers.ulog.messages import Keyed, keyed, release_text
@@ -55,7 +56,7 @@ def overview(source: Source) -> Overview:
     """Go through a log once."""
     walk = Walk(source)
     with_data: set[int] = set()
-    clocks: dict[str, list[Int64Array]] = {}
+    clocks: dict[str, list[Int64Array]] = {}  # (UTC, device time) of messages, microseconds
     found = Overview()
     for block in walk:
         occurring = np.flatnonzero(np.bincount(block.topic[block.topic >= 0])).tolist()
@@ -63,7 +64,7 @@ def overview(source: Source) -> Overview:
         for topic in (block.topics[number] for number in occurring):
             _note_odd_flags(block, topic, found.odd_flags)
             if topic.name in UTC_SOURCES and topic.instance == 0 and _tells_utc(topic):
-                clocks.setdefault(topic.name, []).append(_utc_minus_device_us(block, topic))
+                clocks.setdefault(topic.name, []).append(_utc_and_device_us(block, topic))
         _note_facts(block, found.metadata)
     _assign(found, [topic for topic in walk.definitions.topics if topic.number in with_data])
     _relate_to_utc(found, clocks)
@@ -84,25 +85,25 @@ def _tells_utc(topic: Topic) -> bool:
     return layout is not None and layout.timestamp_offset is not None and "time_utc_usec" in layout.names
 
 
-def _utc_minus_device_us(block: Block, topic: Topic) -> Int64Array:
-    """UTC of power-up by each message that has a good fix and a time that can be true, microseconds."""
+def _utc_and_device_us(block: Block, topic: Topic) -> Int64Array:
+    """UTC and device time of each message that has a good fix and a time that can be true, shape (2, n)."""
     assert topic.layout is not None
     rows = block.rows(topic.layout, np.flatnonzero(block.topic == topic.number))
     utc, device = rows["time_utc_usec"].astype(np.uint64), rows["timestamp"]
     good = (utc >= EARLIEST_US) & (utc < LATEST_US) & (device > 0) & (device < LATEST_US)
     if "fix_type" in topic.layout.names:
         good &= rows["fix_type"] >= FIX_3D
-    return utc[good].astype(np.int64) - device[good].astype(np.int64)
+    return np.stack([utc[good].astype(np.int64), device[good].astype(np.int64)])
 
 
 def _relate_to_utc(found: Overview, clocks: dict[str, list[Int64Array]]) -> None:
-    """UTC of power-up: the median over all good fixes of the first topic that has any."""
+    """UTC of power-up: by the good fixes of the first topic that has any."""
     for name in UTC_SOURCES:
-        offsets = np.concatenate(clocks.get(name, [np.zeros(0, dtype=np.int64)]))
-        if not len(offsets):
+        utc, device = np.concatenate(clocks.get(name, [np.zeros((2, 0), dtype=np.int64)]), axis=1)
+        if not len(utc):
             continue
         found.has_gnss |= name != "vehicle_global_position"
-        median_us = int(np.sort(offsets)[len(offsets) // 2])  # a float has no room for microseconds since 1970
+        median_us, offsets = told_at_zero(utc, device)
         spread_s = float(np.quantile(np.abs(offsets - median_us), 0.9)) / 1e6
         found.utc_of_zero_ns = median_us * 1_000
         text = (

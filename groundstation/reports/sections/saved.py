@@ -9,13 +9,7 @@ from numpy.typing import NDArray
 from groundstation.results.explain import explained
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight
-
-
-def mapping(document: Any, *keys: str) -> Mapping[str, Any]:
-    """The object at a path of keys, empty when it is missing or something else."""
-    for key in keys:
-        document = document.get(key) if isinstance(document, Mapping) else None
-    return document if isinstance(document, Mapping) else {}
+from groundstation.results.files import mapping as mapping
 
 
 def objects(document: Any, key: str) -> list[Mapping[str, Any]]:

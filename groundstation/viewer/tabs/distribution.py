@@ -1,7 +1,7 @@
 """Densities as bar views: the growing one of the heading error over its final state, and the mean speed at standstill.
 
 Rerun has no x-y plots: the fitted normal is drawn as hairline bars. An invisible bar as high as the highest step keeps
-the axes still while one scrubs.
+the axes still while one scrubs. Rerun takes the abscissa of a bar for its left edge.
 """
 
 from collections.abc import Iterator
@@ -34,7 +34,7 @@ def heading_error(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     if final is None:
         return []
     low, high = numbers(final, "bin_low_deg"), numbers(final, "bin_high_deg")
-    centre, width = 0.5 * (low + high), high - low
+    width = high - low
     density = numbers(final, "density_per_deg")
     peak = float(np.nanmax(density))
     normal = figure_of(results, "heading_normal", "difference_deg", "density_per_deg")
@@ -42,11 +42,11 @@ def heading_error(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
         x, y = numbers(normal, "difference_deg"), numbers(normal, "density_per_deg")
         _hairlines(recorder, "fitted_normal", x, y)
         peak = max(peak, float(np.nanmax(y)))
-    _bars(recorder, "samples_all", density, centre, width, (*colours.GREY[:3], MIDDLE))
+    _bars(recorder, "samples_all", density, low, width, (*colours.GREY[:3], MIDDLE))
     growth = figure_of(results, "heading_growth", "step", "time_s", "bin_center_deg", "density_per_deg")
     if growth is not None:
         highest = _growing(recorder, growth, float(np.median(width)), CEILING * peak)
-        middle = np.array([float(np.mean(centre))])
+        middle = np.array([0.5 * float(np.mean(low + high))])
         _bars(recorder, "axis_top", np.array([max(highest, peak)]), middle, np.array([NO_WIDTH]), UNSEEN)
     name = "Density of d, 1/deg (grey all, green so far, red normal)"
     hidden = rrb.PlotLegend(visible=False)  # it would name the invisible bar
@@ -63,7 +63,7 @@ def mean_speed(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
         chosen = windows == window
         x, y = numbers(figure, "speed_of_mean_mps")[chosen], numbers(figure, "density_per_mps")[chosen]
         width = np.full(len(x), float(np.median(np.diff(x))) if len(x) > 1 else 1e-3)
-        bar = rr.BarChart(y, abscissa=x, widths=width, color=(*colour[:3], 140))
+        bar = rr.BarChart(y, abscissa=x - 0.5 * width, widths=width, color=(*colour[:3], 140))
         recorder.static(f"mean_speed/{window:g}s", bar)
     name = "Density of mean speed, s/m (blue 10 s, orange 30 s)"
     return [rrb.BarChartView(name=name, origin="/mean_speed", plot_legend=rrb.PlotLegend(visible=False))]
@@ -98,18 +98,20 @@ def _growing(recorder: Recorder, growth: FigureData, bin_width: float, ceiling: 
         if recorder.has_utc:
             stream.set_time(UTC, timestamp=np.datetime64(time_ns, "ns"))
         width = np.full(len(centre), SLIM * bin_width)
-        bars = rr.BarChart(density, abscissa=centre, widths=width, color=(*colours.ANSWER[:3], FRONT))
+        left = centre - 0.5 * width
+        bars = rr.BarChart(density, abscissa=left, widths=width, color=(*colours.ANSWER[:3], FRONT))
         stream.log(f"{PATH}/samples_so_far", bars)
     stream.reset_time()
     return float(peaks[first:].max(initial=0.0))
 
 
 def _bars(
-    recorder: Recorder, name: str, height: FloatArray, centre: FloatArray, width: FloatArray, colour: Colour
+    recorder: Recorder, name: str, height: FloatArray, left: FloatArray, width: FloatArray, colour: Colour
 ) -> None:
-    recorder.static(f"{PATH}/{name}", rr.BarChart(height, abscissa=centre, widths=width, color=colour))
+    recorder.static(f"{PATH}/{name}", rr.BarChart(height, abscissa=left, widths=width, color=colour))
 
 
 def _hairlines(recorder: Recorder, name: str, x: FloatArray, y: FloatArray) -> None:
     spacing = float(np.median(np.diff(x))) if len(x) > 1 else 0.01
-    _bars(recorder, name, y, x, np.full(len(x), HAIRLINE * spacing), (*colours.NORMAL[:3], BEHIND))
+    width = np.full(len(x), HAIRLINE * spacing)
+    _bars(recorder, name, y, x - 0.5 * width, width, (*colours.NORMAL[:3], BEHIND))

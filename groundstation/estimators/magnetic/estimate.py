@@ -1,0 +1,244 @@
+"""The magnetic estimator: from the tables of a flight to a deviation, a verdict and a card."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray, wrap_180, wrap_360
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.records import BoolArray
+from groundstation.estimators.heading.settings import AircraftData
+from groundstation.estimators.magnetic.alignment import S_PER_H, align
+from groundstation.estimators.magnetic.compass_table import CompassTable, build_table
+from groundstation.estimators.magnetic.earth import earth_field
+from groundstation.estimators.magnetic.figures import draw
+from groundstation.estimators.magnetic.held_out import hold_out
+from groundstation.estimators.magnetic.iron import bank_bias, heading_errors, parameters_of
+from groundstation.estimators.magnetic.manoeuvre import Figure, FoundTurn, find_figures, find_turns, widest_gap_deg
+from groundstation.estimators.magnetic.methods import (
+    FORECAST_BANKS_DEG,
+    Fits,
+    bias_coefficients,
+    fit_all,
+    method_rows,
+    recommend,
+)
+from groundstation.estimators.magnetic.poisson import IronFit
+from groundstation.estimators.magnetic.readings import ANALYSIS, Readings, choose_topics, gather, why_not_independent
+from groundstation.estimators.magnetic.remarks import remarks_on
+from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.estimators.magnetic.swings import compare_swings, steer_card
+from groundstation.estimators.magnetic.verdict import build_gates, decide
+from groundstation.results.heading import HeadingResult
+from groundstation.results.latency import Latencies
+from groundstation.results.magnetic import (
+    Alignment,
+    BankBias,
+    Coverage,
+    MagneticResult,
+    Method,
+    PoissonParameters,
+    Residual,
+    SigmaPart,
+)
+from groundstation.tables.phases import Phases, flight_phases
+from groundstation.tables.table import Flight
+
+IN_THE_AIR = ("airborne", "unknown")  # ground contact is a phase of its own where it is proven
+
+
+def estimate_deviation(
+    flight: Flight,
+    *,
+    settings: MagneticSettings | None = None,
+    heading: HeadingResult | None = None,
+    latencies: Latencies | None = None,
+    kinds: Mapping[str, str] | None = None,
+    aircraft: AircraftData | None = None,
+    phases: Phases | None = None,
+    ins_topic: str = "",
+    magnetometer_topic: str = "",
+) -> MagneticResult:
+    """Find the deviation of the magnetic heading from opposite turns of steady bank.
+
+    Parameters
+    ----------
+    flight : Flight
+        Topics ``ins`` (roll, pitch, true heading) and ``magnetometer``; ``electric`` where there is one.
+    settings : MagneticSettings, optional
+    heading : HeadingResult, optional
+        System 1's answer: aligns the INS heading.
+    latencies : Latencies, optional
+        Where that of the magnetometer is observed, its times are put back by it.
+    kinds : mapping of INS topic to kind, optional
+        ``gnss_aided`` where system 2 found that other sensors correct the INS.
+    aircraft : AircraftData, optional
+        Its mounting angle is taken off the INS heading.
+    phases : Phases, optional
+        Default: found here.
+    ins_topic, magnetometer_topic : str
+        Default: the first that have what is needed.
+
+    Raises
+    ------
+    NotAssessableError
+        With the reason: no magnetometer, no independent heading, no figure, no declination.
+
+    Notes
+    -----
+    Error = magnetic heading (levelled by the attitude) - true heading of the aligned INS. Opposite banks are averaged
+    at equal magnetic headings in bins of 1 deg; beside that table hard and soft iron are fitted with the attitude, and
+    from the modulus alone. Level flight outside the figures judges all three.
+
+    Source: Russian patent on the deviation of magnetometric sensors determined in flight; prior art RU 2550774.
+    """
+    settings = settings or MagneticSettings()
+    topics = choose_topics(flight, ins_topic, magnetometer_topic)
+    objection = why_not_independent(flight, topics[0], dict(kinds or {}), settings)
+    if objection:
+        raise NotAssessableError(ANALYSIS, objection)
+    readings, latency_s = gather(flight, topics, latencies, settings)
+    phase = (phases or flight_phases(flight)).at(readings.time_s)
+    is_airborne = np.isin(phase, IN_THE_AIR)
+    turns = find_turns(readings, is_airborne, settings)
+    figures, turns = find_figures(readings, turns, settings)
+    if not figures:
+        raise NotAssessableError(ANALYSIS, _why_no_figure(turns))
+    figure_at_s = float(np.mean([0.5 * (figure.start_s + figure.end_s) for figure in figures]))
+    alignment = align(heading, topics[0], figure_at_s, settings)
+    readings = _aligned(readings, alignment, aircraft.mounting_deg if aircraft else 0.0)
+    result = _answer(flight, topics, readings, is_airborne, (figures, turns), alignment, settings)
+    return replace(result, remarks=remarks_on(flight, result, latency_s, kinds or {}, settings))
+
+
+def _answer(
+    flight: Flight,
+    topics: tuple[str, str],
+    readings: Readings,
+    is_airborne: BoolArray,
+    found: tuple[list[Figure], list[FoundTurn]],
+    alignment: Alignment,
+    settings: MagneticSettings,
+) -> MagneticResult:
+    figures, turns = found
+    branches = [np.concatenate([figure.rows(right) for figure in figures]) for right in (True, False)]
+    rows = np.sort(np.concatenate(branches))
+    along, declination, earth = earth_field(flight, readings, rows, settings)
+    table = build_table(readings.magnetic_heading_deg, readings.compass_error_deg, branches[0], branches[1])
+    fits = fit_all(readings.take(rows), table, earth, settings)
+    deviation = -wrap_180(table.average_deg + declination.value_deg)
+    unseen, held_out = hold_out(readings, along, is_airborne, figures, alignment, settings) or (None, None)
+    a_sigma = math.hypot(alignment.sigma_deg, declination.sigma_deg)
+    methods = method_rows(fits, unseen, deviation, declination.value_deg, a_sigma)
+    biases = _biases(fits)
+    flown = next((bias for bias in biases if bias.is_flown), None)
+    method, recommendation = recommend(methods, flown.rms_deg if flown else 0.0, fits.bank_deg, settings)
+    chosen = next(row for row in methods if row.name == method)
+    residual = _residual(chosen)
+    coverage = _coverage(figures, table)
+    swings = compare_swings(readings, declination.value_deg, figures)
+    used = [one.turn for one in turns if one.turn.state == "used"]
+    gates = build_gates(used, swings, coverage, alignment, residual, flown, method, settings)
+    verdict, reason = decide(gates)
+    card = deviation if method == "compass_table" else -_level_errors(fits)
+    return MagneticResult(
+        ins_topic=topics[0],
+        magnetometer_topic=topics[1],
+        verdict=verdict,
+        verdict_reason=reason,
+        recommended_method=method,
+        recommendation=recommendation,
+        coefficients_deg=methods[0].coefficients_deg,
+        coefficients_sigma_deg=methods[0].coefficients_sigma_deg,
+        a_parts=_a_parts(fits, alignment, declination.sigma_deg),
+        compass_error_deg=tuple(map(float, table.average_deg)),
+        deviation_deg=tuple(map(float, deviation)),
+        coverage=coverage,
+        residual_rms_deg=residual,
+        alignment=alignment,
+        declination=declination,
+        gates=gates,
+        methods=methods,
+        turns=tuple(one.turn for one in turns),
+        swings=tuple(swings),
+        bank_bias=biases,
+        card=steer_card(card, chosen.coefficients_sigma_deg, table.is_measured, settings.card_step_deg),
+        held_out=held_out,
+        poisson=_parameters(fits.attitude, a_sigma),
+        modulus=_parameters(fits.modulus, a_sigma),
+        table_fit_rms_deg=table.fit_rms_deg,
+        settings={name: value for name, value in asdict(settings).items() if value is not None},
+        figures=draw(readings, along, is_airborne, figures, fits, deviation),
+    )
+
+
+def _residual(row: Method) -> Residual | None:
+    if row.held_out_before_deg is None or row.held_out_after_deg is None:
+        return None
+    return Residual(row.held_out_before_deg, row.held_out_after_deg)
+
+
+def _parameters(fit: IronFit, azimuth_sigma_deg: float) -> PoissonParameters | None:
+    """The iron of a fit, None where it is refused."""
+    return None if fit.reason else parameters_of(fit.iron, fit.covariance_with(azimuth_sigma_deg))
+
+
+def _aligned(readings: Readings, alignment: Alignment, mounting_deg: float) -> Readings:
+    """Readings with the INS heading put right: corrected = reading - estimated error, drift included."""
+    hours = (readings.time_s - alignment.figure_at_s) / S_PER_H
+    error = alignment.error_deg + alignment.drift_deg_per_h * hours
+    return replace(readings, true_heading_deg=wrap_360(readings.true_heading_deg - mounting_deg - error))
+
+
+def _why_no_figure(turns: list[FoundTurn]) -> str:
+    """What was found instead of a figure, the longest turns first."""
+    if not turns:
+        return "no turn of steady bank in flight: opposite turns over the whole circle are needed"
+    longest = sorted(turns, key=lambda one: -abs(one.turn.turned_deg))[:3]
+    told = "; ".join(
+        f"at {one.turn.start_s:.0f} s {one.turn.turned_deg:+.0f} deg at {one.turn.bank_deg:+.0f} deg of bank: "
+        f"{one.turn.reason}"
+        for one in longest
+    )
+    return f"no opposite turns that cover the circle: {told}"
+
+
+def _coverage(figures: list[Figure], table: CompassTable) -> Coverage:
+    measured = int(np.count_nonzero(table.is_measured))
+    share = max(figure.covered_share for figure in figures)
+    return Coverage(share, measured, len(table.is_measured) - measured, widest_gap_deg(table.is_measured))
+
+
+def _biases(fits: Fits) -> tuple[BankBias, ...]:
+    """Forecast at round banks and at the bank flown."""
+    if fits.forecast is None:
+        return ()
+    iron, earth = fits.forecast.iron, fits.forecast.earth
+    banks = [(bank, False) for bank in FORECAST_BANKS_DEG] + [(fits.bank_deg, True)]
+    return tuple(
+        BankBias(bank, _rms(bank_bias(iron, earth.horizontal_nt, earth.down_nt, bank, fits.pitch_deg)), is_flown)
+        for bank, is_flown in sorted(banks)
+    )
+
+
+def _level_errors(fits: Fits) -> FloatArray:
+    earth = fits.attitude.earth
+    return heading_errors(fits.attitude.iron, earth.horizontal_nt, earth.down_nt, 0.0, fits.pitch_deg)
+
+
+def _a_parts(fits: Fits, alignment: Alignment, declination_sigma_deg: float) -> tuple[SigmaPart, ...]:
+    aligned = min(alignment.aligned_sigma_deg, alignment.sigma_deg)
+    bias, bias_covariance = bias_coefficients(fits, math.hypot(alignment.sigma_deg, declination_sigma_deg))
+    return (
+        SigmaPart("readings", float(np.sqrt(fits.table.covariance[0, 0]))),
+        SigmaPart("alignment", aligned),
+        SigmaPart("INS drift until the figure", math.sqrt(alignment.sigma_deg**2 - aligned**2)),
+        SigmaPart("declination", declination_sigma_deg),
+        SigmaPart("bank bias", math.hypot(float(bias[0]), math.sqrt(float(bias_covariance[0, 0])))),
+    )
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,90 @@
+"""Arrays behind the figures of the magnetic chapter."""
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.records import BoolArray
+from groundstation.estimators.magnetic.apply import corrected_by_table
+from groundstation.estimators.magnetic.compass_table import CENTRES_DEG
+from groundstation.estimators.magnetic.manoeuvre import Figure
+from groundstation.estimators.magnetic.methods import Fits
+from groundstation.estimators.magnetic.poisson import corrected_heading_deg
+from groundstation.estimators.magnetic.readings import Readings
+from groundstation.results.figures import FigureData
+
+LARGEST = 20_000  # readings drawn: of more, every k-th
+
+
+def draw(
+    readings: Readings,
+    declination_deg: FloatArray,
+    is_airborne: BoolArray,
+    figures: list[Figure],
+    fits: Fits,
+    deviation_deg: FloatArray,
+) -> tuple[FigureData, ...]:
+    """Readings with their errors, the table, and the modulus."""
+    return (
+        _samples(readings, declination_deg, is_airborne, figures, fits, deviation_deg),
+        _table(fits, deviation_deg),
+        _modulus(readings, figures, fits),
+    )
+
+
+def _samples(
+    readings: Readings,
+    declination_deg: FloatArray,
+    is_airborne: BoolArray,
+    figures: list[Figure],
+    fits: Fits,
+    deviation_deg: FloatArray,
+) -> FigureData:
+    part = np.where(is_airborne, "other flight", "ground").astype("U12")
+    for figure in figures:
+        part[figure.rows(True)], part[figure.rows(False)] = "right turn", "left turn"
+    kept = slice(None, None, max(1, -(-len(readings) // LARGEST)))
+    shown, drawn = readings.take(kept), part[kept]
+    expected = shown.true_heading_deg - declination_deg[kept]
+    heading = shown.magnetic_heading_deg
+    columns = {
+        "time_s": shown.time_s,
+        "part": drawn,
+        "bank_deg": shown.roll_deg,
+        "magnetic_heading_deg": heading,
+        "compass_error_deg": shown.compass_error_deg,
+        "error_before_deg": wrap_180(heading - expected),
+        "error_compass_table_deg": wrap_180(corrected_by_table(heading, deviation_deg) - expected),
+    }
+    for name, fit in (("poisson_attitude", fits.attitude), ("constant_modulus", fits.modulus)):
+        columns[f"error_{name}_deg"] = (
+            np.full(len(shown), np.nan) if fit.reason else wrap_180(corrected_heading_deg(fit.iron, shown) - expected)
+        )
+    return FigureData("magnetic_samples", columns, dict.fromkeys(columns, 4))
+
+
+def _table(fits: Fits, deviation_deg: FloatArray) -> FigureData:
+    table = fits.table
+    columns = {
+        "magnetic_heading_deg": CENTRES_DEG,
+        "right_turn_deg": table.right_deg,
+        "left_turn_deg": table.left_deg,
+        "compass_error_deg": table.average_deg,
+        "is_interpolated": ~table.is_measured,
+        "fitted_error_deg": wrap_180(table.curve_deg),
+        "deviation_deg": deviation_deg,
+        "bank_bias_deg": fits.bias_deg,
+    }
+    return FigureData("magnetic_table", columns, dict.fromkeys(columns, 4))
+
+
+def _modulus(readings: Readings, figures: list[Figure], fits: Fits) -> FigureData:
+    rows = np.unique(np.concatenate([figure.rows(right) for figure in figures for right in (True, False)]))
+    rows = rows[:: max(1, -(-len(rows) // LARGEST))]
+    shown = readings.take(rows)
+    columns = {"time_s": shown.time_s, "before_nt": np.linalg.norm(shown.field_nt, axis=1)}
+    for name, fit in (("poisson_attitude", fits.attitude), ("constant_modulus", fits.modulus)):
+        freed = (
+            fit.iron.field_nt(shown.field_nt, shown.current_a) if not fit.reason else np.full((len(shown), 3), np.nan)
+        )
+        columns[f"{name}_nt"] = np.linalg.norm(freed, axis=1)
+    return FigureData("magnetic_modulus", columns, dict.fromkeys(columns, 1) | {"time_s": 3})

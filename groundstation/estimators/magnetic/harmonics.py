@@ -1,0 +1,88 @@
+"""The five classical coefficients, with errors that allow for residuals correlated from sample to sample."""
+
+import math
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray
+
+COEFFICIENTS = 5
+INFLATION_MAX = 4.0
+BANDWIDTH_FACTOR = 1.1447  # Andrews 1991, equation 6.2, Bartlett kernel
+
+
+def design(heading_deg: FloatArray) -> FloatArray:
+    """Columns 1, sin c, cos c, sin 2c, cos 2c, shape (n, 5)."""
+    rad = np.deg2rad(np.asarray(heading_deg, dtype=np.float64))
+    return np.stack([np.ones_like(rad), np.sin(rad), np.cos(rad), np.sin(2 * rad), np.cos(2 * rad)], axis=-1)
+
+
+def fit(
+    heading_deg: FloatArray, error_deg: FloatArray, weight: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Coefficients A to E, shape (5,), by weighted least squares, and their covariance, shape (5, 5).
+
+    Errors must not wrap: they are differences from a middle, not headings. Samples in order of time or of heading.
+
+    Examples
+    --------
+    >>> heading = np.arange(360.0)
+    >>> values, _ = fit(heading, design(heading) @ [1.0, 2.0, -3.0, 0.5, 0.0])
+    >>> values.round(9).tolist()
+    [1.0, 2.0, -3.0, 0.5, 0.0]
+    """
+    columns = design(heading_deg)
+    weighted = columns if weight is None else columns * weight[:, None]
+    bread = np.linalg.pinv(columns.T @ weighted)
+    values = bread @ (weighted.T @ error_deg)
+    residual = error_deg - columns @ values
+    correlation = autocorrelation(residual, COEFFICIENTS)
+    middle = long_run(weighted * residual[:, None], correlation) * inflation(len(residual), COEFFICIENTS, correlation)
+    return values, bread @ middle @ bread
+
+
+def autocorrelation(residual: FloatArray, parameters: int) -> float:
+    """Correlation of neighbours, in [0, 0.995], freed of the bias that fitting so many slow regressors makes.
+
+    Source: M. G. Kendall, Biometrika 41 (1954) 403-404, whose (1 + 3 r) / n is that of a mean; k (1 + r) / n + 2 r / n
+    here.
+    """
+    power, count = float(np.sum(residual**2)), len(residual)
+    if count < 3 or power <= 0.0:
+        return 0.0
+    raw = float(np.sum(residual[1:] * residual[:-1]) / power)
+    return float(np.clip(raw + (parameters * (1.0 + raw) + 2.0 * raw) / count, 0.0, 0.995)) if raw > 0.0 else 0.0
+
+
+def inflation(samples: int, parameters: int, correlation: float) -> float:
+    """Factor n / (n - k) on a variance, n the number of independent samples that correlated ones are worth; at most 4.
+
+    Examples
+    --------
+    >>> inflation(110, 10, 0.0), inflation(3, 5, 0.0)
+    (1.1, 4.0)
+    """
+    worth = samples * (1.0 - correlation) / (1.0 + correlation)
+    return worth / max(worth - parameters, worth / INFLATION_MAX) if worth > 0.0 else INFLATION_MAX
+
+
+def long_run(scores: FloatArray, correlation: float) -> FloatArray:
+    """Covariance of the sum of correlated scores, shape (n, k) -> (k, k): prewhitened, then with Bartlett weights.
+
+    Scores are whitened by the first-order autocorrelation of the residuals, and the sum is recoloured by
+    1 / (1 - correlation)^2.
+
+    Source: D. W. K. Andrews, J. C. Monahan, Econometrica 60 (1992) 953-966; W. K. Newey, K. D. West, Econometrica 55
+    (1987) 703-708.
+    """
+    if not len(scores):
+        return np.zeros((scores.shape[1], scores.shape[1]))
+    white = scores.copy()
+    white[1:] -= correlation * scores[:-1]
+    lags = min(math.ceil(BANDWIDTH_FACTOR * len(scores) ** (1.0 / 3.0)), len(scores) - 1)
+    total = white.T @ white
+    for lag in range(1, lags + 1):
+        cross = white[lag:].T @ white[:-lag]
+        total += (1.0 - lag / (lags + 1.0)) * (cross + cross.T)
+    eigenvalues, vectors = np.linalg.eigh(0.5 * (total + total.T))  # weights keep it positive but for rounding
+    return np.asarray((vectors * np.maximum(eigenvalues, 0.0)) @ vectors.T / (1.0 - correlation) ** 2)

@@ -1,0 +1,116 @@
+"""What each correction leaves on the part of the flight that no fit has seen."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.records import BoolArray
+from groundstation.estimators.magnetic import harmonics
+from groundstation.estimators.magnetic.alignment import S_PER_H
+from groundstation.estimators.magnetic.apply import corrected_by_table
+from groundstation.estimators.magnetic.compass_table import CompassTable, bin_of
+from groundstation.estimators.magnetic.iron import Iron, derivatives
+from groundstation.estimators.magnetic.manoeuvre import Figure
+from groundstation.estimators.magnetic.poisson import IronFit, corrected_heading_deg
+from groundstation.estimators.magnetic.readings import Readings
+from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.results.magnetic import Alignment, HeldOut
+
+SECTOR_DEG = 30.0
+LARGEST = 5000  # readings judged: of more, every k-th
+LONGEST_STEP_S = 2.0  # counted as flown
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """Held-out readings, the magnetic heading they should show, and the sigma of the INS drift since the figure."""
+
+    readings: Readings
+    expected_deg: FloatArray
+    drift_sigma_deg: float
+
+    def error_deg(self, heading_deg: FloatArray) -> FloatArray:
+        """Shown minus expected."""
+        return wrap_180(heading_deg - self.expected_deg)
+
+
+@dataclass(frozen=True)
+class Left:
+    """RMS and mean of an error, and the sigma the mean should have."""
+
+    rms_deg: float
+    mean_deg: float
+    mean_sigma_deg: float
+
+
+def hold_out(
+    readings: Readings,
+    declination_deg: FloatArray,
+    is_airborne: BoolArray,
+    figures: list[Figure],
+    alignment: Alignment,
+    settings: MagneticSettings,
+) -> tuple[Unseen, HeldOut] | None:
+    """Level flight outside the figures, None where there is hardly any."""
+    is_unseen = is_airborne.copy()
+    for figure in figures:
+        for one in figure.turns:
+            low, high = one.turn.start_s - settings.held_out_margin_s, one.turn.end_s + settings.held_out_margin_s
+            is_unseen &= (readings.time_s < low) | (readings.time_s > high)
+    is_level = np.abs(readings.roll_deg) <= settings.held_out_bank_max_deg
+    rows = np.flatnonzero(is_unseen & is_level)
+    if len(rows) < settings.held_out_samples_min:
+        return None
+    level = readings.take(rows)
+    told = HeldOut(
+        len(rows),
+        float(np.sum(np.minimum(np.diff(level.time_s), LONGEST_STEP_S))),
+        len(np.unique(level.true_heading_deg // SECTOR_DEG)),
+        len(rows) / int(np.count_nonzero(is_unseen)),
+        float(np.max(np.abs(level.roll_deg))),
+    )
+    kept: NDArray[np.intp] = rows[:: -(-len(rows) // LARGEST)]
+    chosen = readings.take(kept)
+    hours = abs(float(np.mean(chosen.time_s)) - alignment.figure_at_s) / S_PER_H
+    expected = chosen.true_heading_deg - declination_deg[kept]
+    return Unseen(chosen, expected, alignment.drift_sigma_deg_per_h * hours), told
+
+
+def left_by_nothing(unseen: Unseen) -> Left:
+    """The uncorrected error."""
+    return _left(unseen, unseen.readings.magnetic_heading_deg, 0.0)
+
+
+def left_by_table(unseen: Unseen, table: CompassTable, deviation_deg: FloatArray, bias_deg: FloatArray) -> Left:
+    """What the table leaves; the forecast bank bias, shape (360,), is part of the sigma."""
+    shown = unseen.readings.magnetic_heading_deg
+    mean_columns = np.mean(harmonics.design(shown), axis=0)
+    bias = float(np.sqrt(np.mean(bias_deg[bin_of(shown)] ** 2)))
+    variance = float(mean_columns @ table.covariance @ mean_columns) + bias**2
+    return _left(unseen, corrected_by_table(shown, deviation_deg), variance)
+
+
+def left_by_iron(unseen: Unseen, fit: IronFit, azimuth_sigma_deg: float) -> Left:
+    """What freeing the readings of an iron leaves; the covariance of the fit is part of the sigma.
+
+    An error of the reference heading is in the fit and in the heading expected: what does not cancel counts.
+    """
+
+    def mean_of(iron: Iron) -> FloatArray:
+        return np.array([np.mean(unseen.error_deg(corrected_heading_deg(iron, unseen.readings)))])
+
+    slopes = derivatives(fit.iron, mean_of, max(abs(fit.earth.horizontal_nt), 1.0))
+    through_azimuth = azimuth_sigma_deg * (float(slopes[0] @ fit.per_azimuth_deg) - 1.0)
+    variance = float(slopes[0] @ fit.covariance @ slopes[0]) + through_azimuth**2
+    return _left(unseen, corrected_heading_deg(fit.iron, unseen.readings), variance)
+
+
+def _left(unseen: Unseen, heading_deg: FloatArray, variance: float) -> Left:
+    error = unseen.error_deg(heading_deg)
+    mean = float(np.mean(error))
+    spread = (error - mean)[:, None]
+    scatter = float(harmonics.long_run(spread, harmonics.autocorrelation(spread[:, 0], 1))[0, 0]) / len(error) ** 2
+    sigma = np.sqrt(max(variance, 0.0) + scatter + unseen.drift_sigma_deg**2)
+    return Left(float(np.sqrt(np.mean(error**2))), mean, float(sigma))

@@ -1,0 +1,20 @@
+"""Chapters of the fleet report: ``build(fleet)`` gives a Section, or None when there is nothing to say."""
+
+from collections.abc import Callable
+
+from groundstation.reports.fleet import aircraft, calibration, densities, flights, rest, skill, trend
+from groundstation.reports.parts import Section
+from groundstation.results.fleet import FleetResults
+
+CHAPTERS: tuple[Callable[[FleetResults], Section | None], ...] = (
+    flights.build,
+    densities.build,
+    aircraft.heading,
+    trend.build,
+    aircraft.ins,
+    skill.build,
+    calibration.build,
+    rest.outliers,
+    rest.not_in_fleet,
+    rest.method,
+)

@@ -1,0 +1,94 @@
+"""Chapter: whether the stated sigmas of the heading error are honest, by independent checks over all flights."""
+
+from typing import Any
+
+import numpy as np
+
+from groundstation.reports import drawing as d
+from groundstation.reports.fleet.common import name_axis, plural
+from groundstation.reports.parts import Drawing, Grid, Head, Mark, Note, Section
+from groundstation.reports.sections.inertial import percent
+from groundstation.reports.wording import number, typeset
+from groundstation.results.fleet import FleetCalibration, FleetResults
+
+LEAD = "Are the stated intervals honest? Of something known independently, 95 % should lie inside."
+
+
+def build(fleet: FleetResults) -> Section:
+    """Build the chapter."""
+    title = "Calibration"
+    if not fleet.calibration:
+        text = "No flight has anything independent to check the heading error by."
+        return Section("calibration", title, LEAD, (Note(text, "unknown"),))
+    return Section("calibration", title, LEAD, (_figure(fleet), _table(fleet)))
+
+
+def judged(row: FleetCalibration) -> Mark:
+    """Whether the stated share lies in the interval of the share found."""
+    low, high = row.confidence95
+    if high < row.stated:
+        return Mark("warn", "too sure")
+    return Mark("plain", "too careful") if low > row.stated else Mark("good", "consistent")
+
+
+def _figure(fleet: FleetResults) -> Drawing:
+    rows = fleet.calibration
+    height = 64.0 + 8.0 * len(rows)
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 62, 62, 174, height - 2.0)
+        for place, row in enumerate(rows):
+            bar = 100.0 * np.array([row.confidence95])
+            d.bars(axes, bar[:, 0], bar[:, 1], place, d.USED, 2.4)
+            axes.plot([100.0 * row.share_inside], [place], "o", color=d.USED, markersize=4.5)
+        axes.axvline(100.0 * rows[0].stated, color=d.LIMIT, linewidth=0.9, linestyle=(0, (4, 2)))
+        name_axis(axes, [f"{_short(row)}  ·  {plural(row.checks, 'check')}" for row in rows])
+        low = min(row.confidence95[0] for row in rows)
+        axes.set_xlim(max(100.0 * low - 5.0, -2.0), 102.0)
+        axes.set_xlabel("inside the stated 95 % interval, %")
+        for place, row in enumerate(rows):
+            left = 16.0 + 56.0 * place
+            panel = d.place(figure, left, 12, left + 46.0, 42)
+            panel.stairs(
+                row.pit, np.linspace(0.0, 1.0, len(row.pit) + 1), fill=True, facecolor=d.FILL, edgecolor=d.USED
+            )
+            panel.axhline(row.checks / len(row.pit), color=d.INK, linewidth=0.8, linestyle=":")
+            panel.set_title(_short(row))
+            panel.set_xlim(0.0, 1.0)
+            panel.set_xlabel("probability integral transform")
+            if place == 0:
+                panel.set_ylabel("checks")
+
+    caption = (
+        "Above: share of the checks inside with its exact 95 % interval; honest sigmas have the dashed line in it. "
+        "Below: where the checks fell in the distribution claimed for them; honest is flat (dotted), heaped at both "
+        "ends too sure, heaped in the middle too careful, heaped at one end off in one direction."
+    )
+    alt = "Share of checks inside the stated interval, and histograms of their probability integral transform."
+    return Drawing("Checks inside the stated interval", caption, alt, d.draw("fleet-calibration", height, paint))
+
+
+def _short(row: FleetCalibration) -> str:
+    return {"reference": "Parking reference", "runway": "Runway", "onboard": "Found on board"}.get(
+        row.quantity, d.label(row.quantity, 20)
+    )
+
+
+def _table(fleet: FleetResults) -> Grid:
+    heads = (
+        *(Head("Check"), Head("Checks", True), Head("Inside", True), Head("Share", True)),
+        *(Head("95 % interval", True), Head("Mean of z", True), Head("σ of z", True), Head("Sigmas are")),
+    )
+    rows = [
+        (
+            *(typeset(row.title), number(row.checks, 0), number(row.inside, 0), percent(row.share_inside, 1)),
+            " … ".join(percent(bound, 1) for bound in row.confidence95),
+            *(number(row.z_mean, 2, signed=True), number(row.z_sigma, 2), judged(row)),
+        )
+        for row in fleet.calibration
+    ]
+    caption = (
+        "z: residual over its stated sigma, honest are 0 and 1. Flights with the verdict reject are left out. What was "
+        "found on board rests on the samples we use too: more than 95 % inside is what to expect of it."
+    )
+    return Grid("Checks", heads, rows, caption)

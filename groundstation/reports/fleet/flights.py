@@ -1,0 +1,119 @@
+"""Chapter: every flight and what is out of the ordinary about it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from groundstation.reports.fleet.common import aircraft_name, bounded, plural, title_of
+from groundstation.reports.parts import Cell, Grid, Head, Mark, Note, Section, Tone
+from groundstation.reports.sections.front import VERDICTS
+from groundstation.reports.wording import ABSENT, clean, number, typeset
+from groundstation.results.fleet import FleetResults
+
+KEY = "flights"
+LEAD = "Every flight of the fleet, with what is out of the ordinary about it."
+GRAVITY: tuple[Tone, ...] = ("bad", "warn", "plain")
+HEADS = (
+    *(Head("Flight"), Head("Aircraft"), Head("Start, UTC"), Head("Verdict")),
+    *(Head("Error, °", True), Head("±, °", True), Head("To enter, °", True), Head("Reference, ′", True)),
+    *(Head("INS, nmi/h", True), Head("60 min, m", True), Head("Remarks")),
+)
+CAPTION = (
+    "Error: INS heading − true heading, with half of its 95 % interval; reference: corrected parking heading less it; "
+    "INS: radial error rate, half of the time below; 60 min: RMS error of the forecast after that long without GNSS."
+)
+LINKED = (("recording", "rrd"), ("mcap", "mcap"))
+
+
+@dataclass(frozen=True)
+class FlightLine:
+    """A flight in the table: its cells but the last, remarks, links (text, address relative to the fleet's page)."""
+
+    report: str
+    cells: Sequence[Cell]
+    remarks: Sequence[Mark]
+    links: Sequence[tuple[str, str]]
+
+
+def lines(fleet: FleetResults) -> list[FlightLine]:
+    """Every flight in the order of the fleet."""
+    noted = remarks_of(fleet)
+    columns = {name: values.tolist() for name, values in fleet.flights.columns.items() if name != "start_utc"}
+    columns["start"] = [_minute(time) for time in fleet.flights["start_utc"]]
+    rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
+    return [_line(row, noted.get(row["flight_id"], ())) for row in rows]
+
+
+def _line(row: dict[str, Any], remarks: Sequence[Mark]) -> FlightLine:
+    half = 0.5 * (row["confidence95_high_deg"] - row["confidence95_low_deg"])
+    cells: tuple[Cell, ...] = (
+        *(row["flight_id"], aircraft_name(row["aircraft"]), row["start"], verdict_mark(row["verdict"])),
+        *(bounded(row["error_deg"], 3, signed=True), bounded(half, 3), bounded(row["correction_deg"], 2, signed=True)),
+        bounded(row["reference_residual_arcmin"], 1, signed=True),
+        *(bounded(row["radial_error_rate_50_nmiph"], 2), bounded(row["forecast_60min_rms_m"], 0)),
+    )
+    links = [(text, row[name]) for name, text in LINKED if row[name]]
+    return FlightLine(row["report"], cells, remarks, [*links, ("folder", row["flight_id"] + "/")])
+
+
+def _minute(time: np.datetime64) -> str:
+    return ABSENT if np.isnat(time) else str(time.astype("datetime64[m]")).replace("T", " ")
+
+
+def verdict_mark(verdict: str) -> Mark:
+    """A verdict as it stands in a cell."""
+    tone, word = VERDICTS.get(verdict, ("unknown", clean(verdict) or "not assessable"))
+    return Mark(tone, word.lower())
+
+
+def remarks_of(fleet: FleetResults) -> dict[str, list[Mark]]:
+    """What is out of the ordinary about flights, by flight id, gravest first."""
+    found: dict[str, list[Mark]] = {}
+
+    def note(flight_id: Any, tone: Tone, text: str) -> None:
+        found.setdefault(str(flight_id), []).append(Mark(tone, text))
+
+    flights, trend = fleet.flights, fleet.trend
+    for row in np.flatnonzero(flights["status"] == "failed"):
+        note(flights["flight_id"][row], "bad", "failed")
+    for row in np.flatnonzero(flights["verdict"] == "reject"):
+        note(
+            flights["flight_id"][row], "bad", f"rejected: {typeset(str(flights['verdict_reason'][row])) or 'no reason'}"
+        )
+    for outlier in fleet.outliers:
+        note(outlier.flight_id, "warn", f"outlier: {title_of(outlier.quantity)}")
+    for row in np.flatnonzero(trend["is_outside"]) if len(trend) else ():
+        note(trend["flight_id"][row], "warn", f"outside limits: {title_of(str(trend['quantity'][row]))}")
+    for change in fleet.change_points:
+        note(change.flight_id, "warn", f"new level from here: {title_of(change.quantity)}")
+    for row in np.flatnonzero(flights["findings_fail"] > 0):
+        note(flights["flight_id"][row], "warn", plural(int(flights["findings_fail"][row]), "grave finding"))
+    for row in np.flatnonzero(flights["has_lost_data"]):
+        note(flights["flight_id"][row], "plain", "data lost")
+    return found
+
+
+def build(fleet: FleetResults) -> Section:
+    """Build the chapter as paper has it: the flights of note first, the gravest of them on top."""
+    if not len(fleet):
+        return Section(KEY, "Flights", LEAD, (Note("No log gave a flight.", "unknown"),))
+    every = sorted(lines(fleet), key=_gravity)
+    noted = sum(_gravity(line) < GRAVITY.index("plain") for line in every)
+    shown = (0, 2, 3, 4, 5)
+    heads = (*(HEADS[place] for place in shown), HEADS[-1])
+    rows = [(*(line.cells[place] for place in shown), _joined(line.remarks)) for line in every]
+    caption = (
+        f"First what is of note, {number(noted, 0)} of {plural(len(fleet), 'flight')}: failed, rejected, outliers, "
+        "outside the limits, the first of a new level, or with grave findings."
+    )
+    return Section(KEY, "Flights", LEAD, (Grid("Flights", heads, rows, caption),))
+
+
+def _gravity(line: FlightLine) -> int:
+    return min((GRAVITY.index(mark.tone) for mark in line.remarks), default=len(GRAVITY))
+
+
+def _joined(remarks: Sequence[Mark]) -> str:
+    return "; ".join(mark.text for mark in remarks)

@@ -1,0 +1,83 @@
+"""The report of a folder of flights: one self-contained HTML file with every flight, and its PDF."""
+
+import base64
+import hashlib
+from dataclasses import replace
+from pathlib import Path
+
+from groundstation.reports.fleet import CHAPTERS, flights, front
+from groundstation.reports.flight_report import Written, write_pages
+from groundstation.reports.page import TEMPLATES, render
+from groundstation.reports.parts import Document, Grid, Part
+from groundstation.reports.wording import number
+from groundstation.results.fleet import FleetResults
+
+PAGE = "summary.html"
+MOST_ROWS_ON_PAPER = 60
+
+
+def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True) -> Written:
+    """Write summary.html and summary.pdf into a folder of flights.
+
+    Parameters
+    ----------
+    out : Path
+        Holds the flight folders: links are relative to it.
+    fleet : FleetResults
+        Equal results give equal bytes, whatever the time, the host or the order of the logs.
+    with_pdf : bool
+        Without it there is no summary.pdf afterwards.
+
+    Notes
+    -----
+    The page has a row for every flight; paper has at most 60 rows of any table, the flights of note first, and says how
+    many more there are. The page's one script sorts and filters the table of flights; without it the table stands as it
+    is.
+
+    Raises
+    ------
+    OSError
+        When a file cannot be written.
+    """
+    document = fleet_document(fleet)
+    return write_pages(out / PAGE, fleet_report_html(document, fleet), on_paper(document), with_pdf=with_pdf)
+
+
+def fleet_document(fleet: FleetResults) -> Document:
+    """Put the report of a fleet together, its tables at full length."""
+    sections = tuple(section for section in (build(fleet) for build in CHAPTERS) if section is not None)
+    top = front.build(fleet)
+    return Document("Fleet report", top.title, top, sections)
+
+
+def on_paper(document: Document) -> Document:
+    """The same with long tables cut."""
+    sections = [replace(one, parts=tuple(map(_shortened, one.parts))) for one in document.sections]
+    return replace(document, sections=sections)
+
+
+def _shortened(part: Part) -> Part:
+    if not isinstance(part, Grid) or len(part.rows) <= MOST_ROWS_ON_PAPER:
+        return part
+    more = f"The first {MOST_ROWS_ON_PAPER}; {number(len(part.rows) - MOST_ROWS_ON_PAPER, 0)} more in {PAGE}."
+    return replace(part, rows=part.rows[:MOST_ROWS_ON_PAPER], caption=f"{part.caption} {more}".strip())
+
+
+def fleet_report_html(document: Document, fleet: FleetResults) -> str:
+    """Render the report of a fleet as a complete HTML document, every flight in its table with links."""
+    script = (TEMPLATES / "fleet.js").read_text(encoding="utf-8").strip()
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
+    return render(
+        "fleet.html.j2",
+        kind=document.kind,
+        label=document.label,
+        front=document.front,
+        sections=document.sections,
+        table_key=flights.KEY,
+        heads=flights.HEADS,
+        lines=flights.lines(fleet),
+        table_caption=flights.CAPTION,
+        script=script,
+        script_digest=digest,
+        style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
+    )

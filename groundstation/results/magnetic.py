@@ -1,0 +1,264 @@
+"""Answer of the magnetic estimator (system 3): the deviation found in flight, how sure it is, what it leaves over."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from groundstation.results.figures import FigureData
+from groundstation.results.frames import Tabular
+from groundstation.results.heading import Gate
+
+MagneticVerdict = Literal["accept", "reject", "undecided"]
+MethodName = Literal["compass_table", "poisson_attitude", "constant_modulus"]
+MethodState = Literal["fitted", "refused"]
+TurnState = Literal["used", "rejected"]
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+LETTERS = ("A", "B", "C", "D", "E")
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """INS heading error at the time of the figure, taken off the INS heading before anything is compared with it.
+
+    ``aligned_error_deg`` and ``aligned_sigma_deg`` belong to ``aligned_at_s``, ``error_deg`` and ``sigma_deg`` to
+    ``figure_at_s`` (flight seconds), after the drift of the hours between. ``origin`` says whence.
+    """
+
+    origin: str
+    error_deg: float
+    sigma_deg: float
+    aligned_error_deg: float
+    aligned_sigma_deg: float
+    drift_deg_per_h: float
+    drift_sigma_deg_per_h: float
+    aligned_at_s: float | None
+    figure_at_s: float
+
+
+@dataclass(frozen=True)
+class DeclinationUsed:
+    """Declination at the figure, east positive, with its sigma, and the model's horizontal and vertical intensity."""
+
+    value_deg: float
+    sigma_deg: float
+    model: str
+    horizontal_nt: float | None = None
+    down_nt: float | None = None
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A turn of about constant bank, and why it is not used. Bank right positive; times are flight seconds."""
+
+    start_s: float
+    end_s: float
+    bank_deg: float
+    bank_sd_deg: float
+    turned_deg: float
+    altitude_m: float | None
+    altitude_range_m: float | None
+    samples: int
+    state: TurnState
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Swing:
+    """One figure: opposite turns that cover the circle together, and its own A to E.
+
+    ``difference_rms_deg`` compares its curve with that of the other figures; None where there is but one.
+    """
+
+    number: int
+    start_s: float
+    end_s: float
+    right_bank_deg: float
+    left_bank_deg: float
+    covered_share: float
+    coefficients_deg: dict[str, float]
+    sigma_deg: dict[str, float]
+    difference_rms_deg: float | None = None
+    difference_sigma_deg: float | None = None
+
+
+@dataclass(frozen=True)
+class SigmaPart:
+    """One contribution to the sigma of coefficient A; they add in quadrature."""
+
+    name: str
+    sigma_deg: float
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How much of the circle of magnetic headings both branches cover.
+
+    ``share`` counts bins with readings of both, or in a gap no wider than the settings allow; ``measured_bins`` those
+    with readings alone, ``interpolated_bins`` the rest of 360; ``widest_gap_deg`` without readings of both.
+    """
+
+    share: float
+    measured_bins: int
+    interpolated_bins: int
+    widest_gap_deg: float
+
+
+@dataclass(frozen=True)
+class Residual:
+    """RMS error of the magnetic heading on the part of the flight that no fit has seen, its mean included."""
+
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """The level part of the flight that no fit has seen; ``level_share`` is its share of all that none has seen.
+
+    ``heading_sectors`` of 30 deg, of 12, were flown in it.
+    """
+
+    samples: int
+    seconds: float
+    heading_sectors: int
+    level_share: float
+    largest_bank_deg: float
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to find the deviation, fitted or refused, and what it leaves on the held-out part.
+
+    Parameters
+    ----------
+    name : {'compass_table', 'poisson_attitude', 'constant_modulus'}
+    state : {'fitted', 'refused'}
+    reason : str
+        Why it is refused, or what it cannot see.
+    condition_number : float or None
+        Of the scaled normal problem; large: hardly observable.
+    fit_rms_nt : float or None
+        RMS of what the fit leaves of the field, per axis.
+    held_out_before_deg, held_out_after_deg : float or None
+        RMS error of the magnetic heading without and with the correction.
+    held_out_mean_deg, held_out_mean_sigma_deg : float or None
+        Mean of the error after correction, and the sigma it should have. The heading expected comes from the same INS
+        and model: of their errors only what the method does not take over counts.
+    coefficients_deg, coefficients_sigma_deg : mapping of A ... E to deg
+        Of level flight; empty where refused. The modulus does not show A.
+    """
+
+    name: MethodName
+    state: MethodState
+    reason: str = ""
+    samples: int = 0
+    parameters: int = 0
+    condition_number: float | None = None
+    fit_rms_nt: float | None = None
+    held_out_before_deg: float | None = None
+    held_out_after_deg: float | None = None
+    held_out_mean_deg: float | None = None
+    held_out_mean_sigma_deg: float | None = None
+    coefficients_deg: dict[str, float] = field(default_factory=dict)
+    coefficients_sigma_deg: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class PoissonParameters:
+    """Iron of the aircraft: reading = soft_iron @ field + hard_iron + current_effect x (current - reference).
+
+    ``field`` is the earth's along the body axes (forward, right, down). Sigmas have the same shapes;
+    ``current_*`` are None where no current was logged, or it did not vary.
+    """
+
+    hard_iron_nt: Vector
+    hard_iron_sigma_nt: Vector
+    soft_iron: Matrix
+    soft_iron_sigma: Matrix
+    current_effect_nt_per_a: Vector | None = None
+    current_effect_sigma_nt_per_a: Vector | None = None
+    current_reference_a: float | None = None
+
+
+@dataclass(frozen=True)
+class BankBias:
+    """Forecast from the fitted iron: error that the average of opposite banks has in level flight."""
+
+    bank_deg: float
+    rms_deg: float
+    is_flown: bool = False
+
+
+@dataclass(frozen=True)
+class CardRow:
+    """Steer card: to fly ``magnetic_heading_deg`` steer ``steer_deg`` by the uncorrected magnetic heading.
+
+    ``deviation_deg`` is added to the reading; ``is_interpolated``: no reading of both branches near it.
+    """
+
+    magnetic_heading_deg: float
+    steer_deg: float
+    deviation_deg: float
+    sigma_deg: float
+    is_interpolated: bool
+
+
+@dataclass(frozen=True)
+class MagneticResult(Tabular):
+    """Deviation of the magnetic heading found in flight. Advisory, not a release to service.
+
+    Parameters
+    ----------
+    ins_topic, magnetometer_topic : str
+    verdict, verdict_reason
+        accept: every required gate passed; undecided: nothing failed, a required gate was not measured.
+    recommended_method, recommendation
+        What to correct by, and why.
+    coefficients_deg, coefficients_sigma_deg : mapping of A ... E to deg
+        error(c) = A + B sin c + C cos c + D sin 2c + E cos 2c, c the uncorrected magnetic heading, error = magnetic
+        heading - true magnetic heading, declination removed: of the table. The sigma of A holds alignment, drift and
+        declination (``a_parts``); that of all the forecast bank bias.
+    compass_error_deg : tuple of 360
+        Magnetic heading minus true heading in bin [k, k + 1) of magnetic heading: declination is in it.
+    deviation_deg : tuple of 360
+        To be added to the reading: true magnetic heading minus reading, declination removed.
+    residual_rms_deg : Residual or None
+        Before and after the recommended correction, on the held-out part; None where nothing was left to hold out.
+    figures
+        ``magnetic_samples`` (readings: part of the flight, errors before and after each method), ``magnetic_table``
+        (360 bins: branches, average, fitted curve, deviation, bank bias), ``magnetic_modulus`` (before and after).
+    """
+
+    ins_topic: str
+    magnetometer_topic: str
+    verdict: MagneticVerdict
+    verdict_reason: str
+    recommended_method: MethodName
+    recommendation: str
+    coefficients_deg: dict[str, float]
+    coefficients_sigma_deg: dict[str, float]
+    a_parts: tuple[SigmaPart, ...]
+    compass_error_deg: tuple[float, ...]
+    deviation_deg: tuple[float, ...]
+    coverage: Coverage
+    residual_rms_deg: Residual | None
+    alignment: Alignment
+    declination: DeclinationUsed
+    gates: tuple[Gate, ...]
+    methods: tuple[Method, ...]
+    turns: tuple[Turn, ...]
+    swings: tuple[Swing, ...]
+    bank_bias: tuple[BankBias, ...]
+    card: tuple[CardRow, ...]
+    held_out: HeldOut | None = None
+    poisson: PoissonParameters | None = None
+    modulus: PoissonParameters | None = None
+    table_fit_rms_deg: float | None = None
+    remarks: tuple[str, ...] = ()
+    settings: dict[str, float | str | bool] = field(default_factory=dict)
+    figures: tuple[FigureData, ...] = ()
+
+    def method(self, name: MethodName) -> Method:
+        """The row of a method; refused where it was never tried."""
+        found = (row for row in self.methods if row.name == name)
+        return next(found, Method(name, "refused", "not tried"))
