@@ -198,7 +198,7 @@ def test_a_cluster_loses_nothing_when_a_worker_is_killed(bucket: str, logs: Path
     assert_equal_runs(copy, whole)
 
 
-def test_a_scheduler_that_goes_away_is_told_in_one_line(tmp_path: Path) -> None:
+def test_a_scheduler_that_goes_away_is_told_in_one_line(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
     scheduler_file = tmp_path / "scheduler.json"
     scheduler = subprocess.Popen(
@@ -224,6 +224,7 @@ def test_a_scheduler_that_goes_away_is_told_in_one_line(tmp_path: Path) -> None:
         killer.start()
         with pytest.raises(GroundstationError, match="the scheduler is gone"):
             list(waiting)
+        assert caplog.text == ""
     finally:
         killer.cancel()
         scheduler.kill()

@@ -3,7 +3,6 @@
 import logging
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from itertools import islice
 from typing import TYPE_CHECKING
@@ -60,11 +59,10 @@ def on_cluster(
         ended = as_completed(handed_over(AHEAD * sum(client.nthreads().values())), loop=client.loop)
         for future in ended:
             number, job = running.pop(future.key)
-            try:
-                error = future.exception()
-            except CancelledError as lost:
+            if future.cancelled():
                 hint = "start it, and run again: what was finished is kept"
-                raise GroundstationError(scheduler, "the scheduler is gone", "", hint) from lost
+                raise GroundstationError(scheduler, "the scheduler is gone", "", hint)
+            error = future.exception()
             yield number, future.result() if error is None else _failed(job, error)
             ended.update(handed_over(1))
 
@@ -84,7 +82,7 @@ def _connected(scheduler: str) -> Iterator["Client"]:
         from distributed import Client
     except ImportError as error:
         raise UsageError(scheduler, "no package distributed", "", "pip install 'groundstation[cluster]'") from error
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # its tracebacks: what is wrong is told in one line
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what is wrong is told in one line here
     try:
         client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
