@@ -15,12 +15,12 @@ import pytest
 from filelock import FileLock
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.batch import LOCK, plan_many, run_many
+from groundstation.pipeline.batch import LOCK, _crew, plan_many, run_many
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.flight import Job
 from groundstation.pipeline.outcome import Outcome
-from groundstation.pipeline.progress import Event, Listener
-from groundstation.pipeline.workers import _teller
+from groundstation.pipeline.progress import Event, Listener, silent
+from groundstation.pipeline.workers import TASKS_PER_PROCESS, _teller, in_turn, side_by_side
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 SHORT = SAMPLES / "taxi-short.csv"
@@ -232,6 +232,11 @@ def is_alive(process: int) -> bool:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
+
+
+def test_many_logs_are_never_run_in_the_process_that_leads() -> None:
+    few, many = (_crew("", 1, logs, silent) for logs in (TASKS_PER_PROCESS, TASKS_PER_PROCESS + 1))
+    assert (few.func, many.func) == (in_turn, side_by_side)  # recordings leave threads behind
 
 
 def test_an_event_of_a_worker_is_one_write_to_a_pipe() -> None:

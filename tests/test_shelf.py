@@ -1,10 +1,13 @@
 """Finished flights are put into place: twins, clashing ids, ids that changed, places that cannot be written."""
 
 import json
+import shutil
 from pathlib import Path
 
+import pytest
+
 from groundstation.pipeline.depot import FolderDepot
-from groundstation.pipeline.flight import PARTIAL_PREFIX
+from groundstation.pipeline.flight import PARTIAL_PREFIX, remove
 from groundstation.pipeline.outcome import Outcome
 from groundstation.pipeline.shelf import Shelf
 
@@ -72,6 +75,18 @@ def test_a_flight_that_has_another_id_now_is_listed_once_and_notes_stay(tmp_path
     run(tmp_path, finished(tmp_path, "a", ONE))
     assert names(tmp_path) == [FLIGHT, "annotated", "kept"]
     assert names(tmp_path / "annotated") == ["notes.txt"]
+
+
+def test_a_flight_is_removed_at_once_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    finished(tmp_path, "a", ONE, folder=FLIGHT)
+
+    def killed(path: Path) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(shutil, "rmtree", killed)
+    with pytest.raises(KeyboardInterrupt):
+        remove(tmp_path / FLIGHT)
+    assert names(tmp_path) == [f"{PARTIAL_PREFIX}{FLIGHT}"]  # which the next run clears away
 
 
 def test_a_newer_version_of_a_log_takes_the_place_of_the_older_one(tmp_path: Path) -> None:

@@ -271,14 +271,15 @@ def is_made(name: str, identity: str) -> bool:
 
 
 def remove(folder: Path) -> None:
-    """Remove what a run made of a flight folder, its marks first, and the folder unless something else is in it."""
+    """Remove a flight folder; where something else is in it, what a run made of it, its marks first."""
+    if all(is_made(entry.name, folder.name) for entry in folder.iterdir()):
+        shutil.rmtree(folder.rename(folder.with_name(f"{PARTIAL_PREFIX}{folder.name}")))  # a kill leaves no part of it
+        return
     for name in (SUMMARY, MANIFEST):
         (folder / name).unlink(missing_ok=True)
     for entry in folder.iterdir():
         if is_made(entry.name, folder.name):
             shutil.rmtree(entry) if entry.is_dir() and not entry.is_symlink() else entry.unlink()
-    if not any(folder.iterdir()):
-        folder.rmdir()
 
 
 def place(partial: Path, target: Path) -> None:

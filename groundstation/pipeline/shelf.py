@@ -109,7 +109,8 @@ class Shelf:
             if origin is None or now.get(origin.sha256) == folder.name:
                 continue
             if origin.sha256 in now or (origin.path, plain_id(folder.name, origin.sha256)) in versions:
-                self._depot.discard(folder.name)
+                with suppress(OSError, GroundstationError):  # the next run tries again
+                    self._depot.discard(folder.name)
 
     def outcomes(self) -> tuple[Outcome, ...]:
         """What became of the logs put so far, in the order of the inputs."""
