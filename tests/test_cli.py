@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from groundstation.cli.main import LATER_VERBS, VERBS, app
+from groundstation.cli.application import VERBS, app
+from groundstation.cli.main import LATER_VERBS
 
 HEAVY = (
     *("numpy", "pandas", "pyarrow", "numba", "scipy", "rerun", "matplotlib", "mcap", "google.protobuf"),

@@ -7,7 +7,7 @@ import typer
 
 from groundstation.base.findings import Finding
 from groundstation.base.signals import is_canonical
-from groundstation.cli.main import printable
+from groundstation.cli.application import printable
 from groundstation.cli.printing import as_json, columns, totals
 from groundstation.pipeline.check import Checked
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from groundstation.cli.main import DONE, Verbose, answers_with_exit_code, app, say
+from groundstation.cli.application import DONE, Verbose, answers_with_exit_code, app, say
 
 
 @app.command()

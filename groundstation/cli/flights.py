@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from groundstation.cli.main import (
+from groundstation.cli.application import (
     DONE,
     ConfigFile,
     Force,

@@ -1,146 +1,38 @@
-"""The command ``groundstation``: its verbs, options and exit codes. Heavy imports happen inside the verbs."""
+"""The command ``groundstation``: its verbs. Heavy imports happen inside them."""
 
 import io
 import sys
-from collections.abc import Callable, Iterable
-from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, Literal, ParamSpec
+from typing import Annotated, Any, Literal
 
 import typer
-import typer.core
 
 from groundstation import __version__
-from groundstation.base.errors import GroundstationError, UsageError
-
-DONE, FAILED, USAGE, DATA_LOST, LIMIT_REACHED = 0, 1, 2, 3, 4
-INTERRUPTED = 130
-EXIT_CODES = (
-    "Exit codes: 0 done; 1 could not read or compute; 2 usage; 3 done, with data lost (truncated, corrupt spans, "
-    "channels dropped); 4 done, and --fail-on reached. For several logs the worst wins (1, 4, 3, 0)."
+from groundstation.cli import fleets, flights
+from groundstation.cli.application import (
+    DATA_LOST,
+    DONE,
+    USAGE,
+    AircraftFile,
+    ConfigFile,
+    FailOn,
+    Force,
+    IntervalsFile,
+    Json,
+    NoPdf,
+    Profile,
+    Progress,
+    Quiet,
+    SiteFile,
+    ThresholdsFile,
+    Verbose,
+    answers_with_exit_code,
+    app,
+    say,
+    tell_written,
 )
 
-VERBS = (
-    *("info", "check", "convert", "run", "report", "view", "clip", "compare", "serve"),
-    *("simulate", "study", "list"),
-)
-
-
-class InOrder(typer.core.TyperGroup):
-    """The verbs in the order of a flight's way, wherever they are defined."""
-
-    def list_commands(self, ctx: Any) -> list[str]:
-        """Names, those without a place at the end."""
-        places = {name: place for place, name in enumerate(VERBS)}
-        return sorted(super().list_commands(ctx), key=lambda name: places.get(name, len(VERBS)))
-
-
-app = typer.Typer(
-    name="groundstation",
-    cls=InOrder,
-    help="Ground station for post-flight navigation analysis: recorded logs become MCAP, a heading correction, a "
-    "Rerun recording and a report.",
-    epilog=EXIT_CODES,
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-
-Parameters = ParamSpec("Parameters")
-
-ProgressMode = Literal["auto", "none", "json"]
-FailOn = Literal["none", "warn", "fail"]
-
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing but errors on the terminal.")]
-Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more; show where an internal error came from.")]
-Json = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
-Force = Annotated[bool, typer.Option("-f", "--force", help="Overwrite what is there.")]
-NoPdf = Annotated[bool, typer.Option("--no-pdf", help="Leave report.pdf out.")]
-Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
-Profile = Annotated[
-    Path | None,
-    typer.Option(
-        "--profile", help="Profile (TOML) that describes the columns of a CSV.", metavar="FILE", readable=False
-    ),
-]
-ConfigFile = Annotated[Path | None, typer.Option("--config", help="Settings (TOML).", metavar="FILE", readable=False)]
-AircraftFile = Annotated[
-    Path | None,
-    typer.Option("--aircraft", help="Aircraft file (TOML): antenna arm, entry step.", metavar="FILE", readable=False),
-]
-SiteFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--site", help="Site file (TOML): stands, runways and their bearings.", metavar="FILE", readable=False
-    ),
-]
-IntervalsFile = Annotated[
-    Path | None,
-    typer.Option("--intervals", help="Intervals to exclude or force (TOML).", metavar="FILE", readable=False),
-]
-ThresholdsFile = Annotated[
-    Path | None,
-    typer.Option("--thresholds", help="Limits of the integrity ledger (TOML).", metavar="FILE", readable=False),
-]
-
-
-def printable(text: str) -> str:
-    """Text of a log without control characters: a log must not drive the terminal.
-
-    Examples
-    --------
-    >>> printable("L-39\\x1b[2J")
-    'L-39?[2J'
-    """
-    return "".join(character if character.isprintable() else "?" for character in text)
-
-
-def say(text: str) -> None:
-    """Print a line on stderr."""
-    typer.echo(printable(text), err=True)
-
-
-def tell_written(paths: Iterable[object], *, as_json_text: bool, quiet: bool) -> None:
-    """Print the files that were written."""
-    from groundstation.cli.printing import as_json
-
-    written = [str(path) for path in paths]
-    if as_json_text:
-        typer.echo(as_json({"written": written}))
-    elif not quiet:
-        typer.echo("\n".join(map(printable, written)))
-
-
-def answers_with_exit_code(verb: Callable[Parameters, int | None]) -> Callable[Parameters, None]:
-    """Turn a verb's answer into the exit code, and its errors into one clear line."""
-
-    @wraps(verb)
-    def run(*args: Parameters.args, **options: Parameters.kwargs) -> None:
-        try:
-            code = verb(*args, **options) or DONE
-        except UsageError as error:
-            say(f"error: {error}")
-            code = USAGE
-        except GroundstationError as error:
-            say(f"error: {error}")
-            code = FAILED
-        except KeyboardInterrupt:
-            say("interrupted")
-            code = INTERRUPTED
-        except BrokenPipeError:  # the reader of our output went away: `groundstation list | head -1`
-            sys.stderr.close()
-            code = DONE
-        except OSError as error:
-            say(f"error: {error.filename or 'file system'}: {error.strerror or error}")
-            code = FAILED
-        except Exception as error:  # a defect of ours: one line for the user, the rest on request
-            if options.get("verbose"):
-                raise
-            say(f"error: internal error ({type(error).__name__}: {error}); please report it; -v shows where")
-            code = FAILED
-        raise typer.Exit(code)
-
-    return run
+__all__ = ["app", "fleets", "flights", "main"]  # the modules hold more verbs
 
 
 def _version(is_asked: bool) -> None:
@@ -413,9 +305,6 @@ def _add_later_verb(name: str) -> None:
 
 for _name in LATER_VERBS:
     _add_later_verb(_name)
-
-from groundstation.cli import fleets as fleets  # noqa: E402  more verbs, which need what stands above
-from groundstation.cli import flights as flights  # noqa: E402
 
 
 def main(arguments: Any = None) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import typer
 
-from groundstation.cli.main import printable
+from groundstation.cli.application import printable
 from groundstation.pipeline.describe import Description
 from groundstation.pipeline.outcome import Outcome, worst_code
 
