@@ -9,10 +9,11 @@ import pytest
 
 from groundstation.reports.drawing import sketching
 from groundstation.reports.parts import Drawing, Grid, Note, Section
-from groundstation.reports.sections.magnetic import ADVISORY, build
+from groundstation.reports.sections.magnetic import build
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SUMMARY, load, save
 from groundstation.results.flight import FlightResults, NotAssessable
+from groundstation.results.magnetic import ADVISORY
 from tests.report_example import example
 from tests.test_magnetic_run import figure_eight
 from tests.test_reports import HOSTILE, Page, report
@@ -58,7 +59,7 @@ def test_coefficients_and_card_are_those_of_the_result(folder: Path) -> None:
     section = chapter(folder)
     iron = found.method("poisson_attitude")
     cells = {row[0]: row[3] for row in grid(section, "Coefficients").rows}
-    assert cells["C"] == f"+{iron.coefficients_deg['C']:.2f} ± {iron.coefficients_sigma_deg['C']:.2f}"
+    assert cells["C"] == f"+{iron.coefficients_deg['C']:.3f} ± {iron.coefficients_sigma_deg['C']:.3f}"
     rows = grid(section, "Steer card").rows
     assert [row[0] for row in rows] + [row[4] for row in rows] == [f"{heading}°" for heading in range(0, 360, 30)]
     assert rows[3][1] == f"{found.card[3].steer_deg:.1f}°"

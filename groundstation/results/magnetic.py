@@ -14,6 +14,12 @@ TurnState = Literal["used", "rejected"]
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
 LETTERS = ("A", "B", "C", "D", "E")
+METHOD_TITLES: dict[MethodName, str] = {
+    "compass_table": "branch table",
+    "poisson_attitude": "iron fit",
+    "constant_modulus": "modulus fit",
+}
+ADVISORY = "Advisory, not a release to service."
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from groundstation.reports.sections.heading import gate_grid, setting_facts
 from groundstation.reports.sections.saved import mapping, not_assessable_reason, objects
 from groundstation.reports.wording import ABSENT, clock, is_number, number, significant, typeset
 from groundstation.results.files import SavedFlight
-from groundstation.results.magnetic import LETTERS
+from groundstation.results.magnetic import ADVISORY, LETTERS
 
 TITLE = "Magnetic deviation"
 LEAD = (
@@ -23,7 +23,6 @@ HOW = (
     "three. error(c) = A + B sin c + C cos c + D sin 2c + E cos 2c, c the uncorrected magnetic heading. Source: "
     "Russian patent on the deviation of magnetometric sensors determined in flight; prior art RU 2550774."
 )
-ADVISORY = "Advisory, not a release to service."
 TONES: dict[str, Tone] = {"accept": "good", "reject": "bad", "undecided": "unknown"}
 MEANING = {
     "A": "constant: mounting, INS heading and declination besides",
@@ -93,8 +92,8 @@ def _coefficients(magnetic: Mapping[str, Any]) -> Grid:
         cells = [MEANING[letter]]
         for row in methods:
             value = mapping(row, "coefficients_deg").get(letter)
-            sigma = number(mapping(row, "coefficients_sigma_deg").get(letter), 2)
-            cells.append(f"{number(value, 2, signed=True)} ± {sigma}" if is_number(value) else "not seen")
+            sigma = number(mapping(row, "coefficients_sigma_deg").get(letter), 3)
+            cells.append(f"{number(value, 3, signed=True)} ± {sigma}" if is_number(value) else "not seen")
         rows.append((letter, *cells))
     heads = (Head(""), Head("Meaning"), *(Head(f"{_name(row.get('name'))}, °", True) for row in methods))
     parts = "; ".join(

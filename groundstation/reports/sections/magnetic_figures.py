@@ -10,12 +10,9 @@ from groundstation.reports.parts import Drawing
 from groundstation.reports.sections.saved import flags, mapping, numbers, objects, texts
 from groundstation.reports.wording import is_number, number
 from groundstation.results.files import SavedFlight
+from groundstation.results.magnetic import METHOD_TITLES
 
-METHODS = {
-    "compass_table": "branch table",
-    "poisson_attitude": "iron fit",
-    "constant_modulus": "modulus fit",
-}
+METHODS = {str(name): title for name, title in METHOD_TITLES.items()}
 METHOD_COLOURS = dict(zip(METHODS, (d.INS, d.USED, "#cc79a7"), strict=True))
 RIGHT, LEFT = d.GNSS, d.INS
 BAND = 1.96  # half width of a 95 % band in sigmas
