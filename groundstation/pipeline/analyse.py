@@ -14,6 +14,7 @@ from groundstation.estimators.heading.settings import AircraftData, HeadingReque
 from groundstation.estimators.inertial.noise import choose_class
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.latency.settings import LatencySettings
+from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.integrity.limits import Thresholds, thresholds_from
 from groundstation.pipeline import configuration as configured
 from groundstation.pipeline import overview
@@ -22,6 +23,7 @@ from groundstation.pipeline.inertial import analyse_inertial
 from groundstation.pipeline.intervals import seconds_of
 from groundstation.pipeline.latency import analyse_latency
 from groundstation.pipeline.leaning import leaning_findings
+from groundstation.pipeline.magnetic import analyse_magnetic
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
 from groundstation.results.heading import HeadingResult
@@ -52,6 +54,7 @@ class UserSettings:
     heading: HeadingSettings
     inertial: InertialSettings
     latency: LatencySettings
+    magnetic: MagneticSettings
     aircraft: AircraftData
     site: SiteData
     thresholds: Thresholds
@@ -69,6 +72,7 @@ def user_settings(configuration: Configuration) -> UserSettings:
         settings_from(HeadingSettings, configuration.heading, configuration.file_of("heading"), "heading"),
         settings_from(InertialSettings, configuration.inertial, configuration.file_of("inertial"), "inertial"),
         settings_from(LatencySettings, configuration.latency, configuration.file_of("latency"), "latency"),
+        settings_from(MagneticSettings, configuration.magnetic, configuration.file_of("magnetic"), "magnetic"),
         settings_from(AircraftData, configuration.aircraft, configuration.file_of("aircraft"), "aircraft"),
         settings_from(SiteData, configuration.site, configuration.file_of("site"), "site"),
         configured_thresholds(configuration),
@@ -111,12 +115,22 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     )
     latency = analyse_latency(flight, settings.latency, inertial.inertial)
     heading = _heading_or_reason(flight, configuration, settings, latency.latency, findings, not_assessable)
-    findings += (*inertial.findings, *latency.findings)
-    not_assessable += (*inertial.not_assessable, *latency.not_assessable)
+    magnetic = analyse_magnetic(
+        flight,
+        phases,
+        settings.magnetic,
+        aircraft=settings.aircraft,
+        inertial=inertial.inertial,
+        latencies=latency.latency,
+        heading=heading,
+    )
+    findings += (*inertial.findings, *latency.findings, *magnetic.findings)
+    not_assessable += (*inertial.not_assessable, *latency.not_assessable, *magnetic.not_assessable)
     figures = (
         *_figures(flight, given, settings, phases, heading),
         *inertial.figures,
         *(latency.latency.figures if latency.latency else ()),
+        *(magnetic.magnetic.figures if magnetic.magnetic else ()),
     )
     findings += leaning_findings(flight, given.ledger, heading, inertial.inertial, settings.thresholds)
     if heading is not None:
@@ -138,6 +152,7 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
         inertial=inertial.inertial,
         forecast=inertial.forecast,
         latency=latency.latency,
+        magnetic=magnetic.magnetic,
         figures=figures,
     )
 

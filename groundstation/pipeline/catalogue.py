@@ -33,7 +33,14 @@ LATENCY: dict[str, Any] = {
     "needs": "ins velocity with gnss velocities, vertical speed with baro, or attitude with a magnetometer; turns and "
     "climbs",
 }
-ANALYSES = (HEADING, INERTIAL, FORECAST, LATENCY)
+MAGNETIC: dict[str, Any] = {
+    "kind": "analysis",
+    "name": "magnetic",
+    "title": "magnetic deviation from opposite turns in flight, with its coefficients A to E",
+    "needs": "magnetometer on three axes, ins roll, pitch and a true heading that no magnetometer corrects, a turn "
+    "each way at one steady bank that together cover the circle, level flight to judge by",
+}
+ANALYSES = (HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC)
 
 
 def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict[str, Any]]:
@@ -58,6 +65,7 @@ def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
     from groundstation.pipeline.inertial import analyse_inertial
     from groundstation.pipeline.latency import analyse_latency
     from groundstation.pipeline.log import open_log
+    from groundstation.pipeline.magnetic import analyse_magnetic
     from groundstation.tables.phases import flight_phases
 
     if not path.exists():
@@ -71,9 +79,12 @@ def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
         estimate_heading(flight, configuration, settings)
     except NotAssessableError as error:
         reasons["heading"] = str(error).removeprefix("heading: ")
-    answers = analyse_inertial(flight, flight_phases(flight), settings.inertial)
+    phases = flight_phases(flight)
+    answers = analyse_inertial(flight, phases, settings.inertial)
     latency = analyse_latency(flight, settings.latency, answers.inertial)
-    reasons |= {lacking.analysis: lacking.reason for lacking in (*answers.not_assessable, *latency.not_assessable)}
+    magnetic = analyse_magnetic(flight, phases, settings.magnetic, inertial=answers.inertial, latencies=latency.latency)
+    lacking = (*answers.not_assessable, *latency.not_assessable, *magnetic.not_assessable)
+    reasons |= {entry.analysis: entry.reason for entry in lacking}
     if "inertial" in reasons:
         reasons["forecast"] = reasons["inertial"]
     return [

@@ -9,7 +9,7 @@ from typing import Any
 
 from groundstation.base.errors import SettingsError
 
-TABLES = ("heading", "inertial", "latency", "aircraft", "site", "thresholds")
+TABLES = ("heading", "inertial", "latency", "magnetic", "aircraft", "site", "thresholds")
 SECTIONS = (*TABLES, "exclude", "force")
 Settings = Path | Mapping[str, Any]  # a TOML file, or its content
 
@@ -27,13 +27,14 @@ class Interval:
 class Configuration:
     """Everything a user may set for a run, as read from TOML; plain values, so that it travels to worker processes.
 
-    ``heading``, ``inertial``, ``latency``, ``aircraft``, ``site`` and ``thresholds`` are the tables as written; they
-    become dataclasses where used.
+    ``heading``, ``inertial``, ``latency``, ``magnetic``, ``aircraft``, ``site`` and ``thresholds`` are the tables as
+    written; they become dataclasses where used.
     """
 
     heading: Mapping[str, Any] = field(default_factory=dict)
     inertial: Mapping[str, Any] = field(default_factory=dict)
     latency: Mapping[str, Any] = field(default_factory=dict)
+    magnetic: Mapping[str, Any] = field(default_factory=dict)
     aircraft: Mapping[str, Any] = field(default_factory=dict)
     site: Mapping[str, Any] = field(default_factory=dict)
     exclude: tuple[Interval, ...] = ()
@@ -109,6 +110,7 @@ def load_configuration(
         heading=document.get("heading", {}),
         inertial=document.get("inertial", {}),
         latency=document.get("latency", {}),
+        magnetic=document.get("magnetic", {}),
         aircraft=document.get("aircraft", {}),
         site=document.get("site", {}),
         thresholds=document.get("thresholds", {}),

@@ -221,7 +221,8 @@ def _state(gravest: Severity | None, has_lost_data: bool, fail_on: str) -> State
 
 def sentence(results: FlightResults) -> str:
     """What was found, in one line."""
-    found = [text for text in (_heading_sentence(results), _inertial_sentence(results)) if text]
+    told = (_heading_sentence(results), _inertial_sentence(results), _magnetic_sentence(results))
+    found = [text for text in told if text]
     if found:
         return "; ".join(found)
     reasons = "; ".join(f"{entry.analysis}: {entry.reason}" for entry in results.not_assessable)
@@ -256,6 +257,16 @@ def _inertial_sentence(results: FlightResults) -> str:
         if longest is not None:
             parts.append(f"forecast {longest.rms_m:.0f} m after {longest.horizon_min:g} min")
     return f"INS {', '.join(parts)}" if parts else "INS errors estimated"
+
+
+def _magnetic_sentence(results: FlightResults) -> str:
+    magnetic = results.magnetic
+    if magnetic is None:
+        return ""
+    if magnetic.verdict == "reject" or magnetic.residual_rms_deg is None:
+        return f"magnetic deviation {magnetic.verdict} ({magnetic.verdict_reason})"
+    residual = magnetic.residual_rms_deg
+    return f"magnetic deviation {magnetic.verdict}: {residual.before:.2f} deg RMS before, {residual.after:.2f} after"
 
 
 def is_made(name: str, identity: str) -> bool:

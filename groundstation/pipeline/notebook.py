@@ -18,6 +18,7 @@ from groundstation.results.forecast import ForecastResult
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
 from groundstation.results.latency import Latencies
+from groundstation.results.magnetic import MagneticResult
 from groundstation.tables.table import Flight, TimedTable, timed
 
 if TYPE_CHECKING:
@@ -69,8 +70,9 @@ class OpenFlight(ABC):
         Parameters
         ----------
         **sections
-            ``heading``, ``inertial``, ``latency``, ``aircraft``, ``site``, ``thresholds``: mappings laid over what is
-            set; ``exclude``, ``force``: lists of intervals (``from``, ``to``, ``reason``) in place of those set.
+            ``heading``, ``inertial``, ``latency``, ``magnetic``, ``aircraft``, ``site``, ``thresholds``: mappings laid
+            over what is set; ``exclude``, ``force``: lists of intervals (``from``, ``to``, ``reason``) in place of
+            those set.
 
         Raises
         ------
@@ -112,6 +114,11 @@ class OpenFlight(ABC):
     def latency(self) -> Latencies:
         """How much later each sensor shows the motion that the INS shows; raises as :meth:`heading`."""
         found: Latencies = self._answer("latency")
+        return found
+
+    def magnetic(self) -> MagneticResult:
+        """The deviation of the magnetic heading (system 3); raises as :meth:`heading`."""
+        found: MagneticResult = self._answer("magnetic")
         return found
 
     def _answer(self, analysis: str) -> Any:

@@ -11,6 +11,7 @@ from groundstation.results.frames import Tabular, no_such_table
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
 from groundstation.results.latency import Latencies
+from groundstation.results.magnetic import MagneticResult
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,6 +60,7 @@ class FlightResults(Tabular):
     inertial : InertialResult, optional
     forecast : ForecastResult, optional
     latency : Latencies, optional
+    magnetic : MagneticResult, optional
     figures : tuple of FigureData
         Arrays behind every figure, those of the analyses among them.
     """
@@ -78,6 +80,7 @@ class FlightResults(Tabular):
     inertial: InertialResult | None = None
     forecast: ForecastResult | None = None
     latency: Latencies | None = None
+    magnetic: MagneticResult | None = None
     figures: tuple[FigureData, ...] = ()
 
     def figure(self, name: str) -> FigureData | None:

@@ -14,6 +14,12 @@ TurnState = Literal["used", "rejected"]
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
 LETTERS = ("A", "B", "C", "D", "E")
+METHOD_TITLES: dict[MethodName, str] = {
+    "compass_table": "branch table",
+    "poisson_attitude": "iron fit",
+    "constant_modulus": "modulus fit",
+}
+ADVISORY = "Advisory, not a release to service."
 
 
 @dataclass(frozen=True)
@@ -226,7 +232,8 @@ class MagneticResult(Tabular):
         Before and after the recommended correction, on the held-out part; None where nothing was left to hold out.
     figures
         ``magnetic_samples`` (readings: part of the flight, errors before and after each method), ``magnetic_table``
-        (360 bins: branches, average, fitted curve, deviation, bank bias), ``magnetic_modulus`` (before and after).
+        (360 bins: branches, average, fitted curve, deviation, bank bias), ``magnetic_curves`` (360 bins: deviation and
+        its sigma by each method), ``magnetic_modulus`` (before and after).
     """
 
     ins_topic: str

@@ -39,6 +39,7 @@ DIGITS_BY_UNIT: Mapping[str, int] = {
     "dph": 6,
     "dphph": 6,
     "nmiph": 4,
+    "nt": 2,
 }
 
 
@@ -135,6 +136,8 @@ def summary_of(results: FlightResults) -> dict[str, Any]:
         answers["forecast"] = _answer(results.forecast)
     if results.latency is not None:
         answers["latency"] = _answer(results.latency)
+    if results.magnetic is not None:
+        answers["magnetic"] = _answer(results.magnetic)
     return {
         "schema_version": SCHEMA_VERSION,
         "flight": plain(flight),

@@ -21,6 +21,7 @@ from groundstation.viewer.tabs.forecast import forecast
 from groundstation.viewer.tabs.heading import heading
 from groundstation.viewer.tabs.inertial import inertial
 from groundstation.viewer.tabs.log import log
+from groundstation.viewer.tabs.magnetic import magnetic
 from groundstation.viewer.tabs.overview import overview
 from groundstation.viewer.tabs.quality import quality
 from groundstation.viewer.tabs.raw import raw
@@ -117,6 +118,7 @@ def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResul
         heading(recorder, results),
         inertial(recorder, results),
         forecast(recorder, results),
+        magnetic(recorder, results),
         raw(recorder, flight, results),
         log(recorder, flight, results),
     )

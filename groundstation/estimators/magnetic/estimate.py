@@ -13,8 +13,8 @@ from groundstation.estimators.heading.settings import AircraftData
 from groundstation.estimators.magnetic.alignment import S_PER_H, align
 from groundstation.estimators.magnetic.compass_table import CompassTable, build_table
 from groundstation.estimators.magnetic.earth import earth_field
-from groundstation.estimators.magnetic.figures import draw
-from groundstation.estimators.magnetic.held_out import hold_out
+from groundstation.estimators.magnetic.figures import draw, parts_of
+from groundstation.estimators.magnetic.held_out import find_unseen, hold_out, is_level
 from groundstation.estimators.magnetic.iron import bank_bias, heading_errors, parameters_of
 from groundstation.estimators.magnetic.manoeuvre import Figure, FoundTurn, find_figures, find_turns, widest_gap_deg
 from groundstation.estimators.magnetic.methods import (
@@ -130,6 +130,8 @@ def _answer(
     fits = fit_all(readings.take(rows), table, earth, settings)
     deviation = -wrap_180(table.average_deg + declination.value_deg)
     unseen, held_out = hold_out(readings, along, is_airborne, figures, alignment, settings) or (None, None)
+    judged = find_unseen(readings, is_airborne, figures, settings) & is_level(readings, settings) & bool(unseen)
+    part = parts_of(is_airborne, judged, figures)
     a_sigma = math.hypot(alignment.sigma_deg, declination.sigma_deg)
     methods = method_rows(fits, unseen, deviation, declination.value_deg, a_sigma)
     biases = _biases(fits)
@@ -170,7 +172,7 @@ def _answer(
         modulus=_parameters(fits.modulus, a_sigma),
         table_fit_rms_deg=table.fit_rms_deg,
         settings={name: value for name, value in asdict(settings).items() if value is not None},
-        figures=draw(readings, along, is_airborne, figures, fits, deviation),
+        figures=draw(readings, along, part, figures, fits, deviation, methods),
     )
 
 

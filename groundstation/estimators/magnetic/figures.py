@@ -1,9 +1,13 @@
 """Arrays behind the figures of the magnetic chapter."""
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.records import BoolArray
+from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.apply import corrected_by_table
 from groundstation.estimators.magnetic.compass_table import CENTRES_DEG
 from groundstation.estimators.magnetic.manoeuvre import Figure
@@ -11,6 +15,7 @@ from groundstation.estimators.magnetic.methods import Fits
 from groundstation.estimators.magnetic.poisson import corrected_heading_deg
 from groundstation.estimators.magnetic.readings import Readings
 from groundstation.results.figures import FigureData
+from groundstation.results.magnetic import LETTERS, Method
 
 LARGEST = 20_000  # readings drawn: of more, every k-th
 
@@ -18,30 +23,37 @@ LARGEST = 20_000  # readings drawn: of more, every k-th
 def draw(
     readings: Readings,
     declination_deg: FloatArray,
-    is_airborne: BoolArray,
+    part: NDArray[np.str_],
     figures: list[Figure],
     fits: Fits,
     deviation_deg: FloatArray,
+    methods: Sequence[Method],
 ) -> tuple[FigureData, ...]:
-    """Readings with their errors, the table, and the modulus."""
+    """Readings with their errors, the table, the deviation by each method, and the modulus."""
     return (
-        _samples(readings, declination_deg, is_airborne, figures, fits, deviation_deg),
+        _samples(readings, declination_deg, part, fits, deviation_deg),
         _table(fits, deviation_deg),
+        _curves(methods),
         _modulus(readings, figures, fits),
     )
+
+
+def parts_of(is_airborne: BoolArray, is_held_out: BoolArray, figures: list[Figure]) -> NDArray[np.str_]:
+    """Part of the flight each reading belongs to, shape (n,)."""
+    part = np.where(is_airborne, "other flight", "ground").astype("U12")
+    part[is_held_out] = "held out"
+    for figure in figures:
+        part[figure.rows(True)], part[figure.rows(False)] = "right turn", "left turn"
+    return part
 
 
 def _samples(
     readings: Readings,
     declination_deg: FloatArray,
-    is_airborne: BoolArray,
-    figures: list[Figure],
+    part: NDArray[np.str_],
     fits: Fits,
     deviation_deg: FloatArray,
 ) -> FigureData:
-    part = np.where(is_airborne, "other flight", "ground").astype("U12")
-    for figure in figures:
-        part[figure.rows(True)], part[figure.rows(False)] = "right turn", "left turn"
     kept = slice(None, None, max(1, -(-len(readings) // LARGEST)))
     shown, drawn = readings.take(kept), part[kept]
     expected = shown.true_heading_deg - declination_deg[kept]
@@ -75,6 +87,20 @@ def _table(fits: Fits, deviation_deg: FloatArray) -> FigureData:
         "bank_bias_deg": fits.bias_deg,
     }
     return FigureData("magnetic_table", columns, dict.fromkeys(columns, 4))
+
+
+def _curves(methods: Sequence[Method]) -> FigureData:
+    """Deviation in level flight and its sigma by A to E of each method; the modulus is drawn without A."""
+    columns = {"magnetic_heading_deg": CENTRES_DEG}
+    design = harmonics.design(CENTRES_DEG)
+    for row in methods:
+        values, sigma = (
+            np.array([of.get(letter, 0.0 if of else np.nan) for letter in LETTERS])
+            for of in (row.coefficients_deg, row.coefficients_sigma_deg)
+        )
+        columns[f"deviation_{row.name}_deg"] = -(design @ values)
+        columns[f"sigma_{row.name}_deg"] = np.sqrt(design**2 @ sigma**2)
+    return FigureData("magnetic_curves", columns, dict.fromkeys(columns, 4))
 
 
 def _modulus(readings: Readings, figures: list[Figure], fits: Fits) -> FigureData:

@@ -45,6 +45,23 @@ class Left:
     mean_sigma_deg: float
 
 
+def find_unseen(
+    readings: Readings, is_airborne: BoolArray, figures: list[Figure], settings: MagneticSettings
+) -> BoolArray:
+    """Readings in flight that are in none of the figures, nor near their ends."""
+    is_unseen = is_airborne.copy()
+    for figure in figures:
+        for one in figure.turns:
+            low, high = one.turn.start_s - settings.held_out_margin_s, one.turn.end_s + settings.held_out_margin_s
+            is_unseen &= (readings.time_s < low) | (readings.time_s > high)
+    return is_unseen
+
+
+def is_level(readings: Readings, settings: MagneticSettings) -> BoolArray:
+    """Readings at small bank: what corrections are judged by."""
+    return np.asarray(np.abs(readings.roll_deg) <= settings.held_out_bank_max_deg)
+
+
 def hold_out(
     readings: Readings,
     declination_deg: FloatArray,
@@ -54,13 +71,8 @@ def hold_out(
     settings: MagneticSettings,
 ) -> tuple[Unseen, HeldOut] | None:
     """Level flight outside the figures, None where there is hardly any."""
-    is_unseen = is_airborne.copy()
-    for figure in figures:
-        for one in figure.turns:
-            low, high = one.turn.start_s - settings.held_out_margin_s, one.turn.end_s + settings.held_out_margin_s
-            is_unseen &= (readings.time_s < low) | (readings.time_s > high)
-    is_level = np.abs(readings.roll_deg) <= settings.held_out_bank_max_deg
-    rows = np.flatnonzero(is_unseen & is_level)
+    is_unseen = find_unseen(readings, is_airborne, figures, settings)
+    rows = np.flatnonzero(is_unseen & is_level(readings, settings))
     if len(rows) < settings.held_out_samples_min:
         return None
     level = readings.take(rows)

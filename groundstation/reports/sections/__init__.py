@@ -7,7 +7,17 @@ to :data:`CHAPTERS`.
 from collections.abc import Callable
 
 from groundstation.reports.parts import Section
-from groundstation.reports.sections import findings, forecast, heading, inertial, latency, overview, provenance, quality
+from groundstation.reports.sections import (
+    findings,
+    forecast,
+    heading,
+    inertial,
+    latency,
+    magnetic,
+    overview,
+    provenance,
+    quality,
+)
 from groundstation.results.files import SavedFlight
 
 CHAPTERS: tuple[Callable[[SavedFlight], Section | None], ...] = (
@@ -15,6 +25,7 @@ CHAPTERS: tuple[Callable[[SavedFlight], Section | None], ...] = (
     inertial.build,
     forecast.build,
     latency.build,
+    magnetic.build,
     overview.build,
     quality.build,
     findings.build,

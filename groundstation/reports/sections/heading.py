@@ -42,11 +42,11 @@ def build(saved: SavedFlight) -> Section:
         note = Note(f"Not assessable: {reason}", "unknown")
         return Section("heading", "Heading correction", lead, (note, *_figures(saved), *_standstill_figures(saved)))
     parts = (
-        *(_gates(heading), _estimates(heading)),
+        *(gate_grid(heading), _estimates(heading)),
         *_figures(saved),
         *(_onboard(heading), _runway(heading), _geometry(heading), _standstill(heading)),
         *_standstill_figures(saved),
-        *(_by_hand(saved), _settings(heading)),
+        *(_by_hand(saved), setting_facts(heading)),
     )
     return Section("heading", "Heading correction", lead, tuple(part for part in parts if part is not None))
 
@@ -89,14 +89,15 @@ def limit_text(gate: Mapping[str, Any]) -> str:
     return SENSE_SIGNS.get(str(gate.get("sense")), "") + text
 
 
-def _gates(heading: Mapping[str, Any]) -> Grid | None:
+def gate_grid(answer: Mapping[str, Any]) -> Grid | None:
+    """The gates of an answer, each with figure, limit and reason; None where there are none."""
     rows: list[tuple[Cell, ...]] = []
-    for gate in objects(heading, "gates"):
+    for gate in objects(answer, "gates"):
         unit = unit_sign(str(gate.get("unit", "")))
         role = "decides" if gate.get("required") else "informs"
         state = GATE_MARKS.get(str(gate.get("state")), Mark("unknown", str(gate.get("state"))))
         if state.tone == "bad" and not gate.get("required"):
-            state = Mark("warn", state.text)  # it does not stand against an accepted correction
+            state = Mark("warn", state.text)  # it does not stand against an accepted answer
         value = number_with_unit(significant(gate.get("value"), 3), unit)
         title = str(gate.get("title") or gate.get("name") or "")
         title, reason = title[:1].upper() + title[1:], typeset(str(gate.get("reason") or ""))
@@ -274,9 +275,10 @@ def _by_hand(saved: SavedFlight) -> Facts | None:
     return Facts("Intervals chosen by hand", pairs) if pairs else None
 
 
-def _settings(heading: Mapping[str, Any]) -> Facts | None:
+def setting_facts(answer: Mapping[str, Any]) -> Facts | None:
+    """The settings an answer was found with."""
     pairs = []
-    for name, value in sorted(mapping(heading, "settings").items()):
+    for name, value in sorted(mapping(answer, "settings").items()):
         title, unit = named_quantity(str(name))
         pairs.append((title, any_value(value, unit), ""))
     return Facts("Settings of the method", pairs, compact=True) if pairs else None

@@ -1,0 +1,194 @@
+"""Figures of the magnetic deviation: by heading, on the part held out, the figure flown, its branches, the modulus."""
+
+from typing import Any
+
+import numpy as np
+
+from groundstation.base.geodesy import north_east_m
+from groundstation.reports import drawing as d
+from groundstation.reports.parts import Drawing
+from groundstation.reports.sections.saved import flags, mapping, numbers, objects, texts
+from groundstation.reports.wording import is_number, number
+from groundstation.results.files import SavedFlight
+from groundstation.results.magnetic import METHOD_TITLES
+
+METHODS = {str(name): title for name, title in METHOD_TITLES.items()}
+METHOD_COLOURS = dict(zip(METHODS, (d.INS, d.USED, "#cc79a7"), strict=True))
+RIGHT, LEFT = d.GNSS, d.INS
+BAND = 1.96  # half width of a 95 % band in sigmas
+MARGIN_S = 20.0  # flight shown before and after the figure
+
+
+def _heading_axis(axes: Any) -> None:
+    axes.set_xlim(0.0, 360.0)
+    axes.set_xticks(range(0, 361, 30))
+    axes.set_xlabel("magnetic heading as read, °")
+
+
+def deviation(saved: SavedFlight) -> Drawing | None:
+    """Deviation against heading by each method, with bands."""
+    curves, table = saved.figure("magnetic_curves"), saved.figure("magnetic_table")
+    if curves is None:
+        return None
+    heading = numbers(curves, "magnetic_heading_deg")
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 16, 12, 174, 74)
+        if table is not None:
+            bins, values = numbers(table, "magnetic_heading_deg"), numbers(table, "deviation_deg")
+            d.dots(axes, bins, values, d.UNUSED, 3.0, label="table, bins of 1°")
+        for name, title in METHODS.items():
+            value, half = numbers(curves, f"deviation_{name}_deg"), BAND * numbers(curves, f"sigma_{name}_deg")
+            if not np.isfinite(value).any():
+                continue
+            colour = METHOD_COLOURS[name]
+            axes.fill_between(heading, value - half, value + half, color=colour, alpha=0.15, linewidth=0)
+            d.line(axes, heading, value, colour, 1.3, label=title)
+        axes.axhline(0.0, color=d.FAINT, linewidth=0.6)
+        axes.set_ylabel("deviation, to be added, °")
+        _heading_axis(axes)
+        d.legend_above(axes, 4)
+
+    caption = (
+        "To be added to the reading, east positive; lines by A to E of each method in level flight, shaded ± 1.96 σ. "
+        "The modulus, where it is drawn, does not show A. Grey: the table bin by bin, with the bias of its bank."
+    )
+    alt = "Deviation against magnetic heading, one curve for each method."
+    return Drawing("Deviation by heading", caption, alt, d.draw("magnetic-deviation", 82, paint), ("magnetic_curves",))
+
+
+def held_out(saved: SavedFlight) -> Drawing | None:
+    """Error of the magnetic heading where no fit has seen, before and after the recommended correction."""
+    data = saved.figure("magnetic_samples")
+    method = str(mapping(saved.summary, "results", "magnetic").get("recommended_method"))
+    if data is None or not (mine := texts(data, "part") == "held out").any():
+        return None
+    time, heading = numbers(data, "time_s")[mine], numbers(data, "magnetic_heading_deg")[mine]
+    before, after = numbers(data, "error_before_deg")[mine], numbers(data, f"error_{method}_deg")[mine]
+    shown = ((before, d.UNUSED, "before"), (after, METHOD_COLOURS.get(method, d.USED), "after"))
+
+    def paint(figure: Any) -> None:
+        left, right = d.place(figure, 16, 12, 92, 62), d.place(figure, 106, 12, 174, 62)
+        for values, colour, name in shown:
+            d.dots(left, time, values, colour, 1.6, 2500, label=name)
+            d.dots(right, heading, values, colour, 1.6, 2500)
+        for axes in (left, right):
+            axes.axhline(0.0, color=d.FAINT, linewidth=0.6)
+        left.set_ylabel("error of magnetic heading, °")
+        d.time_axis(left, *d.padded(float(time.min()), float(time.max())), most=5)
+        _heading_axis(right)
+        right.set_xticks(range(0, 361, 60))
+        d.legend_above(left, 2)
+
+    caption = (
+        f"Level flight that no fit has seen, n = {number(len(time), 0)} drawn, against flight time and heading; "
+        f"after: by the {METHODS.get(method, method)}. Judged by the same INS and declination: an error of theirs "
+        "common to the whole flight does not show."
+    )
+    alt = "Residual heading error before and after correction on the held-out part."
+    sketch = d.draw("magnetic-held-out", 70, paint)
+    return Drawing("Error where no fit has seen", caption, alt, sketch, ("magnetic_samples",))
+
+
+def track(saved: SavedFlight) -> Drawing | None:
+    """The figures as flown, coloured by branch."""
+    data = saved.figure("overview")
+    turns = [turn for turn in _turns(saved) if turn["state"] == "used"]
+    if data is None or not turns:
+        return None
+    time = numbers(data, "time_s")
+    near = (time >= min(turn["start_s"] for turn in turns) - MARGIN_S) & (
+        time <= max(turn["end_s"] for turn in turns) + MARGIN_S
+    )
+    latitude, longitude = numbers(data, "latitude_deg")[near], numbers(data, "longitude_deg")[near]
+    known = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
+    if not known.size:
+        return None
+    north, east = north_east_m(latitude, longitude, float(latitude[known[0]]), float(longitude[known[0]]))
+    time = time[near]
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 16, 12, 174, 84)
+        axes.set_aspect("equal", adjustable="datalim")
+        d.line(axes, east / 1e3, north / 1e3, d.UNUSED, 0.9)
+        named: set[str] = set()
+        for turn in turns:
+            mine = (time >= turn["start_s"]) & (time <= turn["end_s"])
+            colour, name = (RIGHT, "right turn") if turn["bank_deg"] > 0.0 else (LEFT, "left turn")
+            shown = None if name in named else name
+            x, y = (np.where(mine, values, np.nan) / 1e3 for values in (east, north))
+            d.line(axes, x, y, colour, 2.0, label=shown)
+            named.add(name)
+        axes.set_xlabel("east, km")
+        axes.set_ylabel("north, km")
+        d.legend_above(axes, 2)
+
+    caption = "Ground track in wind from before the first used turn until after the last one, equal scales."
+    alt = "Map of the figures flown, right and left turns in two colours."
+    return Drawing("Figures as flown", caption, alt, d.draw("magnetic-track", 90, paint), ("overview",))
+
+
+def _turns(saved: SavedFlight) -> list[dict[str, Any]]:
+    """Turns whose times and bank are known."""
+    listed = objects(mapping(saved.summary, "results", "magnetic"), "turns")
+    wanted = ("start_s", "end_s", "bank_deg")
+    return [{"state": None, **turn} for turn in listed if all(is_number(turn.get(name)) for name in wanted)]
+
+
+def branches(saved: SavedFlight) -> Drawing | None:
+    """Compass error on either branch and their average, declination in it."""
+    samples, table = saved.figure("magnetic_samples"), saved.figure("magnetic_table")
+    if samples is None or table is None:
+        return None
+    part, heading = texts(samples, "part"), numbers(samples, "magnetic_heading_deg")
+    error, bins = numbers(samples, "compass_error_deg"), numbers(table, "magnetic_heading_deg")
+    average, filled = numbers(table, "compass_error_deg"), flags(table, "is_interpolated")
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 16, 12, 174, 70)
+        for name, colour in (("right turn", RIGHT), ("left turn", LEFT)):
+            mine = part == name
+            d.dots(axes, heading[mine], error[mine], colour, 1.4, 2500, label=name)
+        d.line(axes, bins, average, d.INK, 1.4, label="average of both")
+        d.dots(axes, bins[filled], average[filled], d.LIMIT, 3.0, label="interpolated")
+        axes.set_ylabel("magnetic − true heading, °")
+        _heading_axis(axes)
+        d.legend_above(axes, 4)
+
+    caption = (
+        f"Magnetic minus INS true heading, declination in it, as in the patent. What is odd in bank cancels in the "
+        f"average; one branch is never used alone. Bins interpolated: {number(int(filled.sum()), 0)} of 360."
+    )
+    alt = "Compass error against magnetic heading on right and left turns with their average."
+    names = ("magnetic_samples", "magnetic_table")
+    return Drawing("Both branches", caption, alt, d.draw("magnetic-branches", 78, paint), names)
+
+
+def modulus(saved: SavedFlight) -> Drawing | None:
+    """Modulus of the field on the figures before and after it is freed of the iron."""
+    data = saved.figure("magnetic_modulus")
+    if data is None:
+        return None
+    time = numbers(data, "time_s")
+    model = mapping(saved.summary, "results", "magnetic", "declination")
+    horizontal, down = model.get("horizontal_nt"), model.get("down_nt")
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 16, 12, 174, 62)
+        for column, colour, name in (
+            ("before_nt", d.UNUSED, "as read"),
+            *((f"{name}_nt", METHOD_COLOURS[name], METHODS[name]) for name in METHODS if f"{name}_nt" in data.columns),
+        ):
+            values = numbers(data, column)
+            if np.isfinite(values).any():
+                broken_time, broken = d.broken_at_gaps(time, values / 1e3)
+                d.line(axes, broken_time, broken, colour, 1.0, label=name)
+        if is_number(horizontal) and is_number(down):
+            d.limit_line(axes, float(np.hypot(horizontal, down)) / 1e3, "field of the model")
+        axes.set_ylabel("modulus of the field, µT")
+        d.time_axis(axes, *d.padded(float(time.min()), float(time.max())))
+        d.legend_above(axes, 4)
+
+    caption = "Readings of the figures alone. A modulus that still waves after the fit is iron the model does not know."
+    alt = "Modulus of the magnetic field over flight time before and after the fit."
+    return Drawing("Modulus of the field", caption, alt, d.draw("magnetic-modulus", 70, paint), ("magnetic_modulus",))

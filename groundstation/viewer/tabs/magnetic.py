@@ -1,0 +1,121 @@
+"""Magnetic: the deviation by each method against heading, the branches, the errors and the field over time."""
+
+import numpy as np
+import rerun.blueprint as rrb
+
+from groundstation.results.flight import FlightResults
+from groundstation.results.magnetic import METHOD_TITLES
+from groundstation.viewer import colours
+from groundstation.viewer.chart import Axis, Chart
+from groundstation.viewer.recorder import Line, Recorder
+from groundstation.viewer.series import FloatArray, gap_after
+from groundstation.viewer.tabs.magnetic_text import magnetic_text
+from groundstation.viewer.views import document, figure_of, numbers, plot
+
+BAND = 1.96  # half width of a 95 % band in sigmas
+THIN, BOLD, DOT = 1.0, 2.0, 1.6
+SHADES = dict(zip(METHOD_TITLES, (colours.INS, colours.ANSWER, colours.HONEST), strict=True))
+MARGIN = 0.08
+
+
+def magnetic(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
+    """Log the tab of the magnetic deviation; None when the flight was not assessed and no reason is known."""
+    reasons = [entry.reason for entry in results.not_assessable if entry.analysis == "magnetic"]
+    if results.magnetic is None and not reasons:
+        return None
+    recorder.document("magnetic/answer", magnetic_text(results.magnetic, reasons))
+    text = document("Verdict and card", "magnetic/answer")
+    left = [*_deviation(recorder, results), *_branches(recorder, results)]
+    middle = [*_errors(recorder, results), *_modulus(recorder, results)]
+    columns = [rrb.Vertical(contents=column) for column in (left, middle) if column]
+    return rrb.Horizontal(contents=[*columns, rrb.Vertical(contents=[text])], name="Magnetic")
+
+
+def _axis(title: str, curves: list[FloatArray]) -> Axis | None:
+    known = np.concatenate([curve[np.isfinite(curve)] for curve in curves] or [np.zeros(0)])
+    if not known.size:
+        return None
+    low, high = float(known.min()), float(known.max())
+    margin = max(MARGIN * (high - low), 0.1)
+    return Axis(title, low - margin, high + margin)
+
+
+def _chart(
+    recorder: Recorder, path: str, title: str, heading: FloatArray, curves: list[tuple[FloatArray, Line]]
+) -> list[rrb.View]:
+    """Curves against magnetic heading, each with its name; the view, none without a number to draw."""
+    y = _axis(title, [values for values, _ in curves])
+    if y is None:
+        return []
+    chart = Chart(recorder, path, Axis("magnetic heading as read, deg", 0.0, 360.0), y)
+    chart.curves("curves", [(heading, values, line) for values, line in curves])
+    chart.legend([line for _, line in curves if line.name])
+    return [chart.view()]
+
+
+def _deviation(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
+    """Deviation to be added, by each method, with its 95 % band of two thin lines."""
+    figure = figure_of(results, "magnetic_curves", "magnetic_heading_deg")
+    if figure is None:
+        return []
+    curves = []
+    for name, title in METHOD_TITLES.items():
+        columns = f"deviation_{name}_deg", f"sigma_{name}_deg"
+        if not set(columns) <= set(figure.columns):
+            continue
+        value, sigma = (numbers(figure, column) for column in columns)
+        if np.isfinite(value).any():
+            shade = SHADES[name]
+            curves += [(value + sign * BAND * sigma, Line("", shade, THIN)) for sign in (1.0, -1.0)]
+            curves.append((value, Line(title, shade, BOLD)))
+    heading = numbers(figure, "magnetic_heading_deg")
+    return _chart(recorder, "magnetic/deviation", "Deviation to be added, deg", heading, curves)
+
+
+def _branches(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
+    """Magnetic minus true heading on right and left turns and in the average."""
+    columns = ("right_turn_deg", "left_turn_deg", "compass_error_deg")
+    figure = figure_of(results, "magnetic_table", "magnetic_heading_deg", *columns)
+    if figure is None:
+        return []
+    lines = (
+        Line("right turn", colours.GNSS, THIN),
+        Line("left turn", colours.INS, THIN),
+        Line("average", colours.LIGHT, BOLD),
+    )
+    curves = [(numbers(figure, column), line) for column, line in zip(columns, lines, strict=True)]
+    heading = numbers(figure, "magnetic_heading_deg")
+    return _chart(recorder, "magnetic/branches", "Magnetic minus true heading, deg", heading, curves)
+
+
+def _errors(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
+    """Error of the magnetic heading where no fit has seen, before and after the recommended correction."""
+    method = results.magnetic.recommended_method if results.magnetic else "compass_table"
+    column = f"error_{method}_deg"
+    figure = figure_of(results, "magnetic_samples", "time_s", "part", "error_before_deg", column)
+    if figure is None:
+        return []
+    mine = np.asarray(figure["part"].astype(np.str_) == "held out")
+    if not mine.any():
+        return []
+    time_ns = recorder.time_ns(numbers(figure, "time_s")[mine])
+    for name, title, shade in (("error_before_deg", "before", colours.SAMPLES), (column, "after", colours.ANSWER)):
+        values = numbers(figure, name)[mine]
+        recorder.dots(f"magnetic/error/{title}", time_ns, values, Line(f"{title}, deg", shade, DOT))
+    return [plot("Error of magnetic heading where no fit has seen, deg", "magnetic/error")]
+
+
+def _modulus(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
+    """Modulus of the field on the figures, as read and freed of the iron."""
+    figure = figure_of(results, "magnetic_modulus", "time_s", "before_nt")
+    if figure is None:
+        return []
+    shown = {"before_nt": Line("as read, nT", colours.SAMPLES, THIN)}
+    shown |= {f"{name}_nt": Line(f"{title}, nT", SHADES[name]) for name, title in METHOD_TITLES.items()}
+    known = [name for name in shown if name in figure.columns and np.isfinite(numbers(figure, name)).any()]
+    if not known:
+        return []
+    time_ns = recorder.time_ns(numbers(figure, "time_s"))
+    values = np.column_stack([numbers(figure, name) for name in known])
+    recorder.lines("magnetic/modulus", time_ns, values, [shown[name] for name in known], gap_after(time_ns))
+    return [plot("Modulus of the field on the figures, nT", "magnetic/modulus")]

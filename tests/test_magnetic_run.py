@@ -1,0 +1,182 @@
+"""System 3 in a whole run: verdict and coefficients beside the truth, reasons where there is no answer, files."""
+
+import json
+from dataclasses import fields, replace
+from functools import cache
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from groundstation.base.angles import wrap_180
+from groundstation.base.errors import SettingsError
+from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.estimators.magnetic import harmonics
+from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.pipeline.analyse import Given, analyse, user_settings
+from groundstation.pipeline.configuration import Configuration, load_configuration
+from groundstation.pipeline.convert import convert_log
+from groundstation.pipeline.flight import read_flight, sentence
+from groundstation.pipeline.inertial import analyse_inertial
+from groundstation.pipeline.log import open_log
+from groundstation.pipeline.magnetic import analyse_magnetic
+from groundstation.results import magnetic as answers
+from groundstation.results.files import load, save
+from groundstation.results.flight import FlightResults, Source
+from groundstation.results.magnetic import LETTERS
+from groundstation.results.restore import restored
+from groundstation.simulation.deviation import BIN_MIDDLES_DEG, scenario_deviation
+from groundstation.simulation.flight import Simulated, simulate
+from groundstation.simulation.scenario import load_scenario
+from groundstation.tables.phases import flight_phases
+from groundstation.tables.table import Flight
+from tests.real_logs import real_log
+
+SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
+
+
+@cache
+def simulated(name: str) -> Simulated:
+    return simulate(load_scenario(name))
+
+
+def analysed(flight: Flight, configuration: Configuration | None = None) -> FlightResults:
+    source = Source("flight.csv", "ab" * 32, 1, "flat-csv")
+    given = Given("NOTIME_abababab", source, {}, {}, (), has_lost_data=False)
+    return analyse(flight, given, configuration or Configuration())
+
+
+@cache
+def figure_eight() -> FlightResults:
+    return analysed(simulated("magnetic-eight").flight)
+
+
+def reason_of(results: FlightResults) -> str:
+    (reason,) = (entry.reason for entry in results.not_assessable if entry.analysis == "magnetic")
+    return reason
+
+
+def test_a_figure_eight_is_accepted_with_its_coefficients() -> None:
+    """The truth is taken at the mean current of the figure: what the iron fit refers to."""
+    results, flown = figure_eight(), simulated("magnetic-eight")
+    found = results.magnetic
+    assert found is not None
+    assert found.poisson is not None
+    assert flown.scenario.electric is not None
+    electric = replace(flown.scenario.electric, base_a=found.poisson.current_reference_a)
+    truth = scenario_deviation(replace(flown, scenario=replace(flown.scenario, electric=electric)))
+    assert truth is not None
+    assert (found.verdict, found.recommended_method) == ("accept", "poisson_attitude")
+    expected = harmonics.fit(BIN_MIDDLES_DEG, wrap_180(truth.compass_error_deg + truth.declination_deg))[0]
+    for method in (found.method("compass_table"), found.method("poisson_attitude")):
+        for letter, value in zip(LETTERS, expected, strict=True):
+            sigma = method.coefficients_sigma_deg[letter]
+            assert abs(method.coefficients_deg[letter] - value) < 3.0 * sigma, (method.name, letter)
+    assert found.alignment.aligned_at_s is not None
+    assert found.residual_rms_deg is not None
+    assert found.residual_rms_deg.after < 0.2 < 3.0 < found.residual_rms_deg.before
+    assert [finding.severity for finding in results.findings if finding.code == "magnetic.accept"] == ["info"]
+    assert "magnetic deviation accept: 3.35 deg RMS before, 0.11 after" in sentence(results)
+
+
+def test_a_bad_figure_is_refused_with_the_reason() -> None:
+    results = analysed(simulated("magnetic-hard").flight)
+    assert results.magnetic is None
+    assert "no opposite turn of equal bank" in reason_of(results)
+    assert "unsteady bank" in reason_of(results)
+    (finding,) = (finding for finding in results.findings if finding.code.startswith("magnetic."))
+    assert (finding.severity, finding.code) == ("info", "magnetic.not_assessable")
+    assert "magnetic" not in sentence(results)
+
+
+def test_a_rejected_figure_is_a_warning() -> None:
+    strict = Configuration(magnetic={"held_out_rms_max_deg": 0.01})
+    results = analysed(simulated("magnetic-eight").flight, strict)
+    (finding,) = (finding for finding in results.findings if finding.code.startswith("magnetic."))
+    assert (finding.severity, finding.code) == ("warn", "magnetic.reject")
+    assert "rms error after correction" in finding.text
+    assert "magnetic deviation reject (rms error after correction" in sentence(results)
+
+
+def test_without_magnetometer_there_is_a_reason_and_no_finding() -> None:
+    flight = simulated("magnetic-eight").flight
+    tables = {topic: table for topic, table in flight.tables.items() if topic != "magnetometer"}
+    results = analysed(Flight(tables, flight.metadata, flight.start_ns, flight.has_utc, flight.source_name))
+    assert "magnetometer" in reason_of(results)
+    assert not [finding for finding in results.findings if finding.code.startswith("magnetic.")]
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("fixedwing/umn_thor_flight75.csv", "other sensors correct ins"),
+        ("inertial/gv_ff02.csv", "no three-axis magnetometer"),
+        ("g1000/log_220417_125002_LFQA.csv", "no three-axis magnetometer"),
+        ("ulog/pyulog_sample.ulg", "no turn of steady bank"),
+    ],
+)
+def test_recorded_flights_are_refused_with_the_reason(name: str, reason: str, tmp_path: Path) -> None:
+    mcap = tmp_path / "flight.mcap"
+    flight = read_flight(mcap, convert_log(open_log(real_log(name)), mcap))
+    phases = flight_phases(flight)
+    inertial = analyse_inertial(flight, phases, InertialSettings()).inertial
+    answer = analyse_magnetic(flight, phases, MagneticSettings(), inertial=inertial)
+    assert answer.magnetic is None
+    assert answer.not_assessable[0].reason.startswith(reason)
+
+
+@pytest.mark.parametrize("name", [field.name for field in fields(answers.MagneticResult)])
+def test_every_answer_is_saved_and_comes_back(name: str, tmp_path: Path) -> None:
+    save(tmp_path, figure_eight(), {})
+    before, after = figure_eight().magnetic, restored(load(tmp_path)).magnetic
+    if name == "figures":
+        assert {"magnetic_samples", "magnetic_table", "magnetic_modulus"} <= set(load(tmp_path).figures)
+        return
+    value, back = getattr(before, name), getattr(after, name)
+    assert type(back) is type(value)
+    if isinstance(value, str):
+        assert back == value
+    elif name.endswith("_deg") and isinstance(value, tuple):
+        assert np.allclose(back, value, rtol=0.0, atol=1e-4)
+
+
+def test_summary_obeys_the_schema(tmp_path: Path) -> None:
+    save(tmp_path, figure_eight(), {})
+    summary = load(tmp_path).summary
+    own = {"$schema": SCHEMA["$schema"], "$ref": "#/$defs/magnetic", "$defs": SCHEMA["$defs"]}
+    jsonschema.Draft202012Validator(own).validate(summary["results"]["magnetic"])
+    assert len(summary["results"]["magnetic"]["deviation_deg"]) == 360
+
+
+@pytest.mark.parametrize(
+    ("definition", "dataclass"),
+    [
+        ("magnetic", answers.MagneticResult),
+        ("alignment", answers.Alignment),
+        ("declination", answers.DeclinationUsed),
+        ("turn", answers.Turn),
+        ("swing", answers.Swing),
+        ("sigma_part", answers.SigmaPart),
+        ("coverage", answers.Coverage),
+        ("residual", answers.Residual),
+        ("held_out", answers.HeldOut),
+        ("magnetic_method", answers.Method),
+        ("poisson", answers.PoissonParameters),
+        ("bank_bias", answers.BankBias),
+        ("card_row", answers.CardRow),
+    ],
+)
+def test_schema_lists_what_the_dataclasses_hold(definition: str, dataclass: type) -> None:
+    names = [field.name for field in fields(dataclass) if field.name != "figures"]
+    assert list(SCHEMA["$defs"][definition]["properties"]) == names
+    assert SCHEMA["$defs"][definition]["required"] == names
+
+
+def test_settings_are_read_and_mistakes_named(tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    path.write_text("[magnetic]\ncard_step_deg = 15\n", encoding="utf-8")
+    assert user_settings(load_configuration(path)).magnetic.card_step_deg == 15
+    path.write_text("[magnetic]\ncard_step = 15\n", encoding="utf-8")
+    with pytest.raises(SettingsError, match="card_step"):
+        user_settings(load_configuration(path))

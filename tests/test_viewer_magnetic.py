@@ -1,0 +1,56 @@
+"""The tab Magnetic of the recording: values as they came, a reason where there is none."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from groundstation.results.flight import NotAssessable
+from groundstation.results.magnetic import ADVISORY
+from groundstation.viewer.recording import write_recording
+from groundstation.viewer.tabs.magnetic_text import magnetic_text
+from tests.test_magnetic_run import figure_eight, simulated
+from tests.test_viewer_recording import Contents
+
+
+@pytest.fixture(scope="module")
+def contents(tmp_path_factory: pytest.TempPathFactory) -> Contents:
+    path = tmp_path_factory.mktemp("recording") / "flight.rrd"
+    flight = simulated("magnetic-eight").flight
+    tables = {topic: table for topic, table in flight.tables.items() if topic == "magnetometer"}
+    write_recording(path, replace(flight, tables=tables), figure_eight())
+    return Contents(path)
+
+
+def test_errors_and_modulus_are_those_of_the_result(contents: Contents) -> None:
+    figures = {figure.name: figure for figure in figure_eight().figures}
+    samples, modulus = figures["magnetic_samples"], figures["magnetic_modulus"]
+    mine = samples["part"] == "held out"
+    for name, column in (("before", "error_before_deg"), ("after", "error_poisson_attitude_deg")):
+        shown = contents.scalars(f"/magnetic/error/{name}")[1].ravel()
+        assert np.array_equal(shown, samples[column][mine])
+    rows = contents.scalars("/magnetic/modulus")[1]
+    known = np.isfinite(rows).all(axis=1)
+    assert np.array_equal(rows[known][:, 0], modulus["before_nt"])
+
+
+def test_text_holds_verdict_card_and_reasons() -> None:
+    found = figure_eight().magnetic
+    assert found is not None
+    text = magnetic_text(found)
+    assert text.startswith("# Magnetic deviation: accept")
+    assert ADVISORY in text
+    assert f"| 90 | {found.card[3].steer_deg:.1f} | {found.card[3].deviation_deg:+.1f} |" in text
+    assert magnetic_text(None, ["no | turns"]).endswith("no \\| turns")
+
+
+def test_without_a_result_and_with_empty_figures_the_tab_stands(tmp_path: Path) -> None:
+    flight, results = simulated("magnetic-eight").flight, figure_eight()
+    reason = (NotAssessable("magnetic", "no opposite turns"),)
+    write_recording(tmp_path / "a.rrd", flight, replace(results, magnetic=None, figures=(), not_assessable=reason))
+    assert results.magnetic is not None
+    bare = replace(results, magnetic=replace(results.magnetic, figures=()), figures=())
+    write_recording(tmp_path / "b.rrd", flight, bare)
+    assert Contents(tmp_path / "a.rrd").text("/magnetic/answer").startswith("# Magnetic deviation not assessed")
+    assert Contents(tmp_path / "b.rrd").text("/magnetic/answer").startswith("# Magnetic deviation: accept")
