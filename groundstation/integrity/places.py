@@ -89,6 +89,10 @@ class Places:
         self._count = self.records = 0
         self._recent: deque[tuple[Piece, Kept]] = deque(maxlen=8)
 
+    def close(self) -> None:
+        """Let the file go."""
+        self._file.close()
+
     @property
     def is_long(self) -> bool:
         """Whether there may be several windows."""

@@ -4,6 +4,7 @@ Kept are 12 bytes a record for each set of topics that are sampled together, bey
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -98,12 +99,16 @@ def survey(items: Iterable[Item], *, thresholds: Thresholds | None = None) -> Su
     Survey
         With the clock that :func:`groundstation.integrity.ordering.corrected` needs for the second pass.
     """
-    limits = thresholds or shipped()
+    with closing(Places()) as places:
+        return _surveyed(items, places, thresholds or shipped())
+
+
+def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Survey:
     header = LogHeader("")
     damages: list[Damage] = []
     remarks: list[Remark] = []
     pieces: dict[str, list[Kept]] = {}
-    places, contents, references = Places(), Contents(limits), ClockReferences(limits.clock_relation)
+    contents, references = Contents(limits), ClockReferences(limits.clock_relation)
     for item in items:
         if isinstance(item, RecordBatch):
             if len(item):

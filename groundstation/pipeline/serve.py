@@ -2,14 +2,18 @@
 
 import ipaddress
 import os
+import signal
 import subprocess
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.pipeline.inputs import file_in
 from groundstation.pipeline.publishing import FLEET_RECORDING, flight_folders
+
+PATIENCE_S = 1.0  # between two looks at whether it shall end
 
 
 def serve(
@@ -45,7 +49,8 @@ def serve(
             next_step="leave --web out; others open the catalog in their own viewer",
         )
     flights, fleet = recordings_in(out, say)
-    with catalog_server(flights, fleet, host=host, port=port) as catalog:
+    stop = threading.Event()
+    with catalog_server(flights, fleet, host=host, port=port) as catalog, _set_by_signals(stop, asked=not web):
         for path, reason in catalog.refused:
             say(f"warning: {path}: left out ({reason})")
         if not catalog.flights and not catalog.has_fleet:
@@ -55,9 +60,27 @@ def serve(
         say(f"{len(catalog.flights)} recordings{fleet_too}; open them with: groundstation view {catalog.url}")
         say("Ctrl-C ends")
         try:
-            _serve_page(catalog.url, host) if web else threading.Event().wait()
+            if web:
+                _serve_page(catalog.url, host)
+            while not web and not stop.wait(PATIENCE_S):
+                pass
         except KeyboardInterrupt:
-            say("ended")
+            pass
+        say("ended")
+
+
+@contextmanager
+def _set_by_signals(stop: threading.Event, *, asked: bool) -> Iterator[None]:
+    """Let Ctrl-C and an order to end set an event: an exception in the midst of anything might be lost."""
+    if not asked or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {one: signal.signal(one, lambda *_: stop.set()) for one in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
 
 
 def recordings_in(out: Path, say: Callable[[str], None]) -> tuple[list[Path], Path | None]:
