@@ -5,7 +5,9 @@ file still gives is kept.
 """
 
 import io
+import os
 import tempfile
+import weakref
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -73,7 +75,7 @@ def expand(stream: BinaryIO, compression: str, compressed_size: int, name: str) 
     limit = min(max(MAX_RATIO * compressed_size, MIN_LIMIT_BYTES), MAX_LIMIT_BYTES)
     size, damage = 0, None
     try:
-        file: Any = tempfile.TemporaryFile()  # noqa: SIM115 -- it lives as long as the source
+        file = _unnamed_file()
         try:
             for piece in _PIECES[compression](stream):
                 size += len(piece)
@@ -89,6 +91,15 @@ def expand(stream: BinaryIO, compression: str, compressed_size: int, name: str) 
         reason = error.strerror or type(error).__name__
         raise UnreadableLogError(name, f"{compression} data that cannot be decompressed ({reason})") from error
     return Expanded(file, size, damage)
+
+
+def _unnamed_file() -> BinaryIO:
+    """An empty temporary file that is closed with its last user, without Python's warning of one left open."""
+    with tempfile.TemporaryFile() as made:
+        descriptor = os.dup(made.fileno())
+    file = os.fdopen(descriptor, "w+b", closefd=False)
+    weakref.finalize(file, os.close, descriptor)
+    return file
 
 
 class Window(io.RawIOBase):
