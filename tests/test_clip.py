@@ -20,8 +20,8 @@ from groundstation.pipeline.convert import convert_log
 from groundstation.pipeline.log import open_log
 from groundstation.results.files import load
 from groundstation.store.reader import Part, read, read_info
+from tests.recording_contents import Contents
 from tests.test_store import joined
-from tests.test_viewer_recording import Contents
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 SAME = ("record_index", "time_ns")

@@ -27,7 +27,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, load, save
 from groundstation.simulation.samples import write_scenario
 from groundstation.viewer.comparison import write_comparison
-from tests.test_viewer_recording import Contents
+from tests.recording_contents import Contents
 from tests.viewer_example import make_flight, make_results
 from tests.viewer_shots import NoViewerError, colourful, pages, picture, settled, viewer
 

@@ -16,9 +16,10 @@ from groundstation.pipeline.batch import run_many
 from groundstation.pipeline.configuration import Configuration, Interval
 from groundstation.pipeline.conversions import convert_many
 from groundstation.pipeline.flight import Job, run_flight
+from groundstation.pipeline.inputs import flight_folders
 from groundstation.pipeline.outcome import Outcome, worst_code
 from groundstation.pipeline.progress import Event
-from groundstation.pipeline.publishing import flight_folders, report_again
+from groundstation.pipeline.publishing import report_again
 from groundstation.results.files import load
 from tests.real_logs import real_log
 

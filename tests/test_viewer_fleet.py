@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pytest
-from rerun.chunk import RrdReader
 from rerun.experimental import ViewerClient
 
 from groundstation.pipeline.fleet import gather
@@ -19,41 +18,13 @@ from groundstation.results.fleet import Densities, FleetResults, NotInFleet
 from groundstation.viewer.fleet import write_fleet_recording
 from groundstation.viewer.fleet_density import MOST_STEPS, PATH, steps
 from tests.fleet_example import save_flight, skill
+from tests.recording_contents import Contents
 from tests.viewer_shots import NoViewerError, colourful, pages, picture, settled, viewer
 
 STEADY, STEPPING, HOSTILE = "A12", "B3", "![x](http://127.0.0.1/x)|<b>/../"
 FLIGHTS, NEW_LEVEL = 48, 27  # the flight from which on B3 is 1 deg off
 LEAST_PIXELS = 40
 DRAWN_IN_COLOUR = {"TimeSeries", "StateTimeline", "BarChart", "2D"}
-
-
-class Contents:
-    """What a recording holds, by entity."""
-
-    def __init__(self, path: Path) -> None:
-        reader = RrdReader(path)
-        self.store, self.blueprints = reader.recordings()[0], reader.blueprints()
-        self.timelines: set[str] = set()
-        self.batches: dict[str, list[pa.RecordBatch]] = {}
-        self.fixed: dict[str, list[pa.RecordBatch]] = {}
-        for chunk in reader.stream():
-            self.timelines |= set(chunk.timeline_names)
-            place = self.fixed if chunk.is_static else self.batches
-            place.setdefault(chunk.entity_path, []).append(chunk.to_record_batch())
-
-    def scalars(self, entity: str) -> tuple[np.ndarray, np.ndarray]:
-        """Flight numbers and values, shapes (n,) and (n, k), in order."""
-        places, values = [], []
-        for batch in self.batches[entity]:
-            places.append(np.asarray(batch.column("flight_number")))
-            flat = batch.column("Scalars:scalars").flatten().to_numpy(zero_copy_only=False)
-            values.append(flat.reshape(batch.num_rows, -1))
-        order = np.argsort(np.concatenate(places), kind="stable")
-        return np.concatenate(places)[order], np.concatenate(values)[order]
-
-    def text(self, entity: str) -> str:
-        """Text of a document."""
-        return str(self.fixed[entity][0].column("TextDocument:text")[0].as_py()[0])
 
 
 def changed(fleet: FleetResults, **columns: np.ndarray) -> FleetResults:

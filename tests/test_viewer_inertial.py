@@ -17,7 +17,7 @@ from groundstation.viewer.recording import write_recording
 from groundstation.viewer.tabs.forecast_text import forecast_text
 from groundstation.viewer.tabs.inertial_text import inertial_text
 from tests.inertial_example import forecast_result, inertial_result
-from tests.test_viewer_recording import Contents
+from tests.recording_contents import Contents
 from tests.viewer_example import START_NS, make_flight, make_results
 
 

@@ -10,8 +10,8 @@ from groundstation.results.flight import NotAssessable
 from groundstation.results.magnetic import ADVISORY
 from groundstation.viewer.recording import write_recording
 from groundstation.viewer.tabs.magnetic_text import magnetic_text
+from tests.recording_contents import Contents
 from tests.test_magnetic_run import figure_eight, simulated
-from tests.test_viewer_recording import Contents
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,6 @@ import numpy as np
 import pyarrow as pa
 import pytest
 import rerun as rr
-from rerun.chunk import RrdReader
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Column
@@ -25,6 +24,7 @@ from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.recording import stream_recording, write_recording
 from groundstation.viewer.tabs import raw
 from groundstation.viewer.tabs.log import place_s
+from tests.recording_contents import Contents
 from tests.viewer_example import GNSS_GAP_S, START_NS, make_flight, make_results, table
 from tests.viewer_shots import free_port
 
@@ -39,40 +39,6 @@ HOSTILE = [
     "raw.a:b",
     "raw.a/b",
 ]
-
-
-class Contents:
-    """What a recording holds: rows by entity, timelines, static text."""
-
-    def __init__(self, path: Path) -> None:
-        reader = RrdReader(path)
-        self.store, self.blueprints = reader.recordings()[0], reader.blueprints()
-        self.timelines: set[str] = set()
-        self.batches: dict[str, list[pa.RecordBatch]] = {}
-        self.fixed: dict[str, list[pa.RecordBatch]] = {}
-        for chunk in reader.stream():
-            self.timelines |= set(chunk.timeline_names)
-            place = self.fixed if chunk.is_static else self.batches
-            place.setdefault(chunk.entity_path, []).append(chunk.to_record_batch())
-
-    def scalars(self, entity: str) -> tuple[np.ndarray, np.ndarray]:
-        """Flight time in nanoseconds and values, shapes (n,) and (n, k), in order of time."""
-        times, values = [], []
-        for batch in self.batches[entity]:
-            rows = batch.num_rows
-            times.append(np.asarray(batch.column("flight_time").cast(pa.int64())))
-            flat = batch.column("Scalars:scalars").flatten().to_numpy(zero_copy_only=False)
-            values.append(flat.reshape(rows, -1))
-        order = np.argsort(np.concatenate(times), kind="stable")
-        return np.concatenate(times)[order], np.concatenate(values)[order]
-
-    def text(self, entity: str) -> str:
-        """Text of a document."""
-        return next(
-            str(batch.column("TextDocument:text")[0].as_py()[0])
-            for batch in self.fixed[entity]
-            if "TextDocument:text" in batch.schema.names
-        )
 
 
 @pytest.fixture(scope="module")

@@ -15,12 +15,11 @@ from groundstation.pipeline.depot import FarDepot, FolderDepot
 from groundstation.pipeline.elsewhere import far_logs, is_far
 from groundstation.pipeline.far import FarJob, run_far
 from groundstation.pipeline.flight import PARTIAL_PREFIX, Job, run_flight
-from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, collect, is_ours
-from groundstation.pipeline.log import open_log
+from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, collect, flight_folders, is_ours
 from groundstation.pipeline.outcome import Outcome
 from groundstation.pipeline.progress import Event, Listener, silent
-from groundstation.pipeline.publishing import FLEET_FILES, flight_folders, write_beside, write_index_of
-from groundstation.pipeline.resume import Finished, finished_flights, keys_of
+from groundstation.pipeline.publishing import FLEET_FILES, write_beside, write_index_of
+from groundstation.pipeline.resume import Finished, finished_flights
 from groundstation.pipeline.shelf import Shelf
 from groundstation.pipeline.workers import TASKS_PER_PROCESS, AnyJob, Crew, cores, in_turn, side_by_side
 
@@ -248,14 +247,8 @@ def _with_steps(jobs: Sequence[Job], known: Mapping[str, Finished]) -> Iterator[
 
 
 def _with_step(job: Job, known: Mapping[str, Finished]) -> Job:
-    profile = Path(job.configuration.profile) if job.configuration.profile else None
-    try:
-        source = open_log(job.path, profile).source
-        finished = known.get(source.sha256)
-        if finished is None:
-            return job
-        keys = keys_of(source, job.configuration, with_pdf=job.with_pdf)
-    except Exception:
-        return job  # its run tells what is wrong
-    step = finished.step(keys, with_pdf=job.with_pdf)
-    return replace(job, step=step, finished=finished, add_suffix=step == "analysis" and finished.has_suffix)
+    asked = job.asked()
+    if asked is None or asked[0] not in known:
+        return job
+    sha256, keys = asked
+    return job.going_on(known[sha256], keys)

@@ -1,12 +1,11 @@
 """The verb ``check``: the integrity ledger of logs, which is computed and told, and written nowhere."""
 
-import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from groundstation.base.errors import GroundstationError, UnreadableLogError, UsageError
+from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.base.findings import SEVERITIES, Finding, worst
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.integrity.limits import Thresholds, shipped
@@ -15,7 +14,7 @@ from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.convert import census_of, has_other_limits, recounted, stored_findings
 from groundstation.pipeline.describe import facts_of
 from groundstation.pipeline.log import Log, open_log
-from groundstation.pipeline.outcome import Outcome, State
+from groundstation.pipeline.outcome import Outcome, State, reason_of
 from groundstation.pipeline.progress import Event, Listener, silent
 
 
@@ -75,7 +74,7 @@ def check_many(
             raise UsageError(str(path), "no such file")
         if path.is_dir():
             raise UsageError(str(path), "a folder", "a log", "`run` takes folders")
-    profile = Path(configuration.profile) if configuration.profile else None
+    profile = configuration.profile_path
     listen(Event("begin", total=len(paths)))
     found = []
     for path in paths:
@@ -95,18 +94,10 @@ def check_log(log: Log, thresholds: Thresholds | None = None, *, fail_on: str = 
 
 
 def _check_or_reason(path: Path, profile: Path | None, thresholds: Thresholds, fail_on: str) -> Checked:
-    trace = ""
     try:
         return check_log(open_log(path, profile), thresholds, fail_on=fail_on)
-    except GroundstationError as error:
-        reason = str(error)
-    except OSError as error:
-        reason = f"{path.name}: {error.strerror or error}"
-    except MemoryError:
-        reason = f"{path.name}: not enough memory"
     except Exception as error:
-        trace = traceback.format_exc()
-        reason = f"{path.name}: internal error ({type(error).__name__}: {error}); please report it"
+        reason, trace = reason_of(path.name, error)
     return Checked(Outcome(str(path), "failed", reason, trace=trace), {}, {}, {}, ())
 
 

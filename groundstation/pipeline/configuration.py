@@ -43,6 +43,11 @@ class Configuration:
     files: Mapping[str, str] = field(default_factory=dict)
     thresholds: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def profile_path(self) -> Path | None:
+        """The profile as a path."""
+        return Path(self.profile) if self.profile else None
+
     def file_of(self, section: str) -> str:
         """The file a section was read from, for messages."""
         return self.files.get(section, "settings")

@@ -32,7 +32,7 @@ def convert_many(
     """
     configuration = configuration or Configuration()
     thresholds = configured_thresholds(configuration)
-    profile = Path(configuration.profile) if configuration.profile else None
+    profile = configuration.profile_path
     for log in logs:
         if not log.exists():
             raise UsageError(str(log), "no such file")

@@ -135,7 +135,7 @@ class FarFolder:
         return [str(PurePosixPath(path).relative_to(root)) for path in self._fs.find(root)]
 
     def _make_parent(self, name: str) -> None:
-        if "file" in self._fs.protocol or self._fs.protocol == "file":  # buckets have no folders
+        if "file" in self._fs.protocol:  # buckets have no folders
             Path(self._path(name)).parent.mkdir(parents=True, exist_ok=True)
 
     def remove(self, name: str) -> None:

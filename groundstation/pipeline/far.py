@@ -12,10 +12,9 @@ from pathlib import Path, PurePosixPath
 from groundstation.base.errors import GroundstationError
 from groundstation.pipeline.elsewhere import FarFolder, is_far
 from groundstation.pipeline.flight import Job, run_flight
-from groundstation.pipeline.log import open_log
 from groundstation.pipeline.outcome import Outcome
 from groundstation.pipeline.progress import Listener, silent
-from groundstation.pipeline.resume import Finished, finished, keys_of
+from groundstation.pipeline.resume import Finished, finished
 from groundstation.reports.flight_report import PDF
 from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY
 
@@ -85,22 +84,21 @@ def _run_in(scratch: Path, far: FarJob, listen: Listener) -> Outcome:
 
 def _planned(job: Job, out: FarFolder, scratch: Path) -> Job:
     """The job with what has to be done of it; what it needs of a finished flight is fetched."""
-    try:
-        source = open_log(job.path, Path(job.configuration.profile) if job.configuration.profile else None).source
-        keys = keys_of(source, job.configuration, with_pdf=job.with_pdf)
-    except Exception:
-        return job  # its run tells what is wrong
-    flight_id = (out.read(f"{BY_LOG}/{source.sha256}") or b"").decode()
-    found = _fetched(out, flight_id, scratch) if flight_id else None
-    if found is None or found.sha256 != source.sha256:
+    asked = job.asked()
+    if asked is None:
         return job
-    step = found.step(keys, with_pdf=job.with_pdf)
-    if step == "analysis":
+    sha256, keys = asked
+    flight_id = (out.read(f"{BY_LOG}/{sha256}") or b"").decode()
+    found = _fetched(out, flight_id, scratch) if flight_id else None
+    if found is None or found.sha256 != sha256:
+        return job
+    planned = job.going_on(found, keys)
+    if planned.step == "analysis":
         out.fetch(f"{flight_id}/{found.mcap.name}", found.mcap)
-    elif step == "reports":
+    elif planned.step == "reports":
         for name in array_files(out, flight_id):
             out.fetch(f"{flight_id}/{name}", found.folder / name)
-    return replace(job, step=step, finished=found, add_suffix=step == "analysis" and found.has_suffix)
+    return planned
 
 
 def array_files(out: FarFolder, flight_id: str) -> list[str]:

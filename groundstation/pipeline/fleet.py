@@ -17,8 +17,8 @@ from groundstation.estimators.fleet.moments import Moments
 from groundstation.estimators.fleet.skill import SkillMerger
 from groundstation.pipeline.fleet_rows import checks_of, flight_row, flights_table, heading_samples, skill_of
 from groundstation.pipeline.fleet_samples import SampleStore
+from groundstation.pipeline.inputs import flight_folders
 from groundstation.pipeline.outcome import Outcome
-from groundstation.pipeline.publishing import flight_folders
 from groundstation.reports.index import INDEX_JSON
 from groundstation.results.figures import FigureData
 from groundstation.results.files import load, write_bytes

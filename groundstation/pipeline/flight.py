@@ -4,13 +4,12 @@ import os
 import shutil
 import tempfile
 import time
-import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
-from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
+from groundstation.base.errors import UnclaimedLogError, UnreadableLogError
 from groundstation.base.findings import SEVERITIES, Severity, worst
 from groundstation.base.records import RecordBatch
 from groundstation.pipeline.analyse import Given, analyse, configured_thresholds
@@ -19,9 +18,9 @@ from groundstation.pipeline.convert import Converted, convert_log, stored_findin
 from groundstation.pipeline.identity import flight_id, sha256_of
 from groundstation.pipeline.log import Log, open_log
 from groundstation.pipeline.manifest import manifest_of
-from groundstation.pipeline.outcome import Outcome, State
+from groundstation.pipeline.outcome import Outcome, State, reason_of
 from groundstation.pipeline.progress import Event, Listener, silent
-from groundstation.pipeline.resume import Finished, Step, keys_of, remember_reports, remembered
+from groundstation.pipeline.resume import Finished, Keys, Step, keys_of, remember_reports, remembered
 from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
 from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
@@ -78,6 +77,19 @@ class Job:
         """Name of its log."""
         return self.path.name
 
+    def asked(self) -> tuple[str, Keys] | None:
+        """Digest of its log and the keys of what is asked for; None when only its run can tell what is wrong."""
+        try:
+            source = open_log(self.path, self.configuration.profile_path).source
+            return source.sha256, keys_of(source, self.configuration, with_pdf=self.with_pdf)
+        except Exception:
+            return None
+
+    def going_on(self, finished: Finished, keys: Keys) -> "Job":
+        """The job with what is left to do of it, its flight being finished."""
+        step = finished.step(keys, with_pdf=self.with_pdf)
+        return replace(self, step=step, finished=finished, add_suffix=step == "analysis" and finished.has_suffix)
+
 
 def run_flight(job: Job, listen: Listener = silent) -> Outcome:
     """Run one log into a partial folder in ``out``; the caller moves it into place (see :func:`place`).
@@ -86,13 +98,13 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
     stops the others.
     """
     watch = Stopwatch(listen, job.path.name)
-    name, sha256, trace = job.path.name, "", ""
+    sha256 = ""
     partial: Path | None = None
     try:
         if job.finished is not None and job.step in ("nothing", "reports"):
             return _run_reports(job, job.finished, watch)
         version = _version(job.path)
-        log = open_log(job.path, Path(job.configuration.profile) if job.configuration.profile else None)
+        log = open_log(job.path, job.configuration.profile_path)
         sha256 = log.source.sha256
         job.out.mkdir(parents=True, exist_ok=True)
         partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=job.out))
@@ -100,16 +112,8 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
         return _run(log, version, job, partial, watch)
     except UnclaimedLogError as error:
         return Outcome(job.log, "failed" if job.is_named else "skipped", str(error))
-    except GroundstationError as error:
-        reason = str(error)
-    except OSError as error:
-        reason = f"{name}: {Path(error.filename).name + ': ' if error.filename else ''}{error.strerror or error}"
-    except MemoryError:
-        reason = f"{name}: not enough memory"
     except Exception as error:
-        # What is wrong is ours to mend, and the line says so; -v shows where.
-        trace = traceback.format_exc()
-        reason = f"{name}: internal error ({type(error).__name__}: {error}); please report it"
+        reason, trace = reason_of(job.name, error)
     if partial is not None:
         shutil.rmtree(partial, ignore_errors=True)
     return Outcome(job.log, "failed", reason, sha256=sha256, times_s=watch.times_s, trace=trace)

@@ -69,6 +69,11 @@ def file_in(folder: Path, ending: str, *others: str) -> Path:
     return found[0]
 
 
+def flight_folders(out: Path) -> list[Path]:
+    """Flight folders in an OUT, in the order of their names."""
+    return sorted(folder for folder in out.iterdir() if folder.name[0] != "." and (folder / SUMMARY).is_file())
+
+
 def _walk(folder: Path, out: Path | None) -> list[Path]:
     if folder.resolve() == out or is_ours(folder):
         return []

@@ -38,6 +38,6 @@ def manifest_of(
             "machine": platform.machine(),
             "python": sys.version.split()[0],
         },
-        "versions": versions(),
+        "versions": dict(versions()),
         "resume": dict(resume),
     }

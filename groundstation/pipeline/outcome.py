@@ -1,8 +1,12 @@
 """What became of one log of a run, for the totals line, the index and the exit code."""
 
+import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
+
+from groundstation.base.errors import GroundstationError
 
 State = Literal["done", "data_lost", "limit_reached", "failed", "skipped"]
 EXIT_CODE: Mapping[State, int] = {"done": 0, "skipped": 0, "data_lost": 3, "limit_reached": 4, "failed": 1}
@@ -41,6 +45,19 @@ class Outcome:
     def code(self) -> int:
         """Exit code of this log alone."""
         return EXIT_CODE[self.state]
+
+
+def reason_of(name: str, error: Exception) -> tuple[str, str]:
+    """Why a log failed, in one line, and where an error that is ours to mend came from (empty for the others)."""
+    if isinstance(error, GroundstationError):
+        return str(error), ""
+    if isinstance(error, OSError):
+        file = f"{Path(error.filename).name}: " if error.filename and Path(error.filename).name != name else ""
+        return f"{name}: {file}{error.strerror or error}", ""
+    if isinstance(error, MemoryError):
+        return f"{name}: not enough memory", ""
+    trace = "".join(traceback.format_exception(error))
+    return f"{name}: internal error ({type(error).__name__}: {error}); please report it", trace
 
 
 def worst_code(outcomes: "tuple[Outcome, ...]") -> int:

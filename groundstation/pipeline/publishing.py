@@ -5,41 +5,33 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
-from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, is_ours
+from groundstation.pipeline.fleet import FLEET_PARQUET, write_fleet
+from groundstation.pipeline.fleet_samples import SAMPLES
+from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, flight_folders, is_ours
 from groundstation.pipeline.outcome import Outcome
+from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
+from groundstation.reports.fleet_report import write_fleet_report
 from groundstation.reports.index import INDEX_CSV, INDEX_JSON
-from groundstation.results.files import SUMMARY
 
-FLEET_RECORDING = "fleet.rrd"
-FLEET_FILES = (
-    INDEX_JSON,
-    INDEX_CSV,
-    "fleet.parquet",
-    "samples.parquet",
-    FLEET_RECORDING,
-    "summary.html",
-    "summary.pdf",
-)
+FLEET_RECORDING, FLEET_PDF = "fleet.rrd", str(Path(FLEET_PAGE).with_suffix(".pdf"))
+FLEET_FILES = (INDEX_JSON, INDEX_CSV, FLEET_PARQUET, SAMPLES, FLEET_RECORDING, FLEET_PAGE, FLEET_PDF)
 
 
 def write_beside(
     out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[dict[str, Any]] = (), *, with_pdf: bool = True
 ) -> tuple[Outcome, ...]:
     """Write everything that stands beside the flight folders; returns what could not be written or read."""
-    from groundstation.pipeline.fleet import write_fleet
-    from groundstation.reports.fleet_report import write_fleet_report
     from groundstation.viewer.fleet import write_fleet_recording
 
     problems = list(write_index_of(out, outcomes, kept_rows))
     fleet, unwritten = write_fleet(out)
     problems += unwritten
     try:
-        problem = write_fleet_report(out, fleet, with_pdf=with_pdf).problem
-        write_fleet_recording(out / FLEET_RECORDING, fleet)
-    except OSError as error:
-        name = Path(error.filename).name if error.filename else "the fleet's report or recording"
-        problem = f"{name} cannot be written ({error.strerror or error})"
-        problems.append(Outcome(str(out), "failed", f"{out}: {problem}"))
+        with told_in_a_line(str(out)):
+            problem = write_fleet_report(out, fleet, with_pdf=with_pdf).problem
+            write_fleet_recording(out / FLEET_RECORDING, fleet)
+    except GroundstationError as error:  # the flights are done, and told of in any case
+        problems.append(Outcome(str(out), "failed", str(error)))
     else:
         problems += [Outcome(str(out), "skipped", f"{out}: {problem}")] if problem else []
     return tuple(problems)
@@ -69,11 +61,6 @@ def write_index_of(
     except OSError as error:
         problems.append(Outcome(str(out), "failed", f"{out}: the index cannot be written ({error.strerror or error})"))
     return tuple(problems)
-
-
-def flight_folders(out: Path) -> list[Path]:
-    """Flight folders in an OUT, in the order of their names."""
-    return sorted(folder for folder in out.iterdir() if folder.name[0] != "." and (folder / SUMMARY).is_file())
 
 
 def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple[Outcome, ...]]:

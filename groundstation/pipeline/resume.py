@@ -10,8 +10,10 @@ import json
 import platform
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
+from functools import cache
 from importlib import metadata as installed
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal
 
 from groundstation import __version__
@@ -88,9 +90,10 @@ class Finished:
         return "nothing" if keys.reports == self.keys.reports and wanted <= self.files else "reports"
 
 
-def versions() -> dict[str, str]:
+@cache
+def versions() -> Mapping[str, str]:
     """Versions of what results depend on."""
-    return {"groundstation": __version__, **{name: _version(name) for name in PACKAGES}}
+    return MappingProxyType({"groundstation": __version__, **{name: _version(name) for name in PACKAGES}})
 
 
 def _version(package: str) -> str:
@@ -110,7 +113,9 @@ def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool) -> 
     """
     settings = {**asdict(configuration), "files": None, "profile": None}
     thresholds = settings.pop("thresholds")
-    conversion = _digest(asdict(source), _profile_of(configuration), thresholds, versions(), platform.python_version())
+    conversion = _digest(
+        asdict(source), _profile_of(configuration), thresholds, dict(versions()), platform.python_version()
+    )
     analysis = _digest(conversion, settings)
     return Keys(conversion, analysis, _digest(analysis, with_pdf))
 

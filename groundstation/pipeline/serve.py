@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UsageError
-from groundstation.pipeline.inputs import file_in
-from groundstation.pipeline.publishing import FLEET_RECORDING, flight_folders
+from groundstation.pipeline.inputs import file_in, flight_folders
+from groundstation.pipeline.publishing import FLEET_RECORDING
 
 PATIENCE_S = 1.0  # between two looks at whether it shall end
 

@@ -10,8 +10,8 @@ from groundstation.base.errors import GroundstationError
 from groundstation.pipeline.depot import Depot
 from groundstation.pipeline.elsewhere import is_far
 from groundstation.pipeline.identity import plain_id
+from groundstation.pipeline.inputs import flight_folders
 from groundstation.pipeline.outcome import Outcome
-from groundstation.pipeline.publishing import flight_folders
 from groundstation.results.files import MANIFEST
 
 

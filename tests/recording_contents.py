@@ -1,0 +1,42 @@
+"""What an .rrd holds, read back with Rerun's own reader."""
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+from rerun.chunk import RrdReader
+
+
+class Contents:
+    """What a recording holds: rows by entity, timelines, static text."""
+
+    def __init__(self, path: Path) -> None:
+        reader = RrdReader(path)
+        self.store, self.blueprints = reader.recordings()[0], reader.blueprints()
+        self.timelines: set[str] = set()
+        self.batches: dict[str, list[pa.RecordBatch]] = {}
+        self.fixed: dict[str, list[pa.RecordBatch]] = {}
+        for chunk in reader.stream():
+            self.timelines |= set(chunk.timeline_names)
+            place = self.fixed if chunk.is_static else self.batches
+            place.setdefault(chunk.entity_path, []).append(chunk.to_record_batch())
+
+    def scalars(self, entity: str) -> tuple[np.ndarray, np.ndarray]:
+        """Flight time in nanoseconds (of a fleet: flight numbers) and values, shapes (n,) and (n, k), in order."""
+        timeline = next(name for name in ("flight_time", "flight_number") if name in self.timelines)
+        times, values = [], []
+        for batch in self.batches[entity]:
+            rows = batch.num_rows
+            times.append(np.asarray(batch.column(timeline).cast(pa.int64())))
+            flat = batch.column("Scalars:scalars").flatten().to_numpy(zero_copy_only=False)
+            values.append(flat.reshape(rows, -1))
+        order = np.argsort(np.concatenate(times), kind="stable")
+        return np.concatenate(times)[order], np.concatenate(values)[order]
+
+    def text(self, entity: str) -> str:
+        """Text of a document."""
+        return next(
+            str(batch.column("TextDocument:text")[0].as_py()[0])
+            for batch in self.fixed[entity]
+            if "TextDocument:text" in batch.schema.names
+        )
