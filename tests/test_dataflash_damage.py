@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Item, RecordBatch
 from groundstation.readers import registry
 from groundstation.readers.dataflash import blocks, read
@@ -27,6 +28,8 @@ def scanned(path: Path) -> tuple[NDArray[np.int64], list[Damage]]:
         assert block.first_index == before
         before += len(block.offsets)
         places.append(block.offsets)
+    for known, block in zip(places, scanner.again(), strict=True):
+        assert np.array_equal(known, block.offsets)
     return np.concatenate(places) if places else np.zeros(0, dtype=np.int64), list(scanner.spans.damages())
 
 
@@ -34,6 +37,28 @@ def items_of(path: Path) -> list[Item]:
     items = list(read(Source(path)))
     check(items)
     return items
+
+
+def test_second_pass_of_a_log_of_more_records_than_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "long.BIN"
+    path.write_bytes(flight_log(60).content)
+    usual = [block.offsets.tolist() for block in Scanner(Source(path))]
+    monkeypatch.setattr(blocks, "RECORDS_KEPT", 100)
+    scanner = Scanner(Source(path))
+    first = [block.offsets.tolist() for block in scanner]
+    assert sum(map(len, first)) > 100
+    assert [block.offsets.tolist() for block in scanner.again()] == first == usual
+
+
+def test_log_that_becomes_shorter_between_the_passes(tmp_path: Path) -> None:
+    path = tmp_path / "shorter.BIN"
+    content = flight_log(60).content
+    path.write_bytes(content)
+    scanner = Scanner(Source(path))
+    assert len(list(scanner)) >= 1
+    path.write_bytes(content[: len(content) // 2])
+    with pytest.raises(UnreadableLogError, match=r"shorter\.BIN: changed while it was read"):
+        list(scanner.again())
 
 
 def test_cut_at_every_byte(tmp_path: Path) -> None:

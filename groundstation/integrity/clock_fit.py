@@ -29,6 +29,7 @@ MOST_BREAKS = 40
 JITTER_TIMES = 8.0
 SIGNIFICANT = 4.0  # standard errors
 FLOOR_S = 1e-6
+SETTLED_S = 1e-9  # a line that moves less is found
 _MAD = 1.4826
 
 
@@ -161,7 +162,10 @@ def _scatter(residual_s: FloatArray) -> float:
 def _medians(values: FloatArray, blocks: int) -> FloatArray:
     """Medians of blocks of equal numbers of samples; what does not go into them is left out between them."""
     starts = np.linspace(0, len(values), blocks, endpoint=False).astype(np.int64)
-    return np.asarray(np.median(values[starts[:, None] + np.arange(len(values) // blocks)], axis=1))
+    length = len(values) // blocks
+    middle = length // 2
+    ordered = np.partition(values[starts[:, None] + np.arange(length)], (middle - 1, middle), axis=1)
+    return np.asarray(ordered[:, middle] if length % 2 else 0.5 * (ordered[:, middle - 1] + ordered[:, middle]))
 
 
 def _student(freedom: float) -> float:
@@ -201,14 +205,19 @@ def _line(time_s: FloatArray, offset_s: FloatArray, bound_s: float) -> _Line:
     lever_s -= lever_s.mean()  # of times that hardly differ the first mean is rounded
     power = float(lever_s @ lever_s)
     offset = slope = 0.0
+    span_s = float(time_s[-1] - time_s[0])
+    left_s = offset_s
+    residual = _medians(left_s, blocks)
     for _turn in range(4):  # medians of what a line leaves, for a steep line moves them within a block
-        left = _medians(offset_s - offset - slope * (time_s - middle_s), blocks)
-        offset += float(left.mean())
-        slope += float(lever_s @ left) / power
-    residual = _medians(offset_s - offset - slope * (time_s - middle_s), blocks)
+        more, steeper = float(residual.mean()), float(lever_s @ residual) / power
+        offset, slope = offset + more, slope + steeper
+        left_s = offset_s - offset - slope * (time_s - middle_s)
+        residual = _medians(left_s, blocks)
+        if abs(more) + abs(steeper) * span_s < SETTLED_S:
+            break
     offset_sigma_s, slope_sigma = _standard_errors(residual, lever_s)
-    scatter_s = _scatter(offset_s - offset - slope * (time_s - middle_s))
-    hidden = 0.0 if scatter_s > 0.2 * rounding_s else rounding_s / (3**0.5 * float(time_s[-1] - time_s[0]))
+    scatter_s = _scatter(left_s)
+    hidden = 0.0 if scatter_s > 0.2 * rounding_s else rounding_s / (3**0.5 * span_s)
     return _Line(
         middle_s,
         offset,

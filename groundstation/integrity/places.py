@@ -201,11 +201,13 @@ def _united(pieces: list[Piece]) -> tuple[Int64Array, Column]:
         return pieces[0].index, pieces[0].time
     start, end = min(int(piece.index[0]) for piece in pieces), max(int(piece.index[-1]) for piece in pieces) + 1
     if end - start <= 4 * sum(len(piece.index) for piece in pieces):  # places without many holes need no sorting
-        seen, timed = np.zeros(end - start, dtype=bool), np.zeros(end - start, dtype=bool)
-        time = np.zeros(end - start, dtype=np.int64)
+        seen, time = np.zeros(end - start, dtype=bool), np.zeros(end - start, dtype=np.int64)
+        timed = seen if all(piece.time.present is None for piece in pieces) else seen.copy()
         for piece in reversed(pieces):
             at = piece.index - start
-            seen[at], time[at], timed[at] = True, piece.time.values, piece.time.mask
+            seen[at], time[at] = True, piece.time.values
+            if timed is not seen:
+                timed[at] = piece.time.mask
         if seen.all():
             return np.arange(start, end), Column(time, timed)
         places = np.flatnonzero(seen)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from groundstation.readers.source import Source
 BLOCK_BYTES = 4 << 20
 REFUSED_SHOWN = 20  # definitions left out that are told one by one
 MAX_SPANS = 4_096
+RECORDS_KEPT = 1 << 23  # whose places are kept for a second pass: 5 bytes each
 MOST_LOGS, MOST_DEFINITIONS = 256, 10_000  # joined in a file, and different ones in it: more is no log but an attack
 _LOG_BEGINS = bytes((FMT_ID, FMT_BYTES)) + b"FMT"  # every log begins with the definition of definitions
 FILLERS = (b"\0", b"\xff")  # what a recorder fills the rest of a page with
@@ -63,6 +64,30 @@ class Block:
         length = definition.length
         at_any_byte = np.ndarray((len(self.data) - length + 1,), f"V{length}", self.data.data, strides=(1,))
         return at_any_byte[self.offsets[which]].view(definition.dtype)
+
+
+class _Places(NamedTuple):
+    """A block without its data, in little memory."""
+
+    offsets: NDArray[np.uint32]
+    types: NDArray[np.uint8]
+    first_index: int
+    definitions: dict[int, Definition]
+
+    @classmethod
+    def of(cls, block: Block) -> "_Places":
+        return cls(block.offsets.astype(np.uint32), block.types, block.first_index, block.definitions)
+
+    def block(self, data: NDArray[np.uint8]) -> Block:
+        return Block(data, self.offsets.astype(np.int64), self.types, self.first_index, self.definitions)
+
+
+class _Chunk(NamedTuple):
+    """Data that were at hand at once: how many bytes, how many of them are done with, and their blocks."""
+
+    length: int
+    done: int
+    blocks: list[_Places]
 
 
 @dataclass
@@ -116,21 +141,48 @@ class Scanner:
         self._base = 0  # place in the file of the first byte of the data at hand
         self._count = 0
         self._spans = np.empty((MAX_SPANS, 3), dtype=np.int64)
+        self._chunks: list[_Chunk] = []
 
     def __iter__(self) -> Iterator[Block]:
         data = np.zeros(0, dtype=np.uint8)
         with self._source.open() as stream:
             while True:
                 data, is_last = self._longer(data, stream)
-                yield from self._blocks(data, is_last)
+                blocks: list[_Places] = []
+                for block in self._blocks(data, is_last):
+                    blocks.append(_Places.of(block))
+                    yield block
+                done = int(self._state[scan.POSITION])
+                self._chunks.append(_Chunk(len(data), done, blocks))
+                if self._count > RECORDS_KEPT:
+                    self._chunks.clear()
                 if is_last:
                     break
-                done = int(self._state[scan.POSITION])
                 data, self._base = data[done:], self._base + done
                 self._state[scan.POSITION] = 0
                 if self._state[scan.SKIP_START] != scan.NOWHERE:
                     self._state[scan.SKIP_START] -= done
         self._finish(data)
+
+    def again(self) -> Iterator[Block]:
+        """The same blocks once more; records are looked for again only where they were too many to keep their places.
+
+        Raises
+        ------
+        UnreadableLogError
+            When the log is shorter than it was.
+        """
+        if self._count > RECORDS_KEPT:
+            yield from Scanner(self._source)
+            return
+        data = np.zeros(0, dtype=np.uint8)
+        with self._source.open() as stream:
+            for chunk in self._chunks:
+                data, _is_last = self._longer(data, stream)
+                if len(data) < chunk.length:
+                    raise UnreadableLogError(self._source.name, "changed while it was read", "", "read it again")
+                yield from (places.block(data) for places in chunk.blocks)
+                data = data[chunk.done :]
 
     def _longer(self, data: NDArray[np.uint8], stream: BinaryIO) -> tuple[NDArray[np.uint8], bool]:
         """The data with the next block of the file behind it, and whether that was the last."""

@@ -11,7 +11,6 @@ from groundstation.base.records import Damage, Int64Array
 from groundstation.readers.dataflash.blocks import Block, Scanner
 from groundstation.readers.dataflash.definitions import Definition, Units
 from groundstation.readers.dataflash.values import Rows, as_double, by_instance, rows_of
-from groundstation.readers.source import Source
 
 MESSAGES_KEPT = 100
 MOST_INSTANCES = 32  # more values than that tell no sensors apart
@@ -87,10 +86,9 @@ class Overview:
     damages: tuple[Damage, ...]
 
 
-def overview(source: Source) -> Overview:
+def overview(scanner: Scanner) -> Overview:
     """Read a log once and say what it holds; what is kept does not grow with the file but for GPS records."""
     survey = _Survey()
-    scanner = Scanner(source)
     for block in scanner:
         survey.add(block)
     return survey.result(scanner)

@@ -18,14 +18,15 @@ READER = "dataflash"
 
 def items(source: Source) -> Iterator[Item]:
     """Yield the header, batches in the order of the blocks of the file, then remarks and damages."""
-    found = overview(source)
+    scanner = Scanner(source)
+    found = overview(scanner)
     facts = metadata(found)
     utc_ns, remarks = utc_of_power_up(found.gps_times)
     yield LogHeader(READER, facts, utc_ns, has_counting_clock=True)
     choices = choose(found, facts.get("vehicle", ""))
     mapper, topics = Mapper(found, choices), _Topics()
     unreadable: dict[str, int] = {}
-    for block in Scanner(source):
+    for block in scanner.again():
         for rows in _rows(block, found):
             topic = topics.of(rows)
             if rows.definition.time_field is not None:
