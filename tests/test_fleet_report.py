@@ -22,6 +22,7 @@ from groundstation.base.timescales import utc_ns_to_stamp
 from groundstation.estimators.fleet import answer
 from groundstation.estimators.fleet.changes import ChangeSettings
 from groundstation.estimators.fleet.density import densities_of, histogram_of
+from groundstation.estimators.fleet.deviation import deviations
 from groundstation.estimators.fleet.moments import moments_of
 from groundstation.estimators.fleet.skill import SkillMerger, SkillOfFlight
 from groundstation.pipeline.fleet import gather
@@ -106,6 +107,7 @@ def fleet_of(
         answer.outliers(flights),
         tuple(not_in_fleet),
         answer.stated_rates(settings),
+        deviations(flights),
     )
 
 
@@ -331,3 +333,25 @@ def test_without_typst_the_page_is_there(tmp_path: Path, monkeypatch: pytest.Mon
     written = write_fleet_report(tmp_path, fleet_of(1))
     assert [path.name for path in written.paths] == [PAGE] and "summary.pdf: not written" in written.problem
     assert not (tmp_path / "summary.pdf").exists()
+
+
+def test_deviations_of_the_flights_stand_beside_each_other(tmp_path: Path) -> None:
+    values = {"a": 0.3, "b": -2.0, "c": 1.5, "d": 0.2, "e": 0.0}
+    flown = 6
+    columns: dict[str, Any] = {
+        "magnetic_verdict": ["accept"] * flown + [""] * 4,
+        "magnetic_method": ["poisson_attitude"] * flown + [""] * 4,
+        "magnetic_before_rms_deg": [2.0] * flown + [math.nan] * 4,
+        "magnetic_after_rms_deg": [0.12] * flown + [math.nan] * 4,
+    }
+    for letter, value in values.items():
+        columns[f"magnetic_{letter}_deg"] = [value] * flown + [math.nan] * 4
+        columns[f"magnetic_{letter}_sigma_deg"] = [0.1] * flown + [math.nan] * 4
+    columns["magnetic_b_deg"][0] = 3.0  # five degrees from the others of the aircraft
+    fleet = fleet_of(10, **columns)
+    text = page_of(tmp_path, fleet).text
+    assert "Magnetic deviation by aircraft" in text and "iron fit" in text
+    changed = [row for row in fleet.deviations if row.coefficients_deg["B"] == 3.0]
+    assert len(fleet.deviations) == flown and changed[0].difference_rms_deg == pytest.approx(5.0 / math.sqrt(2.0))
+    assert "3.54" in text
+    assert "Magnetic deviation by aircraft" not in page_of(tmp_path, fleet_of(10)).text

@@ -10,6 +10,7 @@ from groundstation.estimators.fleet.aircraft import mean_over_flights
 from groundstation.estimators.fleet.calibration import calibrate, share_interval
 from groundstation.estimators.fleet.changes import ChangeSettings, control_chart, find_changes
 from groundstation.estimators.fleet.density import MOST_BINS, densities_of, histogram_of
+from groundstation.estimators.fleet.deviation import deviations
 from groundstation.estimators.fleet.moments import Moments, merged, moments_of
 from groundstation.estimators.fleet.outliers import find_outliers
 from groundstation.estimators.fleet.skill import SkillMerger, SkillOfFlight
@@ -274,3 +275,47 @@ def test_interval_of_a_share_is_exact() -> None:
     low, high = share_interval(7, 30)
     assert binom.sf(6, 30, low) == pytest.approx(0.025) and binom.cdf(7, 30, high) == pytest.approx(0.025)
     assert share_interval(30, 30)[1] == 1.0 and share_interval(0, 30)[0] == 0.0
+
+
+def deviation_columns(values: np.ndarray, sigma: float, verdict: str = "accept") -> dict[str, list[object]]:
+    """Columns of flights with coefficients A to E, shape (n, 5), all of one sigma."""
+    columns: dict[str, list[object]] = {"magnetic_verdict": [verdict] * len(values)}
+    for place, letter in enumerate("abcde"):
+        columns[f"magnetic_{letter}_deg"] = values[:, place].tolist()
+        columns[f"magnetic_{letter}_sigma_deg"] = [sigma] * len(values)
+    return columns
+
+
+def test_deviation_that_changed_is_far_from_those_of_the_other_flights() -> None:
+    values = np.tile([179.9, 1.0, 2.0, 0.0, 0.5], (4, 1))
+    values[1, 0] = -179.9  # 0.2 deg away, not 359.8
+    values[3] += [0.0, 3.0, 0.0, 0.0, 0.0]
+    rows = deviations(table(**deviation_columns(values, 0.1)))
+    assert [row.others for row in rows] == [3] * 4
+    assert rows[3].difference_rms_deg == pytest.approx(math.hypot(0.2 / 3.0, 3.0 / math.sqrt(2.0)))
+    assert rows[3].expected_rms_deg == pytest.approx(math.sqrt(3.0 * 0.01 * (1.0 + 1.0 / 3.0)))
+    assert rows[0].difference_rms_deg < 0.8
+
+
+def test_difference_of_deviations_that_did_not_change_is_as_expected() -> None:
+    rng = np.random.default_rng(21)
+    sigma = 0.2
+    told = []
+    for _ in range(400):
+        rows = deviations(table(**deviation_columns(rng.normal(0.0, sigma, (3, 5)), sigma)))
+        told += [(row.difference_rms_deg, row.expected_rms_deg) for row in rows]
+    difference, expected = np.array(told, dtype=float).T
+    assert np.sqrt(np.mean(difference**2)) == pytest.approx(np.mean(expected), rel=0.05)
+    assert np.mean(difference > 3.0 * expected) < 0.001
+
+
+def test_rejected_and_nameless_flights_are_told_and_not_compared() -> None:
+    columns = deviation_columns(np.zeros((4, 5)), 0.1)
+    columns["magnetic_verdict"][0] = "reject"
+    columns["magnetic_a_deg"][1] = math.nan
+    rows = deviations(table(aircraft=["B", "B", "B", ""], **columns))
+    assert [(row.flight_id, row.others, row.difference_rms_deg) for row in rows] == [
+        ("F0003", 0, None),
+        ("F0000", 0, None),
+        ("F0002", 0, None),
+    ]

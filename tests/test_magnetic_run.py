@@ -21,6 +21,8 @@ from groundstation.pipeline.flight import read_flight, sentence
 from groundstation.pipeline.inertial import analyse_inertial
 from groundstation.pipeline.log import open_log
 from groundstation.pipeline.magnetic import analyse_magnetic
+from groundstation.reports.index import index_row
+from groundstation.reports.sections import front
 from groundstation.results import magnetic as answers
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults, Source
@@ -139,6 +141,21 @@ def test_every_answer_is_saved_and_comes_back(name: str, tmp_path: Path) -> None
         assert back == value
     elif name.endswith("_deg") and isinstance(value, tuple):
         assert np.allclose(back, value, rtol=0.0, atol=1e-4)
+
+
+def test_index_and_front_page_tell_the_deviation(tmp_path: Path) -> None:
+    save(tmp_path, figure_eight(), {})
+    found, row, saved = figure_eight().magnetic, index_row(load(tmp_path)), load(tmp_path)
+    assert found is not None and found.residual_rms_deg is not None
+    method = found.method(found.recommended_method)
+    assert (row["magnetic_verdict"], row["magnetic_method"]) == (found.verdict, found.recommended_method)
+    assert row["magnetic_after_rms_deg"] == pytest.approx(found.residual_rms_deg.after, abs=1e-4)
+    for letter in "ABCDE":
+        assert row[f"magnetic_{letter.lower()}_deg"] == pytest.approx(method.coefficients_deg[letter], abs=1e-4)
+        sigma = row[f"magnetic_{letter.lower()}_sigma_deg"]
+        assert sigma == pytest.approx(method.coefficients_sigma_deg[letter], abs=1e-4)
+    (tile,) = [figure for figure in front.build(saved).figures if figure[0] == "Magnetic heading"]
+    assert f"{found.residual_rms_deg.after:.2f}" in tile[1]
 
 
 def test_summary_obeys_the_schema(tmp_path: Path) -> None:

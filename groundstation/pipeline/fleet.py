@@ -13,6 +13,7 @@ from groundstation.base.errors import GroundstationError
 from groundstation.estimators.fleet import answer
 from groundstation.estimators.fleet.changes import ChangeSettings
 from groundstation.estimators.fleet.density import SampleHistogram, densities_of
+from groundstation.estimators.fleet.deviation import deviations
 from groundstation.estimators.fleet.moments import Moments
 from groundstation.estimators.fleet.skill import SkillMerger
 from groundstation.pipeline.fleet_rows import checks_of, flight_row, flights_table, heading_samples, skill_of
@@ -169,6 +170,7 @@ def _results(out: Path, collected: _Collected) -> FleetResults:
         calibration_checks=checks,
         outliers=answer.outliers(flights),
         not_in_fleet=_not_in_fleet(out, collected),
+        deviations=deviations(flights),
         stated=answer.stated_rates(settings),
     )
 

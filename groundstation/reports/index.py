@@ -8,6 +8,7 @@ from groundstation.base.findings import SEVERITIES
 from groundstation.reports.sections.saved import heading_of, mapping, objects
 from groundstation.reports.wording import is_number
 from groundstation.results.files import SavedFlight, json_text, text_cell, write_text
+from groundstation.results.magnetic import LETTERS
 from groundstation.results.summary import SCHEMA_VERSION, digits_of
 
 INDEX_JSON, INDEX_CSV = "index.json", "index.csv"
@@ -28,6 +29,8 @@ COLUMNS = (
     *("parking_heading_deg", "reference_residual_arcmin", "onboard_error_deg", "onboard_difference_deg"),
     *("ins_kind", "radial_error_rate_50_nmiph", "radial_error_rate_95_nmiph"),
     *("forecast_method", "forecast_30min_rms_m", "forecast_60min_rms_m", "forecast_120min_rms_m"),
+    *("magnetic_verdict", "magnetic_method", "magnetic_before_rms_deg", "magnetic_after_rms_deg"),
+    *(f"magnetic_{letter.lower()}{end}_deg" for letter in LETTERS for end in ("", "_sigma")),
     *("findings_fail", "findings_warn", "findings_info", "not_assessable", "reason"),
     *("source", "sha256", "summary", "report", "recording", "mcap"),
 )
@@ -77,6 +80,7 @@ def index_row(saved: SavedFlight) -> dict[str, Any]:
         **{name: inertial.get(name) for name in ("radial_error_rate_50_nmiph", "radial_error_rate_95_nmiph")},
         forecast_method=forecast.get("default_method"),
         **{f"forecast_{horizon}min_rms_m": _forecast_rms(forecast, horizon) for horizon in (30, 60, 120)},
+        **_of_deviation(mapping(results, "magnetic")),
         **{f"findings_{severity}": findings.count(severity) for severity in SEVERITIES},
         not_assessable=[
             f"{entry.get('analysis', '')}: {entry.get('reason', '')}"
@@ -95,6 +99,21 @@ def _forecast_rms(forecast: Mapping[str, Any], horizon_min: float) -> Any:
     """RMS of the shipped method at a horizon, None where it was not replayed."""
     rows = (row for row in objects(forecast, "skill") if row.get("method") == forecast.get("default_method"))
     return next((row.get("rms_m") for row in rows if row.get("horizon_min") == horizon_min), None)
+
+
+def _of_deviation(magnetic: Mapping[str, Any]) -> dict[str, Any]:
+    """Verdict, errors before and after, and the coefficients of the method that is recommended."""
+    name, residual = magnetic.get("recommended_method"), mapping(magnetic, "residual_rms_deg")
+    method = next((row for row in objects(magnetic, "methods") if row.get("name") == name), {})
+    values, sigmas = (mapping(method, f"coefficients{end}_deg") for end in ("", "_sigma"))
+    return {
+        "magnetic_verdict": magnetic.get("verdict"),
+        "magnetic_method": name,
+        "magnetic_before_rms_deg": residual.get("before"),
+        "magnetic_after_rms_deg": residual.get("after"),
+        **{f"magnetic_{letter.lower()}_deg": values.get(letter) for letter in LETTERS},
+        **{f"magnetic_{letter.lower()}_sigma_deg": sigmas.get(letter) for letter in LETTERS},
+    }
 
 
 def failed_row(source: str, state: str, reason: str) -> dict[str, Any]:

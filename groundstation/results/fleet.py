@@ -12,6 +12,7 @@ from groundstation.base.records import frozen
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.results.figures import FigureData
 from groundstation.results.frames import no_such_table, row_fields, rows_frame
+from groundstation.results.magnetic import LETTERS
 from groundstation.results.summary import plain
 
 if TYPE_CHECKING:
@@ -76,6 +77,15 @@ FLIGHT_COLUMNS: tuple[FlightColumn, ...] = (
     FlightColumn("forecast_30min_rms_m", "number", "radial error of the forecast after 30 min, RMS over starts"),
     FlightColumn("forecast_60min_rms_m", "number", "after 60 min"),
     FlightColumn("forecast_120min_rms_m", "number", "after 120 min"),
+    FlightColumn("magnetic_verdict", "category", "of the magnetic deviation: accept, reject, undecided"),
+    FlightColumn("magnetic_method", "category", "method recommended to correct by; the coefficients are its own"),
+    FlightColumn("magnetic_before_rms_deg", "number", "magnetic heading error in level flight no fit has seen, RMS"),
+    FlightColumn("magnetic_after_rms_deg", "number", "the same after correction"),
+    *(
+        FlightColumn(f"magnetic_{letter.lower()}{end}_deg", "number", meaning)
+        for letter in LETTERS
+        for end, meaning in (("", f"coefficient {letter} of the magnetic heading error"), ("_sigma", "its sigma"))
+    ),
     FlightColumn("findings_fail", "count", "findings of severity fail"),
     FlightColumn("findings_warn", "count", "findings of severity warn"),
     FlightColumn("findings_info", "count", "findings of severity info"),
@@ -244,6 +254,29 @@ class FleetCalibration:
 
 
 @dataclass(frozen=True)
+class DeviationRow:
+    """Magnetic deviation that one flight found, beside the mean of the ``others`` of its aircraft.
+
+    ``coefficients_deg`` A to E are of the error, by the method recommended; ``before_rms_deg`` and ``after_rms_deg`` of
+    level flight that no fit has seen. ``difference_rms_deg`` is the RMS over the circle of the difference of the curves,
+    ``expected_rms_deg`` what their sigmas lead to expect of it; None where there is nothing to compare with.
+    """
+
+    aircraft: str
+    flight_id: str
+    start_utc_ns: int | None
+    verdict: str
+    method: str
+    coefficients_deg: dict[str, float]
+    coefficients_sigma_deg: dict[str, float]
+    before_rms_deg: float | None
+    after_rms_deg: float | None
+    others: int
+    difference_rms_deg: float | None
+    expected_rms_deg: float | None
+
+
+@dataclass(frozen=True)
 class OutlierRow:
     """A flight whose figure is far from those of the same aircraft.
 
@@ -302,6 +335,8 @@ class FleetResults:
         What failed or was skipped and why, failed first, by source.
     stated : mapping of str to number
         Rates and limits the statistics keep to, by name: chance of a false change point per aircraft, and so on.
+    deviations : tuple of DeviationRow
+        By aircraft, then time.
     """
 
     flights: FigureData
@@ -317,6 +352,7 @@ class FleetResults:
     outliers: tuple[OutlierRow, ...]
     not_in_fleet: tuple[NotInFleet, ...]
     stated: Mapping[str, float] = field(default_factory=dict)
+    deviations: tuple[DeviationRow, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stated", MappingProxyType(dict(self.stated)))

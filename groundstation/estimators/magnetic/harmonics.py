@@ -7,6 +7,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 
 COEFFICIENTS = 5
+OVER_CIRCLE = np.array([1.0, 0.5, 0.5, 0.5, 0.5])  # mean squares of 1, sin, cos, sin 2, cos 2
 INFLATION_MAX = 4.0
 BANDWIDTH_FACTOR = 1.1447  # Andrews 1991, equation 6.2, Bartlett kernel
 

@@ -11,7 +11,6 @@ from groundstation.estimators.magnetic.manoeuvre import Figure
 from groundstation.estimators.magnetic.readings import Readings
 from groundstation.results.magnetic import LETTERS, CardRow, Swing
 
-OVER_CIRCLE = np.array([1.0, 0.5, 0.5, 0.5, 0.5])  # mean squares of 1, sin, cos, sin 2, cos 2
 
 
 def compare_swings(readings: Readings, declination_deg: float, figures: list[Figure]) -> list[Swing]:
@@ -27,8 +26,8 @@ def compare_swings(readings: Readings, declination_deg: float, figures: list[Fig
             steps = np.array([values - other.coefficients_deg for other in others])
             steps[:, 0] = wrap_180(steps[:, 0])
             covariance = table.covariance + np.sum([other.covariance for other in others], axis=0) / len(others) ** 2
-            difference = float(np.sqrt(OVER_CIRCLE @ np.mean(steps, axis=0) ** 2))
-            sigma = float(np.sqrt(OVER_CIRCLE @ np.diag(covariance)))
+            difference = float(np.sqrt(harmonics.OVER_CIRCLE @ np.mean(steps, axis=0) ** 2))
+            sigma = float(np.sqrt(harmonics.OVER_CIRCLE @ np.diag(covariance)))
         values[0] = wrap_180(values[0] + declination_deg)
         rows.append(
             Swing(

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from groundstation.reports.fleet import aircraft, calibration, densities, flights, rest, skill, trend
+from groundstation.reports.fleet import aircraft, calibration, densities, deviation, flights, rest, skill, trend
 from groundstation.reports.parts import Section
 from groundstation.results.fleet import FleetResults
 
@@ -14,6 +14,7 @@ CHAPTERS: tuple[Callable[[FleetResults], Section | None], ...] = (
     aircraft.ins,
     skill.build,
     calibration.build,
+    deviation.build,
     rest.outliers,
     rest.not_in_fleet,
     rest.method,

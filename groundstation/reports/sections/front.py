@@ -56,7 +56,7 @@ def build(saved: SavedFlight) -> Front:
             verdict=Mark("unknown", "Not assessable"),
             headline="Heading correction: not assessable",
             sentences=(_sentence(reason),),
-            figures=_of_the_ins(saved),
+            figures=(*_of_the_ins(saved), *_of_the_compass(saved)),
         )
     tone, word = VERDICTS.get(str(heading.get("verdict")), ("unknown", str(heading.get("verdict"))))
     return Front(
@@ -67,7 +67,7 @@ def build(saved: SavedFlight) -> Front:
         sentences=tuple(
             filter(None, (_sentence(typeset(str(heading.get("verdict_reason") or ""))), _in_words(heading)))
         ),
-        figures=(*_figures(heading), *_of_the_ins(saved)),
+        figures=(*_figures(heading), *_of_the_ins(saved), *_of_the_compass(saved)),
         to_sign=heading.get("verdict") == "accept",
     )
 
@@ -160,3 +160,14 @@ def _of_the_ins(saved: SavedFlight) -> tuple[tuple[str, str, str], ...]:
         remark = f"RMS; raw INS {number(errors.get('raw_ins'), 0, 'm')}"
         figures.append((f"Forecast, {FORECAST_MIN:g} min", number(shipped, 0, "m"), remark))
     return tuple(figures)
+
+
+def _of_the_compass(saved: SavedFlight) -> tuple[tuple[str, str, str], ...]:
+    """What the deviation found in flight leaves of the error of the magnetic heading."""
+    magnetic = mapping(saved.summary, "results", "magnetic")
+    residual = mapping(magnetic, "residual_rms_deg")
+    if not is_number(residual.get("after")):
+        return ()
+    before = number(residual.get("before"), 2, "°")
+    remark = f"RMS after correction; {before} before; deviation {magnetic.get('verdict')}"
+    return (("Magnetic heading", number(residual.get("after"), 2, "°"), remark),)
