@@ -275,6 +275,12 @@ class DeviationRow:
     difference_rms_deg: float | None
     expected_rms_deg: float | None
 
+    def error_deg(self, heading_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A + B sin c + C cos c + D sin 2c + E cos 2c of uncorrected magnetic headings c, shape (n,)."""
+        once, twice = np.deg2rad(heading_deg), 2.0 * np.deg2rad(heading_deg)
+        a, b, c, d, e = (self.coefficients_deg[letter] for letter in LETTERS)
+        return np.asarray(a + b * np.sin(once) + c * np.cos(once) + d * np.sin(twice) + e * np.cos(twice))
+
 
 @dataclass(frozen=True)
 class OutlierRow:

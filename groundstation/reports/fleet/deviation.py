@@ -4,8 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.estimators.fleet.deviation import NOT_COMPARED
-from groundstation.estimators.magnetic.harmonics import design
 from groundstation.reports import drawing as d
 from groundstation.reports.fleet.common import aircraft_name, bounded, colours_of
 from groundstation.reports.parts import Cell, Drawing, Grid, Head, Mark, Part, Section, Tone
@@ -25,7 +23,7 @@ def build(fleet: FleetResults) -> Section | None:
     """Build the chapter; None where no flight found a deviation."""
     if not fleet.deviations:
         return None
-    usable = [row for row in fleet.deviations if row.verdict != NOT_COMPARED]
+    usable = [row for row in fleet.deviations if row.verdict != "reject"]
     parts: list[Part] = [_curves(fleet, usable)] if usable else []
     return Section("deviation", TITLE, LEAD, (*parts, _table(fleet.deviations)))
 
@@ -33,16 +31,21 @@ def build(fleet: FleetResults) -> Section | None:
 def _curves(fleet: FleetResults, rows: list[DeviationRow]) -> Drawing:
     shown, colours = rows[:MOST_CURVES], colours_of(fleet)
     heading_deg = np.arange(0.0, 361.0, 2.0)
-    basis = design(heading_deg)
 
     def paint(figure: Any) -> None:
         axes = d.place(figure, 18, 12, 136, 62)
         named: set[str] = set()
         for row in shown:
-            curve = basis @ np.array([row.coefficients_deg[letter] for letter in LETTERS])
             label = None if row.aircraft in named else d.label(aircraft_name(row.aircraft), 20)
             named.add(row.aircraft)
-            axes.plot(heading_deg, curve, color=colours[row.aircraft], linewidth=1.1, alpha=0.8, label=label)
+            axes.plot(
+                heading_deg,
+                row.error_deg(heading_deg),
+                color=colours[row.aircraft],
+                linewidth=1.1,
+                alpha=0.8,
+                label=label,
+            )
         axes.axhline(0.0, color=d.FAINT, linewidth=0.6)
         axes.set_xlim(0.0, 360.0)
         axes.set_xticks(np.arange(0, 361, 45))
