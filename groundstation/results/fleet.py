@@ -258,7 +258,7 @@ class DeviationRow:
     """Magnetic deviation that one flight found, beside the mean of the ``others`` of its aircraft.
 
     ``coefficients_deg`` A to E are of the error, by the method recommended; ``before_rms_deg`` and ``after_rms_deg`` of
-    level flight that no fit has seen. ``difference_rms_deg`` is the RMS over the circle of the difference of the curves,
+    level flight that no fit has seen. ``difference_rms_deg`` is the RMS over the circle of what the curves differ by,
     ``expected_rms_deg`` what their sigmas lead to expect of it; None where there is nothing to compare with.
     """
 
