@@ -1,15 +1,14 @@
 """Hard iron of a recorded ArduPilot flight: ours beside that of MAGFit, as pymavlink ships it (magfit_WMM.py).
 
-Both fit with the log's own attitude, ours in flight, MAGFit the whole log. No figure-eight and no independent INS stands
-behind it: what is compared is the fit, not a deviation. Offsets are ArduPilot's, milligauss to be added to the raw
-reading.
+Both fit with the log's own attitude, ours in flight, MAGFit the whole log. No figure-eight and no independent INS
+stands behind it: what is compared is the fit, not a deviation. Offsets are ArduPilot's, milligauss to be added to the
+raw reading.
 """
 
 import os
 import re
 import subprocess
 import sys
-from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
