@@ -87,6 +87,18 @@ def test_coefficients_know_their_error_when_noise_is_correlated() -> None:
     assert np.sqrt(np.mean(np.square(scores), axis=0)) == pytest.approx(np.ones(5), abs=0.2)  # 4 sigma of 200 draws
 
 
+def test_coefficients_know_their_error_when_noise_wanders_below_white_noise() -> None:
+    """White noise hides 20 s of correlation from neighbours; sigmas by them alone would be four to five times too small."""
+    rng = np.random.default_rng(3)
+    heading = np.linspace(0.0, 720.0, 4000) % 360.0
+    scores = []
+    for _ in range(200):
+        noise = 0.3 * correlated(rng, (len(heading), 1), 20.0)[:, 0] + 0.2 * rng.standard_normal(len(heading))
+        values, covariance = harmonics.fit(heading, noise)
+        scores.append(values / np.sqrt(np.diag(covariance)))
+    assert (np.sqrt(np.mean(np.square(scores), axis=0)) < 1.7).all()
+
+
 def test_table_averages_branches_and_fills_gaps() -> None:
     heading = np.concatenate([np.arange(0.5, 360.0), np.arange(0.5, 360.0)])
     error = np.where(np.arange(720) < 360, 182.0, -176.0)  # 182 and 184 on the circle

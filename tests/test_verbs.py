@@ -96,7 +96,14 @@ def test_list_of_a_log_says_whether_it_would_run_and_why_not(tmp_path: Path) -> 
     log.write_text("time_s,ins.true_heading_deg\n0,1\n1,1\n2,1\n", encoding="utf-8")
     code, text, _ = groundstation("list", str(log), "--json")
     answers = {entry["name"]: entry for entry in json.loads(text)}
-    assert code == 0 and set(answers) == {"heading", "inertial", "forecast", "latency", "magnetic"}
+    assert code == 0 and set(answers) == {
+        "heading",
+        "inertial",
+        "forecast",
+        "latency",
+        "magnetic",
+        "magnetic_ground",
+    }
     assert not any(entry["would_run"] for entry in answers.values())
     assert "GNSS" in answers["heading"]["reason"] and "INS position" in answers["inertial"]["reason"]
 

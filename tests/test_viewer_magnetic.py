@@ -35,6 +35,26 @@ def test_errors_and_modulus_are_those_of_the_result(contents: Contents) -> None:
     assert np.array_equal(rows[known][:, 0], modulus["before_nt"])
 
 
+def test_field_lies_on_the_sphere_once_it_is_freed_of_the_iron() -> None:
+    found = figure_eight()
+    assert found.magnetic is not None
+    declination = found.magnetic.declination
+    assert declination.horizontal_nt is not None and declination.down_nt is not None
+    figure = next(figure for figure in found.figures if figure.name == "magnetic_field")
+    strength = np.hypot(declination.horizontal_nt, declination.down_nt)
+    before, after = (
+        np.linalg.norm([figure[f"{state}_{axis}_nt"] for axis in ("forward", "right", "down")], axis=0) - strength
+        for state in ("before", "after")
+    )
+    assert np.std(after) < 0.2 * np.std(before) and abs(np.mean(after)) < 60.0
+    assert 1000 < len(before) <= 4000
+
+
+def test_sphere_and_eight_are_in_the_tab(contents: Contents) -> None:
+    assert {"/magnetic/field/model", "/magnetic/field/as_read", "/magnetic/field/freed_of_iron"} <= set(contents.fixed)
+    assert {"/magnetic/eight/track", "/magnetic/eight/grid"} <= set(contents.fixed)
+
+
 def test_text_holds_verdict_card_and_reasons() -> None:
     found = figure_eight().magnetic
     assert found is not None

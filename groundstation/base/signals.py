@@ -117,6 +117,12 @@ TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
         ),
         "satellite": (_double("pseudorange_m", "m"), *(_double(f"{axis}_m", "m") for axis in "xyz")),
         "adf": (Field("relative_bearing_deg", "deg", "double", -360.0, 360.0),),
+        "corrected_heading": (
+            _heading("magnetic_heading_deg"),
+            _heading("uncorrected_magnetic_heading_deg"),
+            _double("deviation_deg", "deg", -180.0, 180.0),
+            _heading("true_heading_deg"),
+        ),
         "truth": _INS,
     }
 )

@@ -53,7 +53,7 @@ Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing but erro
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more; show where an internal error came from.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
 Force = Annotated[bool, typer.Option("-f", "--force", help="Overwrite what is there.")]
-NoPdf = Annotated[bool, typer.Option("--no-pdf", help="Leave report.pdf out.")]
+NoPdf = Annotated[bool, typer.Option("--no-pdf", help="Leave report.pdf and steer_card.pdf out.")]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
 Profile = Annotated[
     Path | None,

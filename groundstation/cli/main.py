@@ -138,6 +138,15 @@ def run(
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
     ] = "",
     fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is this grave.")] = "none",
+    apply: Annotated[
+        str,
+        typer.Option(
+            "--apply",
+            help="Add a magnetic deviation to the log: the flight's own, or that in another's folder, summary.json or "
+            "deviation.csv.",
+            metavar="own|PATH",
+        ),
+    ] = "",
     no_pdf: NoPdf = False,
     redo: Annotated[bool, typer.Option("--redo", help="Do again what an earlier run finished.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done; write nothing.")] = False,
@@ -154,9 +163,9 @@ def run(
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
     from groundstation.pipeline.batch import plan_many, run_many
-    from groundstation.pipeline.configuration import load_configuration
+    from groundstation.pipeline.configuration import applying, load_configuration
 
-    configuration = load_configuration(config, aircraft, site, intervals, profile, thresholds)
+    configuration = applying(load_configuration(config, aircraft, site, intervals, profile, thresholds), apply)
     if dry_run:
         planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo)
         printing.outcomes(planned, as_json_text=json, quiet=quiet)
@@ -246,7 +255,10 @@ def simulate(
 @app.command()
 @answers_with_exit_code
 def study(
-    name: Annotated[Literal["heading", "forecast"], typer.Argument(help="heading or forecast.", metavar="NAME")],
+    name: Annotated[
+        Literal["heading", "forecast", "magnetic"],
+        typer.Argument(help="heading, forecast or magnetic.", metavar="NAME"),
+    ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the tables.", metavar="DIR")],
     runs: Annotated[int, typer.Option("--runs", help="Simulated runs of each family or case.", min=10)] = 200,
     seed: Annotated[int, typer.Option("--seed", help="Seed; families and cases take those that follow from it.")] = 71,

@@ -14,6 +14,7 @@ from groundstation.estimators.heading.settings import AircraftData, HeadingReque
 from groundstation.estimators.inertial.noise import choose_class
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.latency.settings import LatencySettings
+from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.integrity.limits import Thresholds, thresholds_from
 from groundstation.pipeline import configuration as configured
@@ -24,6 +25,7 @@ from groundstation.pipeline.intervals import seconds_of
 from groundstation.pipeline.latency import analyse_latency
 from groundstation.pipeline.leaning import leaning_findings
 from groundstation.pipeline.magnetic import analyse_magnetic
+from groundstation.pipeline.magnetic_ground import analyse_ground_deviation
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
 from groundstation.results.heading import HeadingResult
@@ -55,6 +57,7 @@ class UserSettings:
     inertial: InertialSettings
     latency: LatencySettings
     magnetic: MagneticSettings
+    magnetic_ground: MagneticGroundSettings
     aircraft: AircraftData
     site: SiteData
     thresholds: Thresholds
@@ -73,6 +76,12 @@ def user_settings(configuration: Configuration) -> UserSettings:
         settings_from(InertialSettings, configuration.inertial, configuration.file_of("inertial"), "inertial"),
         settings_from(LatencySettings, configuration.latency, configuration.file_of("latency"), "latency"),
         settings_from(MagneticSettings, configuration.magnetic, configuration.file_of("magnetic"), "magnetic"),
+        settings_from(
+            MagneticGroundSettings,
+            configuration.magnetic_ground,
+            configuration.file_of("magnetic_ground"),
+            "magnetic_ground",
+        ),
         settings_from(AircraftData, configuration.aircraft, configuration.file_of("aircraft"), "aircraft"),
         settings_from(SiteData, configuration.site, configuration.file_of("site"), "site"),
         configured_thresholds(configuration),
@@ -123,14 +132,26 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
         inertial=inertial.inertial,
         latencies=latency.latency,
         heading=heading,
+        heading_settings=settings.heading,
+        heading_request=_request_or_none(flight, configuration),
     )
-    findings += (*inertial.findings, *latency.findings, *magnetic.findings)
-    not_assessable += (*inertial.not_assessable, *latency.not_assessable, *magnetic.not_assessable)
+    on_ground = analyse_ground_deviation(
+        flight,
+        phases,
+        settings.magnetic_ground,
+        aircraft=settings.aircraft,
+        latencies=latency.latency,
+        excluded_s=_excluded(flight, configuration),
+    )
+    findings += (*inertial.findings, *latency.findings, *magnetic.findings, *on_ground.findings)
+    not_assessable += (*inertial.not_assessable, *latency.not_assessable)
+    not_assessable += (*magnetic.not_assessable, *on_ground.not_assessable)
     figures = (
         *_figures(flight, given, settings, phases, heading),
         *inertial.figures,
         *(latency.latency.figures if latency.latency else ()),
         *(magnetic.magnetic.figures if magnetic.magnetic else ()),
+        *(on_ground.magnetic_ground.figures if on_ground.magnetic_ground else ()),
     )
     findings += leaning_findings(flight, given.ledger, heading, inertial.inertial, settings.thresholds)
     if heading is not None:
@@ -153,6 +174,7 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
         forecast=inertial.forecast,
         latency=latency.latency,
         magnetic=magnetic.magnetic,
+        magnetic_ground=on_ground.magnetic_ground,
         figures=figures,
     )
 
@@ -230,6 +252,13 @@ def _intervals(flight: Flight, configuration: Configuration) -> tuple[Interval, 
         ("force", configuration.force),
     )
     return tuple(Interval(start_s, end_s, use) for use, listed in uses for start_s, end_s in seconds_of(flight, listed))
+
+
+def _request_or_none(flight: Flight, configuration: Configuration) -> HeadingRequest | None:
+    try:
+        return HeadingRequest(intervals=_intervals(flight, configuration))
+    except SettingsError:  # intervals in UTC for a flight without it: said with the heading
+        return None
 
 
 def _excluded(flight: Flight, configuration: Configuration) -> tuple[tuple[float, float], ...]:

@@ -40,7 +40,14 @@ MAGNETIC: dict[str, Any] = {
     "needs": "magnetometer on three axes, ins roll, pitch and a true heading that no magnetometer corrects, a turn "
     "each way at one steady bank that together cover the circle, level flight to judge by",
 }
-ANALYSES = (HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC)
+MAGNETIC_GROUND: dict[str, Any] = {
+    "kind": "analysis",
+    "name": "magnetic_ground",
+    "title": "errors of the installed heading sensor on straight ground runs",
+    "needs": "ins magnetic heading, gnss velocities and positions, a date, proof of ground contact, straight runs "
+    "above 3 m/s",
+}
+ANALYSES = (HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND)
 
 
 def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict[str, Any]]:
@@ -66,6 +73,7 @@ def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
     from groundstation.pipeline.latency import analyse_latency
     from groundstation.pipeline.log import open_log
     from groundstation.pipeline.magnetic import analyse_magnetic
+    from groundstation.pipeline.magnetic_ground import analyse_ground_deviation
     from groundstation.tables.phases import flight_phases
 
     if not path.exists():
@@ -83,7 +91,13 @@ def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
     answers = analyse_inertial(flight, phases, settings.inertial)
     latency = analyse_latency(flight, settings.latency, answers.inertial)
     magnetic = analyse_magnetic(flight, phases, settings.magnetic, inertial=answers.inertial, latencies=latency.latency)
-    lacking = (*answers.not_assessable, *latency.not_assessable, *magnetic.not_assessable)
+    ground = analyse_ground_deviation(flight, phases, settings.magnetic_ground, latencies=latency.latency)
+    lacking = (
+        *answers.not_assessable,
+        *latency.not_assessable,
+        *magnetic.not_assessable,
+        *ground.not_assessable,
+    )
     reasons |= {entry.analysis: entry.reason for entry in lacking}
     if "inertial" in reasons:
         reasons["forecast"] = reasons["inertial"]

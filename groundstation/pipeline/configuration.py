@@ -2,14 +2,17 @@
 
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from groundstation.base.errors import SettingsError
 
-TABLES = ("heading", "inertial", "latency", "magnetic", "aircraft", "site", "thresholds")
+if TYPE_CHECKING:
+    from groundstation.pipeline.apply_deviation import Apply
+
+TABLES = ("heading", "inertial", "latency", "magnetic", "magnetic_ground", "aircraft", "site", "thresholds")
 SECTIONS = (*TABLES, "exclude", "force")
 Settings = Path | Mapping[str, Any]  # a TOML file, or its content
 
@@ -27,8 +30,9 @@ class Interval:
 class Configuration:
     """Everything a user may set for a run, as read from TOML; plain values, so that it travels to worker processes.
 
-    ``heading``, ``inertial``, ``latency``, ``magnetic``, ``aircraft``, ``site`` and ``thresholds`` are the tables as
-    written; they become dataclasses where used.
+    ``heading``, ``inertial``, ``latency``, ``magnetic``, ``magnetic_ground``, ``aircraft``, ``site`` and ``thresholds``
+    are the tables as written; they become dataclasses where used. ``apply`` is the deviation to add to the magnetic
+    heading.
     """
 
     heading: Mapping[str, Any] = field(default_factory=dict)
@@ -42,6 +46,8 @@ class Configuration:
     profile: str | None = None
     files: Mapping[str, str] = field(default_factory=dict)
     thresholds: Mapping[str, Any] = field(default_factory=dict)
+    apply: "Apply | None" = None
+    magnetic_ground: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def profile_path(self) -> Path | None:
@@ -61,6 +67,8 @@ class Configuration:
                 document[name] = intervals
         if self.profile:
             document["profile"] = Path(self.profile).name
+        if self.apply:
+            document["apply"] = self.apply.to_dict()
         return document
 
 
@@ -116,6 +124,7 @@ def load_configuration(
         inertial=document.get("inertial", {}),
         latency=document.get("latency", {}),
         magnetic=document.get("magnetic", {}),
+        magnetic_ground=document.get("magnetic_ground", {}),
         aircraft=document.get("aircraft", {}),
         site=document.get("site", {}),
         thresholds=document.get("thresholds", {}),
@@ -124,6 +133,23 @@ def load_configuration(
         profile=str(profile) if profile else None,
         files={name: str(path) for name, path in files.items() if isinstance(path, Path)},
     )
+
+
+def applying(configuration: Configuration, apply: str) -> Configuration:
+    """The configuration with a deviation to add to the magnetic heading; as it is where ``apply`` is empty.
+
+    ``apply`` is ``own``, or names a flight folder, its summary.json or a deviation.csv.
+
+    Raises
+    ------
+    UsageError
+        When it names nothing that holds a deviation.
+    """
+    if not apply:
+        return configuration
+    from groundstation.pipeline.apply_deviation import asked_for
+
+    return replace(configuration, apply=asked_for(apply))
 
 
 def _content(settings: Settings) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from groundstation.pipeline.outcome import Outcome
 from groundstation.pipeline.progress import Listener, silent
 from groundstation.pipeline.resume import Finished, finished
 from groundstation.reports.flight_report import PDF
+from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY
 
 STAGING, BY_LOG = ".staging", ".logs"  # in an OUT elsewhere: what is on its way; flight ids by digest of the log
@@ -74,8 +75,9 @@ def _run_in(scratch: Path, far: FarJob, listen: Listener) -> Outcome:
         return replace(outcome, folder=outcome.flight_id)
     if job.step == "reports" and job.finished is not None:
         out.send(job.finished.folder, outcome.flight_id)
-        if not (job.finished.folder / PDF).exists():
-            out.remove(f"{outcome.flight_id}/{PDF}")
+        for name in (PDF, DEVIATION_CSV, STEER_CARD):
+            if not (job.finished.folder / name).exists():
+                out.remove(f"{outcome.flight_id}/{name}")
         return replace(outcome, folder=outcome.flight_id)
     staged = f"{STAGING}/{outcome.sha256}-{uuid.uuid4().hex[:8]}"
     out.send(Path(outcome.folder), staged)

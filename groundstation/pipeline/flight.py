@@ -12,7 +12,8 @@ from pathlib import Path, PurePosixPath
 from groundstation.base.errors import UnclaimedLogError, UnreadableLogError
 from groundstation.base.findings import SEVERITIES, Severity, worst
 from groundstation.base.records import RecordBatch
-from groundstation.pipeline.analyse import Given, analyse, configured_thresholds
+from groundstation.pipeline.analyse import Given, analyse, configured_thresholds, user_settings
+from groundstation.pipeline.apply_deviation import apply_deviation, corrected_name, write_corrected
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.convert import Converted, convert_log, stored_findings
 from groundstation.pipeline.identity import flight_id, sha256_of
@@ -22,6 +23,7 @@ from groundstation.pipeline.outcome import Outcome, State, reason_of
 from groundstation.pipeline.progress import Event, Listener, silent
 from groundstation.pipeline.resume import Finished, Keys, Step, keys_of, remember_reports, remembered
 from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
+from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight
@@ -150,7 +152,11 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         identity += f"_{log.source.sha256[:8]}"
     with watch.stage("estimating"):
         results = analyse(flight, given_of(log, converted, identity), job.configuration)
+        applied = apply_deviation(flight, results, job.configuration.apply, user_settings(job.configuration))
+        results = applied.results
     with watch.stage("saving"):
+        corrected = partial / corrected_name(identity)
+        write_corrected(corrected, converted.info, flight, applied, configured_thresholds(job.configuration))
         mcap.rename(partial / f"{identity}.mcap")
         text = sentence(results)
         keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf)
@@ -281,8 +287,13 @@ def is_made(name: str, identity: str) -> bool:
     >>> is_made("tables/heading.csv", "NOTIME_abababab"), is_made("notes.txt", "NOTIME_abababab")
     (True, False)
     """
-    made = SUMMARY, MANIFEST, ARRAYS, TABLES, REPORT, PDF, f"{identity}.mcap", f"{identity}.rrd"
+    made = SUMMARY, MANIFEST, ARRAYS, TABLES, REPORT, f"{identity}.mcap", f"{identity}.rrd", *optional_files(identity)
     return PurePosixPath(name).parts[0] in made
+
+
+def optional_files(identity: str) -> tuple[str, ...]:
+    """Files of a flight folder that not every run makes: those of an earlier one would tell of other results."""
+    return PDF, DEVIATION_CSV, STEER_CARD, corrected_name(identity)
 
 
 def remove(folder: Path) -> None:
@@ -303,7 +314,8 @@ def place(partial: Path, target: Path) -> None:
         partial.rename(target)
         return
     (target / MANIFEST).unlink(missing_ok=True)  # the mark of a whole folder goes first and comes back last
-    (target / PDF).unlink(missing_ok=True)  # this run may have made none
+    for name in optional_files(target.name):
+        (target / name).unlink(missing_ok=True)
     for entry in sorted(partial.iterdir(), key=lambda path: path.name == MANIFEST):
         old = target / entry.name
         if old.is_dir() and not old.is_symlink():

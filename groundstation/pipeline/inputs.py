@@ -11,6 +11,7 @@ from groundstation.results.files import MANIFEST, SUMMARY
 FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, STUDY_MARK = MANIFEST, INDEX_JSON, ".groundstation-study"
 COMPARISON_MARKS = "compare.html", "compare.csv"
 COMPARISON_RECORDING = "compare.rrd"
+CORRECTED = ".corrected.mcap"  # end of the name of what stands beside a flight's MCAP, and is none
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,9 @@ def file_in(folder: Path, ending: str, *others: str) -> Path:
         When there is none, or several of other names.
     """
     named = (folder / name for name in (f"{folder.resolve().name}{ending}", *others))
-    found = [path for path in named if path.is_file()][:1] or sorted(folder.glob(f"*{ending}"))
+    found = [path for path in named if path.is_file()][:1] or [
+        path for path in sorted(folder.glob(f"*{ending}")) if not path.name.endswith(CORRECTED)
+    ]
     if len(found) != 1:
         what = f"{len(found)} files *{ending}"
         raise UsageError(str(folder), what, "a flight folder that `run` made", f"name the {ending}")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.heading.settings import AircraftData
+from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.flight import NotAssessable
 from groundstation.results.heading import HeadingResult
@@ -34,6 +34,8 @@ def analyse_magnetic(
     inertial: InertialResult | None = None,
     latencies: Latencies | None = None,
     heading: HeadingResult | None = None,
+    heading_settings: HeadingSettings | None = None,
+    heading_request: HeadingRequest | None = None,
 ) -> MagneticAnswers:
     """Find the deviation; never raises for what the flight lacks.
 
@@ -45,6 +47,8 @@ def analyse_magnetic(
     aircraft, inertial, latencies, heading : optional
         The aircraft file, and what the other analyses know: the kind of INS, the latency of the magnetometer, the
         alignment of the INS.
+    heading_settings, heading_request : optional
+        With which system 1 looks at the ground runs up to lift-off once more.
     """
     from groundstation.estimators.magnetic.estimate import estimate_deviation
 
@@ -53,6 +57,8 @@ def analyse_magnetic(
             flight,
             settings=settings,
             heading=heading,
+            heading_settings=heading_settings,
+            heading_request=heading_request,
             latencies=latencies,
             kinds={inertial.ins_topic: inertial.kind} if inertial else {},
             aircraft=aircraft,

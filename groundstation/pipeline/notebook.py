@@ -19,6 +19,7 @@ from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
+from groundstation.results.magnetic_ground import GroundDeviation
 from groundstation.tables.table import Flight, TimedTable, timed
 
 if TYPE_CHECKING:
@@ -119,6 +120,11 @@ class OpenFlight(ABC):
     def magnetic(self) -> MagneticResult:
         """The deviation of the magnetic heading (system 3); raises as :meth:`heading`."""
         found: MagneticResult = self._answer("magnetic")
+        return found
+
+    def magnetic_ground(self) -> GroundDeviation:
+        """Error of the installed heading sensor on straight ground runs; raises as :meth:`heading`."""
+        found: GroundDeviation = self._answer("magnetic_ground")
         return found
 
     def _answer(self, analysis: str) -> Any:

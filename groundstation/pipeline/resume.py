@@ -19,9 +19,11 @@ from typing import Any, Literal
 from groundstation import __version__
 from groundstation.base.errors import GroundstationError
 from groundstation.base.findings import SEVERITIES, Severity
+from groundstation.pipeline.apply_deviation import APPLIED, corrected_name
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.identity import plain_id
 from groundstation.reports.flight_report import PDF, REPORT
+from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.files import MANIFEST, SUMMARY, json_text, write_text
 from groundstation.results.flight import Source
 
@@ -59,6 +61,8 @@ class Finished:
     has_lost_data : bool
     gravest : {'info', 'warn', 'fail'} or None
         Severity of its gravest finding.
+    has_deviation, has_applied : bool
+        Whether a magnetic deviation was found, and whether one was added to the log: there are files of both.
     """
 
     folder: Path
@@ -69,6 +73,8 @@ class Finished:
     text: str
     has_lost_data: bool
     gravest: Severity | None
+    has_deviation: bool = False
+    has_applied: bool = False
 
     @property
     def mcap(self) -> Path:
@@ -84,9 +90,12 @@ class Finished:
         """What has to be done for the results to be those of ``keys``; a file that somebody took away is made again."""
         if keys.conversion != self.keys.conversion or self.mcap.name not in self.files:
             return "everything"
-        if keys.analysis != self.keys.analysis or f"{self.flight_id}.rrd" not in self.files:
+        analysed = {f"{self.flight_id}.rrd", *([corrected_name(self.flight_id)] if self.has_applied else [])}
+        if keys.analysis != self.keys.analysis or not analysed <= self.files:
             return "analysis"
-        wanted = {REPORT, PDF} if with_pdf else {REPORT}
+        wanted = {REPORT, *([DEVIATION_CSV] if self.has_deviation else [])}
+        if with_pdf:
+            wanted |= {PDF, *([STEER_CARD] if self.has_deviation else [])}
         return "nothing" if keys.reports == self.keys.reports and wanted <= self.files else "reports"
 
 
@@ -173,4 +182,6 @@ def _finished(folder: Path, files: frozenset[str], manifest: Mapping[str, Any], 
         str(manifest["resume"]["text"]),
         bool(manifest["resume"]["has_lost_data"]),
         next((severity for severity in reversed(SEVERITIES) if severity in found), None),
+        bool(summary["results"].get("magnetic")),
+        any(finding["code"] == APPLIED for finding in summary["findings"]),
     )

@@ -9,6 +9,7 @@ from groundstation.reports.parts import Document
 from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.reports.sections import CHAPTERS, front
 from groundstation.reports.sections.saved import mapping
+from groundstation.reports.steer_card import write_exports
 from groundstation.results.files import SavedFlight, load, write_text
 
 REPORT = "report.html"
@@ -25,7 +26,7 @@ class Written:
 
 
 def write_flight_report(folder: Path, *, with_pdf: bool = True) -> Written:
-    """Write report.html and report.pdf into a flight folder.
+    """Write report.html and report.pdf into a flight folder; with a magnetic deviation its table and steer card too.
 
     Parameters
     ----------
@@ -33,15 +34,19 @@ def write_flight_report(folder: Path, *, with_pdf: bool = True) -> Written:
         Holds summary.json, manifest.json and results.parquet/: nothing else is read, and equal files give equal bytes
         whatever the time, the host or the number of workers.
     with_pdf : bool
-        Without it there is no report.pdf afterwards: one of an earlier run would tell of other results.
+        Without it there is neither report.pdf nor steer_card.pdf afterwards: those of an earlier run would tell of
+        other results.
 
     Raises
     ------
     UnreadableLogError
         When the folder has no saved results.
     """
-    document = flight_document(load(folder))
-    return write_pages(folder / REPORT, flight_report_html(document), document, with_pdf=with_pdf)
+    saved = load(folder)
+    exports, problem = write_exports(saved, with_pdf=with_pdf)  # first: the report links to those that are there
+    document = flight_document(saved)
+    written = write_pages(folder / REPORT, flight_report_html(document), document, with_pdf=with_pdf)
+    return Written((*written.paths, *exports), "; ".join(filter(None, (written.problem, problem))))
 
 
 def write_pages(page: Path, html: str, document: Document, *, with_pdf: bool) -> Written:

@@ -84,11 +84,12 @@ class Facts:
 
 @dataclass(frozen=True)
 class Note:
-    """A paragraph, set off in the colour of its tone."""
+    """A paragraph, set off in the colour of its tone; ``files`` beside the report are named, and linked on a screen."""
 
     kind: ClassVar[str] = "note"
     text: str
     tone: Tone = "plain"
+    files: Sequence[str] = ()
 
 
 Part: TypeAlias = Drawing | Grid | Facts | Note

@@ -10,7 +10,7 @@ from typing import Any
 
 from groundstation.base.errors import GroundstationError
 from groundstation.reports.page import TEMPLATES
-from groundstation.reports.parts import Document, Drawing, Mark
+from groundstation.reports.parts import Drawing, Mark
 from groundstation.reports.wording import clean
 from groundstation.results.files import write_bytes
 
@@ -23,8 +23,10 @@ class PdfError(GroundstationError):
     """The PDF could not be made; everything else of the report was."""
 
 
-def write_pdf(document: Document, path: Path) -> None:
-    """Write a report as PDF: A4, equal documents give equal bytes.
+def write_pdf(document: object, path: Path, template: Path | None = None) -> None:
+    """Write a report (:class:`~groundstation.reports.parts.Document`) as PDF on A4; equal documents give equal bytes.
+
+    Another dataclass is set by a template of its own.
 
     Raises
     ------
@@ -34,7 +36,7 @@ def write_pdf(document: Document, path: Path) -> None:
         When the file cannot be written.
     """
     try:
-        content = pdf_bytes(document)
+        content = pdf_bytes(document, template)
     except BaseException as error:
         # A panic inside typst arrives as a PanicException, which is no Exception.
         if not isinstance(error, ImportError | RuntimeError) and type(error).__name__ != "PanicException":
@@ -43,7 +45,7 @@ def write_pdf(document: Document, path: Path) -> None:
     write_bytes(path, content)
 
 
-def pdf_bytes(document: Document) -> bytes:
+def pdf_bytes(document: object, template: Path | None = None) -> bytes:
     """Set a report and return the bytes of its PDF.
 
     The template imports and reads nothing: the document comes as one JSON text in ``sys.inputs``, whose strings typst
@@ -55,7 +57,7 @@ def pdf_bytes(document: Document) -> bytes:
     text = json.dumps(_plain(document), ensure_ascii=False).encode("utf-8", "replace").decode("utf-8")
     with tempfile.TemporaryDirectory(prefix="groundstation-") as root:
         return typst.compile(
-            shutil.copy(TEMPLATE, root),
+            shutil.copy(template or TEMPLATE, root),
             root=root,
             ignore_system_fonts=True,
             sys_inputs={"document": text},

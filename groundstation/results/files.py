@@ -194,7 +194,7 @@ def utf8_text(text: Any) -> str:
     return str(text).encode("utf-8", "backslashreplace").decode("utf-8")
 
 
-def csv_text(figure: FigureData) -> str:
+def csv_text(figure: FigureData, line_end: str = "\n") -> str:
     """Readable copy of a figure's arrays: rounded, NaN empty, no cell a spreadsheet would run as a formula."""
     cells = []
     for name, values in figure.columns.items():
@@ -209,7 +209,7 @@ def csv_text(figure: FigureData) -> str:
             cells.append([str(value) if is_whole else text_cell(str(value)) for value in values.tolist()])
     lines = [",".join(text_cell(name) for name in figure.columns)]
     lines += [",".join(row) for row in zip(*cells, strict=True)]
-    return "\n".join(lines) + "\n"
+    return line_end.join(lines) + line_end
 
 
 def text_cell(text: str) -> str:

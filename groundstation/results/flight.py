@@ -12,6 +12,7 @@ from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
+from groundstation.results.magnetic_ground import GroundDeviation
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,6 +62,7 @@ class FlightResults(Tabular):
     forecast : ForecastResult, optional
     latency : Latencies, optional
     magnetic : MagneticResult, optional
+    magnetic_ground : GroundDeviation, optional
     figures : tuple of FigureData
         Arrays behind every figure, those of the analyses among them.
     """
@@ -81,6 +83,7 @@ class FlightResults(Tabular):
     forecast: ForecastResult | None = None
     latency: Latencies | None = None
     magnetic: MagneticResult | None = None
+    magnetic_ground: GroundDeviation | None = None
     figures: tuple[FigureData, ...] = ()
 
     def figure(self, name: str) -> FigureData | None:

@@ -28,6 +28,8 @@ class Alignment:
 
     ``aligned_error_deg`` and ``aligned_sigma_deg`` belong to ``aligned_at_s``, ``error_deg`` and ``sigma_deg`` to
     ``figure_at_s`` (flight seconds), after the drift of the hours between. ``origin`` says whence.
+    ``speed_min_mps`` is the speed from which on the track may align. ``gyro_*`` are the drifts along forward, right,
+    down at the standstill before flight and their sigmas; None where no rates are logged.
     """
 
     origin: str
@@ -39,6 +41,9 @@ class Alignment:
     drift_sigma_deg_per_h: float
     aligned_at_s: float | None
     figure_at_s: float
+    speed_min_mps: float | None = None
+    gyro_drift_deg_per_h: Vector | None = None
+    gyro_drift_sigma_deg_per_h: Vector | None = None
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.results.files import SUMMARY, SavedFlight
 from groundstation.results.flight import FlightResults
+from groundstation.results.magnetic import MagneticResult
 
 
 def restored(saved: SavedFlight) -> FlightResults:
@@ -47,6 +48,18 @@ def restored(saved: SavedFlight) -> FlightResults:
         raise UnreadableLogError(
             str(saved.folder / SUMMARY), what, "one that this version writes", "run the log again"
         ) from error
+    return result
+
+
+def restored_magnetic(summary: Mapping[str, Any]) -> MagneticResult:
+    """The magnetic deviation in a summary alone, whatever the rest of it is, without figures.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError, AttributeError
+        When there is none, or it is not as this version writes it.
+    """
+    result: MagneticResult = _value(MagneticResult, summary["results"]["magnetic"])
     return result
 
 

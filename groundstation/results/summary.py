@@ -138,6 +138,8 @@ def summary_of(results: FlightResults) -> dict[str, Any]:
         answers["latency"] = _answer(results.latency)
     if results.magnetic is not None:
         answers["magnetic"] = _answer(results.magnetic)
+    if results.magnetic_ground is not None:
+        answers["magnetic_ground"] = _answer(results.magnetic_ground)
     return {
         "schema_version": SCHEMA_VERSION,
         "flight": plain(flight),

@@ -37,6 +37,7 @@ MESSAGE_OF_KIND: Mapping[str, str] = {
     "link": "Link",
     "satellite": "Satellite",
     "adf": "Adf",
+    "corrected_heading": "CorrectedHeading",
     "truth": "Ins",
 }
 DEVICE_TIME, RECORD_INDEX = "device_time_ns", "record_index"

@@ -84,7 +84,8 @@ def _centred(difference_deg: FloatArray) -> FloatArray:
     return np.asarray(centre + wrap_180(difference_deg - centre))
 
 
-def _take(samples: Samples, mask: BoolArray) -> Samples:
+def take_samples(samples: Samples, mask: BoolArray | NDArray[np.intp]) -> Samples:
+    """The rows of every array that a mask or positions select."""
     arrays: dict[str, Any] = {
         name: value[mask] for name, value in vars(samples).items() if isinstance(value, np.ndarray)
     }
@@ -107,7 +108,7 @@ def solve(antenna: Samples, standstill: StandstillData, aircraft: AircraftData, 
     knowledge = know_arm(antenna, aircraft, settings)
     uncorrected = _centred(antenna.difference_deg[antenna.is_used])
     samples = without_arm(antenna, knowledge.applied_arm_m, float(np.median(uncorrected)))
-    used = _take(samples, samples.is_used)
+    used = take_samples(samples, samples.is_used)
     differences = _differences(used, knowledge)
     thinning = -(-len(used) // MOST_SAMPLES)
     thinned = _part(differences, slice(None, None, thinning))

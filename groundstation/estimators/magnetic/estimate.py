@@ -9,8 +9,9 @@ import numpy as np
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray
-from groundstation.estimators.heading.settings import AircraftData
+from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings
 from groundstation.estimators.magnetic.alignment import S_PER_H, align
+from groundstation.estimators.magnetic.before_lift_off import HeadingBasis, find_ground_runs, gyros_at_standstill
 from groundstation.estimators.magnetic.compass_table import CompassTable, build_table
 from groundstation.estimators.magnetic.earth import earth_field
 from groundstation.estimators.magnetic.figures import draw, parts_of
@@ -54,6 +55,8 @@ def estimate_deviation(
     *,
     settings: MagneticSettings | None = None,
     heading: HeadingResult | None = None,
+    heading_settings: HeadingSettings | None = None,
+    heading_request: HeadingRequest | None = None,
     latencies: Latencies | None = None,
     kinds: Mapping[str, str] | None = None,
     aircraft: AircraftData | None = None,
@@ -69,7 +72,9 @@ def estimate_deviation(
         Topics ``ins`` (roll, pitch, true heading) and ``magnetometer``; ``electric`` where there is one.
     settings : MagneticSettings, optional
     heading : HeadingResult, optional
-        System 1's answer: aligns the INS heading.
+        System 1's answer: aligns the INS heading where no faster ground run does.
+    heading_settings, heading_request : optional
+        With which system 1 looks at the ground runs up to lift-off.
     latencies : Latencies, optional
         Where that of the magnetometer is observed, its times are put back by it.
     kinds : mapping of INS topic to kind, optional
@@ -100,14 +105,19 @@ def estimate_deviation(
     if objection:
         raise NotAssessableError(ANALYSIS, objection)
     readings, latency_s = gather(flight, topics, latencies, settings)
-    phase = (phases or flight_phases(flight)).at(readings.time_s)
+    phases = phases or flight_phases(flight)
+    phase = phases.at(readings.time_s)
     is_airborne = np.isin(phase, IN_THE_AIR)
     turns = find_turns(readings, is_airborne, settings)
     figures, turns = find_figures(readings, turns, settings)
     if not figures:
         raise NotAssessableError(ANALYSIS, _why_no_figure(turns))
     figure_at_s = float(np.mean([0.5 * (figure.start_s + figure.end_s) for figure in figures]))
-    alignment = align(heading, topics[0], figure_at_s, settings)
+    request = heading_request or HeadingRequest()
+    basis = HeadingBasis(heading_settings or HeadingSettings(), aircraft or AircraftData(), request, latencies)
+    runs = find_ground_runs(flight, topics[0], heading, phases, basis, settings)
+    gyros = gyros_at_standstill(flight, topics[0], phases, settings)
+    alignment = align(heading, topics[0], figure_at_s, settings, runs, gyros)
     readings = _aligned(readings, alignment, aircraft.mounting_deg if aircraft else 0.0)
     result = _answer(flight, topics, readings, is_airborne, (figures, turns), alignment, settings)
     return replace(result, remarks=remarks_on(flight, result, latency_s, kinds or {}, settings))
@@ -172,7 +182,7 @@ def _answer(
         modulus=_parameters(fits.modulus, a_sigma),
         table_fit_rms_deg=table.fit_rms_deg,
         settings={name: value for name, value in asdict(settings).items() if value is not None},
-        figures=draw(readings, along, part, figures, fits, deviation, methods),
+        figures=draw(readings, along, part, figures, fits, deviation, methods, (method, card)),
     )
 
 

@@ -15,9 +15,11 @@ from groundstation.estimators.magnetic.methods import Fits
 from groundstation.estimators.magnetic.poisson import corrected_heading_deg
 from groundstation.estimators.magnetic.readings import Readings
 from groundstation.results.figures import FigureData
-from groundstation.results.magnetic import LETTERS, Method
+from groundstation.results.magnetic import LETTERS, Method, MethodName
 
 LARGEST = 20_000  # readings drawn: of more, every k-th
+MOST_VECTORS = 4_000  # of the field
+AXES = ("forward", "right", "down")
 
 
 def draw(
@@ -28,13 +30,18 @@ def draw(
     fits: Fits,
     deviation_deg: FloatArray,
     methods: Sequence[Method],
+    recommended: tuple[MethodName, FloatArray],
 ) -> tuple[FigureData, ...]:
-    """Readings with their errors, the table, the deviation by each method, and the modulus."""
+    """Readings with their errors, the table, the deviation by each method, the modulus and the field.
+
+    ``recommended``: the method to correct by, and its deviation in each bin, shape (360,).
+    """
     return (
         _samples(readings, declination_deg, part, fits, deviation_deg),
         _table(fits, deviation_deg),
-        _curves(methods),
+        _curves(methods, *recommended),
         _modulus(readings, figures, fits),
+        _field(readings, part, fits),
     )
 
 
@@ -89,8 +96,11 @@ def _table(fits: Fits, deviation_deg: FloatArray) -> FigureData:
     return FigureData("magnetic_table", columns, dict.fromkeys(columns, 4))
 
 
-def _curves(methods: Sequence[Method]) -> FigureData:
-    """Deviation in level flight and its sigma by A to E of each method; the modulus is drawn without A."""
+def _curves(methods: Sequence[Method], recommended: MethodName, recommended_deg: FloatArray) -> FigureData:
+    """Deviation in level flight and its sigma by A to E of each method, and by the recommended one as it is applied.
+
+    The modulus is drawn without A.
+    """
     columns = {"magnetic_heading_deg": CENTRES_DEG}
     design = harmonics.design(CENTRES_DEG)
     for row in methods:
@@ -100,6 +110,10 @@ def _curves(methods: Sequence[Method]) -> FigureData:
         )
         columns[f"deviation_{row.name}_deg"] = -(design @ values)
         columns[f"sigma_{row.name}_deg"] = np.sqrt(design**2 @ sigma**2)
+    columns |= {
+        "deviation_recommended_deg": recommended_deg,
+        "sigma_recommended_deg": columns[f"sigma_{recommended}_deg"],
+    }
     return FigureData("magnetic_curves", columns, dict.fromkeys(columns, 4))
 
 
@@ -114,3 +128,15 @@ def _modulus(readings: Readings, figures: list[Figure], fits: Fits) -> FigureDat
         )
         columns[f"{name}_nt"] = np.linalg.norm(freed, axis=1)
     return FigureData("magnetic_modulus", columns, dict.fromkeys(columns, 1) | {"time_s": 3})
+
+
+def _field(readings: Readings, part: NDArray[np.str_], fits: Fits) -> FigureData:
+    """The field along the body axes in flight, as read and freed of the fitted iron (NaN where none is)."""
+    rows = np.flatnonzero(part != "ground")
+    rows = rows[:: max(1, -(-len(rows) // MOST_VECTORS))]
+    shown, fit = readings.take(rows), fits.attitude
+    freed = np.full((len(shown), 3), np.nan) if fit.reason else fit.iron.field_nt(shown.field_nt, shown.current_a)
+    columns = {"time_s": shown.time_s, "part": part[rows]}
+    for state, values in (("before", shown.field_nt), ("after", freed)):
+        columns |= {f"{state}_{axis}_nt": values[:, place] for place, axis in enumerate(AXES)}
+    return FigureData("magnetic_field", columns, dict.fromkeys(columns, 1) | {"time_s": 3})

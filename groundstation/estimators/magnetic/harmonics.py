@@ -10,6 +10,7 @@ COEFFICIENTS = 5
 OVER_CIRCLE = np.array([1.0, 0.5, 0.5, 0.5, 0.5])  # mean squares of 1, sin, cos, sin 2, cos 2
 INFLATION_MAX = 4.0
 BANDWIDTH_FACTOR = 1.1447  # Andrews 1991, equation 6.2, Bartlett kernel
+BANDWIDTH_SHARE = 0.1
 
 
 def design(heading_deg: FloatArray) -> FloatArray:
@@ -58,12 +59,15 @@ def autocorrelation(residual: FloatArray, parameters: int) -> float:
 def inflation(samples: int, parameters: int, correlation: float) -> float:
     """Factor n / (n - k) on a variance, n the number of independent samples that correlated ones are worth; at most 4.
 
+    They are worth no more than the windows of :func:`long_run`, among which the parameters take theirs.
+
     Examples
     --------
-    >>> inflation(110, 10, 0.0), inflation(3, 5, 0.0)
-    (1.1, 4.0)
+    >>> round(inflation(3000, 5, 0.0), 1), inflation(3, 5, 0.0)
+    (2.0, 4.0)
     """
     worth = samples * (1.0 - correlation) / (1.0 + correlation)
+    worth = min(worth, samples / _width(samples)) if samples else 0.0
     return worth / max(worth - parameters, worth / INFLATION_MAX) if worth > 0.0 else INFLATION_MAX
 
 
@@ -71,7 +75,8 @@ def long_run(scores: FloatArray, correlation: float) -> FloatArray:
     """Covariance of the sum of correlated scores, shape (n, k) -> (k, k): prewhitened, then with Bartlett weights.
 
     Scores are whitened by the first-order autocorrelation of the residuals, and the sum is recoloured by
-    1 / (1 - correlation)^2.
+    1 / (1 - correlation)^2. What wanders below white noise does not show in the correlation of neighbours: the weights
+    reach over ``BANDWIDTH_SHARE`` of the samples at least. With them the covariance is that of sums over windows.
 
     Source: D. W. K. Andrews, J. C. Monahan, Econometrica 60 (1992) 953-966; W. K. Newey, K. D. West, Econometrica 55
     (1987) 703-708.
@@ -80,10 +85,13 @@ def long_run(scores: FloatArray, correlation: float) -> FloatArray:
         return np.zeros((scores.shape[1], scores.shape[1]))
     white = scores.copy()
     white[1:] -= correlation * scores[:-1]
-    lags = min(math.ceil(BANDWIDTH_FACTOR * len(scores) ** (1.0 / 3.0)), len(scores) - 1)
-    total = white.T @ white
-    for lag in range(1, lags + 1):
-        cross = white[lag:].T @ white[:-lag]
-        total += (1.0 - lag / (lags + 1.0)) * (cross + cross.T)
-    eigenvalues, vectors = np.linalg.eigh(0.5 * (total + total.T))  # weights keep it positive but for rounding
-    return np.asarray((vectors * np.maximum(eigenvalues, 0.0)) @ vectors.T / (1.0 - correlation) ** 2)
+    width = _width(len(scores))
+    running = np.cumsum(np.pad(white, ((width, width - 1), (0, 0))), axis=0)
+    windows = running[width:] - running[:-width]
+    return np.asarray(windows.T @ windows / (width * (1.0 - correlation) ** 2))
+
+
+def _width(samples: int) -> int:
+    """Samples over which the weights reach."""
+    lags: float = max(BANDWIDTH_FACTOR * samples ** (1.0 / 3.0), BANDWIDTH_SHARE * samples)
+    return min(1 + math.ceil(lags), samples)

@@ -112,23 +112,21 @@ def gather(
     """
     unit, sensor = flight[topics[0]], flight[topics[1]]
     sensor = _thinned(sensor.take(sensor.valid(*FIELD)).unique_times(), settings.rate_max_hz)
-    bad = (unit.values("valid") == 0.0) | (unit.text("mode") == "align")
-    unit = unit.take(~bad)
-    row = latencies.observed(*topics) if latencies is not None else None
-    latency_s = row.latency_s if row is not None and row.latency_s is not None else 0.0
+    unit = aligned_part(unit)
+    latency_s = latency_of(topics, latencies)
     at_ns = sensor.time_ns - round(latency_s * NS_PER_S)
     attitude = join(unit, at_ns, ATTITUDE, largest_gap_s=settings.gap_max_s)
-    latitude, longitude = _position(flight, unit, at_ns)
+    latitude, longitude = position_at(flight, unit, at_ns)
     readings = Readings(
         flight.seconds(at_ns),
         np.stack([sensor.values(name) for name in FIELD], axis=-1),
         attitude.values("roll_deg"),
         attitude.values("pitch_deg"),
         wrap_360(attitude.values("true_heading_deg")),
-        _altitude(flight, unit, at_ns),
+        altitude_at(flight, unit, at_ns),
         latitude,
         longitude,
-        _current(flight, at_ns),
+        current_at(flight, at_ns),
     )
     known = attitude.valid(*ATTITUDE) & (np.abs(readings.field_nt).sum(axis=1) > 0.0)
     if np.count_nonzero(known) < LEAST_READINGS:
@@ -136,6 +134,18 @@ def gather(
             ANALYSIS, f"hardly any reading of {topics[1]} while the attitude of {topics[0]} is known"
         )
     return readings.take(known), latency_s
+
+
+def latency_of(topics: tuple[str, str], latencies: Latencies | None) -> float:
+    """Latency of a magnetometer against an INS where it is observed, else 0, seconds."""
+    row = latencies.observed(*topics) if latencies is not None else None
+    return row.latency_s if row is not None and row.latency_s is not None else 0.0
+
+
+def aligned_part(unit: Table) -> Table:
+    """The samples of an INS that calls its output valid and does not align."""
+    bad = (unit.values("valid") == 0.0) | (unit.text("mode") == "align")
+    return unit.take(~bad)
 
 
 def _thinned(table: Table, rate_max_hz: float) -> Table:
@@ -147,7 +157,7 @@ def _thinned(table: Table, rate_max_hz: float) -> Table:
     return table.take(slice(0, None, step)) if step > 1 else table
 
 
-def _altitude(flight: Flight, unit: Table, at_ns: Int64Array) -> FloatArray:
+def altitude_at(flight: Flight, unit: Table, at_ns: Int64Array) -> FloatArray:
     """The first altitude there is: of the INS, a satellite receiver, a barometer."""
     others = [flight[topic] for kind in ("gnss", "baro") for topic in topics_of_kind(kind, flight.topics())]
     for table in (unit, *others):
@@ -157,7 +167,8 @@ def _altitude(flight: Flight, unit: Table, at_ns: Int64Array) -> FloatArray:
     return np.full(len(at_ns), np.nan)
 
 
-def _position(flight: Flight, unit: Table, at_ns: Int64Array) -> tuple[FloatArray, FloatArray]:
+def position_at(flight: Flight, unit: Table, at_ns: Int64Array) -> tuple[FloatArray, FloatArray]:
+    """Latitude and longitude of the INS, else of a satellite receiver; NaN where unknown."""
     names = ("latitude_deg", "longitude_deg")
     for table in (unit, *(flight[topic] for topic in topics_of_kind("gnss", flight.topics()))):
         if table.has(*names):
@@ -166,7 +177,8 @@ def _position(flight: Flight, unit: Table, at_ns: Int64Array) -> tuple[FloatArra
     return np.full(len(at_ns), np.nan), np.full(len(at_ns), np.nan)
 
 
-def _current(flight: Flight, at_ns: Int64Array) -> FloatArray:
+def current_at(flight: Flight, at_ns: Int64Array) -> FloatArray:
+    """The first current logged; NaN where unknown."""
     for topic in topics_of_kind("electric", flight.topics()):
         if flight[topic].has("current_a"):
             return values_at(flight[topic], "current_a", at_ns, largest_gap_s=2.0)

@@ -9,15 +9,26 @@ from groundstation.base.toml_settings import check_ranges, number
 class MagneticSettings:
     """Limits of the magnetic estimator.
 
-    ``alignment_sigma_deg`` is that of an INS heading that taxi did not align, ``drift_sigma_deg_per_h`` what is known
-    of its drift beforehand. ``declination_deg`` with its sigma replaces the model's, for a log without date or place.
-    ``trusts_aided_heading`` states that an INS corrected by GNSS does not take its heading from a magnetometer.
+    ``alignment_sigma_deg`` is that of an INS heading that nothing aligned, ``drift_sigma_deg_per_h`` what is known
+    of its drift beforehand. The track aligns it at speeds at which ``gnss_velocity_error_mps`` (or what the receiver
+    states, where that is larger) turns the track by no more than ``track_error_max_deg``, and with
+    ``uses_slower_taxi`` on taxi as system 1 takes it. ``alignment_event`` and ``release_event`` are names of events
+    between which the alignment looks; empty: not used. ``declination_deg`` with its sigma replaces the model's, for a
+    log without date or place. ``trusts_aided_heading`` states that an INS corrected by GNSS does not take its heading
+    from a magnetometer.
     """
 
     rate_max_hz: float = number(10.0, 0.5, 1000.0)  # faster magnetometers are thinned
     gap_max_s: float = number(0.5, 0.0, 10.0)  # attitude is interpolated over no longer gap
     alignment_sigma_deg: float = number(0.333, 0.0, 180.0)  # 20 arcmin
     drift_sigma_deg_per_h: float = number(0.1, 0.0, 1000.0)
+    track_error_max_deg: float = number(0.3, 0.001, 45.0)  # patent
+    gnss_velocity_error_mps: float = number(0.15, 0.001, 100.0)  # patent
+    uses_slower_taxi: bool = True
+    lift_off_margin_s: float = number(3.0, 0.0, 60.0)  # the nose is raised
+    ground_run_min_s: float = number(5.0, 0.0, 1000.0)
+    alignment_event: str = ""
+    release_event: str = ""
     declination_deg: float | None = number(None, -180.0, 180.0)
     declination_sigma_deg: float = number(0.5, 0.0, 180.0)
     trusts_aided_heading: bool = False

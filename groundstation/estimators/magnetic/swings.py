@@ -12,7 +12,6 @@ from groundstation.estimators.magnetic.readings import Readings
 from groundstation.results.magnetic import LETTERS, CardRow, Swing
 
 
-
 def compare_swings(readings: Readings, declination_deg: float, figures: list[Figure]) -> list[Swing]:
     """Every figure's own A to E, and how far its curve is from the mean of the other figures."""
     heading, error = readings.magnetic_heading_deg, readings.compass_error_deg

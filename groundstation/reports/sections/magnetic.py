@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from groundstation.reports.parts import Cell, Facts, Grid, Head, Mark, Note, Part, Section, Tone
-from groundstation.reports.sections import magnetic_figures
+from groundstation.reports.sections import magnetic_figures, magnetic_ground
 from groundstation.reports.sections.heading import gate_grid, setting_facts
 from groundstation.reports.sections.saved import mapping, not_assessable_reason, objects
 from groundstation.reports.wording import ABSENT, clock, is_number, number, significant, typeset
+from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.files import SavedFlight
 from groundstation.results.magnetic import ADVISORY, LETTERS
 
@@ -39,12 +40,14 @@ def build(saved: SavedFlight) -> Section | None:
     magnetic = mapping(saved.summary, "results", "magnetic")
     if not magnetic:
         reason = not_assessable_reason(saved, "magnetic")
-        note = Note(f"Not assessable: {typeset(reason)}", "unknown")
-        return Section("magnetic", TITLE, LEAD, (note,)) if reason else None
+        notes = (Note(f"Not assessable: {typeset(reason)}", "unknown"),) if reason else ()
+        instead = (*notes, *magnetic_ground.parts(saved))
+        return Section("magnetic", TITLE, LEAD, instead) if instead else None
     parts: tuple[Part | None, ...] = (
         *_conclusions(magnetic),
         _coefficients(magnetic),
         _card(magnetic),
+        _files(saved),
         magnetic_figures.deviation(saved),
         gate_grid(magnetic),
         _methods(magnetic),
@@ -59,6 +62,7 @@ def build(saved: SavedFlight) -> Section | None:
         *(Note(_sentence(remark)) for remark in magnetic.get("remarks") or ()),
         Note(HOW),
         setting_facts(magnetic),
+        *magnetic_ground.parts(saved),
     )
     return Section("magnetic", TITLE, LEAD, tuple(part for part in parts if part is not None))
 
@@ -126,6 +130,12 @@ def _card(magnetic: Mapping[str, Any]) -> Grid | None:
         f"heading; add: the deviation, added to that reading.{starred} {ADVISORY}"
     )
     return Grid("Steer card", heads, rows, caption) if rows else None
+
+
+def _files(saved: SavedFlight) -> Note | None:
+    """The table and the card beside the report, those that were written."""
+    names = [name for name in (STEER_CARD, DEVIATION_CSV) if (saved.folder / name).is_file()]
+    return Note("To print, and for programs, every degree:", files=names) if names else None
 
 
 def _methods(magnetic: Mapping[str, Any]) -> Grid:
@@ -217,6 +227,7 @@ def _basis(magnetic: Mapping[str, Any]) -> Facts:
             _with_sigma(alignment.get("error_deg"), alignment.get("sigma_deg")),
             _sentence(alignment.get("origin")),
         ),
+        *_gyros(alignment),
         (
             "Declination taken off",
             _with_sigma(declination.get("value_deg"), declination.get("sigma_deg")),
@@ -232,6 +243,17 @@ def _basis(magnetic: Mapping[str, Any]) -> Facts:
         ("Sensors", f"{magnetic.get('magnetometer_topic')} against {magnetic.get('ins_topic')}", ""),
     )
     return Facts("What it rests on", pairs)
+
+
+def _gyros(alignment: Mapping[str, Any]) -> tuple[tuple[str, str, str], ...]:
+    """Drift of the three gyros before flight, where it was logged."""
+    values, sigmas = alignment.get("gyro_drift_deg_per_h"), alignment.get("gyro_drift_sigma_deg_per_h")
+    if not isinstance(values, list) or not isinstance(sigmas, list):
+        return ()
+    told = ", ".join(
+        f"{number(value, 2, signed=True)} ± {number(sigma, 2)}" for value, sigma in zip(values, sigmas, strict=False)
+    )
+    return (("Gyro drift at standstill", f"{told} °/h", "forward, right, down; beyond the rotation of the earth"),)
 
 
 def _with_sigma(value: Any, sigma: Any) -> str:

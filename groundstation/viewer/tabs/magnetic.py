@@ -9,6 +9,7 @@ from groundstation.viewer import colours
 from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after
+from groundstation.viewer.tabs.magnetic_field import eight, sphere
 from groundstation.viewer.tabs.magnetic_text import magnetic_text
 from groundstation.viewer.views import document, figure_of, numbers, plot
 
@@ -16,19 +17,21 @@ BAND = 1.96  # half width of a 95 % band in sigmas
 THIN, BOLD, DOT = 1.0, 2.0, 1.6
 SHADES = dict(zip(METHOD_TITLES, (colours.INS, colours.ANSWER, colours.HONEST), strict=True))
 MARGIN = 0.08
+RUN, FITTED = Line("ground runs", colours.INS, BOLD), Line("A to E", colours.ANSWER, THIN)
 
 
 def magnetic(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the tab of the magnetic deviation; None when the flight was not assessed and no reason is known."""
     reasons = [entry.reason for entry in results.not_assessable if entry.analysis == "magnetic"]
-    if results.magnetic is None and not reasons:
+    if results.magnetic is None and results.magnetic_ground is None and not reasons:
         return None
-    recorder.document("magnetic/answer", magnetic_text(results.magnetic, reasons))
+    recorder.document("magnetic/answer", magnetic_text(results.magnetic, reasons, results.magnetic_ground))
     text = document("Verdict and card", "magnetic/answer")
-    left = [*_deviation(recorder, results), *_branches(recorder, results)]
-    middle = [*_errors(recorder, results), *_modulus(recorder, results)]
-    columns = [rrb.Vertical(contents=column) for column in (left, middle) if column]
-    return rrb.Horizontal(contents=[*columns, rrb.Vertical(contents=[text])], name="Magnetic")
+    left = [*_deviation(recorder, results), *_branches(recorder, results), *_ground_runs(recorder, results)]
+    middle = [*_errors(recorder, results), *_modulus(recorder, results), *_applied(recorder, results)]
+    right = [*sphere(recorder, results), *eight(recorder, results), text]
+    columns = [rrb.Vertical(contents=column) for column in (left, middle, right) if column]
+    return rrb.Horizontal(contents=columns, name="Magnetic")
 
 
 def _axis(title: str, curves: list[FloatArray]) -> Axis | None:
@@ -88,6 +91,29 @@ def _branches(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     return _chart(recorder, "magnetic/branches", "Magnetic minus true heading, deg", heading, curves)
 
 
+def _ground_runs(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
+    """Error of the installed heading sensor on each ground run with its 95 % bar, and the curve where it is known."""
+    runs = results.magnetic_ground.used if results.magnetic_ground else ()
+    curves = []
+    for run in runs:
+        if run.error_deg is None or run.sigma_deg is None:
+            continue
+        ends = run.error_deg + BAND * run.sigma_deg * np.array([-1.0, 1.0])
+        middle = run.magnetic_heading_deg + DOT * np.array([-1.0, 1.0])
+        bar = np.full(2, run.magnetic_heading_deg)
+        curves += [(bar, ends, Line("", colours.INS, THIN)), (middle, np.full(2, run.error_deg), RUN)]
+    y = _axis("Error on ground runs, deg", [values for _, values, _ in curves])
+    if y is None:
+        return []
+    figure = figure_of(results, "magnetic_ground_curve", "magnetic_heading_deg", "error_deg")
+    if figure is not None:
+        curves.append((numbers(figure, "magnetic_heading_deg"), numbers(figure, "error_deg"), FITTED))
+    chart = Chart(recorder, "magnetic/ground", Axis("magnetic heading as read, deg", 0.0, 360.0), y)
+    chart.curves("curves", curves)
+    chart.legend([RUN, FITTED] if figure is not None else [RUN])
+    return [chart.view()]
+
+
 def _errors(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Error of the magnetic heading where no fit has seen, before and after the recommended correction."""
     method = results.magnetic.recommended_method if results.magnetic else "compass_table"
@@ -103,6 +129,21 @@ def _errors(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
         values = numbers(figure, name)[mine]
         recorder.dots(f"magnetic/error/{title}", time_ns, values, Line(f"{title}, deg", shade, DOT))
     return [plot("Error of magnetic heading where no fit has seen, deg", "magnetic/error")]
+
+
+def _applied(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
+    """Magnetic heading before and after a deviation was applied to the log."""
+    shown = {
+        "uncorrected_magnetic_heading_deg": ("uncorrected", colours.SAMPLES),
+        "magnetic_heading_deg": ("corrected", colours.ANSWER),
+    }
+    figure = figure_of(results, "corrected_heading", "time_s", *shown)
+    if figure is None:
+        return []
+    time_ns = recorder.time_ns(numbers(figure, "time_s"))
+    for column, (title, shade) in shown.items():
+        recorder.dots(f"magnetic/heading/{title}", time_ns, numbers(figure, column), Line(f"{title}, deg", shade, DOT))
+    return [plot("Magnetic heading with the deviation applied, deg", "magnetic/heading")]
 
 
 def _modulus(recorder: Recorder, results: FlightResults) -> list[rrb.View]:

@@ -3,13 +3,17 @@
 from collections.abc import Sequence
 
 from groundstation.results.magnetic import ADVISORY, LETTERS, METHOD_TITLES, MagneticResult
+from groundstation.results.magnetic_ground import GroundDeviation
 from groundstation.viewer.markdown import markdown_text, number, table
 
 
-def magnetic_text(result: MagneticResult | None, reasons: Sequence[str] = ()) -> str:
-    """Markdown of the panel; without a result the reasons why there is none."""
+def magnetic_text(
+    result: MagneticResult | None, reasons: Sequence[str] = (), ground: GroundDeviation | None = None
+) -> str:
+    """Markdown of the panel; without a result the reasons why there is none. Behind it what the ground runs tell."""
     if result is None:
-        return "\n\n".join(["# Magnetic deviation not assessed", *(markdown_text(reason) for reason in reasons)])
+        why = ["# Magnetic deviation not assessed", *(markdown_text(reason) for reason in reasons)]
+        return "\n\n".join([*why, *_ground_runs(ground)])
     residual, reason = result.residual_rms_deg, result.verdict_reason
     left = (
         f"{number(residual.before, 2)} deg RMS before, {number(residual.after, 2)} after, where no fit has seen."
@@ -29,8 +33,26 @@ def magnetic_text(result: MagneticResult | None, reasons: Sequence[str] = ()) ->
         "## Gates",
         _gates(result),
         *(markdown_text(remark) for remark in result.remarks),
+        *_ground_runs(ground),
     ]
     return "\n\n".join(parts)
+
+
+def _ground_runs(ground: GroundDeviation | None) -> list[str]:
+    """Error of the installed heading sensor on each straight ground run, and the remarks."""
+    if ground is None:
+        return []
+    rows = [
+        [
+            number(run.start_s, 0),
+            run.phase,
+            number(run.magnetic_heading_deg, 1),
+            f"{number(run.error_deg, 2, sign=True)} ± {number(run.sigma_deg, 2)}",
+        ]
+        for run in ground.used
+    ]
+    told = (markdown_text(remark) for remark in ground.remarks)
+    return ["## Heading sensor on ground runs, deg", table(["from, s", "", "reading", "error"], rows), *told]
 
 
 def _coefficients(result: MagneticResult) -> str:

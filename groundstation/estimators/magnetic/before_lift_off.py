@@ -1,0 +1,242 @@
+"""The ground before lift-off: where the INS heading may be aligned by the track, and system 1 run there once more."""
+
+import math
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
+from groundstation.estimators.heading.estimate import estimate_heading_error
+from groundstation.estimators.heading.samples import choose_topics
+from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings
+from groundstation.estimators.magnetic.gyros import GyroDrift, gyro_drift
+from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.results.heading import HeadingResult
+from groundstation.results.latency import Latencies
+from groundstation.tables.phases import Phases, ground_mask
+from groundstation.tables.table import Flight
+
+ANALYSIS = "magnetic"
+NO_LIMIT_MPS = 1000.0  # lift-off ends the run, not a speed
+
+
+@dataclass(frozen=True)
+class HeadingBasis:
+    """What system 1 needs besides the flight: its settings, the aircraft, intervals of the user, latencies."""
+
+    settings: HeadingSettings = field(default_factory=HeadingSettings)
+    aircraft: AircraftData = field(default_factory=AircraftData)
+    request: HeadingRequest = field(default_factory=HeadingRequest)
+    latencies: Latencies | None = None
+
+
+@dataclass(frozen=True)
+class GroundRuns:
+    """Answers of system 1 on the ground before lift-off, each None where there is none.
+
+    Parameters
+    ----------
+    together : HeadingResult or None
+        Of taxi and of what is faster than ``speed_min_mps``, the take-off run above all, in one fit; ``why_not`` says
+        why there is none.
+    fast_epochs : int
+        Epochs in it that are faster than that.
+    taxi : HeadingResult or None
+        Of taxi within the speed limits of system 1 alone; ``why_not_taxi`` likewise.
+    since : str
+        What ``together`` begins with, if not with the log.
+    """
+
+    together: HeadingResult | None = None
+    taxi: HeadingResult | None = None
+    speed_min_mps: float | None = None
+    fast_epochs: int = 0
+    why_not: str = ""
+    why_not_taxi: str = ""
+    since: str = ""
+
+
+@dataclass(frozen=True)
+class Window:
+    """Flight seconds between which the alignment may look, whether an event bounds them, and since what they run."""
+
+    start_s: float
+    end_s: float
+    is_by_event: bool
+    since: str = ""
+
+
+def least_speed_mps(velocity_error_mps: float, track_error_deg: float) -> float:
+    """Speed from which on a velocity error across the track turns the track angle by no more than is allowed.
+
+    tan(track error) = velocity error / speed.
+
+    Examples
+    --------
+    The patent's: 0.15 m/s at 100 km/h makes 0.3 deg.
+
+    >>> round(least_speed_mps(0.15, 0.309), 1), round(least_speed_mps(0.15, 0.3), 1)
+    (27.8, 28.6)
+    """
+    return velocity_error_mps / math.tan(math.radians(track_error_deg))
+
+
+def find_ground_runs(
+    flight: Flight,
+    ins_topic: str,
+    heading: HeadingResult | None,
+    phases: Phases,
+    basis: HeadingBasis,
+    settings: MagneticSettings,
+) -> GroundRuns:
+    """Run system 1 on straight ground runs up to lift-off that are fast enough for the track error allowed.
+
+    Taxi within the limits of system 1 counts with them, though slower: its many epochs are weighed by its noise model,
+    errors correlated over both included. With ``uses_slower_taxi`` false it does not.
+
+    System 1's own answer ``heading`` stays beside it; where events of the operator bound the alignment it is found
+    again between them.
+    """
+    try:
+        window = alignment_window(flight, phases, settings)
+    except NotAssessableError as error:
+        reason = _reason(error)
+        if settings.alignment_event:
+            return GroundRuns(why_not=reason, why_not_taxi=reason)
+        return GroundRuns(taxi=heading, why_not=reason)
+    part, taxi, why_not_taxi = _gnss_within(flight, window), heading, ""
+    basis = replace(basis, request=replace(basis.request, ins_topic=ins_topic))
+    if window.is_by_event:
+        taxi, why_not_taxi = _estimated(flight, part, basis.settings, basis)
+    speed_min_mps = _speed_min_mps(part, basis, settings)
+    limits, part = _fast_enough(part, speed_min_mps, basis.settings, settings)
+    together, why_not = _estimated(flight, part, limits, basis)
+    count, seconds = _fast_part(together, speed_min_mps)
+    if together is not None and seconds < settings.ground_run_min_s:
+        together, why_not = None, f"{seconds:.1f} s straight above {speed_min_mps:.1f} m/s before lift-off"
+    return GroundRuns(together, taxi, speed_min_mps, count, why_not, why_not_taxi, window.since)
+
+
+def gyros_at_standstill(flight: Flight, ins_topic: str, phases: Phases, settings: MagneticSettings) -> GyroDrift | None:
+    """Drift of the gyros at the standstill before lift-off, in the window of the alignment; None where not known."""
+    try:
+        window = alignment_window(flight, phases, settings)
+    except NotAssessableError:
+        return None
+    return gyro_drift(flight, ins_topic, phases, window.start_s, window.end_s)
+
+
+def alignment_window(flight: Flight, phases: Phases, settings: MagneticSettings) -> Window:
+    """Up to the first lift-off less a margin, from the last ``alignment_event`` on, to the ``release_event`` after it.
+
+    A correction entered on board may move the INS heading: what lies before the last one is left out.
+
+    Raises
+    ------
+    NotAssessableError
+        Without a lift-off or without the event.
+    """
+    airborne = np.flatnonzero(phases.phase == "airborne")
+    if not airborne.size or airborne[0] == 0:
+        raise NotAssessableError(ANALYSIS, "the log begins in the air" if airborne.size else "no lift-off is proven")
+    end_s = float(phases.start_s[airborne[0]]) - settings.lift_off_margin_s
+    start_s, is_by_event, since = 0.0, False, ""
+    if settings.alignment_event:
+        begun = [time for time in event_times_s(flight, settings.alignment_event) if time < end_s]
+        if not begun:
+            raise NotAssessableError(ANALYSIS, f"no event {settings.alignment_event!r} before lift-off")
+        start_s, is_by_event, since = begun[-1], True, f"the event {settings.alignment_event!r}"
+    entered = [time for time in _corrections_s(flight) if start_s < time < end_s]
+    if entered:
+        start_s, since = entered[-1], f"the correction entered at {entered[-1]:.0f} s"
+    if settings.release_event:
+        released = [time for time in event_times_s(flight, settings.release_event) if start_s < time < end_s]
+        end_s, is_by_event = min([end_s, *released]), is_by_event or bool(released)
+    return Window(start_s, end_s, is_by_event, since)
+
+
+def event_times_s(flight: Flight, name: str) -> list[float]:
+    """Flight seconds of the events of a name, in order of time."""
+    found: list[float] = []
+    for topic in topics_of_kind("event", flight.topics()):
+        texts, time_s = flight[topic].text("name"), flight.time_s(topic)
+        found += [float(time) for time, text in zip(time_s, texts, strict=True) if name in text.split(EVENT_SEPARATOR)]
+    return sorted(found)
+
+
+def _corrections_s(flight: Flight) -> list[float]:
+    """Flight seconds at which a heading correction was entered or changed on board, in order of time."""
+    found: list[float] = []
+    for topic in topics_of_kind("onboard", flight.topics()):
+        entered = flight[topic].values("correction_entered_deg")
+        rows = np.flatnonzero(np.isfinite(entered))
+        is_new = np.diff(entered[rows], prepend=np.nan) != 0.0
+        found += [float(time) for time in flight.time_s(topic)[rows[is_new & (rows > 0)]]]
+    return sorted(found)
+
+
+def _gnss_within(flight: Flight, window: Window) -> Flight:
+    """The flight with the GNSS epochs of a window alone: those decide what system 1 looks at."""
+    cut = {}
+    for topic in topics_of_kind("gnss", flight.topics()):
+        time_s = flight.time_s(topic)
+        cut[topic] = flight[topic].take((time_s >= window.start_s) & (time_s < window.end_s))
+    return replace(flight, tables={**flight.tables, **cut})
+
+
+def _speed_min_mps(part: Flight, basis: HeadingBasis, settings: MagneticSettings) -> float:
+    """Least speed by the velocity error allowed for, or by that which the receiver states where it is larger."""
+    stated = np.zeros(0)
+    with suppress(NotAssessableError):  # said when system 1 is run
+        stated = part[choose_topics(part, basis.request)[1]].values("velocity_sigma_mps")
+    stated = stated[np.isfinite(stated)]
+    error_mps = max(settings.gnss_velocity_error_mps, float(np.median(stated)) if stated.size else 0.0)
+    return min(least_speed_mps(error_mps, settings.track_error_max_deg), NO_LIMIT_MPS)
+
+
+def _fast_enough(
+    part: Flight, speed_min_mps: float, heading: HeadingSettings, settings: MagneticSettings
+) -> tuple[HeadingSettings, Flight]:
+    """Limits of system 1 for all that counts, and the flight without the epochs between taxi and fast enough."""
+    if not settings.uses_slower_taxi:
+        return replace(heading, taxi_speed_min_mps=speed_min_mps, taxi_speed_max_mps=NO_LIMIT_MPS), part
+    slowest_mps = min(heading.taxi_speed_min_mps, speed_min_mps)
+    kept = {}
+    for topic in topics_of_kind("gnss", part.topics()):
+        speed = np.hypot(part[topic].values("velocity_north_mps"), part[topic].values("velocity_east_mps"))
+        kept[topic] = part[topic].take(~((speed > heading.taxi_speed_max_mps) & (speed <= speed_min_mps)))
+    limits = replace(heading, taxi_speed_min_mps=slowest_mps, taxi_speed_max_mps=NO_LIMIT_MPS)
+    return limits, replace(part, tables={**part.tables, **kept})
+
+
+def _fast_part(found: HeadingResult | None, speed_min_mps: float) -> tuple[int, float]:
+    """How many of the used epochs are faster than a speed, and the seconds they stand for."""
+    samples = next((figure for figure in found.figures if figure.name == "heading_samples"), None) if found else None
+    if samples is None:
+        return 0, 0.0
+    count = int(np.count_nonzero(samples["used"] & (samples["ground_speed_mps"] > speed_min_mps)))
+    return count, count * float(np.median(np.diff(samples["time_s"])))
+
+
+def _estimated(
+    flight: Flight, part: Flight, settings: HeadingSettings, basis: HeadingBasis
+) -> tuple[HeadingResult | None, str]:
+    """System 1's answer, or the reason. Ground contact is judged by the whole flight, not by the part."""
+    try:
+        found = estimate_heading_error(
+            part,
+            on_ground=lambda time_ns: ground_mask(flight, time_ns),
+            settings=replace(settings, runs="before_take_off"),
+            aircraft=basis.aircraft,
+            request=basis.request,
+            latencies=basis.latencies,
+        )
+    except NotAssessableError as error:
+        return None, _reason(error)
+    return found, ""
+
+
+def _reason(error: NotAssessableError) -> str:
+    return str(error).removeprefix(f"{ANALYSIS}: ").removeprefix("heading: ")

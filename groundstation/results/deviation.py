@@ -1,0 +1,213 @@
+"""A deviation on its own: to be applied to a heading, and as a table (deviation.csv) that people and programs read."""
+
+import csv
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, get_args
+
+import numpy as np
+
+from groundstation.base.errors import UsageError
+from groundstation.results.figures import FigureData
+from groundstation.results.files import SavedFlight, csv_text, mapping
+from groundstation.results.magnetic import LETTERS, METHOD_TITLES, MagneticResult, MagneticVerdict, PoissonParameters
+from groundstation.results.restore import restored_magnetic
+
+DEVIATION_CSV, STEER_CARD = "deviation.csv", "steer_card.pdf"  # in the folder of a flight that has one
+BINS = 360
+MIDDLE_TOLERANCE_DEG = 0.01  # a spreadsheet may have rounded
+READING, TO_ADD, SIGMA = "uncorrected_magnetic_heading_deg", "deviation_to_add_deg", "deviation_sigma_deg"
+TABLE_TO_ADD, TABLE_SIGMA, COVERAGE = "table_deviation_to_add_deg", "table_deviation_sigma_deg", "coverage"
+METHOD, VERDICT, FLIGHT, AIRCRAFT = "method", "verdict", "flight_id", "aircraft"
+NEEDED = (READING, TO_ADD, METHOD, VERDICT)
+RUN_AGAIN = "run its log again"
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Deviation of the magnetic heading that one flight found, by the method it recommends.
+
+    Parameters
+    ----------
+    flight_id, aircraft : str
+        Whose it is; empty where that is not known.
+    method, verdict, verdict_reason : str
+    magnetometer_topic : str
+        Sensor that it belongs to; empty where that is not known.
+    table_deg : tuple of 360 float
+        To be added in the middle of each degree of the uncorrected magnetic heading; empty where the coefficients stand
+        for it.
+    coefficients_deg : mapping of A ... E to deg
+        Of the error, the negative of what is added; empty where the table stands for it.
+    iron : PoissonParameters, optional
+        For readings of the field along three axes.
+    """
+
+    flight_id: str
+    aircraft: str
+    method: str
+    verdict: str
+    verdict_reason: str = ""
+    magnetometer_topic: str = ""
+    table_deg: tuple[float, ...] = ()
+    coefficients_deg: Mapping[str, float] = field(default_factory=dict)
+    iron: PoissonParameters | None = None
+
+    @property
+    def title(self) -> str:
+        """Whose it is, for people."""
+        return self.flight_id or "an unnamed flight"
+
+
+def deviation_of(found: MagneticResult, flight_id: str, aircraft: str) -> Deviation:
+    """The deviation of a result, by its recommended method."""
+    by_table = found.recommended_method == "compass_table"
+    return Deviation(
+        flight_id,
+        aircraft,
+        found.recommended_method,
+        found.verdict,
+        found.verdict_reason,
+        found.magnetometer_topic,
+        found.deviation_deg if by_table else (),
+        {} if by_table else dict(found.method(found.recommended_method).coefficients_deg),
+        found.poisson if found.recommended_method == "poisson_attitude" else None,
+    )
+
+
+def deviation_from_summary(summary: Mapping[str, Any], where: str) -> Deviation:
+    """The deviation in a flight's summary.json.
+
+    Raises
+    ------
+    UsageError
+        When it holds none, or one that cannot be used.
+    """
+    flight = mapping(summary, "flight")
+    if not mapping(summary, "results", "magnetic"):
+        entries = summary.get("not_assessable")
+        found = [mapping(one) for one in entries] if isinstance(entries, list) else []
+        why = next((f" ({one.get('reason')})" for one in found if one.get("analysis") == "magnetic"), "")
+        raise UsageError(where, f"no magnetic deviation{why}", "the summary.json of a flight that has one")
+    try:
+        magnetic = restored_magnetic(summary)
+        own = deviation_of(magnetic, str(flight.get("id") or ""), str(flight.get("aircraft") or ""))
+        return _checked(own, where)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        what = f"a magnetic deviation that cannot be used ({type(error).__name__}: {error})"
+        raise UsageError(where, what, "one that this version writes", RUN_AGAIN) from error
+
+
+def deviation_from_csv(text: str, where: str) -> Deviation:
+    """The deviation in a table as :func:`deviation_csv` writes it; further columns and the order of rows do not matter.
+
+    Raises
+    ------
+    UsageError
+        When a column or a degree is missing, or a value is none.
+    """
+    try:
+        reader = csv.DictReader(io.StringIO(text.removeprefix("\ufeff"), newline=""), strict=True)
+        rows = list(reader)
+        names = list(reader.fieldnames or ())
+    except csv.Error as error:
+        raise UsageError(where, f"no CSV ({error})", f"a {DEVIATION_CSV} of a flight folder") from error
+    missing = [name for name in NEEDED if name not in names]
+    if missing:
+        raise UsageError(where, f"no column {missing[0]}", f"a {DEVIATION_CSV} of a flight folder, with commas")
+    table = [math.nan] * BINS
+    for number, row in enumerate(rows, 2):
+        reading, added = (_number(row[name], f"{where}, row {number}, {name}") for name in (READING, TO_ADD))
+        if not 0.0 <= reading < BINS or abs(reading % 1.0 - 0.5) > MIDDLE_TOLERANCE_DEG:
+            raise UsageError(
+                f"{where}, row {number}, {READING}", f"{reading:g}", "the middle of a degree, 0.5 to 359.5"
+            )
+        table[int(reading)] = added
+    empty = [place for place, added in enumerate(table) if math.isnan(added)]
+    if empty or len(rows) != BINS:
+        found = f"no row for {empty[0]} to {empty[0] + 1} deg" if empty else f"{len(rows)} rows"
+        raise UsageError(where, found, f"{BINS} rows, one for each degree")
+    told = {name: _only(rows, name, where) for name in (FLIGHT, AIRCRAFT, METHOD, VERDICT)}
+    return _checked(Deviation(told[FLIGHT], told[AIRCRAFT], told[METHOD], told[VERDICT], table_deg=tuple(table)), where)
+
+
+def deviation_csv(saved: SavedFlight) -> str | None:
+    """The deviation of a flight folder as a table of 360 rows; None when it has none, or lacks the arrays of it.
+
+    Columns: the uncorrected magnetic heading in the middle of its bin; what is to be added to it, with its sigma, by
+    the recommended method and by the table of branches; whether both branches covered the bin; whose it is. Deviations
+    are those of level flight, east positive.
+
+    Source of the form: RFC 4180, Common Format and MIME Type for CSV Files, 2005.
+    """
+    magnetic = mapping(saved.summary, "results", "magnetic")
+    curves, table = saved.figure("magnetic_curves"), saved.figure("magnetic_table")
+    if not magnetic or curves is None or table is None:
+        return None
+    wanted = (
+        (READING, table, "magnetic_heading_deg"),
+        (TO_ADD, curves, "deviation_recommended_deg"),
+        (SIGMA, curves, "sigma_recommended_deg"),
+        (TABLE_TO_ADD, table, "deviation_deg"),
+        (TABLE_SIGMA, curves, "sigma_compass_table_deg"),
+        (COVERAGE, table, "is_interpolated"),
+    )
+    if len(table) != len(curves) or any(column not in figure.columns for _, figure, column in wanted):
+        return None
+    columns = {name: figure[column] for name, figure, column in wanted}
+    columns[COVERAGE] = np.where(columns[COVERAGE], "interpolated", "covered")
+    flight = mapping(saved.summary, "flight")
+    owner = {
+        METHOD: magnetic.get("recommended_method"),
+        VERDICT: magnetic.get("verdict"),
+        FLIGHT: flight.get("id"),
+        AIRCRAFT: flight.get("aircraft"),
+    }
+    columns |= {name: np.full(len(table), str(value or "")) for name, value in owner.items()}
+    return csv_text(FigureData("deviation", columns, {}), "\r\n")
+
+
+def _checked(found: Deviation, where: str) -> Deviation:
+    """The deviation, if every number of it is one and its verdict is known."""
+    if found.verdict not in get_args(MagneticVerdict):
+        raise UsageError(where, f"the verdict {found.verdict!r}", f"one of {', '.join(get_args(MagneticVerdict))}")
+    if found.method not in METHOD_TITLES:
+        raise UsageError(where, f"the method {found.method!r}", f"one of {', '.join(METHOD_TITLES)}")
+    numbers = [*found.table_deg, *(found.coefficients_deg.get(letter, math.nan) for letter in LETTERS)]
+    numbers = numbers[:BINS] if found.table_deg else numbers
+    if found.iron is not None:
+        numbers += [*found.iron.hard_iron_nt, *(value for row in found.iron.soft_iron for value in row)]
+        numbers += found.iron.current_effect_nt_per_a or ()
+    if not all(map(math.isfinite, numbers)) or (found.table_deg and len(found.table_deg) != BINS):
+        raise UsageError(where, "a magnetic deviation with numbers missing", "", RUN_AGAIN)
+    if any(abs(value) > 180.0 for value in found.table_deg):
+        raise UsageError(where, "a deviation beyond 180 deg", "", "check that it is in degrees")
+    if found.iron is not None and not _is_invertible(found.iron.soft_iron):
+        raise UsageError(where, "a soft iron that cannot be inverted", "", RUN_AGAIN)
+    return found
+
+
+def _is_invertible(soft: Sequence[Sequence[float]]) -> bool:
+    (a, b, c), (d, e, f), (g, h, i) = soft
+    return abs(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)) > 1e-6
+
+
+def _number(text: str | None, where: str) -> float:
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise UsageError(where, repr(text or ""), "a number, with a decimal point")
+    return value
+
+
+def _only(rows: Sequence[Mapping[str, str | None]], name: str, where: str) -> str:
+    """The one text of a column, without the apostrophe that keeps a spreadsheet from running it."""
+    texts = {row.get(name) or "" for row in rows}
+    if len(texts) > 1:
+        raise UsageError(where, f"several values of {name}", "the table of one flight")
+    text = texts.pop()
+    return text[1:] if text.startswith("'") else text

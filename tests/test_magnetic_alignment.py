@@ -1,0 +1,423 @@
+"""INS heading aligned on taxi and take-off run: true within its sigma, blind to the air, silent with a reason."""
+
+import math
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from groundstation.base.angles import wrap_180, wrap_360
+from groundstation.base.errors import SettingsError
+from groundstation.base.records import Column
+from groundstation.base.toml_settings import settings_from
+from groundstation.base.units import NS_PER_S
+from groundstation.estimators.heading.estimate import estimate_heading_error
+from groundstation.estimators.heading.settings import HeadingSettings
+from groundstation.estimators.magnetic.alignment import align
+from groundstation.estimators.magnetic.attitude import field_in_body
+from groundstation.estimators.magnetic.before_lift_off import (
+    GroundRuns,
+    HeadingBasis,
+    find_ground_runs,
+    least_speed_mps,
+)
+from groundstation.estimators.magnetic.estimate import estimate_deviation
+from groundstation.estimators.magnetic.gyros import EARTH_DEG_PER_H, GyroDrift, gyro_drift
+from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.pipeline import configuration as configured
+from groundstation.pipeline.analyse import Given, analyse
+from groundstation.pipeline.configuration import Configuration
+from groundstation.results.flight import Source
+from groundstation.results.heading import HeadingResult
+from groundstation.results.magnetic import Alignment
+from groundstation.simulation.flight import Simulated, simulate
+from groundstation.simulation.flight_errors import heading_error_deg
+from groundstation.simulation.magnetic_family import MagneticFamilySettings, simulate_magnetic_family
+from groundstation.simulation.scenario import load_scenario
+from groundstation.tables.phases import Interval, Phases, flight_phases
+from groundstation.tables.table import Flight
+from tests.magnetic_example import START_NS, table, taxi_heading
+from tests.simulated_flights import QUIET_GNSS, QUIET_GROUND, QUIET_INS, scenario
+
+EXACT_DEG = 0.002  # INS heading and velocities are rounded to 0.001 deg and 0.001 m/s
+SIGMAS = 4.0  # of a single draw
+FAST_ALONE = MagneticSettings(uses_slower_taxi=False)
+ANY_SPEED = MagneticSettings(track_error_max_deg=1.4, uses_slower_taxi=False)  # 6.1 m/s at 0.15 m/s
+FLIGHTS = 40
+STAND = {"kind": "parked", "duration_s": 40}
+TAXI = ({"kind": "taxi", "length_m": 350, "speed_mps": 10}, {"kind": "ground_turn", "angle_deg": 100})
+CRAWL = ({"kind": "taxi", "length_m": 40, "speed_mps": 3},)
+LINED_UP = {"kind": "parked", "duration_s": 6}
+AIR = ({"kind": "take_off"}, {"kind": "fly", "duration_s": 30, "airspeed_mps": 60, "climb_rate_mps": 3.0})
+LANDING = (
+    {"kind": "landing", "runway_altitude_m": 200},
+    {"kind": "taxi", "length_m": 300, "speed_mps": 10},
+    {"kind": "parked", "duration_s": 5},
+)
+ERROR_DEG = 1.0  # of the INS heading in the default scenario, with a drift of 0.05 deg/h
+
+
+@cache
+def flown(*kinds: str, wind_mps: float = 0.0, is_quiet: bool = False, seed: int = 5) -> Simulated:
+    """A flight of the named parts; ``quiet`` without any noise."""
+    parts: dict[str, tuple[dict[str, Any], ...]] = {
+        "taxi": TAXI,
+        "crawl": CRAWL,
+        "air": (LINED_UP, *AIR),
+        "landing": LANDING,
+    }
+    quiet = {"ins": QUIET_INS, "gnss": QUIET_GNSS, "ground": QUIET_GROUND} if is_quiet else {}
+    legs = [STAND, *(leg for kind in kinds for leg in parts[kind])]
+    return simulate(scenario(legs=legs, wind={"east_mps": wind_mps}, **quiet), seed)
+
+
+def runs_of(
+    flight: Flight, settings: MagneticSettings | None = None, heading: HeadingResult | None = None
+) -> GroundRuns:
+    basis = HeadingBasis()
+    return find_ground_runs(flight, "ins", heading, flight_phases(flight), basis, settings or MagneticSettings())
+
+
+def aligned(flight: Flight, settings: MagneticSettings | None = None) -> Alignment:
+    """As a run does it: system 1 first, then the ground runs."""
+    settings, heading = settings or MagneticSettings(), estimate_heading_error(flight)
+    return align(heading, "ins", flight.duration_s, settings, runs_of(flight, settings, heading))
+
+
+def truth_at(simulated: Simulated, time_s: float | None) -> float:
+    assert time_s is not None
+    return float(heading_error_deg(np.array(time_s), simulated.scenario.ins))
+
+
+def lift_off_s(flight: Flight) -> float:
+    return next(part.start_s for part in flight_phases(flight).intervals if part.phase == "airborne")
+
+
+def turned(flight: Flight, from_s: float, to_s: float, by_deg: float) -> Flight:
+    """The INS heading changed between two times."""
+    ins, time_s = flight["ins"], flight.time_s("ins")
+    change = np.where((time_s >= from_s) & (time_s < to_s), by_deg, 0.0)
+    columns = {**ins.columns, "true_heading_deg": Column(wrap_360(ins.values("true_heading_deg") + change))}
+    return replace(flight, tables={**flight.tables, "ins": replace(ins, columns=columns)})
+
+
+def with_events(flight: Flight, **times_s: float) -> Flight:
+    order = sorted(times_s, key=lambda name: times_s[name])
+    time_ns = np.array([flight.start_ns + round(times_s[name] * NS_PER_S) for name in order])
+    events = table("event", time_ns, {"name": np.array(order)})
+    return replace(flight, tables={**flight.tables, "event": events})
+
+
+# The threshold
+
+
+def test_speed_follows_from_the_track_error_allowed() -> None:
+    """The patent's example: 0.15 m/s at 100 km/h is 0.3 deg."""
+    assert math.degrees(math.atan2(0.15, 100.0 / 3.6)) == pytest.approx(0.3, abs=0.01)
+    assert least_speed_mps(0.15, math.degrees(math.atan2(0.15, 100.0 / 3.6))) == pytest.approx(27.78, abs=0.01)
+    assert MagneticSettings().gnss_velocity_error_mps == 0.15
+    flight = flown("taxi", "air").flight
+    assert runs_of(flight).speed_min_mps == pytest.approx(28.65, abs=0.01)
+    assert runs_of(flight, MagneticSettings(track_error_max_deg=0.6)).speed_min_mps == pytest.approx(14.32, abs=0.01)
+
+
+def test_a_receiver_that_states_a_worse_velocity_is_believed() -> None:
+    flight = flown("taxi", "air").flight
+    gnss = flight["gnss"]
+    for stated, expected in ((0.05, 28.65), (0.3, 57.30), (math.inf, 28.65), (1e300, 1000.0)):
+        columns = {**gnss.columns, "velocity_sigma_mps": Column(np.full(len(gnss), stated))}
+        changed = replace(flight, tables={**flight.tables, "gnss": replace(gnss, columns=columns)})
+        assert runs_of(changed).speed_min_mps == pytest.approx(expected, abs=0.01), stated
+
+
+def used_speeds(runs: GroundRuns) -> np.ndarray:
+    assert runs.together is not None
+    samples = next(figure for figure in runs.together.figures if figure.name == "heading_samples")
+    return np.asarray(samples["ground_speed_mps"][samples["used"]])
+
+
+def test_between_taxi_and_the_threshold_nothing_counts() -> None:
+    """System 1 takes taxi up to 20 m/s; its settings say so."""
+    flight = flown("taxi", "air").flight
+    speeds = used_speeds(runs_of(flight))
+    assert np.all((speeds <= 20.0) | (speeds > 28.6))
+    assert np.any(speeds < 12.0)
+    assert np.max(speeds) > 50.0
+    assert np.min(used_speeds(runs_of(flight, FAST_ALONE))) > 28.6
+    assert np.min(used_speeds(runs_of(flight, ANY_SPEED))) > 6.1
+    assert runs_of(flight).fast_epochs == np.count_nonzero(speeds > 28.6) > 50
+
+
+# Right, and blind to what it must not see
+
+
+@pytest.mark.parametrize(
+    ("parts", "settings", "told"),
+    [
+        (("taxi",), MagneticSettings(), "straight taxi ("),
+        (("taxi", "air"), MagneticSettings(), "epochs) and ground run above 28.6 m/s up to lift-off"),
+        (("taxi", "air"), ANY_SPEED, "ground run above 6.1 m/s up to lift-off"),
+        (("taxi", "air"), FAST_ALONE, "ground run above 28.6 m/s up to lift-off"),
+        (("crawl", "air"), MagneticSettings(), "ground run above 28.6 m/s up to lift-off"),
+    ],
+)
+def test_a_known_error_is_found(parts: tuple[str, ...], settings: MagneticSettings, told: str) -> None:
+    exact = flown(*parts, is_quiet=True)
+    answer = runs_of(exact.flight, settings).together or estimate_heading_error(exact.flight)
+    assert answer.error_deg == pytest.approx(truth_at(exact, answer.reference_time_s), abs=EXACT_DEG)
+    noisy = flown(*parts)
+    found = aligned(noisy.flight, settings)
+    assert told in found.origin
+    assert abs(found.aligned_error_deg - truth_at(noisy, found.aligned_at_s)) < SIGMAS * found.aligned_sigma_deg
+    assert 0.0 < found.aligned_sigma_deg < 0.333
+
+
+@pytest.mark.parametrize("settings", [MagneticSettings(lift_off_margin_s=1.5), ANY_SPEED])
+def test_wind_after_lift_off_changes_nothing(settings: MagneticSettings) -> None:
+    """Not by a digit: 1.5 s is more than the half window of the turn rate."""
+    calm, windy = (flown("crawl", "air", wind_mps=wind) for wind in (0.0, 15.0))
+    truth = windy.flight["truth"]
+    track = np.rad2deg(np.arctan2(truth.values("velocity_east_mps"), truth.values("velocity_north_mps")))
+    assert np.max(np.abs(wrap_180(truth.values("true_heading_deg") - track))[-100:]) > 5.0
+    before, after = runs_of(calm.flight, settings).together, runs_of(windy.flight, settings).together
+    assert before is not None
+    assert after is not None
+    assert after.error_deg == before.error_deg
+    assert max(segment.end_s for segment in after.segments) < lift_off_s(windy.flight)
+
+
+def test_landing_roll_and_taxi_in_are_not_used() -> None:
+    flight = flown("crawl", "air", "landing").flight
+    assert "landing roll" in flight_phases(flight).phase
+    before = runs_of(flight, ANY_SPEED).together
+    after = runs_of(turned(flight, lift_off_s(flight), math.inf, 5.0), ANY_SPEED).together
+    assert before is not None
+    assert after is not None
+    assert (after.error_deg, after.samples) == (before.error_deg, before.samples)
+    settings = replace(HeadingSettings(), runs="all_ground")
+    basis = HeadingBasis(settings=settings)
+    whole = find_ground_runs(flight, "ins", None, flight_phases(flight), basis, ANY_SPEED).together
+    assert whole is not None
+    assert whole.samples == before.samples
+
+
+def test_the_margin_before_lift_off_is_left_out() -> None:
+    flight = flown("crawl", "air").flight
+    for margin_s in (0.0, 3.0, 6.0):
+        fast = runs_of(flight, MagneticSettings(lift_off_margin_s=margin_s)).together
+        assert fast is not None
+        gap_s = lift_off_s(flight) - max(segment.end_s for segment in fast.segments)
+        assert margin_s - 1e-6 <= gap_s < margin_s + 0.5
+
+
+# What stands in when there is no run
+
+
+def test_slow_taxi_and_no_take_off_run_fall_back_in_order() -> None:
+    taxi = flown("taxi")
+    found = aligned(taxi.flight)
+    assert found.origin.startswith("straight taxi (")
+    assert found.origin.endswith("no faster run: no lift-off is proven")
+    too_fast = aligned(flown("taxi", "air").flight, MagneticSettings(track_error_max_deg=0.1))
+    assert too_fast.origin.startswith("straight taxi (")
+    assert too_fast.origin.endswith("no faster run: 0.0 s straight above 85.9 m/s before lift-off")
+    nothing = aligned(flown("crawl", "air").flight, MagneticSettings(track_error_max_deg=0.1))
+    assert nothing.origin.startswith("not aligned: the heading error is rejected (")
+    assert (nothing.error_deg, nothing.sigma_deg, nothing.aligned_at_s) == (0.0, 0.333, None)
+
+
+def test_without_a_switch_the_take_off_run_is_not_proven_ground() -> None:
+    flight = flown("taxi", "air").flight
+    bare = replace(flight, tables={name: part for name, part in flight.tables.items() if name != "discrete"})
+    assert flight_phases(bare).method.startswith("detector")
+    found = aligned(bare)
+    assert found.origin.startswith("straight taxi (")
+    assert found.origin.endswith(" s straight above 28.6 m/s before lift-off")
+
+
+def test_a_run_that_is_too_short_or_rejected_gives_way_to_taxi() -> None:
+    flight = flown("taxi", "air").flight
+    short = aligned(flight, MagneticSettings(ground_run_min_s=300.0))
+    assert short.origin.endswith(" s straight above 28.6 m/s before lift-off")
+    heading, run = taxi_heading(error_deg=0.4), taxi_heading(verdict="reject", verdict_reason="bent")
+    found = align(heading, "ins", 0.0, MagneticSettings(), GroundRuns(run, heading, 28.6))
+    assert found.error_deg == pytest.approx(0.4)
+    assert found.origin.endswith("no faster run: the heading error is rejected (bent)")
+
+
+def test_a_log_that_begins_in_the_air_has_no_ground_run() -> None:
+    flight = flown("crawl", "air").flight
+    from_ns = flight.start_ns + round((lift_off_s(flight) + 2.0) * NS_PER_S)
+    tables = {name: part.take(part.time_ns >= from_ns) for name, part in flight.tables.items()}
+    runs = runs_of(replace(flight, tables=tables, start_ns=from_ns))
+    assert (runs.together, runs.why_not) == (None, "the log begins in the air")
+    bare = {name: part for name, part in flight.tables.items() if name not in ("gnss", "gnss.2")}
+    assert runs_of(replace(flight, tables=bare)).why_not == "no GNSS velocity in the log"
+
+
+# Commands of the operator
+
+
+def test_alignment_begins_with_its_event() -> None:
+    """The INS is set anew between two taxi legs: only what follows the command counts, in taxi too."""
+    simulated = flown("taxi", "taxi", "air")
+    mixed = turned(simulated.flight, 0.0, 95.0, 3.0)
+    flight = with_events(mixed, align=95.0)
+    slow = MagneticSettings(track_error_max_deg=0.1, alignment_event="align")
+    found = align(
+        estimate_heading_error(flight), "ins", 0.0, slow, runs_of(flight, slow, estimate_heading_error(flight))
+    )
+    assert found.aligned_at_s is not None
+    assert found.aligned_at_s > 95.0
+    assert abs(found.aligned_error_deg - ERROR_DEG) < SIGMAS * found.aligned_sigma_deg
+    misled = runs_of(mixed, ANY_SPEED).together
+    assert misled is not None
+    assert abs(misled.error_deg - ERROR_DEG) > 0.3
+
+
+def test_release_ends_the_alignment_and_a_command_not_given_leaves_it_undone() -> None:
+    flight = with_events(flown("taxi", "air").flight, align=10.0, release=75.0)
+    settings = replace(ANY_SPEED, alignment_event="align", release_event="release")
+    fast = runs_of(flight, settings).together
+    assert fast is not None
+    assert max(segment.end_s for segment in fast.segments) < 75.0
+    missing = replace(settings, alignment_event="begin")
+    found = align(taxi_heading(), "ins", 0.0, missing, runs_of(flight, missing, taxi_heading()))
+    assert found.origin == "not aligned: no event 'begin' before lift-off"
+
+
+@pytest.mark.parametrize("before", [math.nan, 0.0])
+def test_a_correction_entered_on_board_leaves_the_taxi_before_it_out(before: float) -> None:
+    """Worked example: 1 deg too much on taxi, -1.0 typed when lined up, 0 on the take-off run."""
+    simulated = flown("taxi", "air")
+    entered_s = lift_off_s(simulated.flight) - 35.0
+    flight = turned(simulated.flight, entered_s, math.inf, -1.0)
+    entered = np.array([before, before, -1.0, -1.0])
+    time_ns = flight.start_ns + np.round(np.array([1.0, 2.0, entered_s, 150.0]) * NS_PER_S).astype(np.int64)
+    onboard = table("onboard", time_ns, {"correction_entered_deg": entered})
+    flight = replace(flight, tables={**flight.tables, "onboard": onboard})
+    found = aligned(flight)
+    assert found.origin.endswith(f", after the correction entered at {entered_s:.0f} s")
+    assert found.aligned_at_s is not None
+    assert found.aligned_at_s > entered_s
+    assert abs(found.aligned_error_deg) < SIGMAS * found.aligned_sigma_deg < 0.5
+
+
+# Gyros
+
+
+def standing(drift_deg_per_h: tuple[float, float, float], earth: float = 1.0, noise_dps: float = 2e-4) -> Flight:
+    """Two minutes at standstill: rates of the earth (times ``earth``), drift and white noise."""
+    rng, count = np.random.default_rng(3), 1200
+    heading, roll, pitch = np.full(count, 40.0), np.full(count, 1.0), np.full(count, -2.0)
+    latitude = 56.0
+    north, down = (EARTH_DEG_PER_H * part for part in (np.cos(np.deg2rad(latitude)), -np.sin(np.deg2rad(latitude))))
+    rates = (
+        earth * field_in_body(float(north), float(down), heading, roll, pitch) + np.array(drift_deg_per_h)
+    ) / 3600.0
+    rates = np.round(rates + noise_dps * rng.standard_normal((count, 3)), 7)
+    columns = dict(zip(("rate_x_dps", "rate_y_dps", "rate_z_dps"), rates.T, strict=True))
+    columns |= {
+        "true_heading_deg": heading,
+        "roll_deg": roll,
+        "pitch_deg": pitch,
+        "latitude_deg": np.full(count, latitude),
+    }
+    time_ns = START_NS + np.arange(count) * (NS_PER_S // 10)
+    return Flight({"ins": table("ins", time_ns, columns)}, {}, START_NS, True, "still.csv")
+
+
+def drift_of(flight: Flight) -> GyroDrift | None:
+    return gyro_drift(flight, "ins", Phases((Interval(0.0, 120.0, "standstill"),), "made"), 0.0, 120.0)
+
+
+@pytest.mark.parametrize("earth", [1.0, 0.0])
+def test_gyro_drift_is_what_the_earth_does_not_explain(earth: float) -> None:
+    found = drift_of(standing((0.3, -0.2, 0.1), earth))
+    assert found is not None
+    error = np.subtract(found.drift_deg_per_h, (0.3, -0.2, 0.1))
+    assert np.all(np.abs(error) < SIGMAS * np.array(found.sigma_deg_per_h))
+    assert np.all(np.array(found.sigma_deg_per_h) == pytest.approx(0.72 / np.sqrt(1160), rel=0.4))
+    assert abs(found.vertical_deg_per_h - 0.1) < 0.1
+
+
+def test_gyros_too_poor_for_the_earth_say_so_in_their_sigma() -> None:
+    found = drift_of(standing((80.0, -60.0, 40.0)))
+    assert found is not None
+    assert np.all(np.abs(np.subtract(found.drift_deg_per_h, (80.0, -60.0, 40.0))) < 0.2)
+    assert math.hypot(*found.sigma_deg_per_h) == pytest.approx(EARTH_DEG_PER_H, rel=0.05)
+
+
+def test_without_rates_or_with_rates_that_never_change_there_is_no_drift() -> None:
+    flight = standing((0.3, -0.2, 0.1), noise_dps=0.0)
+    assert drift_of(flight) is None
+    ins = flight["ins"]
+    bare = {name: column for name, column in ins.columns.items() if not name.startswith("rate")}
+    assert drift_of(replace(flight, tables={"ins": replace(ins, columns=bare)})) is None
+
+
+@pytest.mark.parametrize(("vertical", "sigma", "expected"), [(0.06, 0.05, 0.048), (0.06, 0.2, 0.0), (3.0, 0.05, 0.0)])
+def test_gyros_count_where_they_know_more_than_the_prior(vertical: float, sigma: float, expected: float) -> None:
+    """0.06 +- 0.05 deg/h against 0 +- 0.1: 0.048; a drift of 3 deg/h is not what such an INS navigates with."""
+    gyros = GyroDrift((0.0, 0.0, vertical), (sigma, sigma, sigma), vertical, sigma)
+    heading = taxi_heading(reference_time_s=0.0)
+    found = align(heading, "ins", 3600.0, MagneticSettings(), gyros=gyros)
+    assert found.drift_deg_per_h == pytest.approx(expected)
+    assert found.error_deg == pytest.approx(expected)
+    assert found.gyro_drift_deg_per_h == (0.0, 0.0, vertical)
+
+
+# Honest, and in a whole flight
+
+
+def test_truth_lies_within_the_sigma_as_often_as_it_should() -> None:
+    """Of 40 flights of the family at least 85 % inside two sigma, 95 % expected; both together know more than taxi."""
+    family = MagneticFamilySettings(figures=1, straights=0, turn_deg=30.0)
+    scaled: dict[str, list[float]] = {"taxi": [], "together": [], "run alone": []}
+    sigmas: dict[str, list[float]] = {name: [] for name in scaled}
+    for simulated in simulate_magnetic_family(family, range(1, FLIGHTS + 1)):
+        flight = simulated.flight
+        taxi = GroundRuns(taxi=estimate_heading_error(flight))
+        every = {"taxi": taxi, "together": runs_of(flight), "run alone": runs_of(flight, FAST_ALONE)}
+        for name, runs in every.items():
+            found = align(None, "ins", flight.duration_s, MagneticSettings(), runs)
+            if found.aligned_at_s is None:  # a gate that sigma does not carry refused it
+                continue
+            scaled[name].append((found.error_deg - truth_at(simulated, found.figure_at_s)) / found.sigma_deg)
+            sigmas[name].append(found.aligned_sigma_deg)
+    for values in scaled.values():
+        assert len(values) >= 0.85 * FLIGHTS
+        assert np.mean(np.abs(values) < 2.0) >= 0.85
+        assert np.sqrt(np.mean(np.square(values))) > 0.3  # nor far too wide
+    assert np.mean(sigmas["together"]) < 0.9 * np.mean(sigmas["taxi"])
+    assert np.mean(sigmas["together"]) < 0.6 * np.mean(sigmas["run alone"])
+
+
+def test_the_deviation_rests_on_the_take_off_run_and_says_so() -> None:
+    simulated = simulate(load_scenario("magnetic-eight"))
+    result = estimate_deviation(simulated.flight, heading=estimate_heading_error(simulated.flight))
+    alignment = result.alignment
+    assert "ground run above 28.6 m/s up to lift-off" in alignment.origin
+    error = alignment.error_deg - truth_at(simulated, alignment.figure_at_s)
+    assert abs(error) < SIGMAS * alignment.sigma_deg
+
+
+def test_what_the_user_set_reaches_the_alignment() -> None:
+    """The event of the scenario at 5 s, and the take-off run excluded: taxi alone is left."""
+    flight = simulate(load_scenario("magnetic-eight")).flight
+    given = Given("NOTIME_abababab", Source("flight.csv", "ab" * 32, 1, "flat-csv"), {}, {}, (), has_lost_data=False)
+    run = configured.Interval(str(lift_off_s(flight) - 40.0), str(lift_off_s(flight)))
+    configuration = Configuration(magnetic={"alignment_event": "alignment"}, exclude=(run,))
+    magnetic = analyse(flight, given, configuration).magnetic
+    assert magnetic is not None
+    assert magnetic.alignment.origin.startswith("straight taxi (")
+    assert magnetic.alignment.origin.endswith("no faster run: 0.0 s straight above 28.6 m/s before lift-off")
+    assert magnetic.settings["alignment_event"] == "alignment"
+
+
+@pytest.mark.parametrize("name", ["track_error_max_deg", "gnss_velocity_error_mps"])
+def test_an_error_of_nothing_is_refused(name: str) -> None:
+    with pytest.raises(SettingsError, match=name):
+        settings_from(MagneticSettings, {name: 0.0}, "c.toml", "magnetic")
