@@ -24,7 +24,7 @@ from groundstation.estimators.magnetic.ground_settings import MagneticGroundSett
 from groundstation.pipeline.analyse import Given, analyse, user_settings
 from groundstation.pipeline.configuration import Configuration, load_configuration
 from groundstation.pipeline.convert import convert_log
-from groundstation.pipeline.flight import read_flight
+from groundstation.pipeline.flight import read_flight, sentence
 from groundstation.pipeline.log import open_log
 from groundstation.pipeline.magnetic_ground import analyse_ground_deviation
 from groundstation.reports.parts import Drawing, Grid, Note
@@ -444,6 +444,7 @@ def test_a_whole_run_tells_it_and_saves_it(tmp_path: Path) -> None:
     assert results.magnetic_ground is not None
     (finding,) = (one for one in results.findings if one.code.startswith("magnetic_ground."))
     assert (finding.severity, finding.code) == ("info", "magnetic_ground.found")
+    assert finding.text in sentence(results)
     save(tmp_path, results, {})
     saved = load(tmp_path)
     assert {"magnetic_ground_epochs", "magnetic_ground_curve"} <= set(saved.figures)

@@ -232,7 +232,8 @@ def _state(gravest: Severity | None, has_lost_data: bool, fail_on: str) -> State
 def sentence(results: FlightResults) -> str:
     """What was found, in one line."""
     told = (_heading_sentence(results), _inertial_sentence(results), _magnetic_sentence(results))
-    found = [text for text in told if text]
+    on_ground = [finding.text for finding in results.findings if finding.code == "magnetic_ground.found"]
+    found = [text for text in (*told, *on_ground) if text]
     if found:
         return "; ".join(found)
     reasons = "; ".join(f"{entry.analysis}: {entry.reason}" for entry in results.not_assessable)
