@@ -88,7 +88,7 @@ def test_coefficients_know_their_error_when_noise_is_correlated() -> None:
 
 
 def test_coefficients_know_their_error_when_noise_wanders_below_white_noise() -> None:
-    """White noise hides 20 s of correlation from neighbours; sigmas by them alone would be four to five times too small."""
+    """White noise hides 20 s of correlation from neighbours; by these alone sigmas would be four times too small."""
     rng = np.random.default_rng(3)
     heading = np.linspace(0.0, 720.0, 4000) % 360.0
     scores = []

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 STUDIES = {
     "heading": "heading correction before take-off: errors, coverage of the interval, the figures of the paper again",
     "forecast": "forecast of INS errors: every method under true and false models, and how honest its sigma is",
+    "magnetic": "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
 }
 
 
@@ -70,4 +71,8 @@ def _study(name: str) -> "Callable[..., StudyResult]":
         from groundstation.studies.forecast import study_forecast
 
         return study_forecast
+    if name == "magnetic":
+        from groundstation.studies.magnetic import study_magnetic
+
+        return study_magnetic
     raise UsageError("study", repr(name), f"one of {', '.join(STUDIES)}")

@@ -1,0 +1,45 @@
+"""Monte Carlo behind the magnetic deviation: error of every method, the published claim and its limit, honesty."""
+
+from collections.abc import Sequence
+
+from groundstation.studies import magnetic_tables as tables
+from groundstation.studies.magnetic_cases import CLAIM, SWEEPS, Sweep, setups
+from groundstation.studies.magnetic_page import page
+from groundstation.studies.magnetic_runs import Progress, jobs_of, run_jobs
+from groundstation.studies.page import StudyResult
+
+
+def study_magnetic(
+    runs: int = 200, seed: int = 71, progress: Progress | None = None, *, sweeps: Sequence[Sweep] = SWEEPS
+) -> StudyResult:
+    """Fly figures through every sweep and compare the methods with the truth; RMS, shares, refusals with intervals.
+
+    Parameters
+    ----------
+    runs : int
+        Whole flights; half as many fly each point of the sweeps, with the same iron, noise and INS at every point, and
+        a quarter fly each incomplete figure.
+    seed : int
+        Flights have the seeds ``7 000 000 + 100 000 seed + run``.
+    progress : callable, optional
+        Called with one line for each run.
+    sweeps : sequence of Sweep
+        That of the bank has to be among them.
+    """
+    flown = setups(sweeps)
+    outcomes = run_jobs(jobs_of(runs, seed, flown), progress)
+    swept = [run for run in outcomes if run.swept]
+    samples = tables.samples_of(swept, flown, seed)
+    judged = tables.judged_sample(outcomes, seed)
+    kept = tables.accepted(judged, seed)
+    found = (
+        tables.honesty_table(kept),
+        tables.residual_table(kept),
+        tables.claim_table(swept, samples),
+        tables.power_table(swept, samples),
+        *(tables.sweep_table(sweep, samples) for sweep in sweeps),
+        tables.ratio_table(sweeps, samples),
+        tables.verdict_table(judged, (*sweeps, CLAIM), samples),
+        tables.incomplete_table(outcomes),
+    )
+    return StudyResult("magnetic", found, page({table.name: table for table in found}, runs, seed, sweeps))

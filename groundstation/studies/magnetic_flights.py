@@ -1,0 +1,145 @@
+"""Flights of the magnetic study, made of what the estimator needs, or whole from the stand on."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray, wrap_360
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.records import Column
+from groundstation.estimators.heading.estimate import estimate_heading_error
+from groundstation.estimators.latency.estimate import estimate_latencies
+from groundstation.results.heading import HeadingResult
+from groundstation.simulation.flight import simulate
+from groundstation.simulation.legs import Fly
+from groundstation.simulation.magnetic_family import FIGURE_ALTITUDE_M, MagneticFamilySettings, draw_magnetic_scenario
+from groundstation.simulation.magnetometer import magnetometer_readings, world_field_nt
+from groundstation.simulation.readings import Readings, generator
+from groundstation.simulation.scenario import InsSettings, Scenario
+from groundstation.simulation.sensors import ins_readings
+from groundstation.simulation.trajectory import Trajectory, fly
+from groundstation.studies.magnetic_cases import Legs, Setup, with_figure
+from groundstation.studies.magnetic_judge import Flown, Outcome, judge
+from groundstation.tables.declination import declination_sigma_deg
+from groundstation.tables.phases import Interval, Phases
+from groundstation.tables.table import Flight, Table
+
+LEGS_TO_LIFT_OFF = 6
+LEVEL_M = 1.0  # within so much of its altitude the figure's part of the flight begins
+INS_FIELDS = ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m", "roll_deg", "pitch_deg", "true_heading_deg")
+
+
+class Hangar:
+    """Flights of one seed: trajectories are flown once for all setups that have them, and so is the taxi."""
+
+    def __init__(self, seed: int) -> None:
+        self.seed = seed
+        self._motions: dict[Scenario, Trajectory] = {}
+        self._taxis: dict[float, HeadingResult | None] = {}
+
+    def outcome(self, setup: Setup, figure: Legs | None = None) -> Outcome:
+        """Fly one setup, perhaps with another figure than its family's, and judge what the estimator makes of it."""
+        scenario = draw_magnetic_scenario(setup.family, self.seed)
+        if figure is not None:
+            scenario = replace(scenario, legs=with_figure(scenario.legs, figure))
+        flown = self.flown(scenario, setup)
+        heading = self._taxi(setup.family) if setup.is_aligned else None
+        if heading is not None and setup.hours_since_taxi:
+            at_s = (heading.reference_time_s or 0.0) - 3600.0 * setup.hours_since_taxi
+            heading = replace(heading, reference_time_s=at_s)
+        phases = Phases((Interval(0.0, flown.flight.duration_s + 1.0, "airborne"),), "truth")
+        return judge(flown, heading=heading, phases=phases)
+
+    def flown(self, scenario: Scenario, setup: Setup) -> Flown:
+        """The level part of a flight. What the model's declination lacks is one with an azimuth error."""
+        motion = self._motion(scenario)
+        assert scenario.magnetometer is not None
+        field = world_field_nt(motion, scenario, scenario.magnetometer)
+        ins = scenario.ins
+        added = ins.azimuth_drift_dph * setup.hours_since_taxi
+        if not setup.is_exact:
+            added += declination_error_deg(self.seed, field)
+        moved = replace(ins, azimuth_error_deg=ins.azimuth_error_deg + added)
+        tables = [
+            ins_readings(motion, moved, generator(self.seed, "ins"), self.seed).only(INS_FIELDS),
+            magnetometer_readings(motion, scenario, scenario.magnetometer, generator(self.seed, "magnetometer")),
+        ]
+        return Flown(scenario, _flight(scenario, tables), motion, field)
+
+    def _motion(self, scenario: Scenario) -> Trajectory:
+        key = replace(scenario, ins=InsSettings(), magnetometer=None)
+        if key not in self._motions:
+            whole = fly(scenario, generator(scenario.seed, "motion"))
+            first = int(np.argmax(whole.altitude_m > FIGURE_ALTITUDE_M - LEVEL_M))
+            self._motions[key] = whole.at(np.arange(first, len(whole)))
+        return self._motions[key]
+
+    def _taxi(self, family: MagneticFamilySettings) -> HeadingResult | None:
+        """System 1's answer of the taxi before the flight: that of the same azimuth error, without drift."""
+        sigma = family.heading_error_sigma_deg
+        if sigma not in self._taxis:
+            drawn = draw_magnetic_scenario(replace(family, drift_sigma_dph=0.0), self.seed)
+            legs = (*drawn.legs[:LEGS_TO_LIFT_OFF], Fly(10.0, family.airspeed_mps))
+            self._taxis[sigma] = _aligned(simulate(replace(drawn, legs=legs)).flight)
+        return self._taxis[sigma]
+
+
+def judged_outcome(family: MagneticFamilySettings, seed: int) -> Outcome:
+    """A whole flight of a family from stand to landing, answered as the pipeline does: latencies, taxi, deviation."""
+    simulated = simulate(draw_magnetic_scenario(family, seed))
+    scenario, motion = simulated.scenario, simulated.trajectory
+    assert scenario.magnetometer is not None
+    field = world_field_nt(motion, scenario, scenario.magnetometer)
+    flight = turned(simulated.flight, declination_error_deg(seed, field))
+    try:
+        latencies = estimate_latencies(flight)
+    except NotAssessableError:
+        latencies = None
+    return judge(Flown(scenario, flight, motion, field), heading=_aligned(flight), latencies=latencies)
+
+
+def declination_error_deg(seed: int, field_ned_nt: FloatArray) -> float:
+    """What the world's declination is more than the model's: a draw of the sigma that the model states."""
+    horizontal = np.hypot(*field_ned_nt[len(field_ned_nt) // 2, :2])
+    sigma = float(declination_sigma_deg(np.asarray(horizontal)))
+    return sigma * float(generator(seed, "declination").standard_normal())
+
+
+def turned(flight: Flight, by_deg: float) -> Flight:
+    """A flight whose every true direction is larger by an angle: the field, then, has so much more declination."""
+    tables = {}
+    for topic in flight.topics():
+        table = flight[topic]
+        columns = dict(table.columns)
+        if "true_heading_deg" in columns:
+            columns["true_heading_deg"] = Column(wrap_360(table.values("true_heading_deg") + by_deg))
+        if "velocity_north_mps" in columns:
+            north, east = table.values("velocity_north_mps"), table.values("velocity_east_mps")
+            sine, cosine = np.sin(np.deg2rad(by_deg)), np.cos(np.deg2rad(by_deg))
+            columns["velocity_north_mps"] = Column(cosine * north - sine * east)
+            columns["velocity_east_mps"] = Column(sine * north + cosine * east)
+        tables[topic] = replace(table, columns=columns)
+    return replace(flight, tables=tables)
+
+
+def _aligned(flight: Flight) -> HeadingResult | None:
+    try:
+        return estimate_heading_error(flight)
+    except NotAssessableError:
+        return None
+
+
+def _flight(scenario: Scenario, readings: list[Readings]) -> Flight:
+    """Readings as the tables of a flight."""
+    zero_ns = scenario.start_utc_ns or 0
+    tables = {
+        part.topic: Table(
+            topic=part.topic,
+            time_ns=part.time_ns + zero_ns,
+            columns=part.columns,
+            record_index=np.arange(len(part.time_ns), dtype=np.int64),
+            device_time_ns=Column(part.time_ns),
+        )
+        for part in readings
+    }
+    return Flight(tables, {"aircraft": scenario.aircraft}, zero_ns, scenario.start_utc_ns is not None, scenario.name)
