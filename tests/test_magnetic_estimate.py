@@ -104,6 +104,18 @@ def test_sigma_of_a_is_the_quadrature_of_its_parts() -> None:
     assert result.coefficients_sigma_deg["A"] > result.declination.sigma_deg > 0.3
 
 
+def test_wander_of_the_attitude_stands_in_the_sigmas_of_b_and_c() -> None:
+    steady, wandering = (estimated(make(), settings=MagneticSettings(attitude_wander_deg=deg)) for deg in (0.0, 0.1))
+    field = steady.declination
+    assert field.horizontal_nt is not None and field.down_nt is not None
+    expected = 0.1 * abs(field.down_nt) / field.horizontal_nt
+    for name in ("compass_table", "poisson_attitude"):
+        low, high = (result.method(name).coefficients_sigma_deg for result in (steady, wandering))
+        added = {letter: np.sqrt(max(high[letter] ** 2 - low[letter] ** 2, 0.0)) for letter in LETTERS}
+        assert (added["B"], added["C"]) == pytest.approx((expected, expected), rel=1e-6)
+        assert max(added[letter] for letter in "ADE") == pytest.approx(0.0, abs=1e-9)
+
+
 def test_turning_the_world_reordering_topics_and_shifting_time_change_nothing() -> None:
     before = estimated(make())
     turned = estimated(make(turn_world_deg=137.0))

@@ -167,3 +167,15 @@ def test_an_alignment_that_does_not_hold_is_not_used(changes: dict[str, object],
 def test_settings_out_of_range_are_refused() -> None:
     with pytest.raises(SettingsError, match="coverage_min"):
         MagneticSettings(coverage_min=2.0)
+
+
+@pytest.mark.parametrize(("roll", "pitch", "letter"), [(0.1, 0.0, 2), (0.0, 0.1, 1)])
+def test_roll_held_wrong_is_seen_as_c_and_pitch_as_b(roll: float, pitch: float, letter: int) -> None:
+    """0.1 deg x Z / H: what the setting ``attitude_wander_deg`` puts into the sigmas of B and C."""
+    heading = np.arange(0.0, 360.0, 1.0)
+    level = np.zeros(len(heading))
+    reading = field_in_body(EARTH.horizontal_nt, EARTH.down_nt, heading, level, level)
+    shown = levelled_heading_deg(reading, level + roll, level + pitch)
+    found = harmonics.fit(shown, wrap_180(shown - heading))[0]
+    assert abs(found[letter]) == pytest.approx(0.1 * 50.0 / 17.0, rel=0.01)
+    assert np.abs(np.delete(found, letter)).max() < 0.005

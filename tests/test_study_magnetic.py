@@ -52,8 +52,6 @@ EXACT_IRON_DEG = 0.02  # readings rounded to 1 nT of 17 000, attitude noise of 0
 SHIFTED_BINS_DEG = 0.02  # the readings fall into other bins of the table
 WIDE_EXPONENT = 0.35  # of a few irons: harmonics of the bank itself and of the bins of the table
 AIRBORNE = Phases((Interval(0.0, 1e5, "airborne"),), "made")
-# Roll that wanders as slowly as a figure lasts goes into the iron across, and what is left does not show it.
-INSIDE_3_SIGMA = {(IRON, "C"): 0.88, (IRON, "B"): 0.98, (TABLE, "B"): 0.96, (TABLE, "C"): 0.98}
 CLAIMED = tuple(setup for _bank, setup in CLAIM.points)
 
 
@@ -304,7 +302,7 @@ def test_two_hundred_flights_keep_what_is_claimed() -> None:
         assert honesty["inside2"][held_out] >= 0.95
         for letter in "ABCDE":
             row = np.flatnonzero(rows_where(honesty, method=method, error_of=letter))[0]
-            assert honesty["inside3"][row] >= INSIDE_3_SIGMA.get((method, letter), 0.99), (method, letter)
+            assert honesty["inside3"][row] >= 0.985, (method, letter)
     claim, power = tables["magnetic_claim"], tables["magnetic_power"]
     published = np.isfinite(claim["published_deg"])
     assert claim["formula_average_deg"][published] == pytest.approx(claim["published_deg"][published], rel=0.12)

@@ -31,7 +31,11 @@ FORECAST_BANKS_DEG = (10.0, 20.0, 30.0)
 
 @dataclass(frozen=True)
 class Fits:
-    """The table with its forecast bank bias, shape (360,), and two irons; ``pitch_deg`` is the mean of the figure."""
+    """The table with its forecast bank bias, shape (360,), and two irons; ``pitch_deg`` is the mean of the figure.
+
+    ``wander`` (5, 5) is what roll and pitch of the INS that wander as slowly as the figure lasts add to the covariance
+    of A to E: no residual shows it.
+    """
 
     table: CompassTable
     bias_deg: FloatArray
@@ -39,6 +43,7 @@ class Fits:
     modulus: IronFit
     pitch_deg: float
     bank_deg: float
+    wander: FloatArray
 
     @property
     def forecast(self) -> IronFit | None:
@@ -58,7 +63,13 @@ def fit_all(figure: Readings, table: CompassTable, earth: EarthField, settings: 
             reason = f"heading error known to {sigma:.2g} deg rms, at most {settings.modulus_sigma_max_deg:g}"
             modulus = replace(modulus, reason=f"{reason}: condition number {modulus.condition_number:.3g}")
     bias = np.zeros(360) if attitude.reason else bank_bias(attitude.iron, *_strengths(found), bank, pitch)
-    return Fits(table, bias, attitude, modulus, pitch, bank)
+    return Fits(table, bias, attitude, modulus, pitch, bank, _wander(found, settings.attitude_wander_deg))
+
+
+def _wander(earth: EarthField, wander_deg: float) -> FloatArray:
+    """A small error of roll turns the vertical field Z into the horizontal: angle x Z / H in C; one of pitch in B."""
+    dip = abs(earth.down_nt) / earth.horizontal_nt if earth.horizontal_nt > 0.0 else 0.0
+    return np.diag((wander_deg * dip) ** 2 * np.array([0.0, 1.0, 1.0, 0.0, 0.0]))
 
 
 def method_rows(
@@ -73,7 +84,7 @@ def method_rows(
     values = table.coefficients_deg + np.array([declination_deg, 0.0, 0.0, 0.0, 0.0])
     values[0] = wrap_180(values[0])
     bias, bias_covariance = bias_coefficients(fits, a_sigma_deg)
-    covariance = table.covariance + np.diag(bias**2) + bias_covariance
+    covariance = table.covariance + np.diag(bias**2) + bias_covariance + fits.wander
     covariance[0, 0] += a_sigma_deg**2
     before = left_by_nothing(unseen).rms_deg if unseen else None
     after = left_by_table(unseen, table, deviation_deg, fits.bias_deg) if unseen else None
@@ -138,6 +149,8 @@ def _by_iron(
         return row
     spread = fit.covariance_with(a_sigma_deg)
     values, covariance = level_coefficients(fit.iron, spread, *_strengths(fit.earth), fits.pitch_deg)
+    if not is_modulus:
+        covariance = covariance + fits.wander
     row = _with(row, left_by_iron(unseen, fit, a_sigma_deg) if unseen else None, values, covariance)
     if not is_modulus:
         return row

@@ -14,7 +14,8 @@ class MagneticSettings:
     states, where that is larger) turns the track by no more than ``track_error_max_deg``, and with
     ``uses_slower_taxi`` on taxi as system 1 takes it. ``alignment_event`` and ``release_event`` are names of events
     between which the alignment looks; empty: not used. ``declination_deg`` with its sigma replaces the model's, for a
-    log without date or place. ``trusts_aided_heading`` states that an INS corrected by GNSS does not take its heading
+    log without date or place. ``attitude_wander_deg`` is how far roll and pitch of the INS wander while a figure is
+    flown. ``trusts_aided_heading`` states that an INS corrected by GNSS does not take its heading
     from a magnetometer.
     """
 
@@ -31,6 +32,7 @@ class MagneticSettings:
     release_event: str = ""
     declination_deg: float | None = number(None, -180.0, 180.0)
     declination_sigma_deg: float = number(0.5, 0.0, 180.0)
+    attitude_wander_deg: float = number(0.03, 0.0, 10.0)
     trusts_aided_heading: bool = False
 
     bank_min_deg: float = number(8.0, 1.0, 80.0)
