@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from groundstation.base.angles import wrap_180
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.base.timescales import iso_to_utc_ns
@@ -99,24 +100,56 @@ def test_what_cannot_be_assessed_says_why() -> None:
     magnetic = table("ins", 1.0, JUNE_2026, magnetic_heading_deg=[1.0])
     placed = table("ins", 1.0, JUNE_2026, magnetic_heading_deg=[1.0], latitude_deg=[56.0], longitude_deg=[40.0])
     nothing = table("ins", 1.0, JUNE_2026, true_heading_deg=[np.nan], magnetic_heading_deg=[np.nan])
-    old = iso_to_utc_ns("1999-12-31T00:00:00Z")[0]
+    late = iso_to_utc_ns("2030-01-01T00:00:00Z")[0]
     for case, text in (
         (flight(), "no samples of ins"),
         (flight(nothing), "neither true nor magnetic"),
         (flight(placed, has_utc=False), "without date"),
         (flight(magnetic), "without any position"),
-        (flight(placed, start_ns=old), "2010 to 2029"),
+        (flight(placed, start_ns=late), "1970 to 2029"),
     ):
         with pytest.raises(NotAssessableError, match=text):
             true_heading(case)
 
 
 @pytest.mark.parametrize(
-    ("date", "model"), [("2010-01-01", "WMM-2010"), ("2019-12-31", "WMM-2015v2"), ("2029-12-31", "WMM-2025")]
+    ("date", "model"),
+    [
+        ("1970-01-01", "IGRF-14"),
+        ("2009-12-31", "IGRF-14"),
+        ("2010-01-01", "WMM-2010"),
+        ("2019-12-31", "WMM-2015v2"),
+        ("2029-12-31", "WMM-2025"),
+    ],
 )
 def test_model_of_the_date(date: str, model: str) -> None:
     utc_ns = iso_to_utc_ns(f"{date}T23:59:00Z")[0]
     assert declination_along(np.array([56.0]), np.array([40.0]), np.array([0.0]), utc_ns).model == model
+
+
+def test_reference_field_goes_over_into_the_world_magnetic_model() -> None:
+    """On the last day of the one and the first of the other they agree by far better than either is known."""
+    latitude, longitude = (
+        np.array([-60.0, -30.0, 0.0, 30.0, 56.0, 65.0]),
+        np.array([20.0, 150.0, -60.0, 100.0, 40.0, -20.0]),
+    )
+    before, after = (
+        declination_along(latitude, longitude, np.full(6, 1000.0), iso_to_utc_ns(f"{date}T12:00:00Z")[0])
+        for date in ("2009-12-31", "2010-01-01")
+    )
+    assert np.abs(wrap_180(after.values_deg - before.values_deg)).max() < 0.15
+    assert np.abs(after.horizontal_nt / before.horizontal_nt - 1.0).max() < 0.005
+    assert np.abs(after.down_nt - before.down_nt).max() < 150.0
+
+
+def test_declination_of_an_older_flight_is_that_of_its_year() -> None:
+    """In London the needle stood some 7 deg west in 1970 and came nearer to north by some 8 arcmin a year."""
+    west = [
+        -float(declination_along(np.array([51.5]), np.array([-0.1]), np.zeros(1), ns).values_deg[0])
+        for ns in (iso_to_utc_ns(f"{year}-07-01T00:00:00Z")[0] for year in (1970, 2005))
+    ]
+    assert west[0] > 6.0 and 1.5 < west[1] < 3.5 and west[0] > west[1]
+    assert np.isfinite(declination_along(np.array([90.0]), np.zeros(1), np.zeros(1), 10**18).values_deg).all()
 
 
 def test_sigma_of_declination() -> None:

@@ -31,7 +31,7 @@ Step = Literal["everything", "analysis", "reports", "nothing"]  # what has to be
 KEYS = "keys"
 PACKAGES = (
     *("mcap", "numpy", "pandas", "numba", "scipy", "pyarrow", "rerun-sdk"),
-    *("protobuf", "matplotlib", "typst", "pygeomag"),
+    *("protobuf", "matplotlib", "typst", "pygeomag", "ppigrf"),
 )
 
 

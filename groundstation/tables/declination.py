@@ -1,8 +1,9 @@
-"""Magnetic declination along a flight, from the world magnetic model of its date."""
+"""Magnetic declination along a flight, from the world magnetic model of its date, or the IGRF before there was one."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from groundstation.base.records import frozen
 from groundstation.base.timescales import utc_ns_to_iso
 
 MODEL_YEARS = range(2010, 2030, 5)  # base years of the sets that pygeomag brings; each serves five years
+IGRF, IGRF_FIRST_YEAR = "IGRF-14", 1970  # the reference field goes back to 1900, recorders do not
+POLE_DEG = 89.99  # nearer to a pole than that east and north are nothing
 KNOT_SPACING_M = 5_000.0
 M_PER_DEG = SEMI_MAJOR_M * np.pi / 180.0
 SIGMA_FLOOR_DEG, SIGMA_SLOPE_DEG_NT = 0.26, 5417.0
@@ -31,7 +34,7 @@ class Declination:
     down_nt : ndarray, shape (n,)
         Vertical intensity Z, down positive.
     model : str
-        Name of the model: ``WMM-2020``.
+        Name of the model: ``WMM-2020``, ``IGRF-14``.
     """
 
     values_deg: FloatArray
@@ -54,7 +57,8 @@ def declination_sigma_deg(horizontal_nt: FloatArray) -> FloatArray:
     """Standard deviation of declination: sqrt(0.26^2 + (5417 / H)^2) degrees, H in nanotesla.
 
     It covers crust and disturbance field on the open earth, not iron and current nearby. The figures are those of the
-    2025 model, taken for its predecessors too: theirs differ by 4 %.
+    2025 model, taken for its predecessors and for the IGRF too: theirs differ by 4 %, and crust and disturbances, which
+    no model holds, make most of it.
 
     Source: The US/UK World Magnetic Model for 2025-2030, NOAA technical report 2024, error model.
 
@@ -72,7 +76,8 @@ def declination_along(
     """Declination along a track.
 
     The model (0.2 ms a call) is evaluated every 5 km of path and interpolated in between, along the shorter arc: an
-    error below 0.01 deg but for the surroundings of the magnetic poles, where a heading is useless anyway.
+    error below 0.01 deg but for the surroundings of the magnetic poles, where a heading is useless anyway. Flights from
+    2010 on have the world magnetic model of their five years, older ones the international geomagnetic reference field.
 
     Parameters
     ----------
@@ -85,8 +90,12 @@ def declination_along(
     ------
     NotAssessableError
         When no model serves the date.
+
+    Source: The US/UK World Magnetic Model, NOAA, 2010 to 2025, as packaged by pygeomag; Alken et al., International
+    Geomagnetic Reference Field: the thirteenth generation, Earth, Planets and Space 73 (2021) 49, in its fourteenth
+    generation (2024), as packaged by ppigrf.
     """
-    model, year = _model_of(utc_ns)
+    model = _model_of(utc_ns)
     known = np.flatnonzero(np.isfinite(latitude_deg) & np.isfinite(longitude_deg))
     values, horizontal, down = np.full((3, len(latitude_deg)), np.nan)
     if known.size:
@@ -94,17 +103,10 @@ def declination_along(
         knot = np.flatnonzero(np.diff(path // KNOT_SPACING_M, prepend=-1.0, append=-1.0)[:-1])
         knot = np.unique(np.append(knot, len(known) - 1))
         altitude_km = np.nan_to_num(altitude_m[known[knot]], nan=0.0) / 1000.0
-        fields = [
-            model.calculate(glat=float(latitude), glon=float(longitude), alt=float(altitude), time=year)
-            for latitude, longitude, altitude in zip(
-                latitude_deg[known[knot]], longitude_deg[known[knot]], altitude_km, strict=True
-            )
-        ]
-        continuous = unwrap(np.array([field.d for field in fields]))
-        values[known] = wrap_180(np.interp(path, path[knot], continuous))
-        horizontal[known] = np.interp(path, path[knot], [field.h for field in fields])
-        down[known] = np.interp(path, path[knot], [field.z for field in fields])
-    return Declination(values, horizontal, down, str(model.model))
+        declination, *strengths = model.field(latitude_deg[known[knot]], longitude_deg[known[knot]], altitude_km)
+        values[known] = wrap_180(np.interp(path, path[knot], unwrap(declination)))
+        horizontal[known], down[known] = (np.interp(path, path[knot], strength) for strength in strengths)
+    return Declination(values, horizontal, down, model.name)
 
 
 def _path_m(latitude_deg: FloatArray, longitude_deg: FloatArray) -> FloatArray:
@@ -114,18 +116,49 @@ def _path_m(latitude_deg: FloatArray, longitude_deg: FloatArray) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(np.hypot(north_m, east_m))])
 
 
-def _model_of(utc_ns: int) -> tuple[Any, float]:
-    """The model that serves a date, and the date as a decimal year."""
+class _Model(NamedTuple):
+    """A model at a date; ``field`` gives declination, horizontal and down intensity at latitude, longitude, km."""
+
+    name: str
+    field: Callable[[FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+
+
+def _model_of(utc_ns: int) -> _Model:
+    """The model that serves a date."""
     moment = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=utc_ns // 1000)
-    base_year = moment.year // 5 * 5
-    if base_year not in MODEL_YEARS:
-        raise NotAssessableError(
-            "magnetic declination",
-            f"a flight of {utc_ns_to_iso(utc_ns, 0)[:10]}",
-            f"a date the world magnetic models serve, {MODEL_YEARS[0]} to {MODEL_YEARS[-1] + 4}",
-            "check the date of the log, or log the variation",
-        )
+    if IGRF_FIRST_YEAR <= moment.year < MODEL_YEARS[0]:
+        return _reference_field(moment)
+    if moment.year // 5 * 5 in MODEL_YEARS:
+        return _world_magnetic_model(moment)
+    raise NotAssessableError(
+        "magnetic declination",
+        f"a flight of {utc_ns_to_iso(utc_ns, 0)[:10]}",
+        f"a date the magnetic models serve, {IGRF_FIRST_YEAR} to {MODEL_YEARS[-1] + 4}",
+        "check the date of the log, or log the variation",
+    )
+
+
+def _world_magnetic_model(moment: datetime) -> _Model:
     from pygeomag import GeoMag
 
     start, end = datetime(moment.year, 1, 1, tzinfo=UTC), datetime(moment.year + 1, 1, 1, tzinfo=UTC)
-    return GeoMag(base_year=base_year), moment.year + (moment - start) / (end - start)
+    year, model = moment.year + (moment - start) / (end - start), GeoMag(base_year=moment.year // 5 * 5)
+
+    def field(latitude: FloatArray, longitude: FloatArray, km: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        places = zip(latitude.tolist(), longitude.tolist(), km.tolist(), strict=True)
+        found = [model.calculate(glat=lat, glon=lon, alt=alt, time=year) for lat, lon, alt in places]
+        declination, horizontal, down = np.array([(one.d, one.h, one.z) for one in found], dtype=np.float64).T
+        return declination, horizontal, down
+
+    return _Model(str(model.model), field)
+
+
+def _reference_field(moment: datetime) -> _Model:
+    from ppigrf import igrf
+
+    def field(latitude: FloatArray, longitude: FloatArray, km: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        off_pole = np.clip(latitude, -POLE_DEG, POLE_DEG)
+        east, north, up = (part[0] for part in igrf(longitude, off_pole, km, moment.replace(tzinfo=None)))
+        return np.rad2deg(np.arctan2(east, north)), np.hypot(east, north), -up
+
+    return _Model(IGRF, field)
