@@ -1,8 +1,7 @@
 """The latency estimator: exact without noise, signs by worked example, silent with a reason where it cannot know."""
 
-import json
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -26,12 +25,12 @@ from groundstation.simulation.flight import simulate
 from groundstation.simulation.scenario import load_scenario
 from groundstation.tables.table import Flight, Table
 from tests.report_example import example
+from tests.schema_fields import SCHEMA, expect_fields
 from tests.simulated_flights import FLIGHT_LEGS, QUIET_GNSS, QUIET_INS, scenario
 
 EXACT_S = 0.002  # interpolation between samples 0.1 s apart, and means over 0.4 s
 NOISY_S = 0.05
 TICK_NS = 200_000_000  # time stamps rounded up to it would make the INS late
-SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
 
 
 @cache
@@ -259,9 +258,7 @@ def test_results_are_saved_obey_the_schema_and_are_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("definition", "dataclass"), [("latencies", answers.Latencies), ("latency", answers.Latency)])
 def test_schema_lists_what_the_dataclasses_hold(definition: str, dataclass: type) -> None:
-    names = [field.name for field in fields(dataclass) if field.name != "figures"]
-    assert list(SCHEMA["$defs"][definition]["properties"]) == names
-    assert SCHEMA["$defs"][definition]["required"] == names
+    expect_fields(definition, dataclass)
 
 
 def test_a_large_latency_is_a_finding() -> None:

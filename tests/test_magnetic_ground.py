@@ -1,8 +1,7 @@
 """The installed heading sensor on straight ground runs: known deviations come back, with honest errors and reasons."""
 
-import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -42,8 +41,8 @@ from groundstation.viewer.recording import write_recording
 from groundstation.viewer.tabs.magnetic_text import magnetic_text
 from tests.real_logs import real_log
 from tests.recording_contents import Contents
+from tests.schema_fields import SCHEMA, expect_fields
 
-SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
 START_NS = iso_to_utc_ns("2026-05-09T08:00:00Z")[0]
 LATITUDE_DEG, LONGITUDE_DEG = 55.97, 37.41
 TURN_DPS, PARKED_S, RUN_S, SPEED_MPS = 10.0, 20.0, 25.0, 8.0
@@ -491,9 +490,7 @@ def test_the_tab_shows_the_runs_without_system_3(tmp_path: Path) -> None:
     ],
 )
 def test_schema_lists_what_the_dataclasses_hold(definition: str, dataclass: type) -> None:
-    names = [field.name for field in fields(dataclass) if field.name != "figures"]
-    assert list(SCHEMA["$defs"][definition]["properties"]) == names
-    assert SCHEMA["$defs"][definition]["required"] == names
+    expect_fields(definition, dataclass)
 
 
 def test_settings_are_read_and_mistakes_named(tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 """System 3 in a whole run: verdict and coefficients beside the truth, reasons where there is no answer, files."""
 
-import json
 from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
@@ -34,8 +33,7 @@ from groundstation.simulation.scenario import load_scenario
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight
 from tests.real_logs import real_log
-
-SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
+from tests.schema_fields import SCHEMA, expect_fields
 
 
 @cache
@@ -185,9 +183,7 @@ def test_summary_obeys_the_schema(tmp_path: Path) -> None:
     ],
 )
 def test_schema_lists_what_the_dataclasses_hold(definition: str, dataclass: type) -> None:
-    names = [field.name for field in fields(dataclass) if field.name != "figures"]
-    assert list(SCHEMA["$defs"][definition]["properties"]) == names
-    assert SCHEMA["$defs"][definition]["required"] == names
+    expect_fields(definition, dataclass)
 
 
 def test_settings_are_read_and_mistakes_named(tmp_path: Path) -> None:

@@ -114,13 +114,13 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     settings = user_settings(configuration)
     findings = list(given.findings)
     not_assessable: list[NotAssessable] = []
-    phases = flight_phases(flight)
+    phases, excluded_s = flight_phases(flight), _excluded(flight, configuration)
     inertial = analyse_inertial(
         flight,
         phases,
         settings.inertial,
         aircraft_class=settings.aircraft.ins_class,
-        excluded_s=_excluded(flight, configuration),
+        excluded_s=excluded_s,
     )
     latency = analyse_latency(flight, settings.latency, inertial.inertial)
     heading = _heading_or_reason(flight, configuration, settings, latency.latency, findings, not_assessable)
@@ -141,7 +141,7 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
         settings.magnetic_ground,
         aircraft=settings.aircraft,
         latencies=latency.latency,
-        excluded_s=_excluded(flight, configuration),
+        excluded_s=excluded_s,
     )
     findings += (*inertial.findings, *latency.findings, *magnetic.findings, *on_ground.findings)
     not_assessable += (*inertial.not_assessable, *latency.not_assessable)

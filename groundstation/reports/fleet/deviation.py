@@ -6,7 +6,8 @@ import numpy as np
 
 from groundstation.reports import drawing as d
 from groundstation.reports.fleet.common import aircraft_name, bounded, colours_of
-from groundstation.reports.parts import Cell, Drawing, Grid, Head, Mark, Part, Section, Tone
+from groundstation.reports.parts import Cell, Drawing, Grid, Head, Mark, Part, Section
+from groundstation.reports.sections.magnetic import TONES
 from groundstation.reports.sections.magnetic_figures import METHODS
 from groundstation.reports.wording import ABSENT, number
 from groundstation.results.fleet import DeviationRow, FleetResults
@@ -16,7 +17,6 @@ TITLE = "Magnetic deviation by aircraft"
 LEAD = "What each flight found with its figure-eight: does the deviation of an aircraft stay the same?"
 MOST_CURVES = 60
 CHANGED = 3.0  # times what the sigmas lead to expect
-TONES: dict[str, Tone] = {"accept": "good", "reject": "bad", "undecided": "unknown"}
 
 
 def build(fleet: FleetResults) -> Section | None:
