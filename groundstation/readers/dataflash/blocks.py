@@ -24,7 +24,7 @@ from groundstation.readers.source import Source
 BLOCK_BYTES = 4 << 20
 REFUSED_SHOWN = 20  # definitions left out that are told one by one
 MAX_SPANS = 4_096
-RECORDS_KEPT = 1 << 23  # whose places are kept for a second pass: 5 bytes each
+BYTES_KEPT, RECORDS_KEPT = 96 << 20, 1 << 22  # of a log whose places are kept for a second pass, 5 bytes a record
 MOST_LOGS, MOST_DEFINITIONS = 256, 10_000  # joined in a file, and different ones in it: more is no log but an attack
 _LOG_BEGINS = bytes((FMT_ID, FMT_BYTES)) + b"FMT"  # every log begins with the definition of definitions
 FILLERS = (b"\0", b"\xff")  # what a recorder fills the rest of a page with
@@ -142,6 +142,7 @@ class Scanner:
         self._count = 0
         self._spans = np.empty((MAX_SPANS, 3), dtype=np.int64)
         self._chunks: list[_Chunk] = []
+        self._keeps = source.size <= BYTES_KEPT  # a compressed one may turn out longer
 
     def __iter__(self) -> Iterator[Block]:
         data = np.zeros(0, dtype=np.uint8)
@@ -150,11 +151,14 @@ class Scanner:
                 data, is_last = self._longer(data, stream)
                 blocks: list[_Places] = []
                 for block in self._blocks(data, is_last):
-                    blocks.append(_Places.of(block))
+                    if self._keeps:
+                        blocks.append(_Places.of(block))
                     yield block
                 done = int(self._state[scan.POSITION])
                 self._chunks.append(_Chunk(len(data), done, blocks))
                 if self._count > RECORDS_KEPT:
+                    self._keeps = False
+                if not self._keeps:
                     self._chunks.clear()
                 if is_last:
                     break
@@ -172,7 +176,7 @@ class Scanner:
         UnreadableLogError
             When the log is shorter than it was.
         """
-        if self._count > RECORDS_KEPT:
+        if not self._keeps:
             yield from Scanner(self._source)
             return
         data = np.zeros(0, dtype=np.uint8)
