@@ -67,10 +67,10 @@ def save_flight(
     heading = replace(_heading(), **({"error_deg": error_deg, "standard_error_deg": 0.03} | changes))
     results = example(
         replace(heading, figures=(taxi,)),
+        forecast,
         flight_id=f"{utc_ns_to_stamp(start_ns)}_{number}",
         metadata={"aircraft": aircraft, "flight": str(number)},
         start_utc_ns=start_ns,
-        forecast=forecast,
         figures=(taxi,),
     )
     folder = out / results.flight_id

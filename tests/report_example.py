@@ -9,6 +9,7 @@ import numpy as np
 from groundstation.base.angles import direction_of, wrap_180, wrap_360
 from groundstation.base.findings import Finding
 from groundstation.base.geodesy import latitude_longitude_deg
+from groundstation.results.answer import Answer, by_analysis
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.heading import (
@@ -286,8 +287,8 @@ def heading_result(**changes: Any) -> HeadingResult:
     return replace(whole, **changes)
 
 
-def example(heading: HeadingResult | None = None, **changes: Any) -> FlightResults:
-    """Results of the whole flight around a heading result."""
+def example(*answers: Answer | None, **changes: Any) -> FlightResults:
+    """Results of the whole flight around its answers."""
     results = FlightResults(
         flight_id="20260504T060000Z_A12_17",
         source=Source("2026-05-04 A12 flight 17.csv", "9f" * 32, 48_211_902, "flat-csv"),
@@ -306,7 +307,7 @@ def example(heading: HeadingResult | None = None, **changes: Any) -> FlightResul
             Finding("info", "integrity.gap", "gap of 28.1 s in flight", "gnss", "20:01", 1),
         ),
         not_assessable=(NotAssessable("magnetic", "no magnetometer in the log"),),
-        heading=heading,
-        figures=(*general_figures(), *(heading.figures if heading else ())),
+        answers=by_analysis(*answers),
+        figures=(*general_figures(), *(figure for answer in answers if answer for figure in answer.figures)),
     )
     return replace(results, **changes)

@@ -237,7 +237,7 @@ def test_an_answer_that_leans_on_a_damaged_span_says_so(tmp_path: Path) -> None:
     cells = rows[head + 1 + at].split(",")
     rows[head + 1 + at] = ",".join(cells[:-2])  # a row too short, within the segment
     broken.write_text("\n".join(rows) + "\n", encoding="utf-8")
-    (outcome,) = run_many([broken], tmp_path / "out", Configuration(thresholds=limits))
+    (outcome,) = run_many([broken], tmp_path / "out", Configuration({"thresholds": limits}))
     summary = load(Path(outcome.folder)).summary
     (finding,) = (one for one in summary["findings"] if one["code"] == "heading.damaged_span")
     assert finding["severity"] == "warn" and "dropped rows" in finding["text"]

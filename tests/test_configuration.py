@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from groundstation.base.errors import SettingsError
-from groundstation.pipeline.analyse import user_settings
+from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.pipeline.configuration import Configuration, Interval, load_configuration
 
 
@@ -22,10 +22,10 @@ def test_no_files_give_the_defaults() -> None:
 def test_a_file_for_a_section_wins_over_the_section(tmp_path: Path) -> None:
     config = written(tmp_path, "c.toml", "[heading]\ntaxi_speed_min_mps = 5\n[aircraft]\nentry_step_deg = 1.0\n")
     aircraft = written(tmp_path, "l39.toml", "antenna_arm_m = 4.2\n")
-    settings = user_settings(load_configuration(config, aircraft))
-    assert settings.heading.taxi_speed_min_mps == 5.0
+    settings = load_configuration(config, aircraft).settings
+    assert settings.of(HeadingSettings).taxi_speed_min_mps == 5.0
     assert settings.aircraft.antenna_arm_m == 4.2
-    assert settings.aircraft.entry_step_deg == user_settings(Configuration()).aircraft.entry_step_deg
+    assert settings.aircraft.entry_step_deg == Configuration().settings.aircraft.entry_step_deg
 
 
 def test_intervals_are_read_with_their_reasons(tmp_path: Path) -> None:
@@ -60,7 +60,7 @@ def test_a_mistake_is_named(tmp_path: Path, text: str, says: str) -> None:
 )
 def test_a_wrong_value_is_named(section: str, values: dict[str, object], says: str) -> None:
     with pytest.raises(SettingsError, match=says):
-        user_settings(Configuration(**{section: values}))
+        Configuration({section: values})
 
 
 def test_a_missing_file_is_told() -> None:
@@ -70,10 +70,10 @@ def test_a_missing_file_is_told() -> None:
 
 def test_thresholds_are_a_section_and_a_file(tmp_path: Path) -> None:
     config = written(tmp_path, "c.toml", "[thresholds]\nversion = 1\ngaps.min_s = 0.5\n")
-    assert user_settings(load_configuration(config)).thresholds.gaps.min_s == 0.5
+    assert load_configuration(config).settings.thresholds.gaps.min_s == 0.5
     own = written(tmp_path, "t.toml", "version = 1\n[gaps]\nperiods = 4\n")
     found = load_configuration(config, thresholds=own)
-    assert user_settings(found).thresholds.gaps == type(user_settings(found).thresholds.gaps)(4.0, 0.2)
+    assert found.settings.thresholds.gaps == type(found.settings.thresholds.gaps)(4.0, 0.2)
     assert found.to_dict() == {"thresholds": {"version": 1, "gaps": {"periods": 4}}}
     with pytest.raises(SettingsError, match=r"c.toml, key thresholds.version"):
-        user_settings(load_configuration(written(tmp_path, "c.toml", "[thresholds]\ngaps.min_s = 0.5\n")))
+        load_configuration(written(tmp_path, "c.toml", "[thresholds]\ngaps.min_s = 0.5\n"))

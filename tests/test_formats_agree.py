@@ -17,6 +17,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.convert import convert_log
 from groundstation.pipeline.flight import read_flight
 from groundstation.pipeline.log import open_log
+from groundstation.results.heading import HeadingResult
 from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
@@ -185,13 +186,16 @@ def test_tables_are_equal_within_the_formats_step(flights: dict[str, Flight], fo
 
 @pytest.mark.parametrize("form", sorted(ANSWER_DEG))
 def test_the_heading_error_is_the_same(flights: dict[str, Flight], form: str) -> None:
-    from groundstation.pipeline.analyse import estimate_heading, user_settings
+    from groundstation.estimators.heading.analysis import HEADING
+    from groundstation.pipeline.analyse import known_of, run_analyses
     from groundstation.pipeline.configuration import Configuration
 
-    configuration = Configuration()
-    settings = user_settings(configuration)
-    expected = estimate_heading(flights["csv"], configuration, settings)
-    found = estimate_heading(flights[form], configuration, settings)
+    expected, found = (
+        run_analyses((HEADING,), flights[name], known_of(flights[name], Configuration())).answers["heading"]
+        for name in ("csv", form)
+    )
+    assert isinstance(expected, HeadingResult)
+    assert isinstance(found, HeadingResult)
     assert found.paper_error_deg == pytest.approx(expected.paper_error_deg, abs=10 * ANSWER_DEG[form])
     assert found.confidence95_deg[0] < expected.error_deg < found.confidence95_deg[1]
 

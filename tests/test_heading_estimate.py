@@ -12,7 +12,8 @@ from groundstation.base.records import Column
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.figures import IN_PAUSE
 from groundstation.estimators.heading.references import reference_findings
-from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings, SiteData, Stand
+from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.estimators.known import AircraftData, SiteData, Stand
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import Gate, HeadingResult
 from groundstation.simulation.taxi import TaxiCase, TaxiRun, noiseless, simulate_taxi, taxi_flight

@@ -13,11 +13,14 @@ from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.heading.estimate import estimate_heading_error
-from groundstation.estimators.heading.settings import AircraftData, HeadingSettings
+from groundstation.estimators.heading.settings import HeadingSettings
+from groundstation.estimators.known import AircraftData
+from groundstation.estimators.latency.analysis import LATENCY
 from groundstation.estimators.latency.estimate import estimate_latencies
 from groundstation.estimators.latency.settings import LatencySettings
 from groundstation.estimators.latency.windows import Series
-from groundstation.pipeline.latency import analyse_latency
+from groundstation.pipeline.analyse import Answered, known_of, run_analyses
+from groundstation.pipeline.configuration import Configuration
 from groundstation.reports.sections.latency import build
 from groundstation.results import latency as answers
 from groundstation.results.files import load, save
@@ -209,10 +212,15 @@ def test_hostile_numbers_give_no_latency_and_no_warning(scale: float) -> None:
     assert {row.state for row in found.rows} == {"not_observable"}
 
 
+def answered(flight: Flight) -> Answered:
+    """The analysis of latencies alone."""
+    return run_analyses((LATENCY,), flight, known_of(flight, Configuration()))
+
+
 def test_no_pair_at_all_is_not_assessable() -> None:
     with pytest.raises(NotAssessableError, match="no INS with another sensor"):
         estimate_latencies(only(flown(), "gnss"))
-    assert analyse_latency(Flight(tables={}), LatencySettings(), None).not_assessable[0].analysis == "latency"
+    assert answered(Flight(tables={})).not_assessable[0].analysis == "latency"
 
 
 def test_settings_out_of_range_are_refused() -> None:
@@ -246,7 +254,7 @@ def test_heading_is_shifted_exactly() -> None:
 
 def test_results_are_saved_obey_the_schema_and_are_told(tmp_path: Path) -> None:
     found = estimate_latencies(flown())
-    results = example(None, latency=found)
+    results = example(None, found)
     save(tmp_path, replace(results, figures=(*results.figures, *found.figures)), {})
     saved = load(tmp_path)
     jsonschema.Draft202012Validator(SCHEMA).validate(saved.summary)
@@ -262,9 +270,7 @@ def test_schema_lists_what_the_dataclasses_hold(definition: str, dataclass: type
 
 
 def test_a_large_latency_is_a_finding() -> None:
-    (finding,) = (
-        finding for finding in analyse_latency(flown(), LatencySettings(), None).findings if finding.topic == "gnss"
-    )
+    (finding,) = (finding for finding in answered(flown()).findings["latency"] if finding.topic == "gnss")
     assert finding.code == "latency.observed"
     assert "velocity of gnss later than that of ins by 0.2" in finding.text
 

@@ -31,7 +31,7 @@ from groundstation.pipeline.analyse import Given, analyse
 from groundstation.pipeline.configuration import Configuration
 from groundstation.results.flight import Source
 from groundstation.results.heading import HeadingResult
-from groundstation.results.magnetic import Alignment
+from groundstation.results.magnetic import Alignment, MagneticResult
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.flight_errors import heading_error_deg
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, simulate_magnetic_family
@@ -409,8 +409,8 @@ def test_what_the_user_set_reaches_the_alignment() -> None:
     flight = simulate(load_scenario("magnetic-eight")).flight
     given = Given("NOTIME_abababab", Source("flight.csv", "ab" * 32, 1, "flat-csv"), {}, {}, (), has_lost_data=False)
     run = configured.Interval(str(lift_off_s(flight) - 40.0), str(lift_off_s(flight)))
-    configuration = Configuration(magnetic={"alignment_event": "alignment"}, exclude=(run,))
-    magnetic = analyse(flight, given, configuration).magnetic
+    configuration = Configuration({"magnetic": {"alignment_event": "alignment"}}, exclude=(run,))
+    magnetic = analyse(flight, given, configuration).answer(MagneticResult)
     assert magnetic is not None
     assert magnetic.alignment.origin.startswith("straight taxi (")
     assert magnetic.alignment.origin.endswith("no faster run: 0.0 s straight above 28.6 m/s before lift-off")

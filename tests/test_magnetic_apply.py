@@ -24,7 +24,6 @@ from groundstation.base.records import Column
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.cli.main import app
 from groundstation.estimators.magnetic.corrected import CorrectedHeading, correct_heading
-from groundstation.pipeline.analyse import user_settings
 from groundstation.pipeline.apply_deviation import APPLIED, NOT_APPLIED, Applied, Apply, apply_deviation, asked_for
 from groundstation.pipeline.batch import plan_many, run_many
 from groundstation.pipeline.check import check_many
@@ -45,7 +44,8 @@ from groundstation.results.deviation import (
 )
 from groundstation.results.files import SUMMARY, SavedFlight, load, save
 from groundstation.results.flight import FlightResults
-from groundstation.results.magnetic import ADVISORY
+from groundstation.results.latency import Latencies
+from groundstation.results.magnetic import ADVISORY, MagneticResult
 from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
@@ -135,7 +135,7 @@ def table_text(deviation_deg: float = -WORST_DEG, *, rows: int = 360, **changes:
 
 
 def applied_to(flight: Flight, asked: Apply, results: FlightResults | None = None) -> Applied:
-    return apply_deviation(flight, results or analysed(flight), asked, user_settings(Configuration()))
+    return apply_deviation(flight, results or analysed(flight), asked, Configuration().settings)
 
 
 def codes(results: FlightResults) -> dict[str, str]:
@@ -283,12 +283,13 @@ def test_the_next_flights_of_forty_aircraft_get_better() -> None:
         drawn = draw_magnetic_scenario(FAMILY, seed)
         following = replace(draw_magnetic_scenario(FAMILY, seed + 5000), magnetometer=drawn.magnetometer)
         results, flown = analysed(simulate(drawn).flight), simulate(following)
-        assert results.magnetic is not None and results.magnetic.verdict != "reject"
-        by_iron = deviation_of(results.magnetic, results.flight_id, "SIM-3")
+        magnetic = results.answer(MagneticResult)
+        assert magnetic is not None and magnetic.verdict != "reject"
+        by_iron = deviation_of(magnetic, results.flight_id, "SIM-3")
         curve = results.figure("magnetic_curves")
         assert curve is not None
         by_curve = replace(by_iron, iron=None, table_deg=tuple(curve["deviation_recommended_deg"].tolist()))
-        latencies = analysed(flown.flight).latency
+        latencies = analysed(flown.flight).answer(Latencies)
         found.append(
             [
                 rms_against_truth(flown, correct_heading(flown.flight, one, latencies=latencies))
@@ -690,7 +691,7 @@ def test_a_deviation_is_the_same_from_summary_and_result(first: Path, pair: tupl
     asked = asked_for(str(first))
     assert asked is not None and isinstance(asked.deviation, Deviation)
     results = analysed(pair[0].flight)
-    assert results.magnetic is not None
+    assert results.answer(MagneticResult) is not None
     table: Table = pair[0].flight["magnetometer"]
     mine, other = (applied_to(pair[0].flight, one, results).corrected for one in (Apply(), asked))
     assert mine is not None and other is not None and len(mine) == len(other) <= len(table)

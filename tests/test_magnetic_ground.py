@@ -9,6 +9,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from groundstation.on_ground import GroundDeviation
 from scipy.signal import lfilter
 
 from groundstation.base.angles import wrap_180, wrap_360
@@ -17,25 +18,23 @@ from groundstation.base.records import Column
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.magnetic import harmonics
+from groundstation.estimators.magnetic.analysis import MAGNETIC_GROUND
 from groundstation.estimators.magnetic.ground_fit import fit_curve
 from groundstation.estimators.magnetic.ground_runs import estimate_ground_deviation
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
-from groundstation.pipeline.analyse import Given, analyse, user_settings
+from groundstation.pipeline.analyse import Answered, Given, analyse, known_of, run_analyses
 from groundstation.pipeline.configuration import Configuration, load_configuration
 from groundstation.pipeline.convert import convert_log
 from groundstation.pipeline.flight import read_flight, sentence
 from groundstation.pipeline.log import open_log
-from groundstation.pipeline.magnetic_ground import analyse_ground_deviation
 from groundstation.reports.parts import Drawing, Grid, Note
 from groundstation.reports.sections.magnetic import build
 from groundstation.results import magnetic_ground as answers
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.magnetic import LETTERS
-from groundstation.results.magnetic_ground import GroundDeviation
 from groundstation.results.restore import restored
 from groundstation.tables.declination import declination_along
-from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer.recording import write_recording
 from groundstation.viewer.tabs.magnetic_text import magnetic_text
@@ -334,13 +333,18 @@ def test_short_and_curved_runs_are_rejected_with_the_reason() -> None:
         (lambda flight: replace(flight, tables={}), "no magnetic heading in the log"),
     ],
 )
+def answered(flight: Flight) -> Answered:
+    """The analysis of ground runs alone."""
+    return run_analyses((MAGNETIC_GROUND,), flight, known_of(flight, Configuration()))
+
+
 def test_what_lacks_is_said_in_a_line(change: Callable[[Flight], Flight], reason: str) -> None:
     flight = change(make())
     with pytest.raises(NotAssessableError, match=reason) as told:
         found(flight)
     assert "\n" not in str(told.value)
-    answer = analyse_ground_deviation(flight, flight_phases(flight), MagneticGroundSettings())
-    assert answer.magnetic_ground is None
+    answer = answered(flight)
+    assert not answer.answers
     assert reason in answer.not_assessable[0].reason
     assert answer.not_assessable[0].analysis == "magnetic_ground"
 
@@ -383,12 +387,11 @@ def test_what_the_user_leaves_out_is_left_out() -> None:
 
 
 def test_a_large_error_is_a_warning_and_a_small_one_is_not() -> None:
-    phases = flight_phases(make())
     for level, severities in ((1.0, ["info"]), (9.0, ["info", "warn"])):
         flight = make(coefficients_deg=(level, 0.0, 0.0, 0.0, 0.0))
-        answer = analyse_ground_deviation(flight, phases, MagneticGroundSettings())
-        assert [finding.severity for finding in answer.findings] == severities
-        assert f"{level:+.1f}" in answer.findings[-1].text
+        findings = answered(flight).findings["magnetic_ground"]
+        assert [finding.severity for finding in findings] == severities
+        assert f"{level:+.1f}" in findings[-1].text
 
 
 def test_two_runs_are_not_taken_for_more_than_they_are() -> None:
@@ -413,11 +416,12 @@ def test_two_runs_are_not_taken_for_more_than_they_are() -> None:
 def test_recorded_flights(name: str, used: int, rejected: int, found_letters: str, reason: str, tmp_path: Path) -> None:
     mcap = tmp_path / "flight.mcap"
     flight = read_flight(mcap, convert_log(open_log(real_log(name)), mcap))
-    answer = analyse_ground_deviation(flight, flight_phases(flight), MagneticGroundSettings())
+    answer = answered(flight)
     if reason:
         assert answer.not_assessable[0].reason.startswith(reason)
         return
-    ground = answer.magnetic_ground
+    ground = answer.answers.get("magnetic_ground")
+    assert isinstance(ground, GroundDeviation)
     assert ground is not None
     assert [len(ground.used), len(ground.runs) - len(ground.used)] == [used, rejected]
     assert "".join(item.letter for item in ground.coefficients if item.state == "found") == found_letters
@@ -440,7 +444,8 @@ def whole() -> FlightResults:
 
 def test_a_whole_run_tells_it_and_saves_it(tmp_path: Path) -> None:
     results = whole()
-    assert results.magnetic_ground is not None
+    on_ground = results.answer(GroundDeviation)
+    assert on_ground is not None
     (finding,) = (one for one in results.findings if one.code.startswith("magnetic_ground."))
     assert (finding.severity, finding.code) == ("info", "magnetic_ground.found")
     assert finding.text in sentence(results)
@@ -449,10 +454,10 @@ def test_a_whole_run_tells_it_and_saves_it(tmp_path: Path) -> None:
     assert {"magnetic_ground_epochs", "magnetic_ground_curve"} <= set(saved.figures)
     own = {"$schema": SCHEMA["$schema"], "$ref": "#/$defs/magnetic_ground", "$defs": SCHEMA["$defs"]}
     jsonschema.Draft202012Validator(own).validate(saved.summary["results"]["magnetic_ground"])
-    back = restored(saved).magnetic_ground
+    back = restored(saved).answer(GroundDeviation)
     assert back is not None
-    assert len(back.runs) == len(results.magnetic_ground.runs)
-    for run, other in zip(results.magnetic_ground.used, back.used, strict=True):
+    assert len(back.runs) == len(on_ground.runs)
+    for run, other in zip(on_ground.used, back.used, strict=True):
         assert other.error_deg == pytest.approx(run.error_deg, abs=1e-4)
     assert back.to_frame("runs")["error_deg"].notna().sum() == len(back.used)
 
@@ -472,9 +477,10 @@ def test_the_tab_shows_the_runs_without_system_3(tmp_path: Path) -> None:
     results = whole()
     write_recording(tmp_path / "flight.rrd", make(), results)
     assert "/magnetic/ground/curves" in Contents(tmp_path / "flight.rrd").fixed
-    assert results.magnetic_ground is not None
-    text = magnetic_text(None, ["no three-axis magnetometer in the log"], results.magnetic_ground)
-    run = results.magnetic_ground.used[0]
+    on_ground = results.answer(GroundDeviation)
+    assert on_ground is not None
+    text = magnetic_text(None, ["no three-axis magnetometer in the log"], on_ground)
+    run = on_ground.used[0]
     assert f"{run.error_deg:+.2f} ± {run.sigma_deg:.2f}" in text.replace("−", "-")
 
 
@@ -496,9 +502,9 @@ def test_schema_lists_what_the_dataclasses_hold(definition: str, dataclass: type
 def test_settings_are_read_and_mistakes_named(tmp_path: Path) -> None:
     path = tmp_path / "c.toml"
     path.write_text("[magnetic_ground]\nsettle_s = 5\n", encoding="utf-8")
-    assert user_settings(load_configuration(path)).magnetic_ground.settle_s == 5.0
+    assert load_configuration(path).settings.of(MagneticGroundSettings).settle_s == 5.0
     path.write_text("[magnetic_ground]\nsettle = 5\n", encoding="utf-8")
     with pytest.raises(SettingsError, match="settle"):
-        user_settings(load_configuration(path))
+        load_configuration(path)
     with pytest.raises(SettingsError, match="speed_min_mps"):
         MagneticGroundSettings(speed_min_mps=90.0)

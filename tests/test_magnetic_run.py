@@ -10,27 +10,25 @@ import pytest
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.errors import SettingsError
-from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.estimators.inertial.analysis import INERTIAL
 from groundstation.estimators.magnetic import harmonics
+from groundstation.estimators.magnetic.analysis import MAGNETIC
 from groundstation.estimators.magnetic.settings import MagneticSettings
-from groundstation.pipeline.analyse import Given, analyse, user_settings
+from groundstation.pipeline.analyse import Given, analyse, known_of, run_analyses
 from groundstation.pipeline.configuration import Configuration, load_configuration
 from groundstation.pipeline.convert import convert_log
 from groundstation.pipeline.flight import read_flight, sentence
-from groundstation.pipeline.inertial import analyse_inertial
 from groundstation.pipeline.log import open_log
-from groundstation.pipeline.magnetic import analyse_magnetic
 from groundstation.reports.index import index_row
 from groundstation.reports.sections import front
 from groundstation.results import magnetic as answers
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.magnetic import LETTERS
+from groundstation.results.magnetic import LETTERS, MagneticResult
 from groundstation.results.restore import restored
 from groundstation.simulation.deviation import BIN_MIDDLES_DEG, scenario_deviation
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
-from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight
 from tests.real_logs import real_log
 from tests.schema_fields import SCHEMA, expect_fields
@@ -60,7 +58,7 @@ def reason_of(results: FlightResults) -> str:
 def test_a_figure_eight_is_accepted_with_its_coefficients() -> None:
     """The truth is taken at the mean current of the figure: what the iron fit refers to."""
     results, flown = figure_eight(), simulated("magnetic-eight")
-    found = results.magnetic
+    found = results.answer(MagneticResult)
     assert found is not None
     assert found.poisson is not None
     assert flown.scenario.electric is not None
@@ -82,7 +80,7 @@ def test_a_figure_eight_is_accepted_with_its_coefficients() -> None:
 
 def test_a_bad_figure_is_refused_with_the_reason() -> None:
     results = analysed(simulated("magnetic-hard").flight)
-    assert results.magnetic is None
+    assert results.answer(MagneticResult) is None
     assert "no opposite turn of equal bank" in reason_of(results)
     assert "unsteady bank" in reason_of(results)
     (finding,) = (finding for finding in results.findings if finding.code.startswith("magnetic."))
@@ -91,7 +89,7 @@ def test_a_bad_figure_is_refused_with_the_reason() -> None:
 
 
 def test_a_rejected_figure_is_a_warning() -> None:
-    strict = Configuration(magnetic={"held_out_rms_max_deg": 0.01})
+    strict = Configuration({"magnetic": {"held_out_rms_max_deg": 0.01}})
     results = analysed(simulated("magnetic-eight").flight, strict)
     (finding,) = (finding for finding in results.findings if finding.code.startswith("magnetic."))
     assert (finding.severity, finding.code) == ("warn", "magnetic.reject")
@@ -119,17 +117,15 @@ def test_without_magnetometer_there_is_a_reason_and_no_finding() -> None:
 def test_recorded_flights_are_refused_with_the_reason(name: str, reason: str, tmp_path: Path) -> None:
     mcap = tmp_path / "flight.mcap"
     flight = read_flight(mcap, convert_log(open_log(real_log(name)), mcap))
-    phases = flight_phases(flight)
-    inertial = analyse_inertial(flight, phases, InertialSettings()).inertial
-    answer = analyse_magnetic(flight, phases, MagneticSettings(), inertial=inertial)
-    assert answer.magnetic is None
-    assert answer.not_assessable[0].reason.startswith(reason)
+    found = run_analyses((INERTIAL, MAGNETIC), flight, known_of(flight, Configuration()))
+    assert "magnetic" not in found.answers
+    assert found.reasons["magnetic"].startswith(reason)
 
 
 @pytest.mark.parametrize("name", [field.name for field in fields(answers.MagneticResult)])
 def test_every_answer_is_saved_and_comes_back(name: str, tmp_path: Path) -> None:
     save(tmp_path, figure_eight(), {})
-    before, after = figure_eight().magnetic, restored(load(tmp_path)).magnetic
+    before, after = (found.answer(MagneticResult) for found in (figure_eight(), restored(load(tmp_path))))
     if name == "figures":
         assert {"magnetic_samples", "magnetic_table", "magnetic_modulus"} <= set(load(tmp_path).figures)
         return
@@ -143,7 +139,7 @@ def test_every_answer_is_saved_and_comes_back(name: str, tmp_path: Path) -> None
 
 def test_index_and_front_page_tell_the_deviation(tmp_path: Path) -> None:
     save(tmp_path, figure_eight(), {})
-    found, row, saved = figure_eight().magnetic, index_row(load(tmp_path)), load(tmp_path)
+    found, row, saved = figure_eight().answer(MagneticResult), index_row(load(tmp_path)), load(tmp_path)
     assert found is not None and found.residual_rms_deg is not None
     method = found.method(found.recommended_method)
     assert (row["magnetic_verdict"], row["magnetic_method"]) == (found.verdict, found.recommended_method)
@@ -189,7 +185,7 @@ def test_schema_lists_what_the_dataclasses_hold(definition: str, dataclass: type
 def test_settings_are_read_and_mistakes_named(tmp_path: Path) -> None:
     path = tmp_path / "c.toml"
     path.write_text("[magnetic]\ncard_step_deg = 15\n", encoding="utf-8")
-    assert user_settings(load_configuration(path)).magnetic.card_step_deg == 15
+    assert load_configuration(path).settings.of(MagneticSettings).card_step_deg == 15
     path.write_text("[magnetic]\ncard_step = 15\n", encoding="utf-8")
     with pytest.raises(SettingsError, match="card_step"):
-        user_settings(load_configuration(path))
+        load_configuration(path)

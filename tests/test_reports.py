@@ -17,10 +17,11 @@ from groundstation.base.findings import Finding
 from groundstation.reports import drawing
 from groundstation.reports.flight_report import PDF, REPORT, flight_document, flight_report_html, write_flight_report
 from groundstation.reports.sections.heading import limit_text
+from groundstation.results.answer import by_analysis
 from groundstation.results.figures import FigureData
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults, NotAssessable, Source
-from groundstation.results.heading import Gate
+from groundstation.results.heading import Gate, HeadingResult
 from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import MANIFEST, example, figure, heading_result
 
@@ -227,7 +228,7 @@ def hostile_results() -> FlightResults:
         clock={HOSTILE: HOSTILE},
         findings=(Finding("fail", HOSTILE, HOSTILE, HOSTILE, HOSTILE, 3),),
         not_assessable=(NotAssessable(HOSTILE, HOSTILE),),
-        heading=heading,
+        answers=by_analysis(heading),
         figures=(*figures, *heading.figures),
     )
 
@@ -277,12 +278,12 @@ def with_nan_everywhere(results: FlightResults) -> FlightResults:
             for name, values in item.columns.items()
         }
         figures.append(FigureData(item.name, columns, item.digits))
-    heading = results.heading
+    heading = results.answer(HeadingResult)
     assert heading is not None
     unknown = {item.name: float("nan") for item in fields(heading) if isinstance(getattr(heading, item.name), float)}
     unknown.pop("entry_step_deg")
     gone = replace(heading, **unknown, confidence95_deg=(float("nan"), float("nan")))
-    return replace(results, heading=gone, duration_s=float("nan"), figures=tuple(figures))
+    return replace(results, answers=by_analysis(gone), duration_s=float("nan"), figures=tuple(figures))
 
 
 def with_one_sample(results: FlightResults) -> FlightResults:
@@ -369,7 +370,7 @@ def test_a_log_without_taxi_says_what_the_method_needs(tmp_path: Path) -> None:
 
 
 def test_every_chapter_has_its_own_anchor(tmp_path: Path) -> None:
-    results = example(heading_result(), inertial=inertial_result(), forecast=forecast_result())
+    results = example(heading_result(), inertial_result(), forecast_result())
     save(tmp_path, results, MANIFEST)
     document = flight_document(load(tmp_path))
     keys = [section.key for section in document.sections]

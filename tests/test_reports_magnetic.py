@@ -13,7 +13,7 @@ from groundstation.reports.sections.magnetic import build
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SUMMARY, load, save
 from groundstation.results.flight import FlightResults, NotAssessable
-from groundstation.results.magnetic import ADVISORY
+from groundstation.results.magnetic import ADVISORY, MagneticResult
 from tests.report_example import example
 from tests.test_magnetic_run import figure_eight
 from tests.test_reports import HOSTILE, Page, report
@@ -54,7 +54,7 @@ def test_the_chapter_stands_whole(folder: Path) -> None:
 
 
 def test_coefficients_and_card_are_those_of_the_result(folder: Path) -> None:
-    found = figure_eight().magnetic
+    found = figure_eight().answer(MagneticResult)
     assert found is not None
     section = chapter(folder)
     iron = found.method("poisson_attitude")
@@ -67,7 +67,7 @@ def test_coefficients_and_card_are_those_of_the_result(folder: Path) -> None:
 
 def test_the_modulus_is_refused_with_its_condition_number(folder: Path) -> None:
     row = grid(chapter(folder), "Methods side by side").rows[2]
-    found = figure_eight().magnetic
+    found = figure_eight().answer(MagneticResult)
     assert found is not None
     number = found.method("constant_modulus").condition_number
     assert row[5] == f"{number:.0f}"

@@ -74,7 +74,7 @@ class Paper:
 def flight(tmp_path_factory: pytest.TempPathFactory) -> Paper:
     """A flight with every chapter."""
     folder = tmp_path_factory.mktemp("paper")
-    results = example(heading_result(), inertial=inertial_result(), forecast=forecast_result())
+    results = example(heading_result(), inertial_result(), forecast_result())
     figures = (*results.figures, *inertial_result().figures, *forecast_result().figures)
     save(folder, replace(results, figures=figures), MANIFEST)
     made = flight_document(load(folder))

@@ -24,7 +24,7 @@ from groundstation.pipeline.workers import TASKS_PER_PROCESS, _teller, in_turn, 
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 SHORT = SAMPLES / "taxi-short.csv"
-SETTINGS = Configuration(heading={"standstill_min_s": 12.0}, files={"heading": "ours.toml"})
+SETTINGS = Configuration({"heading": {"standstill_min_s": 12.0}}, files={"heading": "ours.toml"})
 PROMISED = ("summary.json", "report.html", "report.pdf")  # equal to the byte, and so are tables/ and index.*
 
 
@@ -101,7 +101,7 @@ def test_a_changed_setting_keeps_the_mcap_and_gives_what_a_new_run_gives(finishe
 
 
 def test_a_limit_of_the_ledger_redoes_everything(finished: Path) -> None:
-    changed = Configuration(thresholds={"version": 1, "gaps": {"min_s": 0.7}}, files={"thresholds": "ours.toml"})
+    changed = Configuration({"thresholds": {"version": 1, "gaps": {"min_s": 0.7}}}, files={"thresholds": "ours.toml"})
     (planned,) = plan_many([SHORT], finished, changed)
     assert planned.text == "to run"
 

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 import rerun as rr
 
+from groundstation.results.answer import by_analysis
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable
-from groundstation.results.inertial import RealOutage
+from groundstation.results.forecast import ForecastResult
+from groundstation.results.inertial import InertialResult, RealOutage
 from groundstation.tables.table import Flight
 from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.recorder import Line, Recorder
@@ -90,22 +92,22 @@ def test_figures_asked_first_stand_in_the_panels(contents: Contents) -> None:
 
 
 def test_an_aided_ins_is_told_in_both_panels(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
-    aided = replace(results, inertial=inertial_result(flight.duration_s, kind="gnss_aided"))
-    contents = written(tmp_path, flight, aided)
+    aided = inertial_result(flight.duration_s, kind="gnss_aided")
+    contents = written(tmp_path, flight, replace(results, answers={**results.answers, **by_analysis(aided)}))
     for entity in ("/inertial/answer", "/forecast/answer"):
         assert contents.text(entity).startswith("# This INS is aided by GNSS: a forecast from it means nothing")
 
 
 def test_reasons_stand_in_place_of_results(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
     reasons = (NotAssessable("inertial", "GNSS for a minute only"), NotAssessable("forecast", "too short"))
-    contents = written(tmp_path, flight, replace(results, inertial=None, forecast=None, not_assessable=reasons))
+    contents = written(tmp_path, flight, replace(results, answers={}, not_assessable=reasons))
     assert "GNSS for a minute only" in contents.text("/inertial/answer")
     assert "too short" in contents.text("/forecast/answer")
 
 
 def test_without_results_and_reasons_there_are_no_tabs(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
     figures = tuple(item for item in results.figures if not item.name.startswith(("inertial", "forecast")))
-    contents = written(tmp_path, flight, replace(results, inertial=None, forecast=None, figures=figures))
+    contents = written(tmp_path, flight, replace(results, answers={}, figures=figures))
     entities = [*contents.batches, *contents.fixed]
     assert not [entity for entity in entities if entity.startswith(("/inertial", "/forecast"))]
 
@@ -125,19 +127,19 @@ def test_a_recording_is_written_whatever_the_figures_lack(
                 columns[name] = np.full(len(values), np.nan if kind == "nan" else 1e300)
         return FigureData(item.name, columns, item.digits)
 
-    assert results.inertial is not None and results.forecast is not None
-    names = {item.name for item in (*results.inertial.figures, *results.forecast.figures)}
+    answers = [results.answer(InertialResult), results.answer(ForecastResult)]
+    names = {item.name for answer in answers if answer for item in answer.figures}
     figures = [changed(item) if item.name in names else item for item in results.figures]
     shown = tuple(item for item in figures if kind != "none" or item.name not in names)
-    inertial, forecast = replace(results.inertial, figures=()), replace(results.forecast, figures=())
-    contents = written(tmp_path, flight, replace(results, inertial=inertial, forecast=forecast, figures=shown))
+    bare = by_analysis(*(replace(answer, figures=()) for answer in answers if answer))
+    contents = written(tmp_path, flight, replace(results, answers=bare, figures=shown))
     assert "nmi/h" in contents.text("/inertial/answer")
 
 
 def test_panels_tell_what_is_not_known() -> None:
     outages = (RealOutage(0.0, 20.0, 20.0, 3.0, 4.0, "ins"), RealOutage(50.0, 90.0, 40.0, None, None, "both"))
     changes = {"outages": outages, "reopened": 3, "other_ins": ("ins.1",), "settings": {"noise.drift_rate_dphph": 0.01}}
-    alone = tuple(
+    north, east = (
         replace(
             channel,
             nis_low=None,
@@ -149,7 +151,7 @@ def test_panels_tell_what_is_not_known() -> None:
         )
         for channel in inertial_result().channels
     )
-    text = inertial_text(inertial_result(kind="unknown", channels=alone, **changes))
+    text = inertial_text(inertial_result(kind="unknown", north=north, east=east, **changes))
     assert text.startswith("# Whether GNSS corrects this INS cannot be told")
     assert "| 0 s | INS | 20 s | 3 m | 4 m |" in text and "| 50 s | both | 40 s | neither returned | – |" in text
     assert "| drift rate | not estimated in this class | – |" in text and "| 3 times |" in text and "ins\\.1" in text

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from groundstation.results.answer import by_analysis
 from groundstation.results.flight import NotAssessable
-from groundstation.results.magnetic import ADVISORY
+from groundstation.results.magnetic import ADVISORY, MagneticResult
 from groundstation.viewer.recording import write_recording
 from groundstation.viewer.tabs.magnetic_text import magnetic_text
 from tests.recording_contents import Contents
@@ -37,8 +38,9 @@ def test_errors_and_modulus_are_those_of_the_result(contents: Contents) -> None:
 
 def test_field_lies_on_the_sphere_once_it_is_freed_of_the_iron() -> None:
     found = figure_eight()
-    assert found.magnetic is not None
-    declination = found.magnetic.declination
+    magnetic = found.answer(MagneticResult)
+    assert magnetic is not None
+    declination = magnetic.declination
     assert declination.horizontal_nt is not None and declination.down_nt is not None
     figure = next(figure for figure in found.figures if figure.name == "magnetic_field")
     strength = np.hypot(declination.horizontal_nt, declination.down_nt)
@@ -56,7 +58,7 @@ def test_sphere_and_eight_are_in_the_tab(contents: Contents) -> None:
 
 
 def test_text_holds_verdict_card_and_reasons() -> None:
-    found = figure_eight().magnetic
+    found = figure_eight().answer(MagneticResult)
     assert found is not None
     text = magnetic_text(found)
     assert text.startswith("# Magnetic deviation: accept")
@@ -68,9 +70,10 @@ def test_text_holds_verdict_card_and_reasons() -> None:
 def test_without_a_result_and_with_empty_figures_the_tab_stands(tmp_path: Path) -> None:
     flight, results = simulated("magnetic-eight").flight, figure_eight()
     reason = (NotAssessable("magnetic", "no opposite turns"),)
-    write_recording(tmp_path / "a.rrd", flight, replace(results, magnetic=None, figures=(), not_assessable=reason))
-    assert results.magnetic is not None
-    bare = replace(results, magnetic=replace(results.magnetic, figures=()), figures=())
+    write_recording(tmp_path / "a.rrd", flight, replace(results, answers={}, figures=(), not_assessable=reason))
+    magnetic = results.answer(MagneticResult)
+    assert magnetic is not None
+    bare = replace(results, answers=by_analysis(replace(magnetic, figures=())), figures=())
     write_recording(tmp_path / "b.rrd", flight, bare)
     assert Contents(tmp_path / "a.rrd").text("/magnetic/answer").startswith("# Magnetic deviation not assessed")
     assert Contents(tmp_path / "b.rrd").text("/magnetic/answer").startswith("# Magnetic deviation: accept")

@@ -7,6 +7,7 @@ from groundstation.base.findings import Finding
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.records import Column
 from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.results.answer import by_analysis
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.heading import Gate, HeadingResult, OnboardComparison, Standstill, TaxiSegment
@@ -304,8 +305,6 @@ def make_results(
             Finding("info", "reader.assumed_utc", "times without a zone are read as UTC"),
         ),
         not_assessable=missing,
-        heading=heading_result(heading) if with_heading else None,
-        inertial=inertial,
-        forecast=forecast,
+        answers=by_analysis(heading_result(heading) if with_heading else None, inertial, forecast),
         figures=(*pipeline_figures(flight), *heading, *inertial.figures, *forecast.figures),
     )

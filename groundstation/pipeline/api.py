@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
 from groundstation.integrity.limits import Thresholds
-from groundstation.pipeline.analyse import analyse, user_settings
+from groundstation.pipeline.analyse import analyse
 from groundstation.pipeline.configuration import SECTIONS, Configuration, load_configuration
 from groundstation.pipeline.convert import Converted, convert_log
 from groundstation.pipeline.describe import facts_of
@@ -132,11 +132,11 @@ class OpenLog(OpenFlight):
     def __init__(self, conversion: Conversion, configuration: Configuration) -> None:
         self.configuration = configuration
         self._conversion = conversion
-        self._settings = user_settings(configuration)
+        self._thresholds = configuration.settings.thresholds
 
     @property
     def _converted(self) -> Converted:
-        return self._conversion.read(self._settings.thresholds)[0]
+        return self._conversion.read(self._thresholds)[0]
 
     @property
     def source(self) -> Source:
@@ -156,7 +156,7 @@ class OpenLog(OpenFlight):
 
     @cached_property
     def flight(self) -> Flight:
-        return self._conversion.read(self._settings.thresholds)[1]
+        return self._conversion.read(self._thresholds)[1]
 
     @cached_property
     def results(self) -> FlightResults:

@@ -11,6 +11,7 @@ import numpy as np
 from groundstation.base.errors import NotAssessableError, UsageError
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.records import MAX_BATCH_ROWS, Column, RecordBatch
+from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.convert import census_of, recounted
 from groundstation.pipeline.inputs import CORRECTED
@@ -24,11 +25,15 @@ from groundstation.results.deviation import (
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SUMMARY
 from groundstation.results.flight import FlightResults
+from groundstation.results.heading import HeadingResult
+from groundstation.results.inertial import InertialResult
+from groundstation.results.latency import Latencies
+from groundstation.results.magnetic import MagneticResult
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:
     from groundstation.estimators.magnetic.corrected import CorrectedHeading
-    from groundstation.pipeline.analyse import UserSettings
+    from groundstation.pipeline.configuration import UserSettings
     from groundstation.store.info import StoreInfo
 
 OWN = "own"
@@ -150,7 +155,9 @@ def apply_deviation(flight: Flight, results: FlightResults, asked: Apply | None,
         why = f" ({deviation.verdict_reason})" if deviation.verdict_reason else ""
         return _not_applied(results, f"{whose} is rejected{why}", "warn")
     try:
-        corrected = correct_heading(flight, deviation, settings=settings.magnetic, latencies=results.latency)
+        corrected = correct_heading(
+            flight, deviation, settings=settings.of(MagneticSettings), latencies=results.answer(Latencies)
+        )
     except NotAssessableError as error:
         return _not_applied(results, str(error).removeprefix("magnetic: "), "info")
     findings = [_told(corrected, deviation, whose)]
@@ -161,7 +168,7 @@ def apply_deviation(flight: Flight, results: FlightResults, asked: Apply | None,
 
 
 def _own(results: FlightResults) -> Deviation | None:
-    found = results.magnetic
+    found = results.answer(MagneticResult)
     return deviation_of(found, results.flight_id, results.metadata.get("aircraft", "")) if found else None
 
 
@@ -200,7 +207,7 @@ def _judged(
     from groundstation.estimators.magnetic.corrected import judge
     from groundstation.tables.phases import flight_phases
 
-    inertial = results.inertial
+    inertial = results.answer(InertialResult)
     found = judge(
         flight,
         corrected,
@@ -208,7 +215,7 @@ def _judged(
         kinds={inertial.ins_topic: inertial.kind} if inertial else {},
         ins_error_deg=_ins_error_deg(results, corrected.ins_topic),
         aircraft=settings.aircraft,
-        settings=settings.magnetic,
+        settings=settings.of(MagneticSettings),
     )
     if found is None:
         return []
@@ -224,7 +231,7 @@ def _judged(
 
 def _ins_error_deg(results: FlightResults, ins_topic: str) -> float:
     """Error of the INS heading where it is known: at the figure, or as taxi shows it."""
-    magnetic, heading = results.magnetic, results.heading
+    magnetic, heading = results.answer(MagneticResult), results.answer(HeadingResult)
     if magnetic is not None and magnetic.ins_topic == ins_topic:
         return magnetic.alignment.error_deg
     if heading is None or heading.ins_topic != ins_topic or heading.verdict == "reject":

@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path, PurePath
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.analyse import user_settings
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.depot import FarDepot, FolderDepot
 from groundstation.pipeline.elsewhere import far_logs, is_far
@@ -193,7 +192,6 @@ def plan_many(
 
 def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configuration) -> tuple[tuple[str, bool], ...]:
     """Logs by path or URL, in a stable order, each with whether the user named it."""
-    user_settings(configuration)  # a wrong setting is told before an hour of work
     near = [Path(path) for path in paths if not is_far(str(path))]
     found = {log: named for path in paths if is_far(str(path)) for log, named in far_logs(str(path))}
     found |= {str(one.path): one.is_named for one in collect(near, None if is_far(str(out)) else Path(out))}

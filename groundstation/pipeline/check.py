@@ -9,7 +9,6 @@ from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.base.findings import SEVERITIES, Finding, worst
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.integrity.limits import Thresholds, shipped
-from groundstation.pipeline.analyse import configured_thresholds
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.convert import census_of, has_other_limits, recounted, stored_findings
 from groundstation.pipeline.describe import facts_of
@@ -68,7 +67,7 @@ def check_many(
     UsageError
         When a log is missing, is a folder, or a threshold is wrong.
     """
-    thresholds = configured_thresholds(configuration)
+    thresholds = configuration.settings.thresholds
     for path in paths:
         if not path.exists():
             raise UsageError(str(path), "no such file")

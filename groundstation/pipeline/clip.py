@@ -14,7 +14,7 @@ from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.limits import Thresholds
 from groundstation.integrity.spans import is_span
-from groundstation.pipeline.analyse import analyse, configured_thresholds
+from groundstation.pipeline.analyse import analyse
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.convert import Converted, census_of, convert_log, recounted, stored_findings
 from groundstation.pipeline.describe import facts_of
@@ -95,7 +95,7 @@ def clip(
         When the flight cannot be read, or nothing is left of the part.
     """
     settings = configuration or Configuration()
-    limits = configured_thresholds(settings)
+    limits = settings.settings.thresholds
     source = file_in(path, ".mcap") if path.is_dir() else path
     _expect_free(source, target, with_recording, force)
     log = open_log(source, settings.profile_path)

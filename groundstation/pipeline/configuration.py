@@ -5,14 +5,20 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from groundstation.base.errors import SettingsError
+from groundstation.base.toml_settings import settings_from
+from groundstation.estimators.analyses import FLIGHT_ANALYSES
+from groundstation.estimators.known import AircraftData, SiteData
+from groundstation.integrity.limits import Thresholds, thresholds_from
 
 if TYPE_CHECKING:
     from groundstation.pipeline.apply_deviation import Apply
 
-TABLES = ("heading", "inertial", "latency", "magnetic", "magnetic_ground", "aircraft", "site", "thresholds")
+S = TypeVar("S")
+FLIGHT_TABLES = tuple(dict.fromkeys(analysis.settings_table for analysis in FLIGHT_ANALYSES))
+TABLES = (*FLIGHT_TABLES, "aircraft", "site", "thresholds")
 SECTIONS = (*TABLES, "exclude", "force")
 Settings = Path | Mapping[str, Any]  # a TOML file, or its content
 
@@ -27,40 +33,81 @@ class Interval:
 
 
 @dataclass(frozen=True)
-class Configuration:
-    """Everything a user may set for a run, as read from TOML; plain values, so that it travels to worker processes.
+class UserSettings:
+    """What the user set, as the dataclasses that are worked with: shipped values where nothing is set.
 
-    ``heading``, ``inertial``, ``latency``, ``magnetic``, ``magnetic_ground``, ``aircraft``, ``site`` and ``thresholds``
-    are the tables as written; they become dataclasses where used. ``apply`` is the deviation to add to the magnetic
-    heading.
+    ``analyses`` holds the settings of every analysis by the name of their table.
     """
 
-    heading: Mapping[str, Any] = field(default_factory=dict)
-    inertial: Mapping[str, Any] = field(default_factory=dict)
-    latency: Mapping[str, Any] = field(default_factory=dict)
-    magnetic: Mapping[str, Any] = field(default_factory=dict)
-    aircraft: Mapping[str, Any] = field(default_factory=dict)
-    site: Mapping[str, Any] = field(default_factory=dict)
+    analyses: Mapping[str, Any]
+    aircraft: AircraftData
+    site: SiteData
+    thresholds: Thresholds
+
+    def of(self, kind: type[S]) -> S:
+        """The settings of that type."""
+        return next(found for found in self.analyses.values() if isinstance(found, kind))
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Everything a user may set for a run. Parsed once, when it is made; worker processes get the values.
+
+    Parameters
+    ----------
+    tables : mapping
+        The TOML tables as written, by name: those of the analyses, ``aircraft``, ``site`` and ``thresholds``.
+    exclude, force : tuple of Interval
+    profile : str, optional
+        Path of the layout of logs that no reader knows.
+    files : mapping
+        The file that a table was read from, for messages.
+    apply : Apply, optional
+        The deviation to add to the magnetic heading.
+
+    Raises
+    ------
+    SettingsError
+        For an unknown key or a value that cannot be used, naming file and key.
+    """
+
+    tables: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     exclude: tuple[Interval, ...] = ()
     force: tuple[Interval, ...] = ()
     profile: str | None = None
     files: Mapping[str, str] = field(default_factory=dict)
-    thresholds: Mapping[str, Any] = field(default_factory=dict)
     apply: "Apply | None" = None
-    magnetic_ground: Mapping[str, Any] = field(default_factory=dict)
+    settings: UserSettings = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "settings", self._parsed())
+
+    def _parsed(self) -> UserSettings:
+        types = {analysis.settings_table: analysis.settings for analysis in FLIGHT_ANALYSES}
+        settings = UserSettings(
+            {name: self._table(name, kind) for name, kind in types.items()},
+            self._table("aircraft", AircraftData),
+            self._table("site", SiteData),
+            thresholds_from(self.tables.get("thresholds", {}), self._file_of("thresholds"), "thresholds"),
+        )
+        for analysis in FLIGHT_ANALYSES:
+            analysis.check(settings.analyses[analysis.settings_table], settings.aircraft)
+        return settings
+
+    def _table(self, name: str, kind: type[S]) -> S:
+        return settings_from(kind, self.tables.get(name, {}), self._file_of(name), name)
+
+    def _file_of(self, table: str) -> str:
+        return self.files.get(table, "settings")
 
     @property
     def profile_path(self) -> Path | None:
         """The profile as a path."""
         return Path(self.profile) if self.profile else None
 
-    def file_of(self, section: str) -> str:
-        """The file a section was read from, for messages."""
-        return self.files.get(section, "settings")
-
     def to_dict(self) -> dict[str, Any]:
         """Plain values for the manifest and the MCAP; only what the user set."""
-        document: dict[str, Any] = {name: dict(getattr(self, name)) for name in TABLES if getattr(self, name)}
+        document: dict[str, Any] = {name: dict(self.tables[name]) for name in TABLES if self.tables.get(name)}
         for name in ("exclude", "force"):
             intervals = [{"from": part.start, "to": part.end, "reason": part.reason} for part in getattr(self, name)]
             if intervals:
@@ -120,14 +167,7 @@ def load_configuration(
         if not isinstance(document.get(name, {}), Mapping):
             raise SettingsError(f"{_name(config)}, {name}", repr(document[name]), f"a table [{name}]")
     return Configuration(
-        heading=document.get("heading", {}),
-        inertial=document.get("inertial", {}),
-        latency=document.get("latency", {}),
-        magnetic=document.get("magnetic", {}),
-        magnetic_ground=document.get("magnetic_ground", {}),
-        aircraft=document.get("aircraft", {}),
-        site=document.get("site", {}),
-        thresholds=document.get("thresholds", {}),
+        {name: document[name] for name in TABLES if name in document},
         exclude=_intervals(document.get("exclude", []), f"{_name(intervals or config)}, exclude"),
         force=_intervals(document.get("force", []), f"{_name(intervals or config)}, force"),
         profile=str(profile) if profile else None,

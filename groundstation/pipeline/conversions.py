@@ -5,7 +5,6 @@ from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.integrity.limits import Thresholds
-from groundstation.pipeline.analyse import configured_thresholds
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.convert import convert_log
 from groundstation.pipeline.log import open_log
@@ -31,7 +30,7 @@ def convert_many(
         When a log is missing, the target exists and ``force`` is not given, or a threshold is wrong.
     """
     configuration = configuration or Configuration()
-    thresholds = configured_thresholds(configuration)
+    thresholds = configuration.settings.thresholds
     profile = configuration.profile_path
     for log in logs:
         if not log.exists():

@@ -12,7 +12,8 @@ from pathlib import Path, PurePosixPath
 from groundstation.base.errors import UnclaimedLogError, UnreadableLogError
 from groundstation.base.findings import SEVERITIES, Severity, worst
 from groundstation.base.records import RecordBatch
-from groundstation.pipeline.analyse import Given, analyse, configured_thresholds, user_settings
+from groundstation.estimators.analyses import FLIGHT_ANALYSES
+from groundstation.pipeline.analyse import Given, analyse
 from groundstation.pipeline.apply_deviation import apply_deviation, corrected_name, write_corrected
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.convert import Converted, convert_log, stored_findings
@@ -142,7 +143,7 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         converted = _taken_over(job.finished.mcap, mcap)
     else:
         with watch.stage("converting"):
-            converted = convert_log(log, mcap, configured_thresholds(job.configuration))
+            converted = convert_log(log, mcap, job.configuration.settings.thresholds)
         _require_unchanged(log, version)
     with watch.stage("reading the MCAP"):
         flight = read_flight(mcap, converted)
@@ -152,11 +153,11 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         identity += f"_{log.source.sha256[:8]}"
     with watch.stage("estimating"):
         results = analyse(flight, given_of(log, converted, identity), job.configuration)
-        applied = apply_deviation(flight, results, job.configuration.apply, user_settings(job.configuration))
+        applied = apply_deviation(flight, results, job.configuration.apply, job.configuration.settings)
         results = applied.results
     with watch.stage("saving"):
         corrected = partial / corrected_name(identity)
-        write_corrected(corrected, converted.info, flight, applied, configured_thresholds(job.configuration))
+        write_corrected(corrected, converted.info, flight, applied, job.configuration.settings.thresholds)
         mcap.rename(partial / f"{identity}.mcap")
         text = sentence(results)
         keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf)
@@ -231,53 +232,11 @@ def _state(gravest: Severity | None, has_lost_data: bool, fail_on: str) -> State
 
 def sentence(results: FlightResults) -> str:
     """What was found, in one line."""
-    told = (_heading_sentence(results), _inertial_sentence(results), _magnetic_sentence(results))
-    on_ground = [finding.text for finding in results.findings if finding.code == "magnetic_ground.found"]
-    found = [text for text in (*told, *on_ground) if text]
+    found = [text for analysis in FLIGHT_ANALYSES if (text := analysis.sentence(results.answers))]
     if found:
         return "; ".join(found)
     reasons = "; ".join(f"{entry.analysis}: {entry.reason}" for entry in results.not_assessable)
     return f"not assessable: {reasons or 'no analysis applies'}"
-
-
-def _heading_sentence(results: FlightResults) -> str:
-    heading = results.heading
-    if heading is None:
-        return ""
-    low, high = heading.confidence95_deg
-    text = f"{heading.verdict}: heading error {heading.error_deg:+.3f} deg, 95 % {low:+.3f} to {high:+.3f}"
-    if heading.correction_deg is not None:
-        return f"{text}, enter {heading.correction_deg:+g} deg"
-    return f"{text} ({heading.verdict_reason})"
-
-
-def _inertial_sentence(results: FlightResults) -> str:
-    inertial, forecast = results.inertial, results.forecast
-    if inertial is None:
-        return ""
-    if inertial.kind == "gnss_aided":
-        return "INS corrected by GNSS already, no forecast"
-    if inertial.kind == "unknown":
-        return "INS errors estimated, too little to tell whether GNSS corrects it"
-    parts = []
-    if inertial.radial_error_rate_50_nmiph is not None:
-        parts.append(f"{inertial.radial_error_rate_50_nmiph:.2f} nmi/h")
-    if forecast is not None:
-        shipped = [row for row in forecast.skill if row.method == forecast.default_method]
-        longest = max(shipped, key=lambda row: row.horizon_min, default=None)
-        if longest is not None:
-            parts.append(f"forecast {longest.rms_m:.0f} m after {longest.horizon_min:g} min")
-    return f"INS {', '.join(parts)}" if parts else "INS errors estimated"
-
-
-def _magnetic_sentence(results: FlightResults) -> str:
-    magnetic = results.magnetic
-    if magnetic is None:
-        return ""
-    if magnetic.verdict == "reject" or magnetic.residual_rms_deg is None:
-        return f"magnetic deviation {magnetic.verdict} ({magnetic.verdict_reason})"
-    residual = magnetic.residual_rms_deg
-    return f"magnetic deviation {magnetic.verdict}: {residual.before:.2f} deg RMS before, {residual.after:.2f} after"
 
 
 def is_made(name: str, identity: str) -> bool:

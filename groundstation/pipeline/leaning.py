@@ -1,63 +1,29 @@
 """Results that lean on damage: the samples an answer rests on, held against the ledger's damaged spans and gaps."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.timescales import duration_text
+from groundstation.estimators.analysis import RestsOn
 from groundstation.integrity.ledger import gaps_of
 from groundstation.integrity.limits import Thresholds
 from groundstation.integrity.spans import is_span
-from groundstation.results.heading import HeadingResult
-from groundstation.results.inertial import InertialResult
 from groundstation.tables.table import Flight
 
-VELOCITIES = ("velocity_north_mps", "velocity_east_mps")
-HEADING_FIELDS = ("true_heading_deg", "magnetic_heading_deg", "track_deg", "ground_speed_mps", *VELOCITIES)
-INERTIAL_FIELDS = ("latitude_deg", "longitude_deg", *VELOCITIES)
 SHOWN = 3
 Spans = Sequence[tuple[float, float]]
 
 
-class _Use(NamedTuple):
-    """What an answer rests on: topics, fields and spans of flight seconds."""
+def damage_finding(
+    code: str, subject: str, use: RestsOn, ledger: Mapping[str, Any], flight: Flight, thresholds: Thresholds
+) -> Finding | None:
+    """The finding on an answer whose samples overlap damage: a warning; gaps alone are for information.
 
-    code: str
-    title: str
-    topics: tuple[str, ...]
-    fields: tuple[str, ...]
-    spans_s: Spans
-
-
-def leaning_findings(
-    flight: Flight,
-    ledger: Mapping[str, Any],
-    heading: HeadingResult | None,
-    inertial: InertialResult | None,
-    thresholds: Thresholds,
-) -> tuple[Finding, ...]:
-    """Findings on answers whose samples overlap damage: a warning; gaps alone are for information.
-
-    Codes ``heading.damaged_span``, ``inertial.damaged_span``. Damage without a place in time is in the ledger,
-    and in no such finding.
+    Damage without a place in time is in the ledger, and in no such finding.
     """
-    uses = []
-    if heading is not None and heading.segments:
-        spans = [(segment.start_s, segment.end_s) for segment in heading.segments]
-        topics = (heading.ins_topic, heading.gnss_topic)
-        uses.append(_Use("heading.damaged_span", "heading correction", topics, HEADING_FIELDS, spans))
-    if inertial is not None:
-        topics = (inertial.ins_topic, inertial.gnss_topic)
-        both = [flight.time_s(topic) for topic in topics]
-        spans = [(max(float(time[0]) for time in both), min(float(time[-1]) for time in both))]
-        uses.append(_Use("inertial.damaged_span", "INS errors", topics, INERTIAL_FIELDS, spans))
-    found = [_finding(use, ledger, flight, thresholds) for use in uses]
-    return tuple(finding for finding in found if finding is not None)
-
-
-def _finding(use: _Use, ledger: Mapping[str, Any], flight: Flight, thresholds: Thresholds) -> Finding | None:
     damaged = [entry for entry in ledger.get("spans", ()) if is_span(entry) and _concerns(entry, use)]
     gaps = _gaps(use, flight, thresholds)
     if not damaged and not gaps:
@@ -68,11 +34,11 @@ def _finding(use: _Use, ledger: Mapping[str, Any], flight: Flight, thresholds: T
         told.append(f"{len(damaged) - SHOWN} more damaged spans")
     told += gaps
     place = "+" + duration_text(float(damaged[0]["start_s"])) if damaged else ""
-    text = f"{use.title}: rests on samples in or around {'; '.join(told)}"
-    return Finding(severity, use.code, text, "", place, len(damaged) + len(gaps))
+    text = f"{subject}: rests on samples in or around {'; '.join(told)}"
+    return Finding(severity, code, text, "", place, len(damaged) + len(gaps))
 
 
-def _concerns(entry: Mapping[str, Any], use: _Use) -> bool:
+def _concerns(entry: Mapping[str, Any], use: RestsOn) -> bool:
     """Whether a span is of what the answer uses, and when it does."""
     topic, field, start_s = entry["topic"], entry["field"], float(entry["start_s"])
     if (topic and topic not in use.topics) or (field and field not in use.fields):
@@ -92,7 +58,7 @@ def _told(entry: Mapping[str, Any]) -> str:
     return f"{what} ({where}from +{duration_text(float(entry['start_s']))} for {float(entry['length_s']):.1f} s)"
 
 
-def _gaps(use: _Use, flight: Flight, thresholds: Thresholds) -> list[str]:
+def _gaps(use: RestsOn, flight: Flight, thresholds: Thresholds) -> list[str]:
     """Gaps of the topics within the spans used, one line a topic."""
     told = []
     for topic in use.topics:

@@ -11,6 +11,7 @@ from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.log import Log
 from groundstation.pipeline.resume import versions
 from groundstation.results.flight import FlightResults
+from groundstation.results.heading import HeadingResult
 
 
 def manifest_of(
@@ -20,6 +21,7 @@ def manifest_of(
 
     ``url`` is where the log is, if this machine has but a copy of it.
     """
+    heading = results.answer(HeadingResult)
     return {
         "groundstation": __version__,
         "flight_id": results.flight_id,
@@ -32,7 +34,7 @@ def manifest_of(
             "reader": log.source.reader,
         },
         "configuration": configuration.to_dict(),
-        "heading_settings": dict(results.heading.settings) if results.heading else {},
+        "heading_settings": dict(heading.settings) if heading else {},
         "host": {
             "platform": platform.platform(),
             "machine": platform.machine(),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from groundstation.base.errors import GroundstationError, NotAssessableError, UsageError, told_in_a_line
 from groundstation.pipeline.flight import sentence
+from groundstation.results.answer import A
 from groundstation.results.files import SavedFlight, mapping
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.forecast import ForecastResult
@@ -99,42 +100,41 @@ class OpenFlight(ABC):
         NotAssessableError
             When the data does not allow it; the message says why.
         """
-        found: HeadingResult = self._answer("heading")
-        return found
+        return self.answer(HeadingResult)
 
     def inertial(self) -> InertialResult:
         """The errors of the INS (system 2); raises as :meth:`heading`."""
-        found: InertialResult = self._answer("inertial")
-        return found
+        return self.answer(InertialResult)
 
     def forecast(self) -> ForecastResult:
         """How far the INS can be trusted without GNSS; raises as :meth:`heading`."""
-        found: ForecastResult = self._answer("forecast")
-        return found
+        return self.answer(ForecastResult)
 
     def latency(self) -> Latencies:
         """How much later each sensor shows the motion that the INS shows; raises as :meth:`heading`."""
-        found: Latencies = self._answer("latency")
-        return found
+        return self.answer(Latencies)
 
     def magnetic(self) -> MagneticResult:
         """The deviation of the magnetic heading (system 3); raises as :meth:`heading`."""
-        found: MagneticResult = self._answer("magnetic")
-        return found
+        return self.answer(MagneticResult)
 
     def magnetic_ground(self) -> GroundDeviation:
         """Error of the installed heading sensor on straight ground runs; raises as :meth:`heading`."""
-        found: GroundDeviation = self._answer("magnetic_ground")
-        return found
+        return self.answer(GroundDeviation)
 
-    def _answer(self, analysis: str) -> Any:
-        results = self.results
-        found = getattr(results, analysis)
+    def answer(self, kind: type[A]) -> A:
+        """The answer of any analysis, by its type.
+
+        Raises
+        ------
+        NotAssessableError
+            When the data does not allow it; the message says why.
+        """
+        found = self.results.answer(kind)
         if found is not None:
             return found
-        reasons = {entry.analysis: entry.reason for entry in results.not_assessable}
-        reason = reasons.get(analysis) or reasons.get("inertial") or "the log does not hold what it needs"
-        raise NotAssessableError(analysis, reason)
+        reasons = self.results.reasons(kind.analysis) or self.results.reasons("inertial")
+        raise NotAssessableError(kind.analysis, reasons[0] if reasons else "the log does not hold what it needs")
 
     @property
     def figures(self) -> dict[str, str]:

@@ -120,12 +120,14 @@ def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool) -> 
     GroundstationError
         When the profile cannot be read.
     """
-    settings = {**asdict(configuration), "files": None, "profile": None}
-    thresholds = settings.pop("thresholds")
+    tables = dict(configuration.tables)
+    thresholds = tables.pop("thresholds", {})
     conversion = _digest(
         asdict(source), _profile_of(configuration), thresholds, dict(versions()), platform.python_version()
     )
-    analysis = _digest(conversion, settings)
+    intervals = [[asdict(part) for part in listed] for listed in (configuration.exclude, configuration.force)]
+    apply = None if configuration.apply is None else asdict(configuration.apply)
+    analysis = _digest(conversion, tables, intervals, apply)
     return Keys(conversion, analysis, _digest(analysis, with_pdf))
 
 

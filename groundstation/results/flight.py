@@ -5,14 +5,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from groundstation.base.findings import Finding
+from groundstation.results.answer import A, Answers, answer_of
 from groundstation.results.figures import FigureData
-from groundstation.results.forecast import ForecastResult
 from groundstation.results.frames import Tabular, no_such_table
-from groundstation.results.heading import HeadingResult
-from groundstation.results.inertial import InertialResult
-from groundstation.results.latency import Latencies
-from groundstation.results.magnetic import MagneticResult
-from groundstation.results.magnetic_ground import GroundDeviation
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,12 +52,8 @@ class FlightResults(Tabular):
     ledger, clock : mapping
         As written to summary.json.
     findings, not_assessable : tuples
-    heading : HeadingResult, optional
-    inertial : InertialResult, optional
-    forecast : ForecastResult, optional
-    latency : Latencies, optional
-    magnetic : MagneticResult, optional
-    magnetic_ground : GroundDeviation, optional
+    answers : mapping of str to Answer
+        By the name of the analysis, in the order they are shown.
     figures : tuple of FigureData
         Arrays behind every figure, those of the analyses among them.
     """
@@ -78,13 +69,16 @@ class FlightResults(Tabular):
     clock: Mapping[str, Any] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     not_assessable: tuple[NotAssessable, ...] = ()
-    heading: HeadingResult | None = None
-    inertial: InertialResult | None = None
-    forecast: ForecastResult | None = None
-    latency: Latencies | None = None
-    magnetic: MagneticResult | None = None
-    magnetic_ground: GroundDeviation | None = None
+    answers: Answers = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
+
+    def answer(self, kind: type[A]) -> A | None:
+        """The answer of that type, None where its analysis has none."""
+        return answer_of(self.answers, kind)
+
+    def reasons(self, *analyses: str) -> tuple[str, ...]:
+        """Why these analyses could not run, those of them that could not."""
+        return tuple(entry.reason for entry in self.not_assessable if entry.analysis in analyses)
 
     def figure(self, name: str) -> FigureData | None:
         """The figure data of that name, None when the flight has none."""

@@ -1,9 +1,10 @@
 """Answer of the forecast mode (system 2): how good a forecast of the INS errors is, replayed on the flight itself."""
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
+from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
-from groundstation.results.frames import Tabular
 
 FEWEST_STARTS = 5  # independent ones: with fewer the limits of NEES are so wide that anything passes
 
@@ -110,7 +111,7 @@ class CoupledRow:
 
 
 @dataclass(frozen=True)
-class ForecastResult(Tabular):
+class ForecastResult(Answer):
     """Forecast skill on one flight.
 
     Parameters
@@ -128,6 +129,8 @@ class ForecastResult(Tabular):
     figures : tuple of FigureData
         ``forecast_map``, ``forecast_fan``, ``forecast_classic``.
     """
+
+    analysis: ClassVar[str] = "forecast"
 
     default_method: str
     first_start_s: float

@@ -1,10 +1,10 @@
 """Answer of the heading estimator (system 1): what the operator types, why, and how sure it is."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
 
+from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
-from groundstation.results.frames import Tabular
 
 GateState = Literal["passed", "failed", "not_measured"]
 Sense = Literal["at_most", "at_least", "between"]
@@ -98,7 +98,7 @@ class OnboardComparison:
 
 
 @dataclass(frozen=True)
-class HeadingResult(Tabular):
+class HeadingResult(Answer):
     """INS heading error found on straight taxi (error = INS heading - true heading).
 
     Parameters
@@ -133,6 +133,8 @@ class HeadingResult(Tabular):
     reference_time_s : float
         Flight time the error belongs to (weighted mean time of the samples).
     """
+
+    analysis: ClassVar[str] = "heading"
 
     ins_topic: str
     gnss_topic: str

@@ -3,10 +3,11 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
-from groundstation.results.frames import Tabular, rows_frame
+from groundstation.results.frames import rows_frame
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -88,7 +89,7 @@ class AzimuthEstimate:
 
 
 @dataclass(frozen=True)
-class InertialResult(Tabular):
+class InertialResult(Answer):
     """INS errors of one flight.
 
     Parameters
@@ -119,6 +120,8 @@ class InertialResult(Tabular):
         ``inertial_states``, ``inertial_observability``, ``inertial_track``.
     """
 
+    analysis: ClassVar[str] = "inertial"
+
     ins_topic: str
     gnss_topic: str
     ins_class: str
@@ -128,7 +131,8 @@ class InertialResult(Tabular):
     transition: str
     epochs: int
     gnss_seconds: float
-    channels: tuple[ChannelResult, ...]
+    north: ChannelResult
+    east: ChannelResult
     radial_error_rate_50_nmiph: float | None
     radial_error_rate_95_nmiph: float | None
     velocity_error_rms_mps: float | None
@@ -140,12 +144,19 @@ class InertialResult(Tabular):
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
 
+    @property
+    def channels(self) -> tuple[ChannelResult, ChannelResult]:
+        """Both channels."""
+        return self.north, self.east
+
     def table_names(self) -> tuple[str, ...]:
         """Names that :meth:`to_frame` takes."""
-        return ("states", *super().table_names())
+        return ("states", "channels", *super().table_names())
 
     def to_frame(self, table: str = "states") -> "pd.DataFrame":
         """A list of rows as a frame (see :class:`Tabular`); ``states`` are those of both channels."""
+        if table == "channels":
+            return rows_frame(ChannelResult, self.channels)
         if table != "states":
             return super().to_frame(table)
         rows = [(channel.name, state) for channel in self.channels for state in channel.states]

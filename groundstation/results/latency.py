@@ -1,10 +1,10 @@
 """Answer of the latency estimator: how much later each sensor shows the motion that the INS shows."""
 
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
+from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
-from groundstation.results.frames import Tabular
 
 Quantity = Literal["velocity", "altitude", "field", "attitude"]
 LatencyState = Literal["observed", "not_observable"]
@@ -52,8 +52,10 @@ class Latency:
 
 
 @dataclass(frozen=True)
-class Latencies(Tabular):
+class Latencies(Answer):
     """Latencies of all pairs of a flight; ``settings`` by name."""
+
+    analysis: ClassVar[str] = "latency"
 
     rows: tuple[Latency, ...]
     settings: dict[str, Any] = field(default_factory=dict)

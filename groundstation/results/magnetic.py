@@ -1,10 +1,10 @@
 """Answer of the magnetic estimator (system 3): the deviation found in flight, how sure it is, what it leaves over."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
 
+from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
-from groundstation.results.frames import Tabular
 from groundstation.results.heading import Gate
 
 MagneticVerdict = Literal["accept", "reject", "undecided"]
@@ -215,7 +215,7 @@ class CardRow:
 
 
 @dataclass(frozen=True)
-class MagneticResult(Tabular):
+class MagneticResult(Answer):
     """Deviation of the magnetic heading found in flight. Advisory, not a release to service.
 
     Parameters
@@ -240,6 +240,8 @@ class MagneticResult(Tabular):
         (360 bins: branches, average, fitted curve, deviation, bank bias), ``magnetic_curves`` (360 bins: deviation and
         its sigma by each method), ``magnetic_modulus`` (before and after).
     """
+
+    analysis: ClassVar[str] = "magnetic"
 
     ins_topic: str
     magnetometer_topic: str

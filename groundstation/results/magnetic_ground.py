@@ -1,10 +1,10 @@
 """Deviation of the installed heading sensor from straight runs on the ground: what each run says, and all together."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
 
+from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
-from groundstation.results.frames import Tabular
 from groundstation.results.magnetic import DeclinationUsed
 
 RunState = Literal["used", "rejected"]
@@ -86,7 +86,7 @@ class Repeat:
 
 
 @dataclass(frozen=True)
-class GroundDeviation(Tabular):
+class GroundDeviation(Answer):
     """Errors of the installed heading sensor on straight ground runs. Advisory, not a release to service.
 
     Parameters
@@ -111,6 +111,8 @@ class GroundDeviation(Tabular):
         ``magnetic_ground_epochs`` (every epoch of the runs), ``magnetic_ground_curve`` (360 bins: error and sigma by A
         to E, NaN where it is not known).
     """
+
+    analysis: ClassVar[str] = "magnetic_ground"
 
     ins_topic: str
     gnss_topic: str

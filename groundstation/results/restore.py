@@ -2,19 +2,35 @@
 
 import types
 import typing
-from collections.abc import Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, fields, is_dataclass, replace
 from typing import Any
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.results.answer import Answer
 from groundstation.results.files import SUMMARY, SavedFlight
 from groundstation.results.flight import FlightResults
+from groundstation.results.forecast import ForecastResult
+from groundstation.results.heading import HeadingResult
+from groundstation.results.inertial import InertialResult
+from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
+from groundstation.results.magnetic_ground import GroundDeviation
+
+KINDS: tuple[type[Answer], ...] = (
+    *(HeadingResult, InertialResult, ForecastResult, Latencies, MagneticResult, GroundDeviation),
+)
 
 
-def restored(saved: SavedFlight) -> FlightResults:
+def restored(saved: SavedFlight, kinds: Iterable[type[Answer]] = KINDS) -> FlightResults:
     """Results of a flight folder as the run had them, but for the digits that summary.json leaves out.
+
+    Parameters
+    ----------
+    saved : SavedFlight
+    kinds : iterable of types
+        Those of the answers; one that the summary has besides is left out.
 
     Returns
     -------
@@ -28,13 +44,9 @@ def restored(saved: SavedFlight) -> FlightResults:
     """
     try:
         summary = saved.summary
-        flight, answers = summary["flight"], dict(summary["results"])
-        if "inertial" in answers:
-            answers["inertial"] = _with_channels(answers["inertial"])
-        start = flight["start_utc"]
+        flight, start = summary["flight"], summary["flight"]["start_utc"]
         document = {
-            **summary,
-            **answers,
+            **{key: value for key, value in summary.items() if key != "results"},
             "flight_id": flight["id"],
             "source": flight["source"],
             "metadata": flight["metadata"],
@@ -42,7 +54,9 @@ def restored(saved: SavedFlight) -> FlightResults:
             "duration_s": flight["duration_s"],
             "figures": tuple(saved.figures.values()),
         }
-        result: FlightResults = _value(FlightResults, document)
+        told = summary["results"]
+        answers = {kind.analysis: _value(kind, told[kind.analysis]) for kind in kinds if kind.analysis in told}
+        result: FlightResults = replace(_value(FlightResults, document), answers=answers)
     except (KeyError, TypeError, ValueError, AttributeError, GroundstationError) as error:
         what = f"a summary that cannot be used ({type(error).__name__}: {error})"
         raise UnreadableLogError(
@@ -61,11 +75,6 @@ def restored_magnetic(summary: Mapping[str, Any]) -> MagneticResult:
     """
     result: MagneticResult = _value(MagneticResult, summary["results"]["magnetic"])
     return result
-
-
-def _with_channels(inertial: Mapping[str, Any]) -> dict[str, Any]:
-    """INS errors with the channels as a list: in the summary each stands under its own name."""
-    return {**inertial, "channels": [inertial[name] for name in ("north", "east") if name in inertial]}
 
 
 def _value(hint: Any, value: Any) -> Any:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.timescales import utc_ns_to_iso
+from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
-from groundstation.results.inertial import InertialResult
 
 SCHEMA_VERSION = 1
 
@@ -91,18 +91,10 @@ def _is_figures(value: Any) -> bool:
     return isinstance(value, tuple) and bool(value) and isinstance(value[0], FigureData)
 
 
-def _answer(result: Any) -> dict[str, Any]:
-    """An analysis as plain values; its arrays have files of their own."""
-    out: dict[str, Any] = plain(result)
+def _answer(answer: Answer) -> dict[str, Any]:
+    """An answer as plain values; its arrays have files of their own."""
+    out: dict[str, Any] = plain(answer)
     out.pop("figures", None)
-    return out
-
-
-def _inertial(result: InertialResult) -> dict[str, Any]:
-    """The INS errors, each channel an object under its own name in place of ``channels``."""
-    out: dict[str, Any] = {}
-    for key, value in _answer(result).items():
-        out |= {channel["name"]: channel for channel in value} if key == "channels" else {key: value}
     return out
 
 
@@ -127,19 +119,7 @@ def summary_of(results: FlightResults) -> dict[str, Any]:
         "source": results.source,
         "metadata": dict(sorted(results.metadata.items())),
     }
-    answers: dict[str, Any] = {}
-    if results.heading is not None:
-        answers["heading"] = _answer(results.heading)
-    if results.inertial is not None:
-        answers["inertial"] = _inertial(results.inertial)
-    if results.forecast is not None:
-        answers["forecast"] = _answer(results.forecast)
-    if results.latency is not None:
-        answers["latency"] = _answer(results.latency)
-    if results.magnetic is not None:
-        answers["magnetic"] = _answer(results.magnetic)
-    if results.magnetic_ground is not None:
-        answers["magnetic_ground"] = _answer(results.magnetic_ground)
+    answers = {name: _answer(answer) for name, answer in results.answers.items()}
     return {
         "schema_version": SCHEMA_VERSION,
         "flight": plain(flight),

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.heading.estimate import estimate_heading_error
-from groundstation.estimators.heading.settings import AircraftData, HeadingSettings
+from groundstation.estimators.heading.settings import HeadingSettings
+from groundstation.estimators.known import AircraftData
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import HeadingResult
 from groundstation.simulation.taxi import Family, TaxiCase, draw_case, simulate_taxi, taxi_flight

@@ -46,8 +46,7 @@ def document(name: str, path: str) -> rrb.TextDocumentView:
 
 def figure_of(results: FlightResults, name: str, *columns: str) -> FigureData | None:
     """Figure data that has rows and every column named, None otherwise: the view is then left out."""
-    answers = (results.heading, results.inertial, results.forecast, results.magnetic, results.magnetic_ground)
-    own = [figure for answer in answers if answer is not None for figure in answer.figures]
+    own = [figure for answer in results.answers.values() for figure in answer.figures]
     found = results.figure(name) or next((figure for figure in own if figure.name == name), None)
     usable = found is not None and len(found) > 0 and all(column in found.columns for column in columns)
     return found if usable else None

@@ -14,10 +14,11 @@ from groundstation.estimators.heading.references import (
     parking_heading,
     runway_checks,
 )
-from groundstation.estimators.heading.settings import AircraftData, HeadingSettings, SiteData
+from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.solution import Solution
 from groundstation.estimators.heading.standstill import StandstillData
 from groundstation.estimators.heading.verdict import Figures, build_gates, decide, explain, round_to_step
+from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import HeadingResult, Standstill, TaxiSegment
 from groundstation.tables.table import Flight

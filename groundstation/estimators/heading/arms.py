@@ -24,7 +24,8 @@ from groundstation.estimators.heading.interval import (
     misfit,
 )
 from groundstation.estimators.heading.samples import Samples
-from groundstation.estimators.heading.settings import AircraftData, HeadingSettings
+from groundstation.estimators.heading.settings import HeadingSettings
+from groundstation.estimators.known import AircraftData
 
 FloatArray = NDArray[np.float64]
 ERROR_PRIOR_SIGMA_DEG = 0.3  # of the median of the straight samples, as the error that the turns share

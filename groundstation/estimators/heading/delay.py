@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-from groundstation.estimators.heading.settings import AircraftData, HeadingSettings
+from groundstation.estimators.heading.settings import HeadingSettings
+from groundstation.estimators.known import AircraftData
 from groundstation.estimators.latency.settings import BOUND95
 from groundstation.results.latency import Latencies
 

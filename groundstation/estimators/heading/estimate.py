@@ -10,9 +10,10 @@ from groundstation.estimators.heading.answer import build_answer
 from groundstation.estimators.heading.delay import known_delay
 from groundstation.estimators.heading.gating import gate_samples
 from groundstation.estimators.heading.samples import HeadingOf, OnGround, Samples, choose_topics, pair_samples
-from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings, SiteData
+from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.heading.solution import solve
 from groundstation.estimators.heading.standstill import find_standstill
+from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.results.heading import HeadingResult
 from groundstation.results.latency import Latencies
 from groundstation.tables.table import Flight

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from groundstation.base.angles import wrap_180
 from groundstation.base.records import BoolArray
 from groundstation.estimators.heading.samples import GATE_TEXT, USED, Samples
-from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings, Interval
+from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.estimators.known import Interval
 
 
 def gate_samples(samples: Samples, settings: HeadingSettings, request: HeadingRequest) -> Samples:

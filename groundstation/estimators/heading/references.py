@@ -11,8 +11,9 @@ from groundstation.base.angles import mean_heading, wrap_180, wrap_360
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.heading.samples import Samples
-from groundstation.estimators.heading.settings import HeadingSettings, SiteData
+from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.standstill import effective_samples
+from groundstation.estimators.known import SiteData
 from groundstation.results.heading import HeadingResult, OnboardComparison, RunwayCheck
 from groundstation.tables.table import Flight
 
@@ -105,7 +106,7 @@ def reference_conflict(flight_metadata: Mapping[str, str], site: SiteData) -> st
 
     Examples
     --------
-    >>> from groundstation.estimators.heading.settings import Stand
+    >>> from groundstation.estimators.known import Stand
     >>> reference_conflict({"reference.parking_heading_deg": "311"}, SiteData((Stand("7", 310.0),)))
     'references of the parking heading disagree: 310.00 deg (site file, stand 7), 311.00 deg (log); the former is used'
     """

@@ -20,8 +20,9 @@ from groundstation.estimators.heading.interval import (
 )
 from groundstation.estimators.heading.recursion import Running, run_recursion
 from groundstation.estimators.heading.samples import Samples, without_arm
-from groundstation.estimators.heading.settings import AircraftData, HeadingSettings
+from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.standstill import StandstillData
+from groundstation.estimators.known import AircraftData
 from groundstation.results.heading import TaxiSegment
 
 FloatArray = NDArray[np.float64]

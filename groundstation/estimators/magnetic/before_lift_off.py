@@ -10,7 +10,8 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.samples import choose_topics
-from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings
+from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.gyros import GyroDrift, gyro_drift
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.heading import HeadingResult

@@ -11,7 +11,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.heading.settings import AircraftData
+from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.apply import corrected_by_coefficients, corrected_by_iron, corrected_by_table
 from groundstation.estimators.magnetic.attitude import levelled_heading_deg
 from groundstation.estimators.magnetic.estimate import IN_THE_AIR

@@ -9,7 +9,8 @@ import numpy as np
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray
-from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings
+from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.alignment import S_PER_H, align
 from groundstation.estimators.magnetic.before_lift_off import HeadingBasis, find_ground_runs, gyros_at_standstill
 from groundstation.estimators.magnetic.compass_table import CompassTable, build_table

@@ -20,7 +20,8 @@ from groundstation.estimators.heading.samples import (
     distinct_epochs,
     pair_samples,
 )
-from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings, Interval
+from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.estimators.known import AircraftData, Interval
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import DeclinationUsed

@@ -16,8 +16,8 @@ from groundstation.base.units import DEG_PER_RAD
 from groundstation.estimators.heading.interval import Differences, Regressor, error_posterior
 from groundstation.estimators.heading.lines import fitted_lines, window_bounds
 from groundstation.estimators.heading.samples import OnGround, Samples
-from groundstation.estimators.heading.settings import AircraftData
 from groundstation.estimators.heading.solution import take_samples
+from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.compass_table import CENTRES_DEG
 from groundstation.estimators.magnetic.ground_epochs import (
     ANALYSIS,

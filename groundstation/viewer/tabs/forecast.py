@@ -8,6 +8,7 @@ from groundstation.base.timescales import duration_text
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import METHODS, ForecastResult
+from groundstation.results.inertial import InertialResult
 from groundstation.viewer import colours
 from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.names import words
@@ -28,10 +29,10 @@ CLAIMED = Line("± 1.96 σ", colours.HONEST, THIN)
 def forecast(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the forecast tab; None when the flight was not assessed and no reason is known."""
     reasons = [entry.reason for entry in results.not_assessable if entry.analysis == "forecast"]
-    answer = results.forecast
+    answer, inertial = results.answer(ForecastResult), results.answer(InertialResult)
     if answer is None and not reasons:
         return None
-    kind = results.inertial.kind if results.inertial is not None else "unaided"
+    kind = inertial.kind if inertial is not None else "unaided"
     recorder.document("forecast/answer", forecast_text(answer, reasons, kind=kind))
     text = document("How far a forecast can be trusted", "forecast/answer")
     rows: list[rrb.Container] = []

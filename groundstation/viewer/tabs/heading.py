@@ -6,6 +6,7 @@ import rerun.blueprint as rrb
 from groundstation.results.explain import explained
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
+from groundstation.results.heading import HeadingResult
 from groundstation.viewer import colours
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after, wraps_after
@@ -23,9 +24,10 @@ MARGIN, SMALLEST_MARGIN_DEG = 0.15, 0.05
 def heading(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the heading tab; None when the flight was not assessed and no reason is known."""
     reasons = [explained("heading", entry.reason) for entry in results.not_assessable if entry.analysis == "heading"]
-    if results.heading is None and not reasons:
+    answer = results.answer(HeadingResult)
+    if answer is None and not reasons:
         return None
-    recorder.document("heading/verdict", verdict_text(results.heading, reasons))
+    recorder.document("heading/verdict", verdict_text(answer, reasons))
     verdict = document("Verdict and the number to type", "heading/verdict")
     plots = [*_difference(recorder, results), *_taxi(recorder, results), *_lanes(recorder, results)]
     pictures = [
@@ -115,7 +117,8 @@ def _taxi(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
 
 
 def _speed_limit(results: FlightResults) -> float:
-    settings = {} if results.heading is None else results.heading.settings
+    answer = results.answer(HeadingResult)
+    settings = {} if answer is None else answer.settings
     value = settings.get("taxi_speed_min_mps", SPEED_LIMIT_MPS)
     return float(value) if isinstance(value, int | float) else SPEED_LIMIT_MPS
 

@@ -5,6 +5,7 @@ import rerun.blueprint as rrb
 
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
+from groundstation.results.inertial import InertialResult
 from groundstation.viewer import colours
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after, runs
@@ -36,9 +37,10 @@ TITLES = {
 def inertial(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the tab of the INS errors; None when the flight was not assessed and no reason is known."""
     reasons = [entry.reason for entry in results.not_assessable if entry.analysis == "inertial"]
-    if results.inertial is None and not reasons:
+    answer = results.answer(InertialResult)
+    if answer is None and not reasons:
         return None
-    recorder.document("inertial/answer", inertial_text(results.inertial, reasons))
+    recorder.document("inertial/answer", inertial_text(answer, reasons))
     right: list[rrb.View] = [document("How good this INS is", "inertial/answer")]
     states = figure_of(results, "inertial_states", "time_s", "north_position_m", "east_position_m")
     pages: list[rrb.Container] = []
@@ -175,7 +177,8 @@ def _lanes(recorder: Recorder, results: FlightResults, states: FigureData | None
         return []
     state = np.where(states["gnss_used"].astype(bool), "GNSS used", "GNSS not used")
     state = np.where(states["is_forecast"].astype(bool), "forecast", state)
-    time_s, outages = numbers(states, "time_s"), () if results.inertial is None else results.inertial.outages
+    answer = results.answer(InertialResult)
+    time_s, outages = numbers(states, "time_s"), () if answer is None else answer.outages
     ends = [end for outage in outages for end in (outage.start_s, outage.end_s)]
     every = np.unique(np.concatenate([time_s, ends]))  # a short outage may lie between two rows
     state = state[np.clip(np.searchsorted(time_s, every, side="right") - 1, 0, len(time_s) - 1)]

@@ -4,7 +4,8 @@ import numpy as np
 import rerun.blueprint as rrb
 
 from groundstation.results.flight import FlightResults
-from groundstation.results.magnetic import METHOD_TITLES
+from groundstation.results.magnetic import METHOD_TITLES, MagneticResult
+from groundstation.results.magnetic_ground import GroundDeviation
 from groundstation.viewer import colours
 from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.recorder import Line, Recorder
@@ -23,9 +24,10 @@ RUN, FITTED = Line("ground runs", colours.INS, BOLD), Line("A to E", colours.ANS
 def magnetic(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the tab of the magnetic deviation; None when the flight was not assessed and no reason is known."""
     reasons = [entry.reason for entry in results.not_assessable if entry.analysis == "magnetic"]
-    if results.magnetic is None and results.magnetic_ground is None and not reasons:
+    in_flight, on_ground = results.answer(MagneticResult), results.answer(GroundDeviation)
+    if in_flight is None and on_ground is None and not reasons:
         return None
-    recorder.document("magnetic/answer", magnetic_text(results.magnetic, reasons, results.magnetic_ground))
+    recorder.document("magnetic/answer", magnetic_text(in_flight, reasons, on_ground))
     text = document("Verdict and card", "magnetic/answer")
     left = [*_deviation(recorder, results), *_branches(recorder, results), *_ground_runs(recorder, results)]
     middle = [*_errors(recorder, results), *_modulus(recorder, results), *_applied(recorder, results)]
@@ -93,7 +95,8 @@ def _branches(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
 
 def _ground_runs(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Error of the installed heading sensor on each ground run with its 95 % bar, and the curve where it is known."""
-    runs = results.magnetic_ground.used if results.magnetic_ground else ()
+    on_ground = results.answer(GroundDeviation)
+    runs = on_ground.used if on_ground else ()
     curves = []
     for run in runs:
         if run.error_deg is None or run.sigma_deg is None:
@@ -116,7 +119,8 @@ def _ground_runs(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
 
 def _errors(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Error of the magnetic heading where no fit has seen, before and after the recommended correction."""
-    method = results.magnetic.recommended_method if results.magnetic else "compass_table"
+    in_flight = results.answer(MagneticResult)
+    method = in_flight.recommended_method if in_flight else "compass_table"
     column = f"error_{method}_deg"
     figure = figure_of(results, "magnetic_samples", "time_s", "part", "error_before_deg", column)
     if figure is None:

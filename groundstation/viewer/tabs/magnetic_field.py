@@ -6,7 +6,7 @@ import rerun.blueprint as rrb
 
 from groundstation.base.geodesy import north_east_m
 from groundstation.results.flight import FlightResults
-from groundstation.results.magnetic import Turn
+from groundstation.results.magnetic import MagneticResult, Turn
 from groundstation.viewer import colours
 from groundstation.viewer.chart import round_step, screen_radius
 from groundstation.viewer.recorder import Recorder
@@ -59,7 +59,8 @@ def sphere(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
 
 def _radius_ut(results: FlightResults, field_ut: FloatArray) -> float:
     """Strength of the model; without one the median of the readings."""
-    declination = results.magnetic.declination if results.magnetic else None
+    answer = results.answer(MagneticResult)
+    declination = answer.declination if answer else None
     if declination is None or declination.horizontal_nt is None or declination.down_nt is None:
         return float(np.median(np.linalg.norm(field_ut, axis=1)))
     return float(np.hypot(declination.horizontal_nt, declination.down_nt)) / NT_PER_UT
@@ -86,7 +87,8 @@ def _circles(radius: float) -> list[FloatArray]:
 def eight(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """The used turns on the ground track, right and left in two colours."""
     figure = figure_of(results, "overview", "time_s", "latitude_deg", "longitude_deg")
-    turns = [turn for turn in (results.magnetic.turns if results.magnetic else ()) if turn.state == "used"]
+    answer = results.answer(MagneticResult)
+    turns = [turn for turn in (answer.turns if answer else ()) if turn.state == "used"]
     if figure is None or not turns:
         return []
     time_s, latitude, longitude = (numbers(figure, name) for name in ("time_s", "latitude_deg", "longitude_deg"))

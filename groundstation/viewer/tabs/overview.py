@@ -9,6 +9,7 @@ from groundstation.base.timescales import duration_text, utc_ns_to_iso
 from groundstation.results.explain import explained
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
+from groundstation.results.heading import HeadingResult
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour
 from groundstation.viewer.markdown import markdown_text, table
@@ -116,7 +117,7 @@ def _summary(results: FlightResults) -> str:
         ["status", results.status],
         ["findings", found],
     ]
-    heading = results.heading
+    heading = results.answer(HeadingResult)
     if heading is not None:
         rows.append(["heading", f"**{heading.verdict}**: {to_type(heading)}"])
     facts = table(["flight", markdown_text(results.flight_id)], [row for row in rows if row[1]])

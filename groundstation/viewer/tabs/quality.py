@@ -6,7 +6,7 @@ import rerun.blueprint as rrb
 from groundstation.base.signals import topics_of_kind
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
-from groundstation.results.latency import Latency
+from groundstation.results.latency import Latencies, Latency
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer import colours
 from groundstation.viewer.markdown import markdown_text, number, table
@@ -129,9 +129,10 @@ def _ledger_text(results: FlightResults) -> str:
             plain[f"{relation['clock']}: {relation['source']}"] = "; ".join(told)
         clock = [[markdown_text(words(str(name))), markdown_text(str(value))] for name, value in plain.items()]
         parts += ["## Clock", table(["clock", "value"], clock)]
-    if results.latency:
+    latencies = results.answer(Latencies)
+    if latencies:
         heads = ["sensor", "quantity", "latency, s", "95 % interval, s", "what it rests on, or why not"]
-        parts += ["## Latency behind the INS", table(heads, [_latency(row) for row in results.latency.rows])]
+        parts += ["## Latency behind the INS", table(heads, [_latency(row) for row in latencies.rows])]
     return "\n\n".join(parts)
 
 

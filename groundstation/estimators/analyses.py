@@ -1,0 +1,9 @@
+"""The analyses of a flight, in the order they are shown. A new one is a folder of its own and a line here."""
+
+from groundstation.estimators.analysis import Analysis
+from groundstation.estimators.heading.analysis import HEADING
+from groundstation.estimators.inertial.analysis import FORECAST, INERTIAL
+from groundstation.estimators.latency.analysis import LATENCY
+from groundstation.estimators.magnetic.analysis import MAGNETIC, MAGNETIC_GROUND
+
+FLIGHT_ANALYSES: tuple[Analysis, ...] = (HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND)

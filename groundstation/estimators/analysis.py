@@ -1,0 +1,128 @@
+"""One analysis as one object: what it needs, its settings and answer, how it runs, what it says in a line."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+
+from groundstation.base.findings import Finding
+from groundstation.results.answer import Answer, Answers
+
+Data = TypeVar("Data", contravariant=True)  # a flight, or a session of several
+KnownT = TypeVar("KnownT", contravariant=True)
+SettingsT = TypeVar("SettingsT")
+AnswerT = TypeVar("AnswerT", bound=Answer)
+
+
+@dataclass(frozen=True)
+class Found(Generic[AnswerT]):
+    """What a run of an analysis gives: its answer, its findings, and workings that later analyses build on."""
+
+    answer: AnswerT
+    findings: tuple[Finding, ...] = ()
+    workings: Any = None
+
+
+class Run(Protocol[Data, KnownT, SettingsT, AnswerT]):  # type: ignore[misc]
+    """The run of an analysis. It raises NotAssessableError, with the reason, for what the data lack."""
+
+    def __call__(self, data: Data, known: KnownT, settings: SettingsT, /) -> Found[AnswerT]: ...
+
+
+class RestsOn(NamedTuple):
+    """The samples an answer rests on: topics, fields and spans of flight seconds; damage in them is a finding."""
+
+    topics: tuple[str, ...]
+    fields: tuple[str, ...]
+    spans_s: tuple[tuple[float, float], ...]
+
+
+def _always(_data: Any, _known: Any) -> bool:
+    return True
+
+
+def _nothing(_answers: Answers) -> str:
+    return ""
+
+
+def _any_settings(_settings: Any, _known: Any) -> None:
+    """Settings whose values are in range are fit to run with."""
+
+
+def _no_samples(_data: Any, _answer: Any) -> None:
+    """No damage is held against the answer."""
+
+
+@dataclass(frozen=True)
+class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
+    """An analysis of a flight or a session. What runs, lists or saves analyses loops over them.
+
+    Parameters
+    ----------
+    name : str
+        Its key in settings, in ``results`` of summary.json and in findings.
+    title : str
+        What ``list`` says it does.
+    subject : str
+        What its findings speak of: "magnetic deviation".
+    needs : str
+        What a log must hold, for people.
+    settings : type
+        Frozen dataclass; the TOML table ``table`` fills it.
+    answer : type of Answer
+    table : str
+        Name of its settings in TOML; empty: its own name.
+    run : callable
+        ``run(data, known, settings) -> Found``.
+    builds_on : tuple of str
+        Analyses whose answers it uses where there are any; they run first.
+    requires : tuple of str
+        Those of them without which it cannot run; that it then did not run is their reason, told once.
+    is_expected : callable
+        Whether such data let one expect an answer: then a finding says why there is none.
+    rests_on : callable
+        ``rests_on(data, answer)``: the samples whose damage makes the answer doubtful.
+    sentence : callable
+        One line for people, of all answers; empty where another analysis says it.
+    check : callable
+        ``check(settings, aircraft)`` raises SettingsError for settings that contradict what is known of the aircraft.
+    """
+
+    name: str
+    title: str
+    subject: str
+    needs: str
+    settings: type[SettingsT]
+    answer: type[AnswerT]
+    run: Run[Data, KnownT, SettingsT, AnswerT]
+    table: str = ""
+    builds_on: tuple[str, ...] = ()
+    requires: tuple[str, ...] = ()
+    is_expected: Callable[[Any, Any], bool] = _always
+    rests_on: Callable[[Any, Any], RestsOn | None] = _no_samples
+    sentence: Callable[[Answers], str] = _nothing
+    check: Callable[[Any, Any], None] = _any_settings
+
+    @property
+    def settings_table(self) -> str:
+        """Name of the TOML table with its settings."""
+        return self.table or self.name
+
+
+def in_order_of_need(analyses: tuple[Analysis, ...]) -> tuple[Analysis, ...]:
+    """The analyses so that each stands behind those of them it builds on, else in the order given.
+
+    Raises
+    ------
+    ValueError
+        When some build on each other.
+    """
+    ordered: list[Analysis] = []
+    left = list(analyses)
+    while left:
+        waiting = {analysis.name for analysis in left}
+        ready = next((one for one in left if waiting.isdisjoint((*one.builds_on, *one.requires))), None)
+        if ready is None:
+            raise ValueError(f"analyses that wait for each other: {', '.join(one.name for one in left)}")
+        ordered.append(ready)
+        left.remove(ready)
+    return tuple(ordered)

@@ -1,0 +1,89 @@
+"""System 1 as an analysis: the heading correction, with the user's intervals and the proof of ground contact."""
+
+from typing import TYPE_CHECKING
+
+from groundstation.base.findings import Finding
+from groundstation.estimators.analysis import Analysis, Found, RestsOn
+from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.estimators.known import Known
+from groundstation.results.answer import Answers, answer_of
+from groundstation.results.heading import HeadingResult
+from groundstation.results.latency import Latencies
+
+if TYPE_CHECKING:
+    from groundstation.tables.table import Flight
+
+FIELDS = (
+    *("true_heading_deg", "magnetic_heading_deg", "track_deg", "ground_speed_mps"),
+    *("velocity_north_mps", "velocity_east_mps"),
+)
+
+
+def _run(flight: "Flight", known: Known, settings: HeadingSettings) -> Found[HeadingResult]:
+    from groundstation.estimators.heading.estimate import estimate_heading_error
+    from groundstation.tables.headings import true_heading
+    from groundstation.tables.phases import ground_mask
+
+    if known.intervals_problem:
+        raise known.intervals_problem
+    found = estimate_heading_error(
+        flight,
+        on_ground=lambda time_ns: ground_mask(flight, time_ns),
+        heading=lambda topic: true_heading(flight, topic),
+        settings=settings,
+        aircraft=known.aircraft,
+        site=known.site,
+        request=HeadingRequest(intervals=known.intervals),
+        latencies=known.answer(Latencies),
+    )
+    return Found(found, (_verdict(found), *_findings_of_what_was_set(flight, found, known)))
+
+
+def _verdict(result: HeadingResult) -> Finding:
+    """The verdict: a rejected one is a warning."""
+    text = f"heading correction: {result.verdict}: {result.verdict_reason}"
+    return Finding("warn" if result.verdict == "reject" else "info", f"heading.{result.verdict}", text)
+
+
+def _findings_of_what_was_set(flight: "Flight", heading: HeadingResult, known: Known) -> tuple[Finding, ...]:
+    """Findings on the user's references and intervals: what contradicts the log, or touches none of its samples."""
+    from groundstation.estimators.heading.gating import intervals_without_epoch
+    from groundstation.estimators.heading.references import reference_findings
+
+    lines = reference_findings(heading, flight.metadata, known.site)
+    findings = [Finding("warn", "heading.reference", line) for line in lines]
+    for part in intervals_without_epoch(flight.time_s(heading.gnss_topic), known.intervals):
+        text = f"interval to {part.use}, {part.start_s:g} to {part.end_s:g} s: no GNSS epoch in it"
+        findings.append(Finding("warn", "heading.interval", text))
+    return tuple(findings)
+
+
+def _rests_on(_flight: "Flight", heading: HeadingResult) -> RestsOn | None:
+    spans_s = tuple((segment.start_s, segment.end_s) for segment in heading.segments)
+    return RestsOn((heading.ins_topic, heading.gnss_topic), FIELDS, spans_s) if spans_s else None
+
+
+def _sentence(answers: Answers) -> str:
+    heading = answer_of(answers, HeadingResult)
+    if heading is None:
+        return ""
+    low, high = heading.confidence95_deg
+    text = f"{heading.verdict}: heading error {heading.error_deg:+.3f} deg, 95 % {low:+.3f} to {high:+.3f}"
+    if heading.correction_deg is not None:
+        return f"{text}, enter {heading.correction_deg:+g} deg"
+    return f"{text} ({heading.verdict_reason})"
+
+
+HEADING = Analysis(
+    name="heading",
+    title="INS heading error and correction from GNSS on straight taxi (Markelov et al. 2015)",
+    subject="heading correction",
+    needs="ins heading (true or magnetic), gnss velocities, proof of ground contact (weight on wheels, a landed "
+    "flag or a standstill to start from), straight taxi above 6 m/s",
+    settings=HeadingSettings,
+    answer=HeadingResult,
+    run=_run,
+    builds_on=("latency",),
+    rests_on=_rests_on,
+    sentence=_sentence,
+)

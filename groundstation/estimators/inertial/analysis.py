@@ -1,0 +1,107 @@
+"""System 2 as analyses: the errors of the INS, and the forecast of them replayed on the flight."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from groundstation.base.errors import NotAssessableError
+from groundstation.estimators.analysis import Analysis, Found, RestsOn
+from groundstation.estimators.inertial.noise import choose_class
+from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.estimators.known import AircraftData, Known
+from groundstation.results.answer import Answers, answer_of
+from groundstation.results.forecast import ForecastResult
+from groundstation.results.inertial import InertialResult
+from groundstation.tables.phases import Phases
+
+if TYPE_CHECKING:
+    from groundstation.tables.table import Flight
+
+FIELDS = ("latitude_deg", "longitude_deg", "velocity_north_mps", "velocity_east_mps")
+
+
+def take_off_s(phases: Phases) -> float:
+    """Flight time of the first lift-off; 0 for a log that begins in the air or never leaves the ground."""
+    airborne = np.flatnonzero(phases.phase == "airborne")
+    return float(phases.start_s[airborne[0]]) if airborne.size else 0.0
+
+
+def _run(flight: "Flight", known: Known, settings: InertialSettings) -> Found[InertialResult]:
+    from groundstation.estimators.inertial.estimate import estimate_ins_errors
+
+    found = estimate_ins_errors(
+        flight, settings=settings, aircraft_class=known.aircraft.ins_class, excluded_s=known.excluded_s
+    )
+    return Found(found.result, found.findings, found)
+
+
+def _run_forecast(_flight: "Flight", known: Known, settings: InertialSettings) -> Found[ForecastResult]:
+    from groundstation.estimators.inertial.estimate import Estimation
+    from groundstation.estimators.inertial.forecast import assess_forecast
+
+    estimation = known.workings_of(Estimation)
+    if estimation is None:
+        raise NotAssessableError("forecast", "the errors of the INS were not estimated")
+    phases = known.phases
+    return Found(assess_forecast(estimation, settings=settings, phase_of=phases.at, take_off_s=take_off_s(phases)))
+
+
+def _check(settings: InertialSettings, aircraft: AircraftData) -> None:
+    choose_class(settings, aircraft.ins_class)
+
+
+def _rests_on(flight: "Flight", result: InertialResult) -> RestsOn:
+    topics = (result.ins_topic, result.gnss_topic)
+    both = [flight.time_s(topic) for topic in topics]
+    return RestsOn(topics, FIELDS, ((max(float(time[0]) for time in both), min(float(time[-1]) for time in both)),))
+
+
+def _is_forecast_expected(_flight: "Flight", known: Known) -> bool:
+    """Of an INS that GNSS corrects a finding says already that a forecast means nothing."""
+    inertial = known.answer(InertialResult)
+    return inertial is None or inertial.kind != "gnss_aided"
+
+
+def _sentence(answers: Answers) -> str:
+    inertial, forecast = answer_of(answers, InertialResult), answer_of(answers, ForecastResult)
+    if inertial is None:
+        return ""
+    if inertial.kind == "gnss_aided":
+        return "INS corrected by GNSS already, no forecast"
+    if inertial.kind == "unknown":
+        return "INS errors estimated, too little to tell whether GNSS corrects it"
+    parts = []
+    if inertial.radial_error_rate_50_nmiph is not None:
+        parts.append(f"{inertial.radial_error_rate_50_nmiph:.2f} nmi/h")
+    if forecast is not None:
+        shipped = [row for row in forecast.skill if row.method == forecast.default_method]
+        longest = max(shipped, key=lambda row: row.horizon_min, default=None)
+        if longest is not None:
+            parts.append(f"forecast {longest.rms_m:.0f} m after {longest.horizon_min:g} min")
+    return f"INS {', '.join(parts)}" if parts else "INS errors estimated"
+
+
+INERTIAL = Analysis(
+    name="inertial",
+    title="INS errors estimated against GNSS, two channels of six states (Neusypin et al. 2003)",
+    subject="INS errors",
+    needs="ins and gnss positions (velocities too where there are any), five minutes of both together",
+    settings=InertialSettings,
+    answer=InertialResult,
+    run=_run,
+    rests_on=_rests_on,
+    sentence=_sentence,
+    check=_check,
+)
+FORECAST = Analysis(
+    name="forecast",
+    title="forecast of the INS errors without GNSS, replayed all over the flight",
+    subject="forecast of INS errors",
+    needs="what inertial needs, of an INS that GNSS does not correct; a calibration needs one Schuler period",
+    settings=InertialSettings,
+    answer=ForecastResult,
+    run=_run_forecast,
+    table="inertial",
+    requires=("inertial",),
+    is_expected=_is_forecast_expected,
+)

@@ -1,0 +1,166 @@
+"""What is known of a flight besides its tables: aircraft, airfield, the user's intervals, earlier answers."""
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeVar
+
+from groundstation.base.errors import SettingsError
+from groundstation.base.toml_settings import check_ranges, number, required_number
+from groundstation.results.answer import A, Answers, answer_of
+from groundstation.tables.phases import Phases
+
+S = TypeVar("S")
+LEAST_ENTRY_STEP_DEG = 1e-6  # the places an answer is shown with
+
+
+@dataclass(frozen=True)
+class AircraftData:
+    """What is known of the aircraft.
+
+    Parameters
+    ----------
+    antenna_arm_m, antenna_arm_sigma_m : float or None
+        GNSS antenna ahead of the middle of the main-gear axle (the point that does not slip sideways), and its sigma;
+        None where unknown: it is then estimated, or its possible effect widens the interval.
+    entry_step_deg : float
+        Step in which the operator can enter the correction.
+    mounting_deg, mounting_sigma_deg : float
+        Heading of the INS case minus heading of the airframe, known, and the sigma of what remains of it
+        (steady sideslip included). The sigma widens the interval.
+    gnss_latency_s, gnss_latency_sigma_s : float or None
+        How much later GNSS velocities are logged than the INS shows the same motion, known; None: estimated.
+    ins_class : str
+        For the record.
+    """
+
+    antenna_arm_m: float | None = number(None, -50.0, 50.0)
+    antenna_arm_sigma_m: float = number(0.05, 0.0)
+    entry_step_deg: float = number(0.1, LEAST_ENTRY_STEP_DEG, 10.0)
+    mounting_deg: float = number(0.0, -10.0, 10.0)
+    mounting_sigma_deg: float = number(0.0, 0.0)
+    gnss_latency_s: float | None = number(None, -10.0, 10.0)
+    gnss_latency_sigma_s: float = number(0.01, 0.0, 10.0)
+    ins_class: str = ""
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+@dataclass(frozen=True)
+class Stand:
+    """Parking stand with a reference heading (theodolite) and its sigma."""
+
+    name: str
+    heading_deg: float = required_number(0.0, 360.0)
+    sigma_deg: float = number(0.05, 0.0)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+@dataclass(frozen=True)
+class Runway:
+    """Runway with its true bearing (in the direction of take-off) and the position of its threshold."""
+
+    name: str
+    true_bearing_deg: float = required_number(0.0, 360.0)
+    sigma_deg: float = number(0.05, 0.0)
+    latitude_deg: float | None = number(None, -90.0, 90.0)
+    longitude_deg: float | None = number(None, -180.0, 180.0)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+        if (self.latitude_deg is None) != (self.longitude_deg is None):
+            missing, other = "latitude_deg", "longitude_deg"
+            if self.longitude_deg is None:
+                missing, other = other, missing
+            raise SettingsError(missing, "nothing", f"a value beside {other}, or neither of the two")
+
+
+@dataclass(frozen=True)
+class SiteData:
+    """What is known of the airfield. ``stand`` names the stand the aircraft was parked on."""
+
+    stands: tuple[Stand, ...] = ()
+    runways: tuple[Runway, ...] = ()
+    stand: str = ""
+
+    def __post_init__(self) -> None:
+        for key, listed in (("stands", self.stands), ("runways", self.runways)):
+            twice = [name for name, count in Counter(item.name for item in listed).items() if count > 1]
+            if twice:
+                raise SettingsError(key, f"{twice[0]!r} more than once", "names that differ")
+        names = [stand.name for stand in self.stands]
+        if self.stand and self.stand not in names:
+            expected = f"one of {', '.join(names)}" if names else "a stand listed under [[stands]]: there is none"
+            raise SettingsError("stand", repr(self.stand), expected)
+
+    def parked_on(self) -> Stand | None:
+        """The named stand; the only one where none is named; else None."""
+        if self.stand:
+            return next((stand for stand in self.stands if stand.name == self.stand), None)
+        return self.stands[0] if len(self.stands) == 1 else None
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Flight seconds that a file excludes from the estimate, or forces into it."""
+
+    start_s: float
+    end_s: float
+    use: Literal["exclude", "force"] = "exclude"
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.start_s) and math.isfinite(self.end_s)):
+            raise SettingsError("interval", f"{self.start_s:g} to {self.end_s:g} s", "finite flight seconds")
+
+
+@dataclass(frozen=True)
+class Known:
+    """What an analysis may use besides the tables of a flight.
+
+    Parameters
+    ----------
+    phases : Phases
+        Flight phases, read off the tables once.
+    aircraft : AircraftData
+    site : SiteData
+    intervals : tuple of Interval
+        Parts of the flight that the user excludes or forces.
+    intervals_problem : SettingsError, optional
+        Why the user's intervals have no place on this flight, which then has none.
+    settings : mapping
+        Settings by the name of their table: an analysis that works with another's method takes that one's settings.
+    answers : mapping
+        Answers of the analyses before this one.
+    workings : mapping
+        What an earlier analysis computed on the way, by its name; it is not saved.
+    """
+
+    phases: Phases
+    aircraft: AircraftData = AircraftData()
+    site: SiteData = SiteData()
+    intervals: tuple[Interval, ...] = ()
+    intervals_problem: SettingsError | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    answers: Answers = field(default_factory=dict)
+    workings: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def excluded_s(self) -> tuple[tuple[float, float], ...]:
+        """Flight seconds that the user excludes."""
+        return tuple((part.start_s, part.end_s) for part in self.intervals if part.use == "exclude")
+
+    def answer(self, kind: type[A]) -> A | None:
+        """The answer of that type, None where there is none."""
+        return answer_of(self.answers, kind)
+
+    def settings_of(self, kind: type[S]) -> S:
+        """The settings of that type, the shipped ones where the user set none."""
+        return next((found for found in self.settings.values() if isinstance(found, kind)), None) or kind()
+
+    def workings_of(self, kind: type[S]) -> S | None:
+        """What an earlier analysis computed on the way, None where there is none."""
+        return next((found for found in self.workings.values() if isinstance(found, kind)), None)

@@ -1,0 +1,40 @@
+"""What every analysis answers with: a frozen dataclass that says which analysis it is the answer of."""
+
+from collections.abc import Mapping
+from typing import ClassVar, TypeVar
+
+from groundstation.results.figures import FigureData
+from groundstation.results.frames import Tabular
+
+
+class Answer(Tabular):
+    """Base of every answer.
+
+    A subclass is a frozen dataclass. ``analysis`` is the name of its analysis: its key in ``results`` of summary.json.
+    ``figures`` are the arrays behind its figures; they are saved beside the summary, not in it.
+    """
+
+    analysis: ClassVar[str]
+    figures: tuple[FigureData, ...]
+
+
+A = TypeVar("A", bound=Answer)
+Answers = Mapping[str, Answer]  # by the name of the analysis
+
+
+def answer_of(answers: Answers, kind: type[A]) -> A | None:
+    """The answer of that type, None where there is none.
+
+    Examples
+    --------
+    >>> from groundstation.results.latency import Latencies
+    >>> answer_of({}, Latencies) is None, answer_of({"latency": Latencies(rows=())}, Latencies)
+    (True, Latencies(rows=(), settings={}, figures=()))
+    """
+    found = answers.get(kind.analysis)
+    return found if isinstance(found, kind) else None
+
+
+def by_analysis(*answers: Answer | None) -> dict[str, Answer]:
+    """Answers by the name of their analysis; what is None is left out."""
+    return {answer.analysis: answer for answer in answers if answer is not None}
