@@ -1,9 +1,9 @@
 """``compare``: differences with their sigmas, clocks aligned on events, both flights in one recording and page."""
 
 import json
-import os
 import re
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pytest
+from rerun.experimental import ViewerClient
 from typer.testing import CliRunner
 
 from groundstation.base.errors import UsageError
@@ -29,7 +30,7 @@ from groundstation.simulation.samples import write_scenario
 from groundstation.viewer.comparison import write_comparison
 from tests.recording_contents import Contents
 from tests.viewer_example import make_flight, make_results
-from tests.viewer_shots import NoViewerError, colourful, pages, picture, settled, viewer
+from tests.viewer_shots import colourful, pages, picture, settled
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 SCENARIOS = Path(__file__).parents[1] / "groundstation" / "simulation" / "scenarios"
@@ -383,20 +384,17 @@ def test_a_forecast_of_another_kind_is_none(tmp_path: Path, forecast: Any) -> No
 
 
 @pytest.mark.viewer
-def test_every_view_of_the_recording_draws_both(tmp_path: Path) -> None:
+def test_every_view_of_the_recording_draws_both(
+    tmp_path: Path, headless_viewer: Callable[[Path], ViewerClient]
+) -> None:
     a, b = saved_example(tmp_path / "a"), saved_example(tmp_path / "b")
     comparison = compare(tmp_path / "a", tmp_path / "b", "start")[0]
     write_comparison(tmp_path / "x.rrd", comparison, a, b)
-    try:
-        with viewer(tmp_path / "x.rrd", tmp_path) as client:
-            seen = {view.name for _, views in pages(client) for view in views if _is_drawn(client, view)}
-            state = client.get_state()
-            assert {view.name: view.reports for view in state.views if view.reports} == {}
-            assert seen == {view.name for view in state.views if view.view_class != "TextDocument"}
-    except NoViewerError as error:
-        if os.environ.get("CI") == "true":
-            pytest.fail(str(error))
-        pytest.skip(f"the headless viewer did not start: {error}")
+    client = headless_viewer(tmp_path / "x.rrd")
+    seen = {view.name for _, views in pages(client) for view in views if _is_drawn(client, view)}
+    state = client.get_state()
+    assert {view.name: view.reports for view in state.views if view.reports} == {}
+    assert seen == {view.name for view in state.views if view.view_class != "TextDocument"}
 
 
 def _is_drawn(client: Any, view: Any) -> bool:

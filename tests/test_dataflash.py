@@ -251,6 +251,20 @@ def test_baro_range_finder_and_battery(tmp_path: Path) -> None:
     assert (log.present("air", "wind_north_mps"), log.present("air", "wind_east_mps")) == ([3.0], [-4.5])
 
 
+def test_refused_pressures_are_counted_and_a_missing_one_stays_missing(tmp_path: Path) -> None:
+    sensors = DataFlash()
+    sensors.define(1, "BARO", "Qff", "TimeUS,Alt,Press")
+    for number, pressure in enumerate((12_044.6, 0.0, -3.0, 2e5, np.nan)):
+        sensors.write("BARO", 1 + number, 0.0, pressure)
+    log = Log(tmp_path / "pressures.BIN", sensors.content)
+    altitudes = log.present("baro", "pressure_altitude_m")
+    assert altitudes == pytest.approx([15_000.0, np.nan], abs=1.0, nan_ok=True)
+    assert len(log.present("raw.BARO", "Press")) == 5
+    (damage,) = log.damages
+    assert (damage.kind, damage.count, damage.topic, damage.loses_data) == ("unreadable_cells", 3, "baro", False)
+    assert "pressures outside 5 to 1200 hPa" in damage.what
+
+
 def test_every_format_character_is_read(tmp_path: Path) -> None:
     every = DataFlash()
     characters = "abBhHiIqQfdgnNcCeELM"  # one more than a FMT record can name: in two types

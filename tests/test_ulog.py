@@ -240,6 +240,25 @@ def test_what_does_not_apply_is_left_out(tmp_path: Path) -> None:
     assert "electric" not in one(tmp_path, unknown, "f", -1.0).batches
 
 
+def test_pressure_altitude_above_the_tropopause_and_refused_pressures(tmp_path: Path) -> None:
+    log = UlogWriter().flags().format(BARO).subscribe(0, "vehicle_air_data")
+    pressures = [22_632.06, 12_044.6, 0.0, 5_474.89, -3.0, 2e5, math.nan]
+    for number, pressure in enumerate(pressures):
+        log.row(0, "Qf", T0_US + number, pressure)
+    found = read(tmp_path, log)
+    altitudes = found.values("baro", "pressure_altitude_m")
+    assert altitudes[:3] == [
+        pytest.approx(11_000.0, abs=1.0),
+        pytest.approx(15_000.0, abs=1.0),
+        pytest.approx(2e4, abs=1.0),
+    ]
+    assert len(altitudes) == 4 and math.isnan(altitudes[3]), "a NaN that the device wrote is NaN"
+    assert len(found.values("raw.vehicle_air_data", "baro_pressure_pa")) == len(pressures)
+    (damage,) = found.damages
+    assert (damage.kind, damage.count, damage.topic, damage.loses_data) == ("unreadable_cells", 3, "baro", False)
+    assert "pressures outside 5 to 1200 hPa" in damage.what
+
+
 def gps_log(fixes: list[tuple[int, int]], instances: int = 1) -> UlogWriter:
     """A log of receivers; ``fixes`` are (UTC of power-up in microseconds, fix type), 200 ms apart."""
     log = UlogWriter().flags().format(GPS)

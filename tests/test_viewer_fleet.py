@@ -1,9 +1,7 @@
 """The recording of a fleet as a file, read back and held against the results; and every tab of it in the viewer."""
 
-import os
 import re
-from collections.abc import Iterator
-from contextlib import ExitStack
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +17,7 @@ from groundstation.viewer.fleet import write_fleet_recording
 from groundstation.viewer.fleet_density import MOST_STEPS, PATH, steps
 from tests.fleet_example import save_flight, skill
 from tests.recording_contents import Contents
-from tests.viewer_shots import NoViewerError, colourful, pages, picture, settled, viewer
+from tests.viewer_shots import colourful, pages, picture, settled
 
 STEADY, STEPPING, HOSTILE = "A12", "B3", "![x](http://127.0.0.1/x)|<b>/../"
 FLIGHTS, NEW_LEVEL = 48, 27  # the flight from which on B3 is 1 deg off
@@ -227,20 +225,11 @@ def gather_nothing(folder: Path) -> FleetResults:
     return gather(folder / "nothing")
 
 
-@pytest.fixture(scope="module")
-def client(path: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[ViewerClient]:
-    with ExitStack() as stack:
-        try:
-            yield stack.enter_context(viewer(path, tmp_path_factory.mktemp("home")))
-        except NoViewerError as error:
-            reason = f"the headless viewer did not start (Debian: mesa-vulkan-drivers, libvulkan1): {error}"
-            if os.environ.get("CI") == "true":
-                pytest.fail(reason)
-            pytest.skip(reason)
-
-
 @pytest.mark.viewer
-def test_every_view_of_every_tab_draws_and_complains_of_nothing(client: ViewerClient) -> None:
+def test_every_view_of_every_tab_draws_and_complains_of_nothing(
+    path: Path, headless_viewer: Callable[[Path], ViewerClient]
+) -> None:
+    client = headless_viewer(path)
     client.set_time("flight_number", sequence=FLIGHTS // 2)
     seen = []
     for name, views in pages(client):

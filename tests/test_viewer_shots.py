@@ -1,8 +1,6 @@
 """The real viewer, headless: every view of every tab draws the flight, and complains of nothing."""
 
-import os
-from collections.abc import Iterator
-from contextlib import ExitStack
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +14,7 @@ from groundstation.tables.table import Flight
 from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.recording import send_flight, stream_recording
 from tests.viewer_example import make_flight, make_results
-from tests.viewer_shots import NoViewerError, colourful, open_recording, pages, picture, settled, viewer
+from tests.viewer_shots import colourful, open_recording, pages, picture, settled
 
 pytestmark = pytest.mark.viewer
 
@@ -45,19 +43,16 @@ def results(flight: Flight) -> FlightResults:
 
 
 @pytest.fixture(scope="module")
-def opened(flight: Flight, results: FlightResults, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Opened]:
+def opened(
+    flight: Flight,
+    results: FlightResults,
+    headless_viewer: Callable[[Path], ViewerClient],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Opened:
     folder = tmp_path_factory.mktemp("viewer")
     path, blank = folder / "flight.rrd", folder / "blank.rrd"
     _write_both(path, blank, flight, results)
-    with ExitStack() as stack:
-        try:
-            client = stack.enter_context(viewer(path, folder))
-        except NoViewerError as error:
-            reason = f"the headless viewer did not start (Debian: mesa-vulkan-drivers, libvulkan1): {error}"
-            if os.environ.get("CI") == "true":
-                pytest.fail(reason)
-            pytest.skip(reason)
-        yield Opened(client, path, blank)
+    return Opened(headless_viewer(path), path, blank)
 
 
 def _write_both(path: Path, blank: Path, flight: Flight, results: FlightResults) -> None:

@@ -52,8 +52,10 @@ def viewer(recording: Path, home: Path) -> Iterator[ViewerClient]:
         text=True,
     )
     try:
-        _wait_for_port(port, process)
-        client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+        client = _drawing(port, process)
+        if client is None:
+            process.terminate()
+            raise NoViewerError(_reason(process.communicate(timeout=PATIENCE_S)[1]))
         _until(lambda: _is_loaded(client), recording.name)
         yield client
     finally:
@@ -61,19 +63,24 @@ def viewer(recording: Path, home: Path) -> Iterator[ViewerClient]:
         process.communicate(timeout=PATIENCE_S)
 
 
-def _wait_for_port(port: int, process: "subprocess.Popen[str]") -> None:
+def _drawing(port: int, process: "subprocess.Popen[str]") -> ViewerClient | None:
+    """A client whose viewer drew a picture, or None: without a Vulkan driver it listens, may even answer, then dies."""
     deadline = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline and process.poll() is None:
         try:
             socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
-            time.sleep(0.5)  # without a Vulkan driver it listens, then panics
-            if process.poll() is None:
-                return
-        except OSError:
+            client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+            client.take_screenshot(max_size=SMALL)
+            return client
+        except (OSError, RuntimeError):  # not yet listening, still starting, or dying
             time.sleep(0.1)
-    process.terminate()
-    said = process.communicate(timeout=PATIENCE_S)[1].strip().splitlines()
-    raise NoViewerError(said[-1] if said else "the viewer did not start")
+    return None
+
+
+def _reason(said: str) -> str:
+    """The line of the viewer's last words that says why."""
+    lines = said.strip().splitlines() or ["it said nothing"]
+    return next((line for line in lines if "panicked" in line), lines[-1])
 
 
 def _until(is_so: Callable[[], bool], what: str) -> None:

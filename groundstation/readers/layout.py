@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_360
+from groundstation.base.atmosphere import SEA_LEVEL_PA, pressure_altitude_m
 from groundstation.base.records import Column
 from groundstation.base.signals import Field
 
@@ -151,8 +152,7 @@ def wind_from_direction(from_deg: FloatArray, speed_mps: FloatArray) -> tuple[Fl
 def pressure_altitude(indicated_m: FloatArray, setting_inhg: FloatArray) -> tuple[FloatArray, ...]:
     """Altitude above 1013.25 hPa from the altitude indicated with another altimeter setting.
 
-    H_p = H_i + T0 / L (1 - (setting / p0)^(L R / g0)), T0 = 288.15 K, L = 6.5 K/km, p0 = 29.92126 inHg, exponent
-    0.190263. Source: ICAO Doc 7488/3, Manual of the ICAO Standard Atmosphere (1993), the lowest layer.
+    To the indicated altitude is added that of the setting in the standard atmosphere; 1013.25 hPa are 29.92126 inHg.
 
     Examples
     --------
@@ -161,7 +161,7 @@ def pressure_altitude(indicated_m: FloatArray, setting_inhg: FloatArray) -> tupl
     >>> round(float(pressure_altitude(np.array([0.0]), np.array([28.92126]))[0][0]), 1)  # 979.39 hPa
     285.8
     """
-    setting_altitude_m = 288.15 / 0.0065 * (1.0 - (setting_inhg / 29.92126) ** 0.190263)
+    setting_altitude_m, _is_refused = pressure_altitude_m(setting_inhg / 29.92126 * SEA_LEVEL_PA)
     return (indicated_m + setting_altitude_m,)
 
 

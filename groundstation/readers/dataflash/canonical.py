@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
-from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Int64Array, RecordBatch, frozen
+from groundstation.base.atmosphere import REFUSED, pressure_altitude_m
+from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Damage, Int64Array, RecordBatch, frozen
 from groundstation.readers.dataflash import rules
-from groundstation.readers.dataflash.atmosphere import pressure_altitude_m
 from groundstation.readers.dataflash.choices import Choices
 from groundstation.readers.dataflash.events import event_names
 from groundstation.readers.dataflash.overview import Overview, Unit
@@ -42,6 +42,7 @@ class Mapper:
         self._found, self._choices = found, choices
         self._parts: dict[str, list[_Part]] = {}
         self.fields: dict[str, dict[str, None]] = {}  # what was yielded, for the remarks
+        self._refused: dict[str, int] = {}
         self._takers = self._all_takers()
 
     def take(self, rows: Rows) -> None:
@@ -60,6 +61,11 @@ class Mapper:
                 piece = batch.take(slice(start, start + MAX_BATCH_ROWS)) if len(batch) > MAX_BATCH_ROWS else batch
                 self.fields.setdefault(topic, {}).update(dict.fromkeys(piece.columns))
                 yield piece
+
+    def damages(self) -> Iterator[Damage]:
+        """Pressures that are none, one line for each topic; the log's own values are kept."""
+        for topic, count in self._refused.items():
+            yield Damage("unreadable_cells", topic, count, REFUSED, topic, loses_data=False)
 
     def _all_takers(self) -> Mapping[Unit, list[tuple[str, Callable[[str, Rows], dict[str, Column]]]]]:
         """For each sensor the topics it gives to, and the function that makes the columns."""
@@ -183,8 +189,10 @@ class Mapper:
     def _baro(self, topic: str, rows: Rows) -> dict[str, Column]:
         if not rows.definition.has_numbers("Press"):
             return {}
-        altitude, is_pressure = pressure_altitude_m(as_double(rows.values("Press")))
-        return {"pressure_altitude_m": Column(altitude, is_pressure)}
+        altitude, is_refused = pressure_altitude_m(as_double(rows.values("Press")))
+        if is_refused.any():
+            self._refused[topic] = self._refused.get(topic, 0) + int(is_refused.sum())
+        return {"pressure_altitude_m": Column(altitude, ~is_refused)}
 
     def _height(self, topic: str, rows: Rows) -> dict[str, Column]:
         if not rows.definition.has_numbers("Dist", "Stat", "Orient"):

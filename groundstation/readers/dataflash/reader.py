@@ -37,6 +37,7 @@ def items(source: Source) -> Iterator[Item]:
     yield from remarks
     yield from choices.remarks(found, mapper.fields)
     yield from found.damages
+    yield from mapper.damages()
     for topic, count in unreadable.items():
         if count:
             yield Damage("unreadable_cells", topic, count, "times that no clock writes", topic)

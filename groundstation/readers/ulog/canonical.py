@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_360
+from groundstation.base.atmosphere import pressure_altitude_m
 from groundstation.base.records import BoolArray, Column
 from groundstation.base.units import DEG_PER_RAD, NT_PER_GAUSS
 
@@ -178,30 +179,20 @@ _GNSS_FIELDS: Mapping[str, tuple[tuple[str, float], ...]] = {
 }
 
 
-def pressure_altitude(pressure_pa: FloatArray) -> FloatArray:
-    """Altitude in the standard atmosphere, m, of a static pressure, Pa; NaN where there is none.
-
-    Source: ICAO Doc 7488 (1993), troposphere: h = 44330.77 (1 - (p / 101325)^0.190263).
-
-    Examples
-    --------
-    >>> pressure_altitude(np.array([101325.0, 89874.6])).round(1).tolist()
-    [0.0, 1000.0]
-    """
-    with np.errstate(invalid="ignore"):
-        ratio = np.where(pressure_pa > 0.0, pressure_pa, np.nan) / 101_325.0
-        return np.asarray(44_330.77 * (1.0 - ratio**0.190_263), dtype=np.float64)
+def _pressure_altitude(pressure_pa: FloatArray) -> Columns:
+    altitude, is_refused = pressure_altitude_m(pressure_pa)
+    return {"pressure_altitude_m": Column(altitude, ~is_refused)}
 
 
 def _air_data(rows: Rows) -> Columns:
-    return {"pressure_altitude_m": Column(pressure_altitude(rows["baro_pressure_pa"]))}
+    return _pressure_altitude(rows["baro_pressure_pa"])
 
 
 def _barometer(rows: Rows) -> Columns:
     pressure = rows["pressure"]
     with np.errstate(invalid="ignore"):
         pascals = np.where(pressure < _HPA_BELOW, pressure * 100.0, pressure)
-    return {"pressure_altitude_m": Column(pressure_altitude(pascals))}
+    return _pressure_altitude(pascals)
 
 
 def _current(rows: Rows) -> Columns:

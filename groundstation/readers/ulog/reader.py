@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.atmosphere import REFUSED
 from groundstation.base.records import (
     MAX_BATCH_ROWS,
     BoolArray,
@@ -29,15 +30,16 @@ from groundstation.readers.ulog.texts import MAX_TIME_US, TextTopics, device_tim
 
 MAX_NAME_CHARACTERS = 200
 _ODD = re.compile(r"[^A-Za-z0-9_\-/]")
-_WITH_MODE = "true_heading_deg"
+_WITH_MODE, _OF_PRESSURE = "true_heading_deg", "pressure_altitude_m"
 
 
 @dataclass
 class _Losses:
-    """Data messages without a usable definition, and times that no clock shows."""
+    """Data messages without a usable definition, times that no clock shows, pressures that no air has."""
 
     unreadable: dict[str, int] = field(default_factory=dict)
     beyond: dict[str, int] = field(default_factory=dict)
+    pressures: dict[str, int] = field(default_factory=dict)
 
     def damages(self) -> Iterator[Damage]:
         """One for each topic."""
@@ -46,6 +48,8 @@ class _Losses:
         for topic, count in self.beyond.items():
             what = "times more than 292 years after power-up"
             yield Damage("unreadable_cells", "the whole log", count, what, topic)
+        for topic, count in self.pressures.items():
+            yield Damage("unreadable_cells", "the whole log", count, REFUSED, topic, loses_data=False)
 
 
 def items(source: Source, reader_name: str, start_us: int) -> Iterator[Item]:
@@ -54,7 +58,7 @@ def items(source: Source, reader_name: str, start_us: int) -> Iterator[Item]:
     yield LogHeader(reader_name, found.metadata, found.utc_of_zero_ns, has_counting_clock=True)
     walk, losses = Walk(source), _Losses()
     texts = TextTopics(start_us if start_us <= MAX_TIME_US else 0)
-    raw, canonical = _RawTopics(losses, found.odd_flags), _CanonicalTopics(found)
+    raw, canonical = _RawTopics(losses, found.odd_flags), _CanonicalTopics(losses, found)
     newest_us = 0
     for block in walk:
         messages_us = np.zeros(len(block.at), dtype=np.uint64)
@@ -144,8 +148,8 @@ class _Part:
 class _CanonicalTopics:
     """Gathers canonical columns of a block, and puts those of several sources in the order of the log."""
 
-    def __init__(self, found: Overview) -> None:
-        self._found = found
+    def __init__(self, losses: _Losses, found: Overview) -> None:
+        self._losses, self._found = losses, found
         self._parts: dict[str, list[_Part]] = {}
         self._armed: bool | None = None
         self._flight_mode: float | None = None
@@ -161,6 +165,8 @@ class _CanonicalTopics:
         for name, columns in of_topic.items():
             if _WITH_MODE in columns:
                 columns["mode"] = Column(np.full(len(rows), self._mode), columns[_WITH_MODE].present)
+            if _OF_PRESSURE in columns:
+                self._note_refused(name, columns[_OF_PRESSURE])
             part = _occupied(_Part(index, time, columns))
             if part is not None:
                 self._parts.setdefault(name, []).append(part)
@@ -168,6 +174,11 @@ class _CanonicalTopics:
             self._note_arming(index, time, values)
         if topic.instance == 0 and topic.name == MODES[0] and MODES[1] in values:
             self._note_mode(index, time, values[MODES[1]])
+
+    def _note_refused(self, topic: str, altitude: Column) -> None:
+        refused = 0 if altitude.present is None else int((~altitude.present).sum())
+        if refused:
+            self._losses.pressures[topic] = self._losses.pressures.get(topic, 0) + refused
 
     def _note_mode(self, index: Int64Array, time: Column, modes: NDArray[Any]) -> None:
         """Changes of the flight mode as events, the first mode among them."""
