@@ -26,7 +26,6 @@ from groundstation.results import magnetic as answers
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.magnetic import LETTERS
-from groundstation.results.restore import restored
 from groundstation.simulation.deviation import BIN_MIDDLES_DEG, scenario_deviation
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
@@ -129,7 +128,7 @@ def test_recorded_flights_are_refused_with_the_reason(name: str, reason: str, tm
 @pytest.mark.parametrize("name", [field.name for field in fields(answers.MagneticResult)])
 def test_every_answer_is_saved_and_comes_back(name: str, tmp_path: Path) -> None:
     save(tmp_path, figure_eight(), {})
-    before, after = figure_eight().magnetic, restored(load(tmp_path)).magnetic
+    before, after = figure_eight().magnetic, load(tmp_path).results.magnetic
     if name == "figures":
         assert {"magnetic_samples", "magnetic_table", "magnetic_modulus"} <= set(load(tmp_path).figures)
         return

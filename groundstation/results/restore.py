@@ -3,23 +3,49 @@
 import types
 import typing
 from collections.abc import Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.timescales import iso_to_utc_ns
-from groundstation.results.files import SUMMARY, SavedFlight
 from groundstation.results.flight import FlightResults
+from groundstation.results.forecast import ForecastResult
+from groundstation.results.heading import HeadingResult
+from groundstation.results.inertial import InertialResult
+from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
+from groundstation.results.magnetic_ground import GroundDeviation
+
+# The answer that each analysis saves, by the name of the analysis in ``results`` of summary.json.
+ANSWER_TYPES: Mapping[str, type] = MappingProxyType(
+    {
+        "heading": HeadingResult,
+        "inertial": InertialResult,
+        "forecast": ForecastResult,
+        "latency": Latencies,
+        "magnetic": MagneticResult,
+        "magnetic_ground": GroundDeviation,
+    }
+)
 
 
-def restored(saved: SavedFlight) -> FlightResults:
-    """Results of a flight folder as the run had them, but for the digits that summary.json leaves out.
+def restored(summary: Mapping[str, Any], where: str, answer_types: Mapping[str, type] = ANSWER_TYPES) -> FlightResults:
+    """Results of a flight as the run had them, but for the digits that summary.json leaves out.
+
+    Parameters
+    ----------
+    summary : mapping
+        The content of summary.json.
+    where : str
+        What the summary came from, for errors.
+    answer_types : mapping of analysis name to dataclass
+        Answers of other analyses are left out.
 
     Returns
     -------
     FlightResults
-        Every array stands in its ``figures``; those of the analyses are empty.
+        Without arrays: they are in files of their own.
 
     Raises
     ------
@@ -27,28 +53,30 @@ def restored(saved: SavedFlight) -> FlightResults:
         When the summary lacks what a result needs.
     """
     try:
-        summary = saved.summary
-        flight, answers = summary["flight"], dict(summary["results"])
-        if "inertial" in answers:
-            answers["inertial"] = _with_channels(answers["inertial"])
+        flight = summary["flight"]
         start = flight["start_utc"]
-        document = {
+        general = {
             **summary,
-            **answers,
             "flight_id": flight["id"],
             "source": flight["source"],
             "metadata": flight["metadata"],
             "start_utc_ns": None if start is None else iso_to_utc_ns(start)[0],
             "duration_s": flight["duration_s"],
-            "figures": tuple(saved.figures.values()),
         }
-        result: FlightResults = _value(FlightResults, document)
+        result: FlightResults = _value(FlightResults, general)
+        return replace(result, **_answers(summary["results"], answer_types))
     except (KeyError, TypeError, ValueError, AttributeError, GroundstationError) as error:
         what = f"a summary that cannot be used ({type(error).__name__}: {error})"
-        raise UnreadableLogError(
-            str(saved.folder / SUMMARY), what, "one that this version writes", "run the log again"
-        ) from error
-    return result
+        raise UnreadableLogError(where, what, "one that this version writes", "run the log again") from error
+
+
+def _answers(documents: Mapping[str, Any], answer_types: Mapping[str, type]) -> dict[str, Any]:
+    """The answers among ``results`` of a summary, by the name of their analysis."""
+    found = {}
+    for name, answer in documents.items():
+        if name in answer_types:
+            found[name] = _value(answer_types[name], _with_channels(answer) if name == "inertial" else answer)
+    return found
 
 
 def restored_magnetic(summary: Mapping[str, Any]) -> MagneticResult:
@@ -92,7 +120,9 @@ def _value(hint: Any, value: Any) -> Any:
     if origin is tuple:
         item = arguments if arguments[-1] is not Ellipsis else arguments[:1] * len(value)
         return tuple(_value(one, part) for one, part in zip(item, value, strict=True))
-    if is_dataclass(hint) and isinstance(value, Mapping):
+    if is_dataclass(hint):
+        if not isinstance(value, Mapping):
+            raise TypeError(f"{value!r} is no object")
         return _instance(typing.cast(type, hint), value)
     return value
 
