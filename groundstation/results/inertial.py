@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MISSING: dict[str, str] = {"gnss": "GNSS", "ins": "INS", "both": "both"}  # RealOutage.missing, for people
+CHANNELS = ("north", "east")  # in summary.json each stands under its own name
 NOT_SEEN = 0.01  # observability below which the data said nothing of a state
 UNMOVED = 0.01  # share of its sigma at the start by which the sigma of such a state may differ
 SUMMARY_ROUNDING = 1e-6  # of a sigma in summary.json
@@ -128,7 +129,7 @@ class InertialResult(Tabular):
     transition: str
     epochs: int
     gnss_seconds: float
-    channels: tuple[ChannelResult, ...]
+    channels: tuple[ChannelResult, ...] = field(metadata={"spread": CHANNELS})
     radial_error_rate_50_nmiph: float | None
     radial_error_rate_95_nmiph: float | None
     velocity_error_rms_mps: float | None
