@@ -11,6 +11,7 @@ import pytest
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
+from groundstation.base.serial import to_json
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.heading.estimate import estimate_heading_error
@@ -18,7 +19,6 @@ from groundstation.estimators.magnetic.estimate import estimate_deviation
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.latency import Latencies, Latency
 from groundstation.results.magnetic import LETTERS, MagneticResult
-from groundstation.results.summary import plain
 from groundstation.simulation.flight import simulate
 from groundstation.simulation.scenario import load_scenario
 from groundstation.tables.table import Flight, Table
@@ -227,7 +227,7 @@ def test_card_leads_from_reading_to_heading() -> None:
     for row in result.card:
         assert (row.steer_deg + row.deviation_deg - row.magnetic_heading_deg + 180.0) % 360.0 == pytest.approx(180.0)
         assert row.sigma_deg > 0.0
-    assert json.dumps(plain(result), allow_nan=False)
+    assert json.dumps(to_json(result), allow_nan=False)
 
 
 def test_the_figure_eight_of_the_simulator_gives_its_iron_back() -> None:

@@ -33,7 +33,6 @@ from groundstation.results import magnetic_ground as answers
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.magnetic import LETTERS
-from groundstation.results.restore import restored
 from groundstation.tables.declination import declination_along
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer.recording import write_recording
@@ -454,7 +453,7 @@ def test_a_whole_run_tells_it_and_saves_it(tmp_path: Path) -> None:
     assert {"magnetic_ground_epochs", "magnetic_ground_curve"} <= set(saved.figures)
     own = {"$schema": SCHEMA["$schema"], "$ref": "#/$defs/magnetic_ground", "$defs": SCHEMA["$defs"]}
     jsonschema.Draft202012Validator(own).validate(saved.summary["results"]["magnetic_ground"])
-    back = restored(saved).answer(GroundDeviation)
+    back = saved.results.answer(GroundDeviation)
     assert back is not None
     assert len(back.runs) == len(on_ground.runs)
     for run, other in zip(on_ground.used, back.used, strict=True):

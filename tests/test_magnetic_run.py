@@ -25,7 +25,6 @@ from groundstation.results import magnetic as answers
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.magnetic import LETTERS, MagneticResult
-from groundstation.results.restore import restored
 from groundstation.simulation.deviation import BIN_MIDDLES_DEG, scenario_deviation
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
@@ -125,7 +124,7 @@ def test_recorded_flights_are_refused_with_the_reason(name: str, reason: str, tm
 @pytest.mark.parametrize("name", [field.name for field in fields(answers.MagneticResult)])
 def test_every_answer_is_saved_and_comes_back(name: str, tmp_path: Path) -> None:
     save(tmp_path, figure_eight(), {})
-    before, after = (found.answer(MagneticResult) for found in (figure_eight(), restored(load(tmp_path))))
+    before, after = (found.answer(MagneticResult) for found in (figure_eight(), load(tmp_path).results))
     if name == "figures":
         assert {"magnetic_samples", "magnetic_table", "magnetic_modulus"} <= set(load(tmp_path).figures)
         return

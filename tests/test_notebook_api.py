@@ -22,7 +22,6 @@ from groundstation.pipeline.clip import Wanted, clip
 from groundstation.reports import drawing
 from groundstation.results.files import SavedFlight, load, save
 from groundstation.results.flight import FlightResults
-from groundstation.results.restore import restored
 from groundstation.results.summary import summary_of
 from groundstation.viewer import inline
 from tests import inertial_example, report_example
@@ -215,7 +214,7 @@ def test_saved_results_are_restored_as_they_were(make: Callable[[], FlightResult
     results = make()
     save(tmp_path / "flight", results, {})
     saved = load(tmp_path / "flight")
-    again = restored(saved)
+    again = saved.results_with_figures()
     assert summary_of(again) == saved.summary
     assert {figure.name for figure in again.figures} == {figure.name for figure in results.figures}
     assert list(again.answers) == list(results.answers)
@@ -233,7 +232,7 @@ def test_a_summary_that_lacks_something_is_one_line(folder: Path) -> None:
         {"findings": [{"severity": "info"}]},
     ):
         with pytest.raises(UnreadableLogError, match="run the log again"):
-            restored(SavedFlight(folder, {**saved.summary, **spoil}, {}, {}))
+            assert SavedFlight(folder, {**saved.summary, **spoil}, {}, {}).results
 
 
 def test_the_card_shows_no_markup_of_a_log(tmp_path: Path) -> None:

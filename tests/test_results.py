@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import UnreadableLogError
+from groundstation.base.serial import to_json
 from groundstation.results.figures import FigureData
 from groundstation.results.files import csv_text, json_text, load, save, write_text
-from groundstation.results.summary import digits_of, plain, summary_of
+from groundstation.results.summary import digits_of, summary_of
 from tests.report_example import MANIFEST, example, figure, heading_result
 
 
@@ -113,11 +114,11 @@ def test_json_refuses_nan() -> None:
 
 
 def test_numbers_are_rounded_by_their_unit_without_minus_zero() -> None:
-    assert plain({"error_deg": 0.00004}) == {"error_deg": 0.0}
-    assert str(plain(-1e-9, "error_deg")) == "0.0"
-    assert plain((1.23456, float("inf")), "residual_arcmin") == [1.23, None]
-    assert plain(np.array([1.23456789, np.nan]), "speed_of_mean_mps") == [1.2346, None]
-    assert plain({"a": np.int64(3), "b": np.bool_(True), "c": None, "d": "x"}) == {
+    assert to_json({"error_deg": 0.00004}) == {"error_deg": 0.0}
+    assert str(to_json(-1e-9, "error_deg")) == "0.0"
+    assert to_json((1.23456, float("inf")), "residual_arcmin") == [1.23, None]
+    assert to_json(np.array([1.23456789, np.nan]), "speed_of_mean_mps") == [1.2346, None]
+    assert to_json({"a": np.int64(3), "b": np.bool_(True), "c": None, "d": "x"}) == {
         "a": 3,
         "b": True,
         "c": None,

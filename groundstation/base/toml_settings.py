@@ -8,12 +8,15 @@ faults) is a union whose members carry a class attribute ``kind``; the TOML tabl
 
 import dataclasses
 import math
-import types
 import typing
-from collections.abc import Mapping
-from typing import Any, ClassVar, Protocol, TypeVar
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
 from groundstation.base.errors import SettingsError
+
+if TYPE_CHECKING:
+    import cattrs
 
 Settings = TypeVar("Settings")
 
@@ -92,80 +95,78 @@ def settings_from(cls: type[Settings], table: Mapping[str, Any], where: str, key
     groundstation.base.errors.SettingsError: a.toml, key wind.nort_mps: found a key that nothing reads, expected
     one of north_mps
     """
-    fields = {field.name: field for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
-    hints = typing.get_type_hints(cls)
-    for name in table:
-        if name not in fields and not (name == "kind" and hasattr(cls, "kind")):
-            raise _error(where, _join(key, name), "a key that nothing reads", f"one of {', '.join(fields)}")
-    values: dict[str, Any] = {}
-    for name, field in fields.items():
-        place = _join(key, name)
-        if name in table:
-            values[name] = _convert(hints[name], table[name], where, place)
-            _check_range(values[name], field, where, place)
-        elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
-            raise _error(where, place, "nothing", "a value")
+    import cattrs  # not for `--help`
+
+    from groundstation.base.serial import MismatchError, first_mismatch, join
+
     try:
-        return cls(**values)
-    except SettingsError as error:  # raised by the class itself, which knows neither file nor table
-        place = f"{where}, key {_join(key, error.where)}"
-        raise SettingsError(place, error.found, error.expected, error.next_step) from error
+        found: Settings = _reader().structure(table, cls)
+    except (cattrs.BaseValidationError, MismatchError) as error:
+        told = first_mismatch(error)
+        raise SettingsError(
+            f"{where}, key {join(key, told.place)}", told.found, told.expected, told.next_step
+        ) from error
+    return found
 
 
-def _convert(hint: Any, value: Any, where: str, key: str) -> Any:
-    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-    if origin in (typing.Union, types.UnionType):
-        members = [member for member in arguments if member is not type(None)]
-        if len(members) == 1:
-            return _convert(members[0], value, where, key)
-        return _convert_by_kind(members, value, where, key)
-    if origin is tuple:
-        return _convert_tuple(arguments, value, where, key)
-    if dataclasses.is_dataclass(hint):
+@cache
+def _reader() -> "cattrs.Converter":
+    from groundstation.base.serial import new_reader
+
+    wanted = {str: "text in quotes", float: "a number", int: "a whole number", bool: "true or false"}
+    reader = new_reader(wanted, "a table", float_of=_finite)
+    reader.register_structure_hook_factory(dataclasses.is_dataclass, lambda cls: _table_reader(cls, reader))
+    return reader
+
+
+def _finite(value: Any) -> float:
+    from groundstation.base.serial import MismatchError
+
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError
+    if not math.isfinite(value):
+        raise MismatchError(repr(value), "a finite number")
+    return float(value)
+
+
+def _table_reader(cls: type, reader: "cattrs.Converter") -> Callable[[Any, Any], Any]:
+    """Reads a table of a file: no key that the class does not know, no number out of the range of its field."""
+    from cattrs.gen import make_dict_structure_fn, override
+
+    from groundstation.base.serial import MismatchError
+
+    fields = {field.name: field for field in dataclasses.fields(cls)}
+    hints = typing.get_type_hints(cls)
+    ranged = {
+        name: override(struct_hook=_ranged_reader(field, hints[name], reader))
+        for name, field in fields.items()
+        if field.metadata
+    }
+    make: Callable[..., Callable[[Any, Any], Any]] = make_dict_structure_fn
+    read = make(cls, reader, **ranged)
+
+    def strict(value: Any, kind: Any) -> Any:
         if not isinstance(value, Mapping):
-            raise _error(where, key, repr(value), "a table")
-        return settings_from(typing.cast(type[Any], hint), value, where, key)
-    if origin is typing.Literal:
-        if value not in arguments:
-            raise _error(where, key, repr(value), f"one of {', '.join(arguments)}")
-        return value
-    return _convert_plain(hint, value, where, key)
+            raise MismatchError(repr(value), "a table")
+        for name in value:
+            if name not in fields and not (name == "kind" and hasattr(cls, "kind")):
+                raise MismatchError("a key that nothing reads", f"one of {', '.join(fields)}", str(name))
+        return read(value, kind)
+
+    return strict
 
 
-def _convert_by_kind(members: list[type[HasKind]], value: Any, where: str, key: str) -> Any:
-    kinds = {member.kind: member for member in members}
-    kind = value.get("kind") if isinstance(value, Mapping) else None
-    if kind not in kinds:
-        raise _error(where, _join(key, "kind"), repr(kind), f"one of {', '.join(kinds)}")
-    return settings_from(kinds[kind], value, where, key)
+def _ranged_reader(field: "dataclasses.Field[Any]", hint: Any, reader: "cattrs.Converter") -> Callable[[Any, Any], Any]:
+    from groundstation.base.serial import MismatchError
 
+    def read(value: Any, _hint: Any) -> Any:
+        found = reader.structure(value, hint)
+        problem = _out_of_range(found, field)
+        if problem:
+            raise MismatchError(*problem)
+        return found
 
-def _convert_tuple(arguments: tuple[Any, ...], value: Any, where: str, key: str) -> tuple[Any, ...]:
-    if not isinstance(value, list):
-        raise _error(where, key, repr(value), "a list")
-    if len(arguments) == 2 and arguments[1] is Ellipsis:
-        arguments = (arguments[0],) * len(value)
-    if len(value) != len(arguments):
-        raise _error(where, key, f"{len(value)} values", f"{len(arguments)} values")
-    pairs = enumerate(zip(arguments, value, strict=True))
-    return tuple(_convert(hint, item, where, f"{key}[{i}]") for i, (hint, item) in pairs)
-
-
-def _convert_plain(hint: Any, value: Any, where: str, key: str) -> Any:
-    if hint is float and isinstance(value, int) and not isinstance(value, bool):
-        value = float(value)
-    if not isinstance(value, hint) or (hint is not bool and isinstance(value, bool)):
-        wanted = {"str": "text in quotes", "float": "a number", "int": "a whole number", "bool": "true or false"}
-        raise _error(where, key, repr(value), wanted.get(hint.__name__, hint.__name__))
-    if isinstance(value, float) and not math.isfinite(value):
-        raise _error(where, key, repr(value), "a finite number")
-    return value
-
-
-def _check_range(value: Any, field: "dataclasses.Field[Any]", where: str, key: str) -> None:
-    expected = _out_of_range(value, field)
-    if expected:
-        raise _error(where, key, *expected)
+    return read
 
 
 def _out_of_range(value: Any, field: "dataclasses.Field[Any]") -> tuple[str, str] | None:
@@ -175,11 +176,3 @@ def _out_of_range(value: Any, field: "dataclasses.Field[Any]") -> tuple[str, str
         if isinstance(item, int | float) and not low <= item <= high:
             return f"{item:g}", f"{low:g} or more" if math.isinf(high) else f"within [{low:g}, {high:g}]"
     return None
-
-
-def _join(key: str, name: str) -> str:
-    return f"{key}.{name}" if key else name
-
-
-def _error(where: str, key: str, found: str, expected: str) -> SettingsError:
-    return SettingsError(f"{where}, key {key}", found, expected)

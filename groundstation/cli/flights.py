@@ -94,14 +94,14 @@ def compare(
     json: Json = False,
 ) -> int | None:
     """Compare two flights, or two runs of one flight: what differs, and both in one recording on one time axis."""
+    from groundstation.base.serial import to_json
     from groundstation.cli import printing
     from groundstation.pipeline.compare import compare as held_against
     from groundstation.pipeline.compare import compare_to
-    from groundstation.results.summary import plain
 
     found = held_against(a, b, align)[0] if output is None else compare_to(a, b, output, align, force=force)
     if json:
-        typer.echo(printing.as_json(plain(found.to_dict())))
+        typer.echo(printing.as_json(to_json(found.to_dict())))
     elif not quiet:
         typer.echo(comparison_text(found, everything=verbose))
     return DONE

@@ -19,7 +19,6 @@ from groundstation.pipeline.log import Log, open_log
 from groundstation.pipeline.notebook import AnyPath, OpenFlight
 from groundstation.results.files import SavedFlight, load
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.restore import restored
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:
@@ -203,7 +202,7 @@ class SavedRun(OpenFlight):
 
     @cached_property
     def results(self) -> FlightResults:
-        return restored(self.saved)
+        return self.saved.results_with_figures()
 
     @property
     def source(self) -> Source:

@@ -10,10 +10,11 @@ from typing import Any, get_args
 import numpy as np
 
 from groundstation.base.errors import UsageError
+from groundstation.base.serial import MismatchError
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, csv_text, mapping
 from groundstation.results.magnetic import LETTERS, METHOD_TITLES, MagneticResult, MagneticVerdict, PoissonParameters
-from groundstation.results.restore import restored_magnetic
+from groundstation.results.restore import restored_answer
 
 DEVIATION_CSV, STEER_CARD = "deviation.csv", "steer_card.pdf"  # in the folder of a flight that has one
 BINS = 360
@@ -92,11 +93,11 @@ def deviation_from_summary(summary: Mapping[str, Any], where: str) -> Deviation:
         why = next((f" ({one.get('reason')})" for one in found if one.get("analysis") == "magnetic"), "")
         raise UsageError(where, f"no magnetic deviation{why}", "the summary.json of a flight that has one")
     try:
-        magnetic = restored_magnetic(summary)
+        magnetic = restored_answer(summary, MagneticResult)
         own = deviation_of(magnetic, str(flight.get("id") or ""), str(flight.get("aircraft") or ""))
         return _checked(own, where)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        what = f"a magnetic deviation that cannot be used ({type(error).__name__}: {error})"
+    except (MismatchError, ValueError, KeyError, TypeError, AttributeError) as error:
+        what = f"a magnetic deviation that cannot be used ({error})"
         raise UsageError(where, what, "one that this version writes", RUN_AGAIN) from error
 
 

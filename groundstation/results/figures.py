@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ class FigureData:
         Decimals a column is rounded to in tables/*.csv; 6 where nothing is said.
     """
 
+    is_kept_apart: ClassVar[bool] = True  # from the answer that holds it: arrays have files of their own
     name: str
     columns: Mapping[str, NDArray[Any]]
     digits: Mapping[str, int]

@@ -3,7 +3,8 @@
 import json
 import shutil
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from os import SEEK_END
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,10 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.errors import UnreadableLogError
+from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
+from groundstation.results.restore import ANSWER_TYPES, restored
 from groundstation.results.summary import digits_of, summary_of
 
 SUMMARY, MANIFEST, ARRAYS, TABLES = "summary.json", "manifest.json", "results.parquet", "tables"
@@ -25,14 +28,30 @@ PARQUET_LEAST_BYTES = 12  # both, and the length of what describes the file
 class SavedFlight:
     """What a flight folder holds, as the report, ``compare`` and the fleet read it.
 
-    ``summary`` and ``manifest`` are the JSON documents; ``figures`` maps a name to its arrays, which are read when they
-    are asked for.
+    ``results`` are the answers as the run had them, but for their arrays: ``figures`` maps a name to those, which are
+    read when they are asked for. ``summary`` and ``manifest`` are the JSON documents.
     """
 
     folder: Path
     summary: Mapping[str, Any]
     manifest: Mapping[str, Any]
     figures: Mapping[str, FigureData]
+    answer_types: Mapping[str, type[Answer]] = field(default_factory=lambda: ANSWER_TYPES)
+
+    @cached_property
+    def results(self) -> FlightResults:
+        """The answers, rounded as they were written, without arrays.
+
+        Raises
+        ------
+        UnreadableLogError
+            When the summary lacks what a result needs.
+        """
+        return restored(self.summary, str(self.folder / SUMMARY), self.answer_types)
+
+    def results_with_figures(self) -> FlightResults:
+        """The answers with every array, which is read for it."""
+        return replace(self.results, figures=tuple(self.figures.values()))
 
     def figure(self, name: str) -> FigureData | None:
         """The figure data of that name, None when the flight has none or it is empty."""
@@ -118,8 +137,14 @@ class _Figures(Mapping[str, FigureData]):
         return len(self._paths)
 
 
-def load(folder: Path) -> SavedFlight:
+def load(folder: Path, answer_types: Mapping[str, type[Answer]] = ANSWER_TYPES) -> SavedFlight:
     """Read a flight folder back; its figures are read when they are asked for.
+
+    Parameters
+    ----------
+    folder : Path
+    answer_types : mapping of analysis name to dataclass
+        What ``results`` of summary.json become.
 
     Raises
     ------
@@ -138,7 +163,8 @@ def load(folder: Path) -> SavedFlight:
     paths = sorted((folder / ARRAYS).glob("*.parquet"))
     for path in paths:
         _require_whole(path)
-    return SavedFlight(folder, documents[SUMMARY], documents[MANIFEST], _Figures({path.stem: path for path in paths}))
+    figures = _Figures({path.stem: path for path in paths})
+    return SavedFlight(folder, documents[SUMMARY], documents[MANIFEST], figures, answer_types)
 
 
 def _require_whole(path: Path) -> None:

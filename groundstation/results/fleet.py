@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import frozen
+from groundstation.base.serial import to_json
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.results.figures import FigureData
 from groundstation.results.frames import no_such_table, row_fields, rows_frame
 from groundstation.results.magnetic import LETTERS
-from groundstation.results.summary import plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -416,7 +416,7 @@ class FleetResults:
         out: dict[str, Any] = {}
         for part in fields(self):
             found = getattr(self, part.name)
-            out[part.name] = _rows(found) if isinstance(found, FigureData) else plain(found)
+            out[part.name] = _rows(found) if isinstance(found, FigureData) else to_json(found)
         return out
 
 
@@ -428,5 +428,5 @@ def _rows(table: FigureData) -> list[dict[str, Any]]:
 def _values(name: str, values: NDArray[Any]) -> list[Any]:
     if values.dtype.kind == "M":
         return [None if np.isnat(one) else utc_ns_to_iso(int(one.astype(np.int64))) for one in values]
-    found: list[Any] = plain(values, name)
+    found: list[Any] = to_json(values, name)
     return found

@@ -1,0 +1,65 @@
+"""Decimals that a number is rounded to wherever it is written for people and scripts, from its name."""
+
+import math
+from collections.abc import Mapping
+from functools import cache
+
+# Decimals by unit suffix; by full name where a suffix is not enough. 6 where neither says anything.
+DIGITS_BY_NAME: Mapping[str, int] = {
+    "drift_deg_per_h": 2,
+    "drift_sigma_deg_per_h": 2,
+    "latitude_deg": 7,
+    "longitude_deg": 7,
+    "start_s": 3,
+    "end_s": 3,
+    "taxi_seconds": 1,
+    "value": 5,
+    "reference_residual_arcmin": 2,
+}
+DIGITS_BY_UNIT: Mapping[str, int] = {
+    "deg": 4,
+    "arcmin": 2,
+    "mps": 4,
+    "m": 3,
+    "s": 3,
+    "min": 3,
+    "h": 4,
+    "hz": 4,
+    "arcsec": 3,
+    "dph": 6,
+    "dphph": 6,
+    "nmiph": 4,
+    "nt": 2,
+}
+USUAL = 6
+
+
+@cache
+def digits_of(name: str) -> int:
+    """Decimals a number is rounded to, from its field name.
+
+    Examples
+    --------
+    >>> digits_of("error_deg"), digits_of("ground_speed_mps"), digits_of("drift_deg_per_h"), digits_of("share")
+    (4, 4, 2, 6)
+    >>> digits_of("north_drift_sigma_dph"), digits_of("radial_error_rate_50_nmiph"), digits_of("horizon_min")
+    (6, 4, 3)
+    """
+    if name in DIGITS_BY_NAME:
+        return DIGITS_BY_NAME[name]
+    for part in reversed(name.split("_")):
+        unit = part.rstrip("0123456789")
+        if unit in DIGITS_BY_UNIT:
+            return DIGITS_BY_UNIT[unit]
+    return USUAL
+
+
+def rounded(value: float, digits: int) -> float | None:
+    """A number as JSON tells it: rounded, never minus zero; None where it is not finite.
+
+    Examples
+    --------
+    >>> rounded(1.23456, 2), rounded(-0.001, 2), rounded(math.nan, 2)
+    (1.23, 0.0, None)
+    """
+    return round(value, digits) + 0.0 if math.isfinite(value) else None

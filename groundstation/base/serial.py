@@ -1,0 +1,426 @@
+"""Frozen dataclasses to JSON values and back, by their types: the rules of every file that is written and read.
+
+Floats are rounded by the name of their field, NaN is null, tuples are lists. A field with ``left_out_when_default``
+in its metadata is absent while it has its default; a class with ``is_kept_apart = True`` (arrays, which have files of
+their own) is left out with the fields that hold it. What is read is checked: a value of another kind is a
+:class:`MismatchError` that names its place. Read leniently (:func:`salvaged`), it is left out instead.
+"""
+
+import dataclasses
+import math
+import types
+import typing
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, partial
+from typing import Any, TypeVar
+
+import cattrs
+import cattrs.gen
+import numpy as np
+
+from groundstation.base.digits import USUAL, digits_of, rounded
+from groundstation.base.errors import GroundstationError
+
+Document = TypeVar("Document")
+Hook = Callable[[Any, Any], Any]
+LARGEST = 1 << 62  # of a number in a file that may be damaged
+LEFT_OUT_WHEN_DEFAULT: Mapping[str, Any] = {"left_out_when_default": True}
+_WANTED = {str: "text", float: "a number", int: "a whole number", bool: "true or false"}
+
+
+class MismatchError(Exception):
+    """A value that is not of the kind its place needs.
+
+    Parameters
+    ----------
+    found, expected : str
+    place : str
+        Dotted path within the document; empty while it is not known.
+    next_step : str
+        What the user can do about it.
+    """
+
+    def __init__(self, found: str, expected: str, place: str = "", next_step: str = "") -> None:
+        self.found, self.expected, self.place, self.next_step = found, expected, place, next_step
+        text = f"found {found}, expected {expected}" if expected else found
+        super().__init__(f"{place}: {text}" if place else text)
+
+
+# ------------------------------------------------------------------------------------------------ writing
+
+
+def to_json(value: Any, name: str = "") -> Any:
+    """Turn a value into JSON: floats rounded by their name, NaN and infinities null, dataclasses and arrays opened.
+
+    Parameters
+    ----------
+    value : dataclass, mapping, sequence, array or plain value
+    name : str
+        Says how ``value`` is rounded where it is a number, or a list of them.
+
+    Examples
+    --------
+    >>> to_json({"error_deg": 1.234567, "gap_s": float("nan")})
+    {'error_deg': 1.2346, 'gap_s': None}
+    """
+    return _writer(digits_of(name) if name else USUAL).unstructure(value)
+
+
+@cache
+def _writer(digits: int) -> cattrs.Converter:
+    """Writes what stands under a name with so many decimals; what has names of its own goes by these."""
+    writer = cattrs.Converter(unstructure_fallback_factory=lambda _cls: str)
+    for kind in (type(None), bool, int):
+        writer.register_unstructure_hook(kind, lambda value: value)
+    writer.register_unstructure_hook(float, lambda value: rounded(float(value), digits))
+    writer.register_unstructure_hook(str, str)
+    writer.register_unstructure_hook(np.floating, lambda value: rounded(float(value), digits))
+    writer.register_unstructure_hook(np.integer, int)
+    writer.register_unstructure_hook(np.bool_, bool)
+    writer.register_unstructure_hook_func(
+        lambda cls: isinstance(cls, type) and issubclass(cls, tuple | list | np.ndarray),
+        lambda values: [writer.unstructure(value) for value in values],
+    )
+    writer.register_unstructure_hook_func(
+        lambda cls: isinstance(cls, type) and issubclass(cls, Mapping),
+        lambda table: {str(key): to_json(value, str(key)) for key, value in table.items()},
+    )
+    writer.register_unstructure_hook_factory(dataclasses.is_dataclass, lambda cls: _object_writer(cls, writer))
+    return writer
+
+
+def _object_writer(cls: type, writer: cattrs.Converter) -> Callable[[Any], dict[str, Any]]:
+    hints = typing.get_type_hints(cls)
+    parts = {
+        field.name: cattrs.gen.override(
+            omit=_is_kept_apart(hints[field.name]),
+            omit_if_default="left_out_when_default" in field.metadata,
+            unstruct_hook=_writer(digits_of(field.name)).unstructure,
+        )
+        for field in dataclasses.fields(cls)
+    }
+    make: Callable[..., Callable[[Any], dict[str, Any]]] = cattrs.gen.make_dict_unstructure_fn
+    return make(cls, writer, **parts)
+
+
+def _is_kept_apart(hint: Any) -> bool:
+    return getattr(hint, "is_kept_apart", False) is True or any(map(_is_kept_apart, typing.get_args(hint)))
+
+
+# ------------------------------------------------------------------------------------------------ reading
+
+
+def from_json(cls: type[Document], document: Any) -> Document:
+    """Read a dataclass back from the JSON values of :func:`to_json`; null where a number is meant is NaN.
+
+    Keys that the class does not know are passed over: a later version may have written them.
+
+    Raises
+    ------
+    MismatchError
+        For the first value that is missing or of another kind.
+
+    Examples
+    --------
+    >>> @dataclasses.dataclass(frozen=True)
+    ... class Wind:
+    ...     north_mps: float
+    ...     levels_m: tuple[float, ...] = ()
+    >>> from_json(Wind, {"north_mps": None, "levels_m": [0, 500]})
+    Wind(north_mps=nan, levels_m=(0.0, 500.0))
+    >>> from_json(Wind, {"north_mps": 1, "levels_m": [0, "high"]})
+    Traceback (most recent call last):
+    groundstation.base.serial.MismatchError: levels_m[1]: found 'high', expected a number
+    """
+    return structured(_json_reader(), cls, document)
+
+
+def salvaged(cls: type[Document], document: Any) -> Document:
+    """Read what is sound of a document that may be damaged or written by anyone; the rest is left out.
+
+    A value of another kind gives its field's default, or drops the entry of a list or mapping it stands in. Whole
+    numbers are counts: not negative.
+
+    Raises
+    ------
+    MismatchError
+        When the document itself lacks what its class must have.
+
+    Examples
+    --------
+    >>> @dataclasses.dataclass(frozen=True)
+    ... class Wind:
+    ...     samples: int = 0
+    ...     levels_m: tuple[float, ...] = ()
+    >>> salvaged(Wind, {"samples": -3, "levels_m": [0, "high", 500]})
+    Wind(samples=0, levels_m=(0.0, 500.0))
+    """
+    return structured(_salvager(), cls, document)
+
+
+def structured(reader: cattrs.Converter, cls: type[Document], document: Any) -> Document:
+    """What a converter makes of a document, its first complaint as a :class:`MismatchError`."""
+    try:
+        return reader.structure(document, cls)
+    except (cattrs.BaseValidationError, MismatchError) as error:
+        raise first_mismatch(error) from error
+
+
+def first_mismatch(error: Exception) -> MismatchError:
+    """The first complaint of a converter, with its place in the document."""
+    place, cause = _leaf(error, "")
+    if isinstance(cause, MismatchError):
+        return MismatchError(cause.found, cause.expected, join(place, cause.place), cause.next_step)
+    if isinstance(cause, KeyError):
+        return MismatchError("nothing", "a value", place)
+    if isinstance(cause, GroundstationError):  # raised by the class itself, which knows neither file nor table
+        return MismatchError(cause.found, cause.expected, join(place, cause.where), cause.next_step)
+    return MismatchError(f"{type(cause).__name__}: {cause}", "", place)
+
+
+def _leaf(error: BaseException, place: str) -> tuple[str, BaseException]:
+    """Follow the first complaint of a group down to its leaf: its place and itself."""
+    if not isinstance(error, cattrs.BaseValidationError):
+        return place, error
+    first = error.exceptions[0]
+    for note in getattr(first, "__notes__", ()):
+        if isinstance(note, cattrs.AttributeValidationNote):
+            place = join(place, note.name)
+        elif isinstance(note, cattrs.IterableValidationNote):
+            place = join(place, f"[{note.index}]" if isinstance(note.index, int) else str(note.index))
+    return _leaf(first, place)
+
+
+def join(place: str, name: str) -> str:
+    """Dotted path of a name within a place.
+
+    Examples
+    --------
+    >>> join("", "a"), join("a", "b"), join("a", "[0]"), join("a", "")
+    ('a', 'a.b', 'a[0]', 'a')
+    """
+    return f"{place}.{name}" if place and name and not name.startswith("[") else place + name
+
+
+@cache
+def _json_reader() -> cattrs.Converter:
+    reader = new_reader(_WANTED, float_of=_json_number)
+    reader.register_structure_hook_factory(dataclasses.is_dataclass, lambda cls: _object_reader(cls, reader))
+    return reader
+
+
+def _object_reader(cls: type, reader: cattrs.Converter) -> Hook:
+    read: Hook = cattrs.gen.make_dict_structure_fn(cls, reader)
+
+    def strict(value: Any, kind: Any) -> Any:
+        if not isinstance(value, Mapping):
+            raise MismatchError(repr(value), "an object")
+        return read(value, kind)
+
+    return strict
+
+
+def new_reader(
+    wanted: Mapping[type, str], table: str = "an object", *, float_of: Callable[[Any], float]
+) -> cattrs.Converter:
+    """A strict converter without a rule for dataclasses.
+
+    Parameters
+    ----------
+    wanted : mapping of plain type to text
+        What is expected of a value of that type, for messages.
+    table : str
+        What a mapping is called.
+    float_of : callable
+        Reads a number; raises TypeError for anything else.
+    """
+    reader = cattrs.Converter()
+    for kind in (str, int, bool):
+        reader.register_structure_hook(kind, partial(_plain, wanted=wanted))
+    reader.register_structure_hook(float, partial(_number, float_of=float_of, wanted=wanted[float]))
+    reader.register_structure_hook_func(lambda hint: _origin(hint) is typing.Literal, _literal)
+    reader.register_structure_hook_func(lambda hint: hint in (Any, object), lambda value, _hint: value)
+    reader.register_structure_hook_factory(
+        lambda hint: _origin(hint) in (typing.Union, types.UnionType),
+        lambda hint: _union_reader(hint, reader),
+    )
+    reader.register_structure_hook_factory(
+        lambda hint: _origin(hint) is tuple, lambda hint: _tuple_reader(typing.get_args(hint), reader)
+    )
+    reader.register_structure_hook_factory(
+        lambda hint: _origin(hint) in (Mapping, dict), lambda hint: _mapping_reader(hint, table, reader)
+    )
+    return reader
+
+
+def _origin(hint: Any) -> Any:
+    return typing.get_origin(hint)
+
+
+def _json_number(value: Any) -> float:
+    if value is None:
+        return math.nan
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError
+    return float(value)
+
+
+def _number(value: Any, _hint: Any, *, float_of: Callable[[Any], float], wanted: str) -> float:
+    try:
+        return float_of(value)
+    except TypeError:
+        raise MismatchError(repr(value), wanted) from None
+
+
+def _plain(value: Any, hint: type, *, wanted: Mapping[type, str]) -> Any:
+    if not isinstance(value, hint) or (hint is not bool and isinstance(value, bool)):
+        raise MismatchError(repr(value), wanted[hint])
+    return value
+
+
+def _literal(value: Any, hint: Any) -> Any:
+    if value not in typing.get_args(hint):
+        raise MismatchError(repr(value), f"one of {', '.join(map(str, typing.get_args(hint)))}")
+    return value
+
+
+def _tuple_reader(hints: tuple[Any, ...], reader: cattrs.Converter) -> Hook:
+    """Reads tuples item by item, from lists alone."""
+    is_fixed = len(hints) != 2 or hints[1] is not Ellipsis
+
+    def read(value: Any, _hint: Any) -> Any:
+        if not isinstance(value, list | tuple):
+            raise MismatchError(repr(value), "a list")
+        if is_fixed and len(value) != len(hints):
+            raise MismatchError(f"{len(value)} values", f"{len(hints)} values")
+        return _items(value, hints if is_fixed else hints[:1] * len(value), reader)
+
+    return read
+
+
+def _mapping_reader(hint: Any, table: str, reader: cattrs.Converter) -> Hook:
+    """Reads mappings entry by entry."""
+    make: Callable[..., Hook] = cattrs.gen.mapping_structure_factory
+    entries = make(hint, reader, structure_to=dict)
+
+    def read(value: Any, kind: Any) -> Any:
+        if not isinstance(value, Mapping):
+            raise MismatchError(repr(value), table)
+        return entries(value, kind)
+
+    return read
+
+
+def _items(values: Sequence[Any], hints: Sequence[Any], reader: cattrs.Converter) -> tuple[Any, ...]:
+    found = []
+    for index, (value, hint) in enumerate(zip(values, hints, strict=True)):
+        try:
+            found.append(reader.structure(value, hint))
+        except Exception as error:
+            error.add_note(cattrs.IterableValidationNote(f"item {index}", index, hint))
+            raise cattrs.IterableValidationError("list", [error], tuple) from None
+    return tuple(found)
+
+
+def _union_reader(hint: Any, reader: cattrs.Converter) -> Hook:
+    """Reads one of several kinds: nothing, a dataclass named by ``kind``, a list, or the plain kind that fits."""
+    members = [member for member in typing.get_args(hint) if member is not type(None)]
+    may_be_absent = len(members) < len(typing.get_args(hint))
+    kinds = {member.kind: member for member in members if hasattr(member, "kind")}
+
+    def read(value: Any, _hint: Any) -> Any:
+        if value is None and may_be_absent:
+            return None
+        if len(kinds) > 1:
+            kind = value.get("kind") if isinstance(value, Mapping) else None
+            if not isinstance(kind, str) or kind not in kinds:
+                raise MismatchError(repr(kind), f"one of {', '.join(kinds)}", "kind")
+            return reader.structure(value, kinds[kind])
+        if type(value) is int and float in members and len(members) > 1:  # settings: 400 draws stay 400
+            return value
+        return reader.structure(value, next((one for one in members if _fits(value, one)), members[0]))
+
+    return read
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    """Whether a value looks like one of a kind, among the members of a union."""
+    origin = _origin(hint)
+    if origin is tuple:
+        return isinstance(value, list | tuple)
+    if origin in (Mapping, dict) or dataclasses.is_dataclass(hint):
+        return isinstance(value, Mapping)
+    if hint is float:
+        return isinstance(value, int | float) and not isinstance(value, bool)
+    return isinstance(hint, type) and type(value) is hint
+
+
+# ------------------------------------------------------------------------------------------------ salvage
+
+
+@cache
+def _salvager() -> cattrs.Converter:
+    reader = new_reader(_WANTED, float_of=_sound_number)
+    reader.register_structure_hook(int, _count)
+    reader.register_structure_hook_factory(
+        lambda hint: _origin(hint) in (tuple, Mapping, dict) and typing.get_args(hint)[-1] is not None,
+        lambda hint: _lenient_several(hint, reader),
+    )
+    reader.register_structure_hook_factory(dataclasses.is_dataclass, lambda cls: _lenient_object(cls, reader))
+    return reader
+
+
+def _sound_number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError
+    if not abs(value) < LARGEST:
+        raise TypeError
+    return float(value)
+
+
+def _count(value: Any, _hint: Any) -> int:
+    if type(value) is not int or not 0 <= value < LARGEST:
+        raise MismatchError(repr(value), "a count")
+    return value
+
+
+def _sound(reader: cattrs.Converter, value: Any, hint: Any) -> tuple[Any, ...]:
+    """The value in a tuple of one; an empty one where it is not of its kind."""
+    try:
+        return (reader.structure(value, hint),)
+    except (MismatchError, cattrs.BaseValidationError):
+        return ()
+
+
+def _lenient_several(hint: Any, reader: cattrs.Converter) -> Hook:
+    arguments = typing.get_args(hint)
+    is_mapping = _origin(hint) is not tuple
+    if not is_mapping and arguments[-1] is not Ellipsis:
+        return _tuple_reader(arguments, reader)
+
+    def read(value: Any, _hint: Any) -> Any:
+        if is_mapping and isinstance(value, Mapping):
+            return {str(key): one for key, item in value.items() for one in _sound(reader, item, arguments[1])}
+        if is_mapping or not isinstance(value, list | tuple):
+            raise MismatchError(repr(value), "an object" if is_mapping else "a list")
+        return tuple(one for item in value for one in _sound(reader, item, arguments[0]))
+
+    return read
+
+
+def _lenient_object(cls: type, reader: cattrs.Converter) -> Hook:
+    hints, parts = typing.get_type_hints(cls), dataclasses.fields(cls)
+
+    def read(value: Any, _hint: Any) -> Any:
+        if not isinstance(value, Mapping):
+            raise MismatchError(repr(value), "an object")
+        found = {}
+        for part in parts:
+            sound = _sound(reader, value[part.name], hints[part.name]) if part.name in value else ()
+            if sound:
+                found[part.name] = sound[0]
+            elif part.default is dataclasses.MISSING and part.default_factory is dataclasses.MISSING:
+                raise MismatchError(repr(value.get(part.name)), "a value", part.name)
+        return cls(**found)
+
+    return read

@@ -1,0 +1,38 @@
+"""What stands in summary.json around the answers; the schema is generated from it and from the answers' types."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from groundstation.base.findings import Finding
+from groundstation.results.flight import NotAssessable, Source, Status
+
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class FlightDocument:
+    """Which flight it is; ``start_utc`` is null without absolute time."""
+
+    id: str
+    aircraft: str
+    flight: str
+    start_utc: str | None
+    duration_s: float
+    source: Source
+    metadata: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class SummaryDocument:
+    """The whole of summary.json; ``results`` are the answers by the name of their analysis."""
+
+    schema_version: int
+    flight: FlightDocument
+    status: Status
+    completeness: Mapping[str, float] = field(default_factory=dict)
+    ledger: Mapping[str, Any] = field(default_factory=dict)
+    clock: Mapping[str, Any] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+    not_assessable: tuple[NotAssessable, ...] = ()
+    results: Mapping[str, Any] = field(default_factory=dict)
