@@ -1,14 +1,15 @@
 """Tables of one flight in, all its answers out: everything the data allows, and the reason for what it does not."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.clock import Clock
 from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.findings import Finding, Severity
+from groundstation.base.ledger import Ledger
 from groundstation.base.toml_settings import settings_from
 from groundstation.estimators.heading.settings import AircraftData, HeadingRequest, HeadingSettings, Interval, SiteData
 from groundstation.estimators.inertial.noise import choose_class
@@ -43,8 +44,8 @@ class Given:
 
     flight_id: str
     source: Source
-    ledger: Mapping[str, Any]
-    clock: Mapping[str, Any]
+    ledger: Ledger
+    clock: Clock
     findings: tuple[Finding, ...]
     has_lost_data: bool
 
@@ -164,8 +165,8 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
         start_utc_ns=flight.start_ns if flight.has_utc else None,
         duration_s=flight.duration_s,
         status=_status(given, findings),
-        completeness=_completeness(given.ledger),
-        ledger={key: value for key, value in given.ledger.items() if key != "findings"},
+        completeness=given.ledger.completeness,
+        ledger=given.ledger,
         clock=given.clock,
         findings=tuple(findings),
         not_assessable=tuple(not_assessable),
@@ -272,11 +273,6 @@ def _status(given: Given, findings: list[Finding]) -> Status:
     if any(finding.severity == "fail" for finding in findings):
         return "failed"
     return "degraded" if given.has_lost_data else "ok"
-
-
-def _completeness(ledger: Mapping[str, Any]) -> dict[str, float]:
-    topics = ledger.get("topics", {})
-    return {name: float(entry["coverage"]) for name, entry in topics.items() if entry.get("coverage") is not None}
 
 
 def _figures(

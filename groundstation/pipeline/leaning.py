@@ -1,15 +1,15 @@
 """Results that lean on damage: the samples an answer rests on, held against the ledger's damaged spans and gaps."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from groundstation.base.findings import Finding, Severity
+from groundstation.base.ledger import DamagedSpan, Ledger
 from groundstation.base.timescales import duration_text
 from groundstation.integrity.ledger import gaps_of
 from groundstation.integrity.limits import Thresholds
-from groundstation.integrity.spans import is_span
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
 from groundstation.tables.table import Flight
@@ -33,7 +33,7 @@ class _Use(NamedTuple):
 
 def leaning_findings(
     flight: Flight,
-    ledger: Mapping[str, Any],
+    ledger: Ledger,
     heading: HeadingResult | None,
     inertial: InertialResult | None,
     thresholds: Thresholds,
@@ -57,8 +57,8 @@ def leaning_findings(
     return tuple(finding for finding in found if finding is not None)
 
 
-def _finding(use: _Use, ledger: Mapping[str, Any], flight: Flight, thresholds: Thresholds) -> Finding | None:
-    damaged = [entry for entry in ledger.get("spans", ()) if is_span(entry) and _concerns(entry, use)]
+def _finding(use: _Use, ledger: Ledger, flight: Flight, thresholds: Thresholds) -> Finding | None:
+    damaged = [span for span in ledger.spans if _concerns(span, use)]
     gaps = _gaps(use, flight, thresholds)
     if not damaged and not gaps:
         return None
@@ -67,17 +67,16 @@ def _finding(use: _Use, ledger: Mapping[str, Any], flight: Flight, thresholds: T
     if len(damaged) > SHOWN:
         told.append(f"{len(damaged) - SHOWN} more damaged spans")
     told += gaps
-    place = "+" + duration_text(float(damaged[0]["start_s"])) if damaged else ""
+    place = "+" + duration_text(damaged[0].start_s) if damaged else ""
     text = f"{use.title}: rests on samples in or around {'; '.join(told)}"
     return Finding(severity, use.code, text, "", place, len(damaged) + len(gaps))
 
 
-def _concerns(entry: Mapping[str, Any], use: _Use) -> bool:
+def _concerns(span: DamagedSpan, use: _Use) -> bool:
     """Whether a span is of what the answer uses, and when it does."""
-    topic, field, start_s = entry["topic"], entry["field"], float(entry["start_s"])
-    if (topic and topic not in use.topics) or (field and field not in use.fields):
+    if (span.topic and span.topic not in use.topics) or (span.field and span.field not in use.fields):
         return False
-    return _overlaps(start_s, start_s + float(entry["length_s"]), use.spans_s)
+    return _overlaps(span.start_s, span.start_s + span.length_s, use.spans_s)
 
 
 def _overlaps(start_s: float, end_s: float, spans_s: Spans) -> bool:
@@ -85,11 +84,11 @@ def _overlaps(start_s: float, end_s: float, spans_s: Spans) -> bool:
     return any(start_s < high and end_s >= low for low, high in spans_s)
 
 
-def _told(entry: Mapping[str, Any]) -> str:
-    name = ".".join(part for part in (entry["topic"], entry["field"]) if part)
-    what = str(entry["cause"]).replace("_", " ") + (f" of {name}" if name else "")
-    where = "" if entry["is_exact"] else "somewhere "
-    return f"{what} ({where}from +{duration_text(float(entry['start_s']))} for {float(entry['length_s']):.1f} s)"
+def _told(span: DamagedSpan) -> str:
+    name = ".".join(part for part in (span.topic, span.field) if part)
+    what = span.cause.replace("_", " ") + (f" of {name}" if name else "")
+    where = "" if span.is_exact else "somewhere "
+    return f"{what} ({where}from +{duration_text(span.start_s)} for {span.length_s:.1f} s)"
 
 
 def _gaps(use: _Use, flight: Flight, thresholds: Thresholds) -> list[str]:
