@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from groundstation.integrity.clock import Clock
+from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.ordering import corrected
 from groundstation.integrity.survey import survey
 from groundstation.pipeline.convert import convert_log
@@ -70,7 +70,7 @@ def damaged(source: Path, target: Path, seed: int = 1) -> None:
 def to_tables(path: Path, *, is_surveyed: bool = True) -> int:
     """Read and make the tables of all topics, the clock repaired and a ledger made; returns the number of records."""
     items = list(read(Source(path)))
-    clock = survey(items).clock if is_surveyed else Clock(has_times=True)
+    clock = survey(items).clock if is_surveyed else ClockModel(has_times=True)
     batches = corrected(items, clock)
     flight = flight_from_batches(batches, metadata={}, has_utc=clock.is_absolute, source_name=path.name)
     return sum(len(table) for topic, table in flight.tables.items() if topic.startswith("raw."))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.angles import direction_of, wrap_180, wrap_360
+from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.results.answer import Answer, by_analysis
@@ -297,8 +298,7 @@ def example(*answers: Answer | None, **changes: Any) -> FlightResults:
         duration_s=3000.0,
         status="ok",
         completeness={"gnss": 0.9897, "ins": 1.0},
-        ledger={"has_lost_data": False, "damage_count": 0, "topics": {}},
-        clock={"kind": "UTC from GNSS", "offset_s": 0.012, "rate_ppm": -3.2, "residual_rms_s": 0.0004, "steps": []},
+        clock=Clock(first_device_time="2026-05-04T06:00:00.000Z", is_absolute=True, nominal_period_s=0.02, start="utc"),
         findings=(
             Finding("info", "reader.derived", "GNSS velocity derived from track and ground speed", "gnss"),
             Finding(

@@ -123,8 +123,8 @@ def test_metadata_says_what_it_was_cut_from(whole: Path, tmp_path: Path) -> None
         "clip.topics": "ins gn*",
     }
     assert second.metadata["aircraft"] == first.metadata["aircraft"] and second.clock == first.clock
-    assert set(second.ledger["topics"]) == {"ins", "gnss"}
-    assert second.ledger["topics"]["gnss"]["rows"] == 600
+    assert set(second.ledger.topics) == {"ins", "gnss"}
+    assert second.ledger.topics["gnss"].rows == 600
     assert second.start_ns == (first.start_ns or 0) + 60 * NS_PER_S
 
 
@@ -174,7 +174,7 @@ def test_only_chunks_that_overlap_are_read(whole: Path, tmp_path: Path) -> None:
     assert before.state == "done"
     within = clip(broken, tmp_path / "b.mcap", Wanted(str(low_s), str(high_s)), with_recording=False)
     assert within.state == "data_lost" and within.code == 3
-    assert read_info(tmp_path / "b.mcap").ledger["findings"][-1]["code"].startswith("store.")
+    assert read_info(tmp_path / "b.mcap").findings[-1].code.startswith("store.")
     elsewhere = clip(broken, tmp_path / "c.mcap", Wanted(str(low_s), str(high_s), ("ins",)), with_recording=False)
     assert elsewhere.state == "done"
     part = Part(0, (read_info(whole).start_ns or 0) + 60 * NS_PER_S)
@@ -199,13 +199,13 @@ def test_losses_of_the_log_stay_with_the_part_they_lie_in(tmp_path: Path) -> Non
     early = clip(log, tmp_path / "a.mcap", Wanted("0", "60"), with_recording=False)
     late = clip(log, tmp_path / "b.mcap", Wanted("200", None), with_recording=False)
     assert (early.state, late.state) == ("done", "data_lost")
-    codes = [{one["code"] for one in read_info(tmp_path / f"{name}.mcap").ledger["findings"]} for name in "ab"]
+    codes = [{one.code for one in read_info(tmp_path / f"{name}.mcap").findings} for name in "ab"]
     assert "data.truncated" not in codes[0] and {"data.truncated", "clock.backward_step"} <= codes[1]
     zero_s = float(read_info(tmp_path / "b.mcap").metadata["clip.zero_s"])
     convert_log(open_log(log), tmp_path / "whole.mcap")
-    spans = [read_info(tmp_path / name).ledger["spans"] for name in ("whole.mcap", "b.mcap")]
-    kept = {one["cause"]: one["start_s"] for one in spans[1]}
-    (truncated,) = [one["start_s"] for one in spans[0] if one["cause"] == "truncated"]
+    spans = [read_info(tmp_path / name).ledger.spans for name in ("whole.mcap", "b.mcap")]
+    kept = {one.cause: one.start_s for one in spans[1]}
+    (truncated,) = [one.start_s for one in spans[0] if one.cause == "truncated"]
     assert kept["truncated"] == pytest.approx(truncated - zero_s, abs=2e-3)
 
 

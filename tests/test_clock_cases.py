@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from groundstation.base.records import Column, Int64Array
+from groundstation.base.serial import to_json_exactly
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.cli.check_table import text_of
@@ -229,7 +230,7 @@ def test_each_error_is_found_and_has_its_size(case: Case, tmp_path: Path) -> Non
 @pytest.mark.parametrize("name", ["an epoch jump of 53 years", "a drift that changes", "a rolled-over week"])
 def test_check_the_mcap_and_the_schema_tell_the_same(name: str, tmp_path: Path) -> None:
     case = next(case for case in CASES if case.name == name)
-    told = found_in(case, tmp_path).clock.to_dict()
+    told = to_json_exactly(found_in(case, tmp_path).clock.document())
     schema = json.loads((Path(__file__).parents[1] / "schemas/summary.schema.json").read_text(encoding="utf-8"))
     strict = {**schema["$defs"]["clock"], "additionalProperties": False, "$defs": schema["$defs"]}
     jsonschema.Draft202012Validator(strict).validate(told)
@@ -237,7 +238,7 @@ def test_check_the_mcap_and_the_schema_tell_the_same(name: str, tmp_path: Path) 
     convert_many([tmp_path / "a.csv"], tmp_path / "a.mcap")
     for log in ("a.csv", "a.mcap"):
         (checked,) = check_many([tmp_path / log], Configuration())
-        assert dict(checked.clock) == json.loads(json.dumps(told))
+        assert to_json_exactly(checked.clock) == told
         text = text_of(checked)
         assert all(one["drift"] in text for relation in told["relations"] for one in relation["segments"])
         assert all(one["text"] in text for relation in told["relations"] for one in relation["mistakes"])
@@ -293,7 +294,7 @@ def test_autopilots_drift_and_week(
 
 def test_the_report_has_the_clocks_in_tables(tmp_path: Path) -> None:
     case = next(case for case in CASES if case.name == "a backward step of 5 s")
-    clock = found_in(case, tmp_path).clock.to_dict()
+    clock = to_json_exactly(found_in(case, tmp_path).clock.document())
     parts = quality.build(SavedFlight(tmp_path, {"clock": clock}, {}, {})).parts
     grids = {part.title: part.rows for part in parts if isinstance(part, Grid)}
     (step,), (relation,) = grids["Steps of the recorder's clock"], grids["The recorder's clock by others"]

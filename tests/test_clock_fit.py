@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from groundstation.base.clock import Clock
 from groundstation.base.records import Column, LogHeader, RecordBatch
+from groundstation.base.serial import from_json, to_json_exactly
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity import ledger_findings, survey
@@ -234,7 +236,8 @@ def test_hostile_readings_give_an_answer_or_a_reason(told: NDArray[Any], field: 
         assert relation.segments or relation.reason
         assert all("\n" not in relation.drift_text(one) for one in relation.segments)
     assert all("\n" not in finding.text for finding in ledger_findings(found.ledger))
-    assert found.clock.to_dict()["relations"] is not None
+    kept = found.clock.document()
+    assert from_json(Clock, to_json_exactly(kept)) == kept
 
 
 def test_recorder_times_at_both_ends_of_64_bits() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from groundstation.base.ledger import Ledger
 from groundstation.cli.main import app
 from groundstation.store.reader import read_info
 
@@ -30,10 +31,10 @@ def log(tmp_path: Path) -> Path:
     return path
 
 
-def ledger_of(log: Path, *options: Any) -> dict[str, Any]:
+def ledger_of(log: Path, *options: Any) -> Ledger:
     target = log.with_name("out.mcap")
     assert groundstation("convert", log, "-o", target, "-f", *options)[0] == 0
-    return dict(read_info(target).ledger)
+    return read_info(target).ledger
 
 
 def test_limits_of_a_file_reach_the_ledger(log: Path) -> None:
@@ -43,8 +44,8 @@ def test_limits_of_a_file_reach_the_ledger(log: Path) -> None:
     default = ledger_of(log)
     by_file, by_config = ledger_of(log, "--thresholds", limits), ledger_of(log, "--config", config)
     assert by_file == by_config
-    assert default["thresholds"]["name"] != by_file["thresholds"]["name"] == "mine"
-    assert default["topics"]["ins"]["gaps"]["count"] == 0 and by_file["topics"]["ins"]["gaps"]["count"] == 1
+    assert default.thresholds.name != by_file.thresholds.name == "mine"
+    assert default.topics["ins"].gaps.count == 0 and by_file.topics["ins"].gaps.count == 1
 
 
 def test_wrong_limits_are_a_usage_error_and_write_nothing(log: Path) -> None:

@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 import zstandard
 
+from groundstation.base.clock import Clock
 from groundstation.base.errors import GroundstationError
+from groundstation.base.ledger import Ledger
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.pipeline.batch import run_many
 from groundstation.pipeline.configuration import Configuration
@@ -211,14 +213,17 @@ def test_ten_thousand_channels_become_an_mcap(tmp_path: Path) -> None:
     assert len(topics) >= CHANNELS
 
 
-def test_facts_of_a_crafted_mcap_have_their_shape(tmp_path: Path) -> None:
+def test_facts_of_a_crafted_mcap_have_their_shape(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ledger = {"topics": {"ins": {"rows": "x"}, "b": 3}, "damages": [1], "findings": [{"severity": "evil"}, None]}
-    info = StoreInfo(source_name="<b>", ledger=ledger, damages=[1, {"kind": 4}], remarks=["x"], start_ns=1 << 200)
+    crafted = {Ledger: ledger, tuple: ledger["findings"], Clock: {"steps": [7], "start": "noon", "shift_s": "x"}}
+    monkeypatch.setattr("groundstation.store.info.to_json_exactly", lambda value: crafted[type(value)])
+    info = StoreInfo(source_name="<b>", damages=[1, {"kind": 4}], remarks=["x"], start_ns=1 << 200)
     path = tmp_path / "a.mcap"
     with StoreWriter(path, info) as writer:
         writer.write(batch_of("ins", 20))
+    monkeypatch.undo()
     found = read_info(path)
-    assert found.ledger == {"topics": {}, "damages": [], "findings": []}
+    assert (found.ledger, found.clock, found.findings) == (Ledger(), Clock(), ())
     assert found.damages == found.remarks == () and found.start_ns is None
     converted = convert_log(open_log(path), tmp_path / "b.mcap")
     assert all(finding.severity in ("info", "warn", "fail") for finding in converted.findings)

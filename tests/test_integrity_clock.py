@@ -8,13 +8,13 @@ from groundstation.base.records import Column, LogHeader, RecordBatch
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity import ClockSettings, Survey, corrected, ledger_findings, survey
-from groundstation.integrity.clock import Clock, estimate_clock
+from groundstation.integrity.clock import ClockModel, estimate_clock
 
 NAN = float("nan")
 DAY_IN_2026_NS = iso_to_utc_ns("2026-05-04T06:00:00Z")[0]
 
 
-def model(times_s: list[float], utc_of_zero_ns: int | None = None, **settings: float) -> tuple[Clock, list[float]]:
+def model(times_s: list[float], utc_of_zero_ns: int | None = None, **settings: float) -> tuple[ClockModel, list[float]]:
     """The clock of a log with these device times (NaN: none), and its corrected times in seconds."""
     device = column(times_s)
     index = np.arange(10, 10 + len(times_s), dtype=np.int64)

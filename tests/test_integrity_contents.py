@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import Column, Damage, Item, LogHeader, RecordBatch
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity import Ledger, ledger_findings, survey
+from groundstation.integrity import LedgerCounts, ledger_findings, survey
 from groundstation.integrity.limits import thresholds_from
 from groundstation.integrity.stretches import Sampler
 from groundstation.pipeline.batch import run_many
@@ -62,14 +62,14 @@ def without(fields: Fields, *names: str) -> dict[str, NDArray[np.float64]]:
     return {name: values for name, values in fields.items() if name not in names}
 
 
-def ledger_of(**topics: Fields) -> Ledger:
+def ledger_of(**topics: Fields) -> LedgerCounts:
     items: list[Item] = [LogHeader("t")]
     for topic, fields in topics.items():
         items += batches(topic, fields)
     return survey(items).ledger
 
 
-def stuck_fields(ledger: Ledger) -> set[str]:
+def stuck_fields(ledger: LedgerCounts) -> set[str]:
     return {f"{topic.topic}.{field.name}" for topic in ledger.topics for field in topic.fields if field.stuck}
 
 
@@ -220,16 +220,16 @@ def test_lost_rows_lie_between_the_rows_around_them() -> None:
         Damage("truncated", "byte 900", 5, "bytes of a message cut by the end of the file"),
         Damage("comment_line", "row 7", 1, "comment lines", loses_data=False),
     ]
-    plain = survey(items).ledger.to_dict()
-    spans = [(one["cause"], one["field"], one["start_s"], one["length_s"], one["is_exact"]) for one in plain["spans"]]
+    found = survey(items).ledger.document()
+    spans = [(one.cause, one.field, one.start_s, one.length_s, one.is_exact) for one in found.spans]
     assert spans == [
         ("unreadable_cells", "roll_deg", 9.0, 72.0, False),
         ("dropped_rows", "", 49.0, 11.0, True),
         ("truncated", "", 99.0, 0.0, True),
     ]
-    assert (plain["bytes_skipped"], plain["skipped_spans"]) == (69, [[100, 163, 64], [900, 904, 5]])
-    assert plain["truncated"]["place"] == "byte 900"
-    assert plain["topics"]["ins"]["losses"] == {"unreadable_cells": 2}
+    assert (found.bytes_skipped, found.skipped_spans) == (69, ((100, 163, 64), (900, 904, 5)))
+    assert found.truncated is not None and found.truncated.place == "byte 900"
+    assert found.topics["ins"].losses == {"unreadable_cells": 2}
 
 
 def test_skipped_bytes_lie_between_the_records_around_them() -> None:
@@ -244,8 +244,8 @@ def test_skipped_bytes_lie_between_the_records_around_them() -> None:
         ((89, 90), (99.0, 0.0)),
     ):
         damage = Damage("corrupt", "bytes 100 to 163", 64, what, between_records=between)
-        (span,) = survey([LogHeader("t"), ins, damage]).ledger.to_dict()["spans"]
-        assert (span["cause"], span["start_s"], span["length_s"], span["is_exact"]) == ("corrupt", *expected, False)
+        (span,) = survey([LogHeader("t"), ins, damage]).ledger.document().spans
+        assert (span.cause, span.start_s, span.length_s, span.is_exact) == ("corrupt", *expected, False)
 
 
 @pytest.mark.parametrize("write", [as_ulog, as_dataflash])
@@ -285,7 +285,7 @@ def test_a_range_of_the_user_is_used() -> None:
     assert field.name == "velocity_north_mps" and field.out_of_range == int(
         np.count_nonzero(np.abs(flight()["velocity_north_mps"]) > 50.0)
     )
-    assert ledger.to_dict()["thresholds"]["name"] == "user"
+    assert ledger.document().thresholds.name == "user"
 
 
 def test_a_sampler_keeps_a_bounded_part_evenly() -> None:

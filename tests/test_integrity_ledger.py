@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from groundstation.base.records import Column, Damage, Item, LogHeader, RecordBatch, Remark
+from groundstation.base.serial import to_json_exactly
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity import corrected, ledger_findings, survey, thresholds_from
 from groundstation.integrity.ledger import gaps_of
@@ -96,9 +97,9 @@ def test_dictionaries_are_json_and_repeat_exactly() -> None:
         batch("baro", [0, 1, 2, 3]),
     ]
     first, second = (survey(list(items)) for _ in range(2))
-    text = json.dumps(first.ledger.to_dict(), allow_nan=False)
-    assert text == json.dumps(second.ledger.to_dict(), allow_nan=False)
-    assert json.dumps(first.clock.to_dict(), allow_nan=False)
+    text = json.dumps(to_json_exactly(first.ledger.document()), allow_nan=False)
+    assert text == json.dumps(to_json_exactly(second.ledger.document()), allow_nan=False)
+    assert json.dumps(to_json_exactly(first.clock.document()), allow_nan=False)
     assert list(json.loads(text)["topics"]) == ["baro", "ins"] and first.ledger.completeness["baro"] == 1.0
     with pytest.raises(KeyError):
         first.ledger["gnss"]

@@ -41,7 +41,7 @@ def log_of(seed: int, is_counting: bool) -> list[Item]:
 
 
 def described(found: Survey) -> dict[str, object]:
-    return {topic.topic: topic.to_dict(found.clock) for topic in found.ledger.topics}
+    return {topic.topic: topic.entry(found.clock, {}) for topic in found.ledger.topics}
 
 
 @pytest.mark.parametrize("is_counting", [True, False])

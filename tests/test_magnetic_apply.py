@@ -585,7 +585,7 @@ def test_the_files_are_there_linked_and_the_same_twice(first: Path, logs: tuple[
 def test_the_mcap_is_one_of_ours_and_checks_clean(first: Path) -> None:
     (checked,) = check_many([mcap_in(first)], Configuration())
     assert checked.outcome.code == 0
-    assert set(checked.ledger["topics"]) == {"corrected_heading"}
+    assert set(checked.ledger.topics) == {"corrected_heading"}
     assert not [one for one in checked.findings if one.severity != "info"]
     info, whole = read_info(mcap_in(first)), read_info(first / f"{first.name}.mcap")
     assert info.has_utc == whole.has_utc and info.clock == whole.clock

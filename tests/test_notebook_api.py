@@ -86,7 +86,7 @@ def test_the_page_names_what_there_is() -> None:
 def test_a_log_is_described_without_an_estimate() -> None:
     opened = groundstation.open(str(GOOD))
     assert opened.info["format"] == "flat-csv" and opened.info["aircraft"] == "SIM-1"
-    assert opened.ledger["topics"]["ins"]["rows"] == len(opened.tables["ins"])
+    assert opened.ledger.topics["ins"].rows == len(opened.tables["ins"])
     assert opened.clock and opened.source.name == "taxi-good.csv"
     assert "results" not in vars(opened)
     assert repr(opened) == "<OpenLog taxi-good.csv (flat-csv)>"
@@ -173,7 +173,7 @@ def test_a_setting_changes_the_answer_and_not_the_flight(flight: OpenLog) -> Non
 
 def test_other_thresholds_count_the_log_anew(flight: OpenLog) -> None:
     stricter = flight.with_settings(thresholds={"version": 1, "gaps": {"periods": 1.01}})
-    assert stricter.ledger["thresholds"] != flight.ledger["thresholds"]
+    assert stricter.ledger.thresholds != flight.ledger.thresholds
 
 
 def test_a_flight_folder_answers_as_the_log_does(flight: OpenLog, folder: Path) -> None:

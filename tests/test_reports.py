@@ -12,8 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from groundstation.base.clock import Clock
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.findings import Finding
+from groundstation.base.ledger import DamageEntry, Ledger, RemarkEntry, ThresholdsUsed, Truncation
 from groundstation.reports import drawing
 from groundstation.reports.flight_report import PDF, REPORT, flight_document, flight_report_html, write_flight_report
 from groundstation.reports.sections.heading import limit_text
@@ -224,8 +226,12 @@ def hostile_results() -> FlightResults:
         start_utc_ns=None,
         duration_s=10.0,
         status="ok",
-        ledger={HOSTILE: {HOSTILE: [HOSTILE]}},
-        clock={HOSTILE: HOSTILE},
+        ledger=Ledger(
+            damages=(DamageEntry(kind=HOSTILE, what=HOSTILE, topic=HOSTILE, place=HOSTILE, count=1, loses_data=True),),
+            thresholds=ThresholdsUsed(name=HOSTILE, sha256=HOSTILE),
+            truncated=Truncation(place=HOSTILE, what=HOSTILE, count=1),
+        ),
+        clock=Clock(first_device_time=HOSTILE),
         findings=(Finding("fail", HOSTILE, HOSTILE, HOSTILE, HOSTILE, 3),),
         not_assessable=(NotAssessable(HOSTILE, HOSTILE),),
         answers=by_analysis(heading),
@@ -347,14 +353,15 @@ def test_findings_stand_gravest_first(tmp_path: Path) -> None:
 def test_remarks_on_raw_topics_are_one_line_and_the_losses_a_table(tmp_path: Path) -> None:
     remarks = [Finding("info", "values.nan", f"raw.t.f{n}: NaN", "raw.t", "", 2) for n in range(50)]
     findings = (*remarks, Finding("warn", "data.truncated", "cut", "", "byte 9", 1))
-    damage = {"kind": "truncated", "what": "bytes of a record", "topic": "", "place": "byte 9", "count": 7}
-    remark = {"code": "derived", "text": "told as a finding", "topic": "ins"}
-    ledger = {"damages": [{**damage, "loses_data": True}], "remarks": [remark]}
+    what = "bytes of a record"
+    damage = DamageEntry(kind="truncated", what=what, topic="", place="byte 9", count=7, loses_data=True)
+    remark = RemarkEntry(code="derived", text="told as a finding", topic="ins")
+    ledger = Ledger(damages=(damage,), remarks=(remark,))
     text = Page(report(tmp_path / "lost", example(None, findings=findings, ledger=ledger))).text
     assert "50 fields of raw topics hold NaN as the device wrote it: t 100 values.nan" in text
     assert "summary.json lists all 51" in text and "raw.t.f7" not in text
     assert "truncated bytes of a record byte 9 7 yes" in text and "told as a finding" not in text
-    clean = Page(report(tmp_path / "whole", example(None, ledger={"damages": []}))).text
+    clean = Page(report(tmp_path / "whole", example(None, ledger=Ledger()))).text
     assert "No damage was found in the log" in clean
 
 

@@ -8,7 +8,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from groundstation.base.clock import BreakEntry, Clock, RelationEntry
 from groundstation.base.errors import GroundstationError
+from groundstation.base.findings import Finding
+from groundstation.base.ledger import (
+    CounterEntry,
+    Dropouts,
+    FieldEntry,
+    Ledger,
+    OutOfRange,
+    StuckStretch,
+    TopicEntry,
+    TopicGaps,
+    Truncation,
+)
 from groundstation.base.records import Column, Damage, LogHeader, RecordBatch
 from groundstation.base.signals import TOPICS
 from groundstation.store.channel import CHUNK_SPAN_NS, SHORT_SPAN_NS
@@ -224,10 +237,42 @@ def test_one_chunk_of_a_busy_topic_is_no_more_than_a_minute(tmp_path: Path) -> N
 
 def test_equal_input_gives_equal_bytes(tmp_path: Path) -> None:
     batches = [batch_of(topic, share=0.6) for topic in ("ins", "gnss", "raw.x", "event")]
-    info = StoreInfo(source_name="a.csv", versions={"b": "1", "a": "2"}, ledger={"z": 1, "y": [1, 2]})
-    same = StoreInfo(source_name="a.csv", versions={"a": "2", "b": "1"}, ledger={"y": (1, 2), "z": 1})
+    info = StoreInfo(source_name="a.csv", versions={"b": "1", "a": "2"}, ledger=Ledger(bytes_skipped=1))
+    same = StoreInfo(source_name="a.csv", versions={"a": "2", "b": "1"}, ledger=Ledger(bytes_skipped=1))
     one, two = written(tmp_path / "one.mcap", batches, info), written(tmp_path / "two.mcap", batches, same)
     assert one.read_bytes() == two.read_bytes()
+
+
+OUTSIDE = OutOfRange(record=7, time="+0:01.0", range=(None, 90.0))
+STUCK = StuckStretch(record=3, start="+0:00.2", length_s=4.0, samples=40, value=1.25, why="gnss moves")
+TOPIC = TopicEntry(
+    rows=5,
+    first="+0:00.0",
+    last="+0:02.0",
+    span_s=2.0,
+    nominal_rate_hz=2.5,
+    actual_rate_hz=None,
+    coverage=0.987654,
+    duplicates=0,
+    backward_steps=1,
+    stray_rows=0,
+    gaps=TopicGaps(count=1, longest_s=1.5, total_s=1.5, listed=(("+0:00.5", 1.5),)),
+    fields={
+        "a_deg": FieldEntry(present=5, out_of_range=1, first_out_of_range=OUTSIDE),
+        "b": FieldEntry(stuck=(STUCK,)),
+    },
+    sequences=(CounterEntry(field="count", kind="records", lost=2, listed=(("+0:00.5", 2),)),),
+    losses={"corrupt": 3},
+)
+RELATION = RelationEntry(
+    clock="gnss",
+    source="raw.time",
+    samples=2,
+    reason="too few readings",
+    residual_s=0.001,
+    resolution_s=0.0,
+    breaks=(BreakEntry(drift_change_ppm=None, kind="step", step_s=1.0, step_sigma_s=0.1, time="x", time_sigma_s=0.2),),
+)
 
 
 def test_info_comes_back(tmp_path: Path) -> None:
@@ -240,8 +285,14 @@ def test_info_comes_back(tmp_path: Path) -> None:
         metadata={"aircraft": "T-1", "flight": "7"},
         has_utc=True,
         start_ns=np.int64(T0),
-        clock={"kind": "utc", "jumps": []},
-        ledger={"rows": np.int64(5), "share": np.float64(0.5)},
+        clock=Clock(first_device_time="5.000 s", nominal_period_s=0.0123456789, relations=(RELATION,)),
+        ledger=Ledger(
+            topics={"ins": TOPIC},
+            skipped_spans=((100, 163, 64),),
+            dropouts=Dropouts(count=1, total_s=0.5),
+            truncated=Truncation(place="byte 900", what="bytes", count=5),
+        ),
+        findings=(Finding("warn", "data.truncated", "cut at byte 900", place="byte 900", count=5),),
         remarks=[{"code": "derived", "text": "velocities"}],
         damages=[{"kind": "truncated", "count": 1}],
     )
@@ -254,8 +305,8 @@ def test_info_comes_back(tmp_path: Path) -> None:
 def test_info_may_be_completed_until_the_end(tmp_path: Path) -> None:
     with StoreWriter(tmp_path / "a.mcap", StoreInfo()) as writer:
         writer.write(batch_of("ins", 5))
-        writer.info = StoreInfo(ledger={"rows": 5})
-    assert read_info(tmp_path / "a.mcap").ledger == {"rows": 5}
+        writer.info = StoreInfo(ledger=Ledger(bytes_skipped=5))
+    assert read_info(tmp_path / "a.mcap").ledger == Ledger(bytes_skipped=5)
 
 
 def test_file_without_rows_is_a_file(tmp_path: Path) -> None:

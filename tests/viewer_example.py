@@ -3,6 +3,7 @@
 import numpy as np
 
 from groundstation.base.angles import direction_of, wrap_180, wrap_360
+from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.records import Column
@@ -297,7 +298,7 @@ def make_results(
         duration_s=flight.duration_s,
         status="ok",
         completeness=dict.fromkeys(flight.topics(), 1.0),
-        clock={"kind": "absolute", "steps": 0},
+        clock=Clock(first_device_time="2026-05-04T06:00:00.000Z", is_absolute=True, start="utc"),
         findings=(
             Finding(
                 "warn", "clock.backward_step", "the recorder's clock stepped back by 0.2 s", "gnss", "at 61.3 s", 1

@@ -54,12 +54,14 @@ def digits_of(name: str) -> int:
     return USUAL
 
 
-def rounded(value: float, digits: int) -> float | None:
-    """A number as JSON tells it: rounded, never minus zero; None where it is not finite.
+def rounded(value: float, digits: int | None) -> float | None:
+    """A number as JSON tells it: rounded (None: not), never minus zero; None where it is not finite.
 
     Examples
     --------
     >>> rounded(1.23456, 2), rounded(-0.001, 2), rounded(math.nan, 2)
     (1.23, 0.0, None)
     """
-    return round(value, digits) + 0.0 if math.isfinite(value) else None
+    if not math.isfinite(value):
+        return None
+    return value if digits is None else round(value, digits) + 0.0

@@ -66,9 +66,17 @@ def to_json(value: Any, name: str = "") -> Any:
     return _writer(digits_of(name) if name else USUAL).unstructure(value)
 
 
+def to_json_exactly(value: Any) -> Any:
+    """Turn a value into JSON as :func:`to_json` does, no number rounded."""
+    return _writer(None).unstructure(value)
+
+
 @cache
-def _writer(digits: int) -> cattrs.Converter:
-    """Writes what stands under a name with so many decimals; what has names of its own goes by these."""
+def _writer(digits: int | None) -> cattrs.Converter:
+    """Writes what stands under a name with so many decimals; what has names of its own goes by these.
+
+    None rounds nothing, of any name.
+    """
     writer = cattrs.Converter(unstructure_fallback_factory=lambda _cls: str)
     for kind in (type(None), bool, int):
         writer.register_unstructure_hook(kind, lambda value: value)
@@ -83,19 +91,23 @@ def _writer(digits: int) -> cattrs.Converter:
     )
     writer.register_unstructure_hook_func(
         lambda cls: isinstance(cls, type) and issubclass(cls, Mapping),
-        lambda table: {str(key): to_json(value, str(key)) for key, value in table.items()},
+        lambda table: {str(key): _writer_of(str(key), digits).unstructure(value) for key, value in table.items()},
     )
-    writer.register_unstructure_hook_factory(dataclasses.is_dataclass, lambda cls: _object_writer(cls, writer))
+    writer.register_unstructure_hook_factory(dataclasses.is_dataclass, lambda cls: _object_writer(cls, writer, digits))
     return writer
 
 
-def _object_writer(cls: type, writer: cattrs.Converter) -> Callable[[Any], dict[str, Any]]:
+def _writer_of(name: str, above: int | None) -> cattrs.Converter:
+    return _writer(None if above is None else digits_of(name))
+
+
+def _object_writer(cls: type, writer: cattrs.Converter, digits: int | None) -> Callable[[Any], dict[str, Any]]:
     hints = typing.get_type_hints(cls)
     parts = {
         field.name: cattrs.gen.override(
             omit=_is_kept_apart(hints[field.name]),
             omit_if_default="left_out_when_default" in field.metadata,
-            unstruct_hook=_writer(digits_of(field.name)).unstructure,
+            unstruct_hook=_writer_of(field.name, digits).unstructure,
         )
         for field in dataclasses.fields(cls)
     }
@@ -388,7 +400,7 @@ def _sound(reader: cattrs.Converter, value: Any, hint: Any) -> tuple[Any, ...]:
     """The value in a tuple of one; an empty one where it is not of its kind."""
     try:
         return (reader.structure(value, hint),)
-    except (MismatchError, cattrs.BaseValidationError):
+    except (MismatchError, cattrs.BaseValidationError, RecursionError):
         return ()
 
 

@@ -1,18 +1,18 @@
 """How ``check`` looks on stdout: tables for people, JSON for programs."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import typer
 
+from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
+from groundstation.base.ledger import FieldEntry, Ledger, TopicEntry
 from groundstation.base.signals import is_canonical
 from groundstation.cli.application import printable
 from groundstation.cli.printing import as_json, columns, totals
 from groundstation.pipeline.check import Checked
 
 MOST_LISTED = 8  # gaps or stretches of one topic; all are in the JSON
-Topic = Mapping[str, Any]
 
 
 def show(
@@ -40,7 +40,7 @@ def show(
 
 def text_of(one: Checked, everything: bool = False) -> str:
     """The ledger of one log as text."""
-    topics: Mapping[str, Topic] = one.ledger.get("topics", {})
+    topics = one.ledger.topics
     shown = {name: topic for name, topic in topics.items() if everything or is_canonical(name) or _is_odd(topic)}
     parts = [_head(one), _clock(one.clock)]
     if shown:
@@ -63,45 +63,40 @@ def text_of(one: Checked, everything: bool = False) -> str:
 def _head(one: Checked) -> str:
     wanted = ("file", "size", "sha256", "format", "first sample", "last sample")
     rows = [[f"{key}:", printable(one.facts[key])] for key in wanted if key in one.facts]
-    used = one.ledger.get("thresholds")
-    if used:
-        name = f"{printable(str(used['name']))}, version {used['version']}, sha256 {str(used['sha256'])[:16]}"
+    used = one.ledger.thresholds
+    if used.sha256:
+        name = f"{printable(used.name)}, version {used.version}, sha256 {used.sha256[:16]}"
         rows.append(["thresholds:", name])
     return columns(rows)
 
 
-def _clock(clock: Mapping[str, Any]) -> str:
+def _clock(clock: Clock) -> str:
     """The clock: where it began, how it was set, how it runs by other clocks of the log."""
-    if "first_device_time" not in clock:
+    if not clock.first_device_time:
         return ""
-    time = "UTC" if clock["is_absolute"] else "no absolute time (NOTIME): counts from its own zero"
-    began = f"{printable(str(clock['first_device_time']))}{', not set' if clock['start'] == 'unset' else ''}"
+    time = "UTC" if clock.is_absolute else "no absolute time (NOTIME): counts from its own zero"
+    began = f"{printable(clock.first_device_time)}{', not set' if clock.start == 'unset' else ''}"
     parts = ["clock\n" + columns([["time:", time], ["first reading:", began]])]
     steps = [
-        [
-            str(step["record_index"]),
-            f"{step['size_s']:+.3f}",
-            f"{step['set_s']:+.3f}",
-            str(step["mistake"]).replace("_", " "),
-        ]
-        for step in clock["steps"]
+        [str(step.record_index), f"{step.size_s:+.3f}", f"{step.set_s:+.3f}", step.mistake.replace("_", " ")]
+        for step in clock.steps
     ]
     parts.append(_titled("clock steps", ["record", "step s", "set by s", "what"], steps, right=(0, 1, 2)))
     lines, breaks = [], []
-    for relation in clock["relations"]:
-        name = printable(f"{relation['clock']}: {relation['source']}")
-        if relation["reason"]:
-            lines.append([name, "", "", str(relation["samples"]), relation["reason"], "", ""])
-        for one in relation["segments"]:
-            span = [one["start"] if len(relation["segments"]) > 1 else "", f"{one['length_s']:.1f}"]
-            told = [one["offset"], one["drift"], f"{relation['residual_s']:.4f}"]
-            lines.append([name, *span, str(one["samples"]), *told])
-        for one in relation["breaks"]:
-            step = f"{one['step_s']:+.3f} ± {one['step_sigma_s']:.3f}" if one["kind"] == "step" else ""
-            change = _number(one["drift_change_ppm"], 1)
-            breaks.append([name, one["kind"], f"{one['time']} ± {one['time_sigma_s']:.1f} s", step, change])
-        for one in relation["mistakes"]:
-            breaks.append([name, "error", one["time"] or "", one["text"], ""])
+    for relation in clock.relations:
+        name = printable(f"{relation.clock}: {relation.source}")
+        if relation.reason:
+            lines.append([name, "", "", str(relation.samples), relation.reason, "", ""])
+        for segment in relation.segments:
+            span = [segment.start if len(relation.segments) > 1 else "", f"{segment.length_s:.1f}"]
+            told = [segment.offset, segment.drift, f"{relation.residual_s:.4f}"]
+            lines.append([name, *span, str(segment.samples), *told])
+        for one in relation.breaks:
+            step = f"{one.step_s:+.3f} ± {one.step_sigma_s:.3f}" if one.kind == "step" else ""
+            change = _number(one.drift_change_ppm, 1)
+            breaks.append([name, one.kind, f"{one.time} ± {one.time_sigma_s:.1f} s", step, change])
+        for mistake in relation.mistakes:
+            breaks.append([name, "error", mistake.time or "", mistake.text, ""])
     heads = ["other clock", "from", "length s", "readings", "other less recorder", "drift of the recorder", "scatter s"]
     parts.append(_titled("recorder by other clocks (± 1 sigma)", heads, lines, right=(2, 3, 6)))
     heads = ["other clock", "break", "at", "step s", "drift change ppm"]
@@ -115,116 +110,109 @@ def _is_usual(finding: Finding) -> bool:
     return is_of_source and finding.severity == "info" and finding.code in ("values.nan", "time.duplicates")
 
 
-def _is_odd(topic: Topic) -> bool:
+def _is_odd(topic: TopicEntry) -> bool:
     """Whether a topic has more to tell than its rate; repeated times are common among what a recorder writes."""
-    lost = any(entry["lost"] or entry["resets"] for entry in topic.get("sequences", ()))
-    return bool(topic["gaps"]["count"] or topic["backward_steps"] or topic["stray_rows"] or topic.get("losses")) or lost
+    lost = any(counter.lost or counter.resets for counter in topic.sequences)
+    return bool(topic.gaps.count or topic.backward_steps or topic.stray_rows or topic.losses) or lost
 
 
-def _topics(topics: Mapping[str, Topic]) -> str:
+def _topics(topics: Mapping[str, TopicEntry]) -> str:
     heads = ["topic", "rows", "span s", "nominal Hz", "actual Hz", "coverage", "gaps", "longest s"]
-    counts = {
-        "repeated": lambda topic: topic["duplicates"],
-        "steps back": lambda topic: topic["backward_steps"],
-        "stray": lambda topic: topic["stray_rows"],
-        "unreadable": lambda topic: sum(topic.get("losses", {}).values()),
-        "missing": lambda topic: sum(entry["lost"] for entry in topic.get("sequences", ())),
-        "NaN": lambda topic: _of_fields(topic, "nan"),
-        "out of range": lambda topic: _of_fields(topic, "out_of_range"),
-        "stuck": lambda topic: _of_fields(topic, "stuck"),
+    counts: dict[str, Callable[[TopicEntry], int]] = {
+        "repeated": lambda topic: topic.duplicates,
+        "steps back": lambda topic: topic.backward_steps,
+        "stray": lambda topic: topic.stray_rows,
+        "unreadable": lambda topic: sum(topic.losses.values()),
+        "missing": lambda topic: topic.missing,
+        "NaN": lambda topic: sum(field.nan for field in topic.fields.values()),
+        "out of range": lambda topic: topic.out_of_range,
+        "stuck": lambda topic: topic.stuck,
     }
     told = {head: count for head, count in counts.items() if any(count(topic) for topic in topics.values())}
     rows = [[*heads, *told]]
     for name, topic in topics.items():
-        gaps = topic["gaps"]
         row = [
             printable(name),
-            str(topic["rows"]),
-            f"{topic['span_s']:.1f}",
-            _number(topic["nominal_rate_hz"], 3),
-            _number(topic["actual_rate_hz"], 3),
-            "-" if topic["coverage"] is None else f"{100.0 * topic['coverage']:.2f} %",
-            str(gaps["count"]),
-            f"{gaps['longest_s']:.2f}" if gaps["count"] else "",
+            str(topic.rows),
+            f"{topic.span_s:.1f}",
+            _number(topic.nominal_rate_hz, 3),
+            _number(topic.actual_rate_hz, 3),
+            "-" if topic.coverage is None else f"{100.0 * topic.coverage:.2f} %",
+            str(topic.gaps.count),
+            f"{topic.gaps.longest_s:.2f}" if topic.gaps.count else "",
         ]
         rows.append([*row, *(str(count(topic) or "") for count in told.values())])
     return columns(rows, right=range(1, len(rows[0])))
-
-
-def _of_fields(topic: Topic, what: str) -> int:
-    found = [entry.get(what, 0) for entry in topic["fields"].values()]
-    return sum(one if isinstance(one, int) else len(one) for one in found)
 
 
 def _number(value: float | None, digits: int) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-def _gaps(topics: Mapping[str, Topic]) -> str:
+def _gaps(topics: Mapping[str, TopicEntry]) -> str:
     rows = []
     for name, topic in topics.items():
         if not is_canonical(name):
             continue
-        listed = sorted(topic["gaps"]["listed"], key=lambda gap: -gap[1])[:MOST_LISTED]
+        listed = sorted(topic.gaps.listed, key=lambda gap: -gap[1])[:MOST_LISTED]
         rows += [[printable(name), start, f"{length:.3f}"] for start, length in sorted(listed)]
-        more = topic["gaps"]["count"] - len(listed)
+        more = topic.gaps.count - len(listed)
         if more:
             rows.append([printable(name), f"{more} shorter ones", ""])
     return _titled("gaps", ["topic", "after", "length s"], rows, right=(2,))
 
 
-def _stuck(topics: Mapping[str, Topic]) -> str:
+def _stuck(topics: Mapping[str, TopicEntry]) -> str:
     rows = []
     for name, field in _fields(topics):
-        listed = field.get("stuck", ())
+        listed = field.stuck
         for one in listed[:MOST_LISTED]:
-            length = f"{one['length_s']:.1f}"
-            rows.append([name, one["start"], length, str(one["samples"]), f"{one['value']:g}", printable(one["why"])])
+            length = f"{one.length_s:.1f}"
+            rows.append([name, one.start, length, str(one.samples), f"{one.value:g}", printable(one.why)])
         if len(listed) > MOST_LISTED:
             rows.append([name, f"{len(listed) - MOST_LISTED} more", "", "", "", ""])
     return _titled("stuck values", ["field", "from", "length s", "samples", "value", "why"], rows, right=(2, 3))
 
 
-def _outside(topics: Mapping[str, Topic]) -> str:
+def _outside(topics: Mapping[str, TopicEntry]) -> str:
     rows = []
     for name, field in _fields(topics):
-        if field["out_of_range"]:
-            first = field["first_out_of_range"]
-            low, high = ("" if end is None else f"{end:g}" for end in first["range"])
-            place = [str(first["record"]), str(first["time"] or "")]
-            rows.append([name, str(field["out_of_range"]), f"[{low}, {high}]", *place])
+        first = field.first_out_of_range
+        if first is not None:
+            low, high = ("" if end is None else f"{end:g}" for end in first.range)
+            place = [str(first.record), first.time or ""]
+            rows.append([name, str(field.out_of_range), f"[{low}, {high}]", *place])
     return _titled("values out of range", ["field", "count", "range", "first record", "at"], rows, right=(1, 3))
 
 
-def _counters(topics: Mapping[str, Topic]) -> str:
+def _counters(topics: Mapping[str, TopicEntry]) -> str:
     rows = []
     for name, topic in topics.items():
-        for entry in topic.get("sequences", ()):
-            first = entry["listed"][0][0] if entry["listed"] else ""
-            counts = [str(entry["lost"]), str(entry["before"]), str(entry["resets"])]
-            rows.append([printable(f"{name}.{entry['field']}"), entry["kind"], *counts, first])
+        for entry in topic.sequences:
+            first = entry.listed[0][0] if entry.listed else ""
+            counts = [str(entry.lost), str(entry.before), str(entry.resets)]
+            rows.append([printable(f"{name}.{entry.field}"), entry.kind, *counts, first])
     heads = ["counter", "counts", "missing", "before the log", "resets", "first loss before"]
     return _titled("counters", heads, rows, right=(2, 3, 4))
 
 
-def _damages(ledger: Mapping[str, Any]) -> str:
+def _damages(ledger: Ledger) -> str:
     rows = [
         [
-            entry["kind"],
-            str(entry["count"]),
-            printable(entry["what"]),
-            printable(f"{entry['topic']} {entry['place']}".strip()),
+            entry.kind,
+            str(entry.count),
+            printable(entry.what),
+            printable(f"{entry.topic} {entry.place}".strip()),
         ]
-        for entry in ledger.get("damages", ())
+        for entry in ledger.damages
     ]
     table = _titled("damage", ["kind", "count", "what", "where"], rows, right=(1,))
-    skipped = ledger.get("bytes_skipped", 0)
-    return table + (f"\nbytes skipped: {skipped}" if skipped else "")
+    return table + (f"\nbytes skipped: {ledger.bytes_skipped}" if ledger.bytes_skipped else "")
 
 
-def _fields(topics: Mapping[str, Topic]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+def _fields(topics: Mapping[str, TopicEntry]) -> Iterator[tuple[str, FieldEntry]]:
     for name, topic in topics.items():
-        for field, entry in topic["fields"].items():
+        for field, entry in topic.fields.items():
             yield printable(f"{name}.{field}"), entry
 
 

@@ -1,8 +1,8 @@
 """Integrity: the clock model of a log, its ledger of losses and oddities, and records in order of corrected time."""
 
-from groundstation.integrity.clock import Clock
+from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.clock_steps import ClockSettings, ClockStep
-from groundstation.integrity.ledger import FieldLedger, Ledger, TopicLedger
+from groundstation.integrity.ledger import FieldCounts, LedgerCounts, TopicCounts
 from groundstation.integrity.ledger_findings import ledger_findings
 from groundstation.integrity.limits import Thresholds, thresholds_from
 from groundstation.integrity.ordering import corrected
@@ -10,15 +10,15 @@ from groundstation.integrity.rhythm import Gaps
 from groundstation.integrity.survey import Survey, survey
 
 __all__ = [
-    "Clock",
+    "ClockModel",
     "ClockSettings",
     "ClockStep",
-    "FieldLedger",
+    "FieldCounts",
     "Gaps",
-    "Ledger",
+    "LedgerCounts",
     "Survey",
     "Thresholds",
-    "TopicLedger",
+    "TopicCounts",
     "corrected",
     "ledger_findings",
     "survey",

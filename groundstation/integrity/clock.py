@@ -9,10 +9,11 @@ How that time runs by other clocks of the log is told (``relations``), and nothi
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from groundstation.base.clock import Clock, Start, StepEntry
 from groundstation.base.records import Column, Int64Array, RecordBatch, frozen
 from groundstation.base.timescales import duration_text, iso_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
@@ -21,11 +22,10 @@ from groundstation.integrity.clock_steps import ClockSettings, ClockStep, Steps
 
 LARGEST_NS = 2**62  # of a time and of what is added to it: sums fit 64 bits
 FIRST_NS = iso_to_utc_ns("1980-01-08T00:00:00Z")[0]  # a clock before it was not set: 1970, or the zero of GPS
-Start = Literal["utc", "unset", "own_zero"]
 
 
 @dataclass(frozen=True)
-class Clock:
+class ClockModel:
     """Corrected time as a function of device time and place.
 
     Parameters
@@ -127,38 +127,35 @@ class Clock:
         seconds = time_ns / NS_PER_S
         return f"{'-' if seconds < 0 else '+'}{duration_text(abs(seconds))}"
 
-    def to_dict(self) -> dict[str, Any]:
-        """JSON-able summary, times in seconds rounded to the millisecond."""
-        return {
-            "is_absolute": self.is_absolute,
-            "nominal_period_s": round(self.period_ns / NS_PER_S, 6),
-            "start": self.start,
-            "first_device_time": (
-                utc_ns_to_iso(self.first_device_ns)
-                if self.start != "own_zero"
-                else f"{self.first_device_ns / NS_PER_S:.3f} s"
-            ),
-            "steps": [
-                {
-                    "record_index": step.record_index,
-                    "kind": step.kind,
-                    "size_s": round(step.size_s, 3),
-                    "records_before": step.records_before,
-                    "shift_of_earlier_s": round(step.shift_s, 3),
-                    "set_s": round(step.set_s, 3),
-                    "mistake": self.mistake(step),
-                }
+    def document(self) -> Clock:
+        """What is kept of it: seconds to the millisecond."""
+        own_zero = f"{self.first_device_ns / NS_PER_S:.3f} s"
+        return Clock(
+            is_absolute=self.is_absolute,
+            nominal_period_s=round(self.period_ns / NS_PER_S, 6),
+            start=self.start,
+            first_device_time=own_zero if self.start == "own_zero" else utc_ns_to_iso(self.first_device_ns),
+            steps=tuple(
+                StepEntry(
+                    record_index=step.record_index,
+                    kind=step.kind,
+                    size_s=round(step.size_s, 3),
+                    records_before=step.records_before,
+                    shift_of_earlier_s=round(step.shift_s, 3),
+                    set_s=round(step.set_s, 3),
+                    mistake=self.mistake(step),
+                )
                 for step in self.steps
-            ],
-            "missing_times": self.missing_times,
-            "implausible_times": self.implausible_times,
-            "stale_times": self.stale_times,
-            "stray_rows": self.stray_rows,
-            "is_unordered": self.is_unordered,
-            "is_counting": self.is_counting,
-            "shift_s": round(self.shift_ns / NS_PER_S, 3),
-            "relations": [relation.to_dict(self.text, has_utc=self.is_absolute) for relation in self.relations],
-        }
+            ),
+            missing_times=self.missing_times,
+            implausible_times=self.implausible_times,
+            stale_times=self.stale_times,
+            stray_rows=self.stray_rows,
+            is_unordered=self.is_unordered,
+            is_counting=self.is_counting,
+            shift_s=round(self.shift_ns / NS_PER_S, 3),
+            relations=tuple(relation.entry(self.text, has_utc=self.is_absolute) for relation in self.relations),
+        )
 
     def mistake(self, step: ClockStep) -> str:
         """Name of the error that a step put right, empty where it has none."""
@@ -171,7 +168,7 @@ def estimate_clock(
     utc_of_zero_ns: int | None,
     *,
     settings: ClockSettings | None = None,
-) -> Clock:
+) -> ClockModel:
     """Model the clock of a log.
 
     Parameters
@@ -184,7 +181,7 @@ def estimate_clock(
 
     Returns
     -------
-    Clock
+    ClockModel
         Without ``lateness_ns``, which needs the topics.
 
     Examples
@@ -199,7 +196,7 @@ def estimate_clock(
     if not timed.all():
         index, time = index[timed], time[timed]
     if not len(time):
-        return Clock(missing_times=len(record_index))
+        return ClockModel(missing_times=len(record_index))
     found = Steps(index, time, settings or ClockSettings())
     if any(abs(offset) > LARGEST_NS for offset in found.offsets_ns()):
         found.sort()
@@ -213,7 +210,7 @@ def estimate_clock(
     placed = interpolated(placed_index, index[nodes], own[nodes], found.period_per_record_ns)
     times = [part for part in (own if believed.all() else own[believed], placed) if len(part)]
     zero = zero_of(min(int(part.min()) for part in times), max(int(part.max()) for part in times), utc_of_zero_ns)
-    return Clock(
+    return ClockModel(
         is_absolute=zero.is_absolute,
         period_ns=found.period_ns,
         starts=starts,

@@ -5,16 +5,16 @@ from collections.abc import Iterator
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import FIRST_NS, Clock
+from groundstation.integrity.clock import FIRST_NS, ClockModel
 from groundstation.integrity.clock_fit import Z95
 from groundstation.integrity.clock_relation import ClockRelation, Mistake
 from groundstation.integrity.clock_steps import ClockStep
-from groundstation.integrity.ledger import Ledger
+from groundstation.integrity.ledger import LedgerCounts
 
 _UNIX_SECONDS = (1_000_000_000, 4_000_000_000)  # 2001 to 2096: as a time since power-up, more than 31 years
 
 
-def clock_findings(ledger: Ledger) -> Iterator[Finding]:
+def clock_findings(ledger: LedgerCounts) -> Iterator[Finding]:
     """Findings of a clock: steps, times that are missing or not believed, order, absolute time, other clocks.
 
     Codes: ``clock.backward_step``, ``clock.forward_step``, ``clock.unset``, ``clock.missing_times``,
@@ -50,7 +50,7 @@ def counted(count: int, noun: str, nouns: str = "") -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {nouns or noun + 's'}"
 
 
-def _step(step: ClockStep, clock: Clock) -> Finding:
+def _step(step: ClockStep, clock: ClockModel) -> Finding:
     zero_ns = int(clock.offsets_ns[-1])
     before, after = clock.text(step.device_before_ns + zero_ns), clock.text(step.device_after_ns + zero_ns)
     direction = "back" if step.kind == "backward" else "ahead"
@@ -64,7 +64,7 @@ def _step(step: ClockStep, clock: Clock) -> Finding:
     return Finding("warn", f"clock.{step.kind}_step", text, place=f"{after}, record {step.record_index}")
 
 
-def _times(ledger: Ledger) -> Iterator[Finding]:
+def _times(ledger: LedgerCounts) -> Iterator[Finding]:
     clock = ledger.clock
     if clock.missing_times:
         rows = sum(topic.rows for topic in ledger.topics)
@@ -85,7 +85,7 @@ def _times(ledger: Ledger) -> Iterator[Finding]:
         yield Finding("info", "clock.stale_times", text, count=clock.stale_times)
 
 
-def _order(clock: Clock) -> Iterator[Finding]:
+def _order(clock: ClockModel) -> Iterator[Finding]:
     if clock.is_unordered:
         text = f"the log is not in order of time ({clock.stray_rows} records after a later one): sorted"
         yield Finding("warn", "time.unordered", text, count=clock.stray_rows)
@@ -98,7 +98,7 @@ def _order(clock: Clock) -> Iterator[Finding]:
         yield Finding("info", "clock.shifted", text)
 
 
-def _absolute(clock: Clock) -> Iterator[Finding]:
+def _absolute(clock: ClockModel) -> Iterator[Finding]:
     """Whether the time is UTC, and where the clock began."""
     if clock.start == "unset":
         began = f"the clock began at {utc_ns_to_iso(clock.first_device_ns)}: it was not set"
@@ -119,7 +119,7 @@ def _absolute(clock: Clock) -> Iterator[Finding]:
     yield Finding("info", "clock.no_utc", text)
 
 
-def _relation(relation: ClockRelation, clock: Clock, most_ppm: float) -> Iterator[Finding]:
+def _relation(relation: ClockRelation, clock: ClockModel, most_ppm: float) -> Iterator[Finding]:
     for mistake in relation.mistakes:
         place = "" if mistake.time_ns is None else clock.text(mistake.time_ns)
         text = f"{relation.name} less the recorder's: {mistake.text}" + (f", a step at {place}" if place else "")

@@ -16,7 +16,7 @@ from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatc
 from groundstation.base.timescales import gps_week_to_utc_ns, iso_to_utc_ns
 from groundstation.base.toml_settings import number, required_number
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import FIRST_NS, LARGEST_NS, Clock
+from groundstation.integrity.clock import FIRST_NS, LARGEST_NS, ClockModel
 from groundstation.integrity.clock_fit import Fitted, fit_relation
 from groundstation.integrity.clock_relation import (
     ROLLOVER_S,
@@ -158,13 +158,13 @@ class ClockReferences:
             if readings.reference.serves(batch):
                 readings.add(batch)
 
-    def relations(self, clock: Clock) -> tuple[ClockRelation, ...]:
+    def relations(self, clock: ClockModel) -> tuple[ClockRelation, ...]:
         """How the recorder's corrected clock runs by each of them, in the order of their topics."""
         known = [one for topic in sorted(self._readings) for one in self._readings[topic]]
         return tuple(_relation(one, clock, self._settings) for one in known[:MOST_REFERENCES])
 
 
-def _relation(readings: _Readings, clock: Clock, settings: RelationSettings) -> ClockRelation:
+def _relation(readings: _Readings, clock: ClockModel, settings: RelationSettings) -> ClockRelation:
     reference, source = readings.reference, f"{readings.topic}.{readings.reference.field}"
     index, columns = readings.sampler.all()
     told_ns, good = _told(reference, columns) if len(index) else (index, np.zeros(0, dtype=bool))
@@ -252,7 +252,7 @@ def _last_digit_s(time_ns: Int64Array) -> float:
     return step / NS_PER_S
 
 
-def _mistakes(reference: ReferenceField, fitted: Fitted, clock: Clock, told_ns: Int64Array) -> tuple[Mistake, ...]:
+def _mistakes(reference: ReferenceField, fitted: Fitted, clock: ClockModel, told_ns: Int64Array) -> tuple[Mistake, ...]:
     """Errors that have a name, of steps and of what stands at the end."""
     if reference.scale == "free":
         return ()

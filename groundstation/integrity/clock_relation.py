@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
+from groundstation.base.clock import BreakEntry, MistakeEntry, RelationEntry, SegmentEntry
 from groundstation.base.timescales import leap_seconds_at, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 
@@ -162,50 +162,48 @@ class ClockRelation:
             return f"not observable to better than ± {_figure(sigma)} ppm: {why} in {segment.length_s:.1f} s"
         return f"{segment.drift_ppm:+.{_places(sigma)}f} ± {_figure(sigma)} ppm"
 
-    def to_dict(self, text: Callable[[int], str], *, has_utc: bool) -> dict[str, Any]:
-        """JSON-able: seconds to the microsecond, rates to a thousandth of a ppm; ``text`` writes a corrected time."""
-        return {
-            "clock": self.clock,
-            "source": self.source,
-            "samples": self.samples,
-            "reason": self.reason,
-            "resolution_s": round(self.resolution_s, 6),
-            "residual_s": round(self.residual_s, 6),
-            "segments": [
-                {
-                    "start": text(one.start_ns),
-                    "length_s": round(one.length_s, 3),
-                    "samples": one.samples,
-                    "offset_s": round(one.offset_ns / NS_PER_S, 6),
-                    "offset_sigma_s": round(one.offset_sigma_s, 6),
-                    "drift_ppm": _rounded(one.drift_ppm),
-                    "drift_sigma_ppm": _rounded(one.drift_sigma_ppm),
-                    "offset": self.offset_text(one, has_utc=has_utc),
-                    "drift": self.drift_text(one),
-                }
-                for one in self.segments
-            ],
-            "breaks": [
-                {
-                    "time": text(one.time_ns),
-                    "time_sigma_s": round(one.time_sigma_s, 3),
-                    "kind": one.kind,
-                    "step_s": round(one.step_s, 6),
-                    "step_sigma_s": round(one.step_sigma_s, 6),
-                    "drift_change_ppm": _rounded(one.drift_change_ppm),
-                }
-                for one in self.breaks
-            ],
-            "mistakes": [
-                {
-                    "kind": one.kind,
-                    "size_s": round(one.size_s, 3),
-                    "time": None if one.time_ns is None else text(one.time_ns),
-                    "text": one.text,
-                }
-                for one in self.mistakes
-            ],
-        }
+    def entry(self, text: Callable[[int], str], *, has_utc: bool) -> RelationEntry:
+        """What is kept of it: seconds to the microsecond, rates to a thousandth of a ppm; ``text`` writes a time."""
+        return RelationEntry(
+            clock=self.clock,
+            source=self.source,
+            samples=self.samples,
+            reason=self.reason,
+            resolution_s=round(self.resolution_s, 6),
+            residual_s=round(self.residual_s, 6),
+            segments=tuple(self._segment_entry(one, text, has_utc) for one in self.segments),
+            breaks=tuple(_break_entry(one, text) for one in self.breaks),
+            mistakes=tuple(_mistake_entry(one, text) for one in self.mistakes),
+        )
+
+    def _segment_entry(self, one: ClockSegment, text: Callable[[int], str], has_utc: bool) -> SegmentEntry:
+        return SegmentEntry(
+            start=text(one.start_ns),
+            length_s=round(one.length_s, 3),
+            samples=one.samples,
+            offset_s=round(one.offset_ns / NS_PER_S, 6),
+            offset_sigma_s=round(one.offset_sigma_s, 6),
+            drift_ppm=_rounded(one.drift_ppm),
+            drift_sigma_ppm=_rounded(one.drift_sigma_ppm),
+            offset=self.offset_text(one, has_utc=has_utc),
+            drift=self.drift_text(one),
+        )
+
+
+def _break_entry(one: ClockBreak, text: Callable[[int], str]) -> BreakEntry:
+    return BreakEntry(
+        time=text(one.time_ns),
+        time_sigma_s=round(one.time_sigma_s, 3),
+        kind=one.kind,
+        step_s=round(one.step_s, 6),
+        step_sigma_s=round(one.step_sigma_s, 6),
+        drift_change_ppm=_rounded(one.drift_change_ppm),
+    )
+
+
+def _mistake_entry(one: Mistake, text: Callable[[int], str]) -> MistakeEntry:
+    time = None if one.time_ns is None else text(one.time_ns)
+    return MistakeEntry(kind=one.kind, size_s=round(one.size_s, 3), time=time, text=one.text)
 
 
 def mistake_of_step(size_s: float, utc_ns: int) -> str:

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import Column, Int64Array, RecordBatch
 from groundstation.base.signals import is_canonical
-from groundstation.integrity.clock import Clock
-from groundstation.integrity.ledger import FieldLedger
+from groundstation.integrity.clock import ClockModel
+from groundstation.integrity.ledger import FieldCounts
 from groundstation.integrity.limits import Thresholds
 from groundstation.integrity.sequence import Counter, Sequence, counters_of
 from groundstation.integrity.spans import Dropout, Timeline
@@ -70,8 +70,8 @@ class _FieldTally:
         first, last = (Place(int(record_index[one]), int(device_ns[one])) for one in (at[0], at[-1]))
         self.first, self.last = self.first or first, last
 
-    def ledger(self, name: str, clock: Clock, stuck: tuple[Stuck, ...]) -> FieldLedger:
-        return FieldLedger(
+    def ledger(self, name: str, clock: ClockModel, stuck: tuple[Stuck, ...]) -> FieldCounts:
+        return FieldCounts(
             name,
             self.present,
             self.nan,
@@ -144,7 +144,7 @@ class Contents:
             if length_s > 0.0:
                 self._dropouts.append((Place(int(record_index[at]), int(device_ns[at])), length_s))
 
-    def fields(self, topic: str, clock: Clock) -> tuple[FieldLedger, ...]:
+    def fields(self, topic: str, clock: ClockModel) -> tuple[FieldCounts, ...]:
         """Ledgers of a topic's fields."""
         if self._judge is None:
             self._judge = Judge(self._motion, clock, self._thresholds.stuck)
@@ -153,16 +153,16 @@ class Contents:
         stuck = self._judge.stuck(topic, watched)
         return tuple(tally.ledger(name, clock, stuck.get(name, ())) for name, tally in tallies.items())
 
-    def sequences(self, topic: str, clock: Clock) -> tuple[Sequence, ...]:
+    def sequences(self, topic: str, clock: ClockModel) -> tuple[Sequence, ...]:
         """What the counters of a topic say."""
         counters = self._topics[topic].counters or {}
         return tuple(told for told in (counter.sequence(clock) for counter in counters.values()) if told is not None)
 
-    def dropouts(self, clock: Clock) -> tuple[Dropout, ...]:
+    def dropouts(self, clock: ClockModel) -> tuple[Dropout, ...]:
         """Drop-outs that the recorder marked."""
         return tuple(Dropout(place.time_ns(clock), length_s) for place, length_s in self._dropouts)
 
-    def timeline(self, clock: Clock) -> Timeline:
+    def timeline(self, clock: ClockModel) -> Timeline:
         """Times of rows."""
         index, columns = self._timeline.all()
         return Timeline.of(index, columns.get("time", np.zeros(0, dtype=np.int64)), clock)

@@ -14,7 +14,7 @@ import numpy as np
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.toml_settings import number
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import Clock, interpolated, start_of, zero_of
+from groundstation.integrity.clock import ClockModel, interpolated, start_of, zero_of
 from groundstation.integrity.clock_steps import middle_of
 
 FROZEN_SHARE, FROZEN_LEAST_RECORDS = 0.9, 10
@@ -54,7 +54,7 @@ def estimate_counting_clock(
     utc_of_zero_ns: int | None,
     *,
     settings: CountingSettings | None = None,
-) -> Clock:
+) -> ClockModel:
     """Model a counting clock.
 
     Parameters
@@ -69,7 +69,7 @@ def estimate_counting_clock(
 
     Returns
     -------
-    Clock
+    ClockModel
         Without ``lateness_ns``, which needs the topics.
 
     Examples
@@ -86,7 +86,7 @@ def estimate_counting_clock(
         usable, frozen = has_time, np.zeros(len(has_time), dtype=bool)
     index, time = record_index[usable], device_time_ns.values[usable]
     if not len(time):
-        return Clock(missing_times=len(record_index))
+        return ClockModel(missing_times=len(record_index))
     tolerance_ns = round(settings.tolerance_s * NS_PER_S)
     judged = _judged(time, tolerance_ns, settings.run_records)
     doubted = judged.stale | judged.ahead
@@ -102,7 +102,7 @@ def estimate_counting_clock(
     zero = zero_of(int(time.min()), int(time.max()), utc_of_zero_ns)
     late = np.maximum.accumulate(time) - time > tolerance_ns
     steps = np.diff(time)
-    return Clock(
+    return ClockModel(
         is_absolute=zero.is_absolute,
         period_ns=int(middle_of(steps[steps > 0])),
         starts=record_index[:1],

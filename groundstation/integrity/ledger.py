@@ -1,14 +1,26 @@
 """The integrity ledger: what a log holds, topic by topic, and what is odd about it. Figures only, no judgement."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
+from groundstation.base.ledger import (
+    DamageEntry,
+    Dropouts,
+    FieldEntry,
+    GapDefinition,
+    Ledger,
+    OutOfRange,
+    RemarkEntry,
+    StuckStretch,
+    TopicEntry,
+    TopicGaps,
+)
 from groundstation.base.records import Damage, Int64Array, Remark
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import Clock
+from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.integrity.rhythm import Gaps, rhythm_of
 from groundstation.integrity.sequence import Sequence
@@ -19,7 +31,7 @@ GAPS_LISTED = STUCK_LISTED = SPANS_LISTED = 100
 
 
 @dataclass(frozen=True)
-class FieldLedger:
+class FieldCounts:
     """One field: samples present, NaN the device wrote, values outside the physical range, stretches it was stuck.
 
     ``first_out_of_range`` is the record of the first value outside the range; ``first_outside_ns`` and
@@ -42,33 +54,34 @@ class FieldLedger:
         """Whether there is more to say of it than how many samples it has."""
         return bool(self.nan or self.out_of_range or self.stuck)
 
-    def to_dict(self, clock: Clock) -> dict[str, Any]:
-        """JSON-able."""
-        plain: dict[str, Any] = {"present": self.present, "nan": self.nan, "out_of_range": self.out_of_range}
-        if self.out_of_range:
-            first_ns = self.first_outside_ns
-            plain["first_out_of_range"] = {
-                "record": self.first_out_of_range,
-                "time": None if first_ns is None else clock.text(first_ns),
-                "range": [end if math.isfinite(end) else None for end in (self.low, self.high)],
-            }
-        if self.stuck:
-            plain["stuck"] = [
-                {
-                    "record": one.record_index,
-                    "start": clock.text(one.start_ns),
-                    "length_s": round(one.length_s, 3),
-                    "samples": one.samples,
-                    "value": one.value,
-                    "why": one.why,
-                }
+    def entry(self, clock: ClockModel) -> FieldEntry:
+        """What is kept of it."""
+        first_ns, ends = self.first_outside_ns, (self.low, self.high)
+        low, high = (end if math.isfinite(end) else None for end in ends)
+        time = None if first_ns is None else clock.text(first_ns)
+        return FieldEntry(
+            present=self.present,
+            nan=self.nan,
+            out_of_range=self.out_of_range,
+            first_out_of_range=(
+                OutOfRange(record=self.first_out_of_range, time=time, range=(low, high)) if self.out_of_range else None
+            ),
+            stuck=tuple(
+                StuckStretch(
+                    record=one.record_index,
+                    start=clock.text(one.start_ns),
+                    length_s=round(one.length_s, 3),
+                    samples=one.samples,
+                    value=one.value,
+                    why=one.why,
+                )
                 for one in self.stuck[:STUCK_LISTED]
-            ]
-        return plain
+            ),
+        )
 
 
 @dataclass(frozen=True)
-class TopicLedger:
+class TopicCounts:
     """One topic on the corrected clock.
 
     Parameters
@@ -87,7 +100,7 @@ class TopicLedger:
     duplicates, backward_steps, stray_rows : int
         Records at the time of the one before (in order of time); steps back of device time; records out of order.
     gaps : Gaps
-    fields : tuple of FieldLedger
+    fields : tuple of FieldCounts
     sequences : tuple of Sequence
         What record counters say is missing.
     """
@@ -103,7 +116,7 @@ class TopicLedger:
     backward_steps: int
     stray_rows: int
     gaps: Gaps
-    fields: tuple[FieldLedger, ...]
+    fields: tuple[FieldCounts, ...]
     sequences: tuple[Sequence, ...] = ()
 
     @property
@@ -111,44 +124,45 @@ class TopicLedger:
         """Seconds from the first to the last record."""
         return (self.last_ns - self.first_ns) / NS_PER_S
 
-    def to_dict(self, clock: Clock) -> dict[str, Any]:
-        """JSON-able; seconds to the millisecond, rates to 4 decimals, shares to 6."""
+    def entry(self, clock: ClockModel, losses: Mapping[str, int]) -> TopicEntry:
+        """What is kept of it: seconds to the millisecond, rates to 4 decimals, shares to 6."""
         listed = zip(self.gaps.start_ns[:GAPS_LISTED], self.gaps.length_s[:GAPS_LISTED], strict=True)
-        return {
-            "rows": self.rows,
-            "first": clock.text(self.first_ns),
-            "last": clock.text(self.last_ns),
-            "span_s": round(self.span_s, 3),
-            "nominal_rate_hz": _rounded(self.nominal_rate_hz, 4),
-            "actual_rate_hz": _rounded(self.actual_rate_hz, 4),
-            "coverage": _rounded(self.coverage, 6),
-            "duplicates": self.duplicates,
-            "backward_steps": self.backward_steps,
-            "stray_rows": self.stray_rows,
-            "gaps": {
-                "count": len(self.gaps),
-                "total_s": round(float(self.gaps.length_s.sum()), 3),
-                "longest_s": round(float(self.gaps.length_s.max(initial=0.0)), 3),
-                "listed": [[clock.text(int(start)), round(float(length), 3)] for start, length in listed],
-            },
-            "sequences": [sequence.to_dict(clock) for sequence in self.sequences],
-            "fields": {ledger.name: ledger.to_dict(clock) for ledger in self.fields},
-        }
+        return TopicEntry(
+            rows=self.rows,
+            first=clock.text(self.first_ns),
+            last=clock.text(self.last_ns),
+            span_s=round(self.span_s, 3),
+            nominal_rate_hz=_rounded(self.nominal_rate_hz, 4),
+            actual_rate_hz=_rounded(self.actual_rate_hz, 4),
+            coverage=_rounded(self.coverage, 6),
+            duplicates=self.duplicates,
+            backward_steps=self.backward_steps,
+            stray_rows=self.stray_rows,
+            gaps=TopicGaps(
+                count=len(self.gaps),
+                total_s=round(float(self.gaps.length_s.sum()), 3),
+                longest_s=round(float(self.gaps.length_s.max(initial=0.0)), 3),
+                listed=tuple((clock.text(int(start)), round(float(length), 3)) for start, length in listed),
+            ),
+            sequences=tuple(sequence.entry(clock) for sequence in self.sequences),
+            fields={one.name: one.entry(clock) for one in sorted(self.fields, key=lambda one: one.name)},
+            losses=dict(sorted(losses.items())),
+        )
 
 
 @dataclass(frozen=True)
-class Ledger:
+class LedgerCounts:
     """The ledger of a log: its topics in alphabetical order, its clock, and what the reader lost and remarked."""
 
-    topics: tuple[TopicLedger, ...] = ()
-    clock: Clock = field(default_factory=Clock)
+    topics: tuple[TopicCounts, ...] = ()
+    clock: ClockModel = field(default_factory=ClockModel)
     damages: tuple[Damage, ...] = ()
     remarks: tuple[Remark, ...] = ()
     thresholds: Thresholds = field(default_factory=shipped)
     dropouts: tuple[Dropout, ...] = ()
     timeline: Timeline | None = None
 
-    def __getitem__(self, topic: str) -> TopicLedger:
+    def __getitem__(self, topic: str) -> TopicCounts:
         """The ledger of one topic; KeyError when the log has none of that name."""
         for ledger in self.topics:
             if ledger.topic == topic:
@@ -193,39 +207,38 @@ class Ledger:
                 counts[damage.kind] = counts.get(damage.kind, 0) + damage.count
         return counts
 
-    def to_dict(self) -> dict[str, Any]:
-        """JSON-able, in a fixed order."""
+    def document(self) -> Ledger:
+        """What is kept of it."""
         limits, spans = self.thresholds.gaps, self.spans
         skipped, skipped_spans = skipped_bytes(self.damages)
-        return {
-            "thresholds": self.thresholds.to_dict(),
-            "gap_definition": {"periods": limits.periods, "min_s": limits.min_s},
-            "topics": {
-                ledger.topic: {**ledger.to_dict(self.clock), "losses": self.losses(ledger.topic)}
-                for ledger in self.topics
-            },
-            "bytes_skipped": skipped,
-            "skipped_spans": skipped_spans,
-            "truncated": truncation(self.damages),
-            "dropouts": {"count": len(self.dropouts), "total_s": round(sum(one.length_s for one in self.dropouts), 3)},
-            "spans": [span.to_dict(self.clock, self.start_ns) for span in spans[:SPANS_LISTED]],
-            "spans_more": max(0, len(spans) - SPANS_LISTED),
-            "damages": [
-                {
-                    "kind": damage.kind,
-                    "place": damage.place,
-                    "count": damage.count,
-                    "what": damage.what,
-                    "topic": damage.topic,
-                    "loses_data": damage.loses_data,
-                }
-                for damage in self.damages
-            ],
-            "remarks": [{"code": remark.code, "text": remark.text, "topic": remark.topic} for remark in self.remarks],
-        }
+        return Ledger(
+            thresholds=self.thresholds.used(),
+            gap_definition=GapDefinition(periods=limits.periods, min_s=limits.min_s),
+            topics={one.topic: one.entry(self.clock, self.losses(one.topic)) for one in self.topics},
+            bytes_skipped=skipped,
+            skipped_spans=skipped_spans,
+            truncated=truncation(self.damages),
+            dropouts=Dropouts(count=len(self.dropouts), total_s=round(sum(one.length_s for one in self.dropouts), 3)),
+            spans=tuple(span.entry(self.clock, self.start_ns) for span in spans[:SPANS_LISTED]),
+            spans_more=max(0, len(spans) - SPANS_LISTED),
+            damages=tuple(damage_entry(damage) for damage in self.damages),
+            remarks=tuple(RemarkEntry(code=one.code, text=one.text, topic=one.topic) for one in self.remarks),
+        )
 
 
-def _spans_of_topic(topic: TopicLedger) -> list[Span]:
+def damage_entry(damage: Damage) -> DamageEntry:
+    """What is kept of damage."""
+    return DamageEntry(
+        kind=damage.kind,
+        place=damage.place,
+        count=damage.count,
+        what=damage.what,
+        topic=damage.topic,
+        loses_data=damage.loses_data,
+    )
+
+
+def _spans_of_topic(topic: TopicCounts) -> list[Span]:
     """Spans of wrong values and of records that a counter misses."""
     found = []
     for ledger in topic.fields:
@@ -264,15 +277,15 @@ def topic_ledger(
     *,
     backward_steps: int,
     stray_rows: int,
-    fields: tuple[FieldLedger, ...],
+    fields: tuple[FieldCounts, ...],
     sequences: tuple[Sequence, ...] = (),
     thresholds: Thresholds,
-) -> TopicLedger:
+) -> TopicCounts:
     """Ledger of one topic from its corrected times in order, shape (n,), n at least 1."""
     rhythm = rhythm_of(topic, time_ns, thresholds)
     span_ns = int(time_ns[-1] - time_ns[0])
     ahead = rhythm.ahead
-    return TopicLedger(
+    return TopicCounts(
         topic,
         rows=len(time_ns),
         first_ns=int(time_ns[0]),

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.signals import is_canonical
-from groundstation.integrity.clock import Clock
+from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.clock_findings import clock_findings, counted
-from groundstation.integrity.ledger import FieldLedger, Ledger, TopicLedger
+from groundstation.integrity.ledger import FieldCounts, LedgerCounts, TopicCounts
 from groundstation.integrity.limits import DuplicateLimits
 from groundstation.integrity.sequence import Sequence
 
@@ -17,7 +17,7 @@ TOPIC_CODES = (
 _REMARKS_THAT_WARN = ("assumed_utc", "clock_disagrees", "unreadable_metadata", "plug_in", "duplicate_column")
 
 
-def ledger_findings(ledger: Ledger) -> tuple[Finding, ...]:
+def ledger_findings(ledger: LedgerCounts) -> tuple[Finding, ...]:
     """Findings of a ledger: clock first, then losses, topics and the reader's remarks.
 
     Codes: those of :func:`clock_findings`, ``time.duplicates``, ``data.none``, ``data.gaps``, ``data.<kind of damage>``
@@ -28,19 +28,19 @@ def ledger_findings(ledger: Ledger) -> tuple[Finding, ...]:
     return (*clock_findings(ledger), *_damages(ledger), *topic_findings(ledger), *_remarks(ledger))
 
 
-def topic_findings(ledger: Ledger) -> tuple[Finding, ...]:
+def topic_findings(ledger: LedgerCounts) -> tuple[Finding, ...]:
     """Those of the findings that are about topics: order, gaps, counters and values."""
     return tuple(finding for topic in ledger.topics for finding in _topic(topic, ledger))
 
 
-def _damages(ledger: Ledger) -> Iterator[Finding]:
+def _damages(ledger: LedgerCounts) -> Iterator[Finding]:
     for damage in ledger.damages:
         severity: Severity = "warn" if damage.loses_data else "info"
         text = f"{damage.what}: {damage.count} ({damage.place})"
         yield Finding(severity, f"data.{damage.kind}", text, damage.topic, damage.place, damage.count)
 
 
-def _duplicates(topic: TopicLedger, clock: Clock, limits: DuplicateLimits) -> Finding:
+def _duplicates(topic: TopicCounts, clock: ClockModel, limits: DuplicateLimits) -> Finding:
     """Records at one time: a warning where many, but of a counting clock's topics, whose sources share times."""
     share = topic.duplicates / topic.rows
     text = f"{topic.topic}: {topic.duplicates} of {topic.rows} records repeat the time of the one before"
@@ -51,7 +51,7 @@ def _duplicates(topic: TopicLedger, clock: Clock, limits: DuplicateLimits) -> Fi
     return Finding("warn" if is_odd else "info", "time.duplicates", text, topic.topic, count=topic.duplicates)
 
 
-def _topic(topic: TopicLedger, ledger: Ledger) -> Iterator[Finding]:
+def _topic(topic: TopicCounts, ledger: LedgerCounts) -> Iterator[Finding]:
     if topic.duplicates:
         yield _duplicates(topic, ledger.clock, ledger.thresholds.duplicates)
     if len(topic.gaps):
@@ -69,7 +69,7 @@ def _topic(topic: TopicLedger, ledger: Ledger) -> Iterator[Finding]:
         yield from _field(topic.topic, field, ledger.clock)
 
 
-def _field(topic: str, field: FieldLedger, clock: Clock) -> Iterator[Finding]:
+def _field(topic: str, field: FieldCounts, clock: ClockModel) -> Iterator[Finding]:
     name = f"{topic}.{field.name}"
     if field.out_of_range:
         place = f"record {field.first_out_of_range}"
@@ -91,7 +91,7 @@ def _field(topic: str, field: FieldLedger, clock: Clock) -> Iterator[Finding]:
         yield Finding("warn", "values.stuck", text, topic, place, len(field.stuck))
 
 
-def _sequence(topic: str, sequence: Sequence, clock: Clock) -> Iterator[Finding]:
+def _sequence(topic: str, sequence: Sequence, clock: ClockModel) -> Iterator[Finding]:
     name = f"{topic}.{sequence.field}"
     if sequence.lost:
         place = clock.text(sequence.places[0][0])
@@ -106,7 +106,7 @@ def _sequence(topic: str, sequence: Sequence, clock: Clock) -> Iterator[Finding]
         yield Finding("info", "data.sequence_reset", text, topic, count=sequence.resets)
 
 
-def _remarks(ledger: Ledger) -> Iterator[Finding]:
+def _remarks(ledger: LedgerCounts) -> Iterator[Finding]:
     for remark in ledger.remarks:
         severity: Severity = "warn" if remark.code in _REMARKS_THAT_WARN else "info"
         yield Finding(severity, f"reader.{remark.code}", remark.text, remark.topic)

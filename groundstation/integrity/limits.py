@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 
 from groundstation.base.errors import SettingsError
+from groundstation.base.ledger import ThresholdsUsed
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.signals import TOPICS, field_of, kind_of
 from groundstation.base.toml_settings import required_number, settings_from
@@ -123,9 +124,9 @@ class Thresholds:
             return None
         return self.ranges.get(kind_of(topic), {}).get(name, (known.low, known.high))
 
-    def to_dict(self) -> dict[str, Any]:
+    def used(self) -> ThresholdsUsed:
         """Which thresholds these are: name, version and digest."""
-        return {"name": self.name, "version": self.version, "sha256": self.sha256}
+        return ThresholdsUsed(name=self.name, version=self.version, sha256=self.sha256)
 
 
 @cache

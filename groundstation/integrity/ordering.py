@@ -5,10 +5,10 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Item, RecordBatch
-from groundstation.integrity.clock import Clock
+from groundstation.integrity.clock import ClockModel
 
 
-def corrected(items: Iterable[Item], clock: Clock) -> Iterator[RecordBatch]:
+def corrected(items: Iterable[Item], clock: ClockModel) -> Iterator[RecordBatch]:
     """Yield the batches of a log with corrected time, each topic in non-decreasing ``time_ns``.
 
     A record is held back until no earlier one of its topic can follow, which the lateness found by the survey tells:
@@ -19,7 +19,7 @@ def corrected(items: Iterable[Item], clock: Clock) -> Iterator[RecordBatch]:
     ----------
     items : iterable of Item
         The same log again.
-    clock : Clock
+    clock : ClockModel
         From the survey of that log.
     """
     if not clock.has_times:

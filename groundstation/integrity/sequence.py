@@ -3,12 +3,12 @@
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
+from groundstation.base.ledger import CounterEntry
 from groundstation.base.records import Column, Int64Array, RecordBatch
-from groundstation.integrity.clock import Clock
+from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.limits import SequenceLimits
 from groundstation.integrity.stretches import Place
 
@@ -43,16 +43,16 @@ class Sequence:
     resets: int = 0
     places: tuple[tuple[int, int], ...] = ()
 
-    def to_dict(self, clock: Clock) -> dict[str, Any]:
-        """JSON-able."""
-        return {
-            "field": self.field,
-            "kind": self.kind,
-            "lost": self.lost,
-            "before": self.before,
-            "resets": self.resets,
-            "listed": [[clock.text(time_ns), lost] for time_ns, lost in self.places],
-        }
+    def entry(self, clock: ClockModel) -> CounterEntry:
+        """What is kept of it."""
+        return CounterEntry(
+            field=self.field,
+            kind=self.kind,
+            lost=self.lost,
+            before=self.before,
+            resets=self.resets,
+            listed=tuple((clock.text(time_ns), lost) for time_ns, lost in self.places),
+        )
 
 
 @dataclass
@@ -98,7 +98,7 @@ class Counter:
         for at in lost[: LISTED - len(self.places)].tolist():
             self.places.append((Place(int(index[at]), int(device[at])), int(step[at]) - usual))
 
-    def sequence(self, clock: Clock) -> Sequence | None:
+    def sequence(self, clock: ClockModel) -> Sequence | None:
         """What it says; None when it is no counter after all."""
         if self.first is None:
             return None

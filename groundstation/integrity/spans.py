@@ -1,17 +1,17 @@
 """Where damage lies: spans of time in which data was lost or is wrong, and spans of bytes that were skipped."""
 
-import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from groundstation.base.ledger import DamagedSpan, Truncation
 from groundstation.base.records import Column, Damage, Int64Array, frozen
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import Clock
+from groundstation.integrity.clock import ClockModel
 
 LISTED = 100
 _ROWS = re.compile(r"\brows? (\d+)(?: to (\d+))?$")
@@ -52,18 +52,18 @@ class Span:
     is_exact: bool
     count: int
 
-    def to_dict(self, clock: Clock, zero_ns: int) -> dict[str, Any]:
-        """JSON-able; ``start_s`` counts from the first record of the log, as flight time does."""
-        return {
-            "cause": self.cause,
-            "topic": self.topic,
-            "field": self.field,
-            "start": clock.text(self.start_ns),
-            "start_s": round((self.start_ns - zero_ns) / NS_PER_S, 3),
-            "length_s": round((self.end_ns - self.start_ns) / NS_PER_S, 3),
-            "is_exact": self.is_exact,
-            "count": self.count,
-        }
+    def entry(self, clock: ClockModel, zero_ns: int) -> DamagedSpan:
+        """What is kept of it; ``start_s`` counts from the first record of the log, as flight time does."""
+        return DamagedSpan(
+            cause=self.cause,
+            topic=self.topic,
+            field=self.field,
+            start=clock.text(self.start_ns),
+            start_s=round((self.start_ns - zero_ns) / NS_PER_S, 3),
+            length_s=round((self.end_ns - self.start_ns) / NS_PER_S, 3),
+            is_exact=self.is_exact,
+            count=self.count,
+        )
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Timeline:
     time_ns: Int64Array
 
     @classmethod
-    def of(cls, index: Int64Array, device_ns: Int64Array, clock: Clock) -> "Timeline":
+    def of(cls, index: Int64Array, device_ns: Int64Array, clock: ClockModel) -> "Timeline":
         """From rows in any order."""
         index, first = np.unique(index, return_index=True)
         return cls(frozen(index), frozen(clock.time_ns(index, Column(device_ns[first]))))
@@ -130,29 +130,18 @@ def _times(damage: Damage, timeline: Timeline, end_ns: int) -> tuple[tuple[int, 
     return None, False
 
 
-def is_span(entry: Any) -> bool:
-    """Whether a plain form is that of a span: it may come from a file that anyone wrote."""
-    texts, numbers = ("cause", "topic", "field", "start"), ("start_s", "length_s", "count")
-    return (
-        isinstance(entry, Mapping)
-        and all(isinstance(entry.get(key), str) for key in texts)
-        and all(type(entry.get(key)) in (int, float) and math.isfinite(entry[key]) for key in numbers)
-        and isinstance(entry.get("is_exact"), bool)
-    )
-
-
-def skipped_bytes(damages: Sequence[Damage]) -> tuple[int, list[list[int]]]:
-    """Bytes that no record was made of: how many together, and the spans as [first, last, bytes]."""
+def skipped_bytes(damages: Sequence[Damage]) -> tuple[int, tuple[tuple[int, int, int], ...]]:
+    """Bytes that no record was made of: how many together, and the spans as (first, last, bytes)."""
     spans = []
     for damage in damages:
         place = _BYTES.search(damage.place)
         if damage.loses_data and place and damage.what.startswith("bytes"):
             first = int(place[1])
-            spans.append([first, int(place[2]) if place[2] else first + damage.count - 1, damage.count])
-    return sum(count for _first, _last, count in spans), sorted(spans)[:LISTED]
+            spans.append((first, int(place[2]) if place[2] else first + damage.count - 1, damage.count))
+    return sum(count for _first, _last, count in spans), tuple(sorted(spans)[:LISTED])
 
 
-def truncation(damages: Sequence[Damage]) -> dict[str, Any] | None:
+def truncation(damages: Sequence[Damage]) -> Truncation | None:
     """Where the log is cut: place, what is lost of it, how many; None when it is whole."""
     cut = next((damage for damage in damages if damage.kind == "truncated"), None)
-    return None if cut is None else {"place": cut.place, "what": cut.what, "count": cut.count}
+    return None if cut is None else Truncation(place=cut.place, what=cut.what, count=cut.count)

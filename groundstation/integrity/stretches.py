@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Column, Int64Array
-from groundstation.integrity.clock import Clock
+from groundstation.integrity.clock import ClockModel
 
 MOST_STRETCHES = 512  # kept of a field: the longest
 CHANGES_MEASURED = 512  # of a batch
@@ -19,7 +19,7 @@ class Place(NamedTuple):
     record_index: int
     device_ns: int
 
-    def time_ns(self, clock: Clock) -> int:
+    def time_ns(self, clock: ClockModel) -> int:
         """Its corrected time."""
         time = clock.time_ns(np.array([self.record_index]), Column(np.array([self.device_ns], dtype=np.int64)))
         return int(time[0])

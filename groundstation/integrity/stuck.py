@@ -13,7 +13,7 @@ from groundstation.base.angles import direction_of, wrap_180
 from groundstation.base.records import Int64Array, RecordBatch
 from groundstation.base.signals import kind_of
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import Clock
+from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.limits import StuckLimits
 from groundstation.integrity.stretches import Constancy, FloatArray, Sampler, Stretch
 
@@ -108,7 +108,7 @@ class Motion:
 class Judge:
     """Tells stuck stretches from innocent ones."""
 
-    def __init__(self, motion: Motion, clock: Clock, limits: StuckLimits) -> None:
+    def __init__(self, motion: Motion, clock: ClockModel, limits: StuckLimits) -> None:
         self._sources = motion.sources()
         self._clock, self._limits = clock, limits
 

@@ -12,11 +12,11 @@ import numpy as np
 
 from groundstation.base.records import BoolArray, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import Clock, estimate_clock
+from groundstation.integrity.clock import ClockModel, estimate_clock
 from groundstation.integrity.clock_references import ClockReferences
 from groundstation.integrity.contents import Contents
 from groundstation.integrity.counting import CountingSettings, estimate_counting_clock
-from groundstation.integrity.ledger import Ledger, TopicLedger, topic_ledger
+from groundstation.integrity.ledger import LedgerCounts, TopicCounts, topic_ledger
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.integrity.ordering import joined_columns
 from groundstation.integrity.places import Kept, Places
@@ -31,14 +31,14 @@ class Survey:
     Parameters
     ----------
     header : LogHeader
-    clock : Clock
+    clock : ClockModel
         Turns device times into corrected times.
-    ledger : Ledger
+    ledger : LedgerCounts
     """
 
     header: LogHeader
-    clock: Clock
-    ledger: Ledger
+    clock: ClockModel
+    ledger: LedgerCounts
 
     @property
     def damages(self) -> tuple[Damage, ...]:
@@ -65,7 +65,7 @@ class _Order(NamedTuple):
     stray_rows: int
 
 
-def _order_of(places: Places, pieces: Sequence[Kept], clock: Clock) -> _Order:
+def _order_of(places: Places, pieces: Sequence[Kept], clock: ClockModel) -> _Order:
     """The order of the records of some pieces, taken piece by piece."""
     time_ns = np.empty(sum(kept.count for kept in pieces), dtype=np.int64)
     at = backward = stray = 0
@@ -127,13 +127,13 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
     topics = tuple(ledger for ledger, _lateness in results)
     clock = replace(clock, lateness_ns={ledger.topic: lateness for ledger, lateness in results})
     dropouts, timeline = (contents.dropouts(clock), contents.timeline(clock)) if clock.has_times else ((), None)
-    ledger = Ledger(topics, clock, tuple(damages), tuple(remarks), limits, dropouts, timeline)
+    ledger = LedgerCounts(topics, clock, tuple(damages), tuple(remarks), limits, dropouts, timeline)
     return Survey(header, clock, ledger)
 
 
 def _ledgers(
-    places: Places, pieces: Mapping[str, Sequence[Kept]], contents: Contents, clock: Clock, limits: Thresholds
-) -> list[tuple[TopicLedger, int]]:
+    places: Places, pieces: Mapping[str, Sequence[Kept]], contents: Contents, clock: ClockModel, limits: Thresholds
+) -> list[tuple[TopicCounts, int]]:
     """Ledgers and latenesses of all topics in alphabetical order; topics that are sampled together share theirs."""
     together: dict[tuple[int, ...], list[str]] = {}
     for topic, several in pieces.items():
@@ -155,7 +155,7 @@ def _ledgers(
     return sorted(results, key=lambda result: result[0].topic)
 
 
-def _clock_of(header: LogHeader, places: Places, topics: Sequence[Sequence[Kept]], limits: Thresholds) -> Clock:
+def _clock_of(header: LogHeader, places: Places, topics: Sequence[Sequence[Kept]], limits: Thresholds) -> ClockModel:
     """The model of the log's clock, of the kind that its reader names."""
     if header.has_counting_clock:
         return _counting_clock(header, places, topics, limits.counting_clock)
@@ -165,7 +165,7 @@ def _clock_of(header: LogHeader, places: Places, topics: Sequence[Sequence[Kept]
 
 def _counting_clock(
     header: LogHeader, places: Places, topics: Sequence[Sequence[Kept]], settings: CountingSettings
-) -> Clock:
+) -> ClockModel:
     """The model of a counting clock; of a long log only the records that have a say are laid together."""
     thinner = Thinner(round(settings.tolerance_s * NS_PER_S), settings.run_records)
     windows: list[tuple[Int64Array, Column, BoolArray]] = []
@@ -175,7 +175,7 @@ def _counting_clock(
         kept = thinner.kept(time.values, time.mask & ~frozen)
         windows.append((index[kept], time.take(kept), frozen[kept]))
     if not windows:
-        return Clock()
+        return ClockModel()
     clock = estimate_counting_clock(
         np.concatenate([index for index, _time, _frozen in windows]),
         joined_columns([time for _index, time, _frozen in windows]),
@@ -190,7 +190,7 @@ class Census:
     """Ledger of records whose corrected time is known: what is in a store file."""
 
     def __init__(self, is_absolute: bool, thresholds: Thresholds | None = None, *, is_counting: bool = False) -> None:
-        self._clock = Clock(is_absolute=is_absolute, is_counting=is_counting)
+        self._clock = ClockModel(is_absolute=is_absolute, is_counting=is_counting)
         self._thresholds = thresholds or shipped()
         self._times: dict[str, list[Int64Array]] = {}
         self._contents = Contents(self._thresholds)
@@ -204,7 +204,7 @@ class Census:
         self._times.setdefault(batch.topic, []).append(np.array(batch.time_ns))
         self._contents.add(batch, batch.time_ns)
 
-    def ledger(self, damages: Sequence[Damage] = ()) -> Ledger:
+    def ledger(self, damages: Sequence[Damage] = ()) -> LedgerCounts:
         """The ledger of what is in the file; device order and device clock are not in it."""
         topics = [
             topic_ledger(
@@ -220,4 +220,4 @@ class Census:
         ]
         clock, contents = self._clock, self._contents
         dropouts, timeline = contents.dropouts(clock), contents.timeline(clock)
-        return Ledger(tuple(topics), clock, tuple(damages), (), self._thresholds, dropouts, timeline)
+        return LedgerCounts(tuple(topics), clock, tuple(damages), (), self._thresholds, dropouts, timeline)

@@ -7,8 +7,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.clock import Clock
 from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.findings import Finding, Severity
+from groundstation.base.ledger import Ledger
 from groundstation.estimators.analyses import FLIGHT_ANALYSES
 from groundstation.estimators.analysis import Analysis, in_order_of_need
 from groundstation.estimators.heading.settings import HeadingSettings
@@ -33,8 +35,8 @@ class Given:
 
     flight_id: str
     source: Source
-    ledger: Mapping[str, Any]
-    clock: Mapping[str, Any]
+    ledger: Ledger
+    clock: Clock
     findings: tuple[Finding, ...]
     has_lost_data: bool
 
@@ -78,8 +80,8 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
         start_utc_ns=flight.start_ns if flight.has_utc else None,
         duration_s=flight.duration_s,
         status=_status(given, findings),
-        completeness=_completeness(given.ledger),
-        ledger={key: value for key, value in given.ledger.items() if key != "findings"},
+        completeness=given.ledger.completeness,
+        ledger=given.ledger,
         clock=given.clock,
         findings=tuple(findings),
         not_assessable=found.not_assessable,
@@ -175,11 +177,6 @@ def _status(given: Given, findings: list[Finding]) -> Status:
     if any(finding.severity == "fail" for finding in findings):
         return "failed"
     return "degraded" if given.has_lost_data else "ok"
-
-
-def _completeness(ledger: Mapping[str, Any]) -> dict[str, float]:
-    topics = ledger.get("topics", {})
-    return {name: float(entry["coverage"]) for name, entry in topics.items() if entry.get("coverage") is not None}
 
 
 def _general_figures(

@@ -6,7 +6,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from groundstation.base.clock import Clock
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
+from groundstation.base.ledger import Ledger
 from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.analyse import analyse
 from groundstation.pipeline.configuration import SECTIONS, Configuration, load_configuration
@@ -142,11 +144,11 @@ class OpenLog(OpenFlight):
         return self._conversion.log.source
 
     @property
-    def ledger(self) -> Mapping[str, Any]:
-        return {key: value for key, value in self._converted.info.ledger.items() if key != "findings"}
+    def ledger(self) -> Ledger:
+        return self._converted.info.ledger
 
     @property
-    def clock(self) -> Mapping[str, Any]:
+    def clock(self) -> Clock:
         return self._converted.info.clock
 
     @property
@@ -209,11 +211,11 @@ class SavedRun(OpenFlight):
         return self.results.source
 
     @property
-    def ledger(self) -> Mapping[str, Any]:
+    def ledger(self) -> Ledger:
         return self.results.ledger
 
     @property
-    def clock(self) -> Mapping[str, Any]:
+    def clock(self) -> Clock:
         return self.results.clock
 
     @property

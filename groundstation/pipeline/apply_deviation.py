@@ -10,6 +10,7 @@ import numpy as np
 
 from groundstation.base.errors import NotAssessableError, UsageError
 from groundstation.base.findings import Finding, Severity
+from groundstation.base.ledger import Ledger
 from groundstation.base.records import MAX_BATCH_ROWS, Column, RecordBatch
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.integrity.limits import Thresholds
@@ -282,7 +283,8 @@ def write_corrected(target: Path, info: "StoreInfo", flight: Flight, applied: Ap
         source_sha256="",
         start_ns=int(flight[corrected.topic].time_ns[corrected.rows[0]]),
         metadata={**info.metadata, **_origin(corrected, deviation)},
-        ledger={},
+        ledger=Ledger(),
+        findings=(),
         remarks=(),
         damages=(),
     )

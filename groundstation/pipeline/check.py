@@ -5,12 +5,15 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from groundstation.base.clock import Clock
 from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.base.findings import SEVERITIES, Finding, worst
+from groundstation.base.ledger import Ledger
 from groundstation.base.records import Damage, RecordBatch
+from groundstation.base.serial import to_json_exactly
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.convert import census_of, has_other_limits, recounted, stored_findings
+from groundstation.pipeline.convert import census_of, has_other_limits, recounted
 from groundstation.pipeline.describe import facts_of
 from groundstation.pipeline.log import Log, open_log
 from groundstation.pipeline.outcome import Outcome, State, reason_of
@@ -27,15 +30,15 @@ class Checked:
         State and exit code; the reason when the log could not be read.
     facts : mapping of str to str
         What the log is; empty when it could not be read.
-    ledger, clock : mapping
-        As in summary.json.
+    ledger : Ledger
+    clock : Clock
     findings : tuple of Finding
     """
 
     outcome: Outcome
     facts: Mapping[str, str]
-    ledger: Mapping[str, Any]
-    clock: Mapping[str, Any]
+    ledger: Ledger
+    clock: Clock
     findings: tuple[Finding, ...]
 
     def to_dict(self) -> dict[str, Any]:
@@ -47,8 +50,8 @@ class Checked:
             "text": self.outcome.text,
             "sha256": self.outcome.sha256,
             "facts": dict(self.facts),
-            "clock": dict(self.clock),
-            "ledger": dict(self.ledger),
+            "clock": to_json_exactly(self.clock),
+            "ledger": to_json_exactly(self.ledger),
             "findings": [asdict(finding) for finding in self.findings],
         }
 
@@ -97,7 +100,7 @@ def _check_or_reason(path: Path, profile: Path | None, thresholds: Thresholds, f
         return check_log(open_log(path, profile), thresholds, fail_on=fail_on)
     except Exception as error:
         reason, trace = reason_of(path.name, error)
-    return Checked(Outcome(str(path), "failed", reason, trace=trace), {}, {}, {}, ())
+    return Checked(Outcome(str(path), "failed", reason, trace=trace), {}, Ledger(), Clock(), ())
 
 
 def _recorded(log: Log, limits: Thresholds, fail_on: str) -> Checked:
@@ -105,10 +108,10 @@ def _recorded(log: Log, limits: Thresholds, fail_on: str) -> Checked:
     from groundstation.integrity.survey import survey
 
     found = survey(log.items(), thresholds=limits)
-    ledger = found.ledger.to_dict()
+    ledger = found.ledger.document()
     facts = facts_of(log, found.header.metadata, ledger)
     findings = ledger_findings(found.ledger)
-    return _checked(log, facts, ledger, found.clock.to_dict(), findings, found.ledger.loses_data, fail_on)
+    return _checked(log, facts, ledger, found.clock.document(), findings, found.ledger.loses_data, fail_on)
 
 
 def _stored(log: Log, limits: Thresholds, fail_on: str) -> Checked:
@@ -125,24 +128,23 @@ def _stored(log: Log, limits: Thresholds, fail_on: str) -> Checked:
     if not census.rows:
         raise UnreadableLogError(log.path.name, "no intact record", "", "the file is damaged beyond its index")
     anew = recounted(info, damages, census)
-    ledger = {key: value for key, value in anew.ledger.items() if key != "findings"}
     if damages or has_other_limits(info, limits):  # else what was found in the log is told as it was
         info = anew
-    facts = facts_of(log, info.metadata, ledger)
+    facts = facts_of(log, info.metadata, anew.ledger)
     has_lost = any(entry.get("loses_data") for entry in info.damages)
-    return _checked(log, facts, ledger, info.clock, stored_findings(info), has_lost, fail_on)
+    return _checked(log, facts, anew.ledger, info.clock, info.findings, has_lost, fail_on)
 
 
 def _checked(
     log: Log,
     facts: Mapping[str, str],
-    ledger: Mapping[str, Any],
-    clock: Mapping[str, Any],
+    ledger: Ledger,
+    clock: Clock,
     findings: tuple[Finding, ...],
     has_lost_data: bool,
     fail_on: str,
 ) -> Checked:
-    if not ledger.get("topics"):
+    if not ledger.topics:
         reason = f"{log.path.name}: no record that could be read: `info` tells what the file is"
         outcome = Outcome(str(log.path), "failed", reason, sha256=log.source.sha256)
         return Checked(outcome, facts, ledger, clock, findings)

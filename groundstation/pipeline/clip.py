@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from groundstation.base.errors import SettingsError, UnreadableLogError, UsageError, told_in_a_line
+from groundstation.base.ledger import DamagedSpan, Ledger
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.limits import Thresholds
-from groundstation.integrity.spans import is_span
 from groundstation.pipeline.analyse import analyse
 from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.convert import Converted, census_of, convert_log, recounted, stored_findings
+from groundstation.pipeline.convert import Converted, census_of, convert_log, recounted
 from groundstation.pipeline.describe import facts_of
 from groundstation.pipeline.flight import given_of, read_flight
 from groundstation.pipeline.identity import flight_id
@@ -165,7 +165,7 @@ def _cut(log: Log, mcap: Path, target: Path, wanted: Wanted, limits: Thresholds)
         # Neither name nor digest of the log: the part is a log of its own, and two parts of one log are no twins.
         cut = replace(inside, source_name=target.name, source_sha256="", start_ns=first_ns, metadata=metadata)
         info = writer.info = recounted(cut, damages, census)
-    return Converted(info, stored_findings(info), any(entry.get("loses_data") for entry in info.damages))
+    return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages))
 
 
 def _zero_ns(mcap: Path, info: "StoreInfo") -> int:
@@ -191,7 +191,7 @@ def _span_ns(wanted: Wanted, zero_ns: int, has_utc: bool) -> tuple[int, int]:
 
 def _nothing_in(log: Log, info: "StoreInfo", wanted: Wanted) -> UsageError:
     """Why a part is empty: no topic is wanted, or the flight has no record of them then."""
-    topics = info.ledger.get("topics", {})
+    topics = info.ledger.topics
     if topics and not any(wanted.wants(topic) for topic in topics):
         asked = ", ".join(map(repr, wanted.topics))
         return UsageError(log.path.name, f"no topic {asked}", f"some of {', '.join(topics)}")
@@ -209,31 +209,33 @@ def _inside(info: "StoreInfo", zero_ns: int, first_ns: int, part: "Part") -> "St
 
     Losses without a known place in time stay: they may lie within.
     """
-    ledger = dict(info.ledger)
-    spans = [entry for entry in ledger.get("spans", ()) if is_span(entry)]
+    spans = info.ledger.spans
     low_s, high_s = ((end_ns - zero_ns) / NS_PER_S for end_ns in (part.start_ns, part.end_ns))
-    within = [one for one in spans if one["start_s"] < high_s and one["start_s"] + one["length_s"] >= low_s]
-    outside = {_mark(one["cause"], one) for one in spans} - {_mark(one["cause"], one) for one in within}
-    gone = [entry for entry in info.damages if _mark(entry.get("kind"), entry) in outside]
+    within = [one for one in spans if one.start_s < high_s and one.start_s + one.length_s >= low_s]
+    outside = {_mark_of_span(one) for one in spans} - {_mark_of_span(one) for one in within}
+    gone = [entry for entry in info.damages if _mark(entry) in outside]
     told = {(f"data.{entry.get('kind')}", entry.get("topic"), entry.get("place")) for entry in gone}
     shift_s = (first_ns - zero_ns) / NS_PER_S
-    kept = [entry for entry in info.damages if entry not in gone]
-    findings = ledger.get("findings", ())
+    lost = {_mark(entry) for entry in gone}
     return replace(
         info,
-        damages=kept,
-        ledger={
-            "spans": [{**one, "start_s": round(one["start_s"] - shift_s, 3)} for one in within],
-            "damages": kept,
-            "remarks": ledger.get("remarks", ()),
-            "findings": [one for one in findings if (one.get("code"), one.get("topic"), one.get("place")) not in told],
-        },
+        damages=[entry for entry in info.damages if entry not in gone],
+        findings=tuple(one for one in info.findings if (one.code, one.topic, one.place) not in told),
+        ledger=Ledger(
+            spans=tuple(replace(one, start_s=round(one.start_s - shift_s, 3)) for one in within),
+            damages=tuple(one for one in info.ledger.damages if (one.kind, one.topic, one.count) not in lost),
+            remarks=info.ledger.remarks,
+        ),
     )
 
 
-def _mark(kind: Any, entry: Mapping[str, Any]) -> tuple[Any, ...]:
+def _mark(damage: Mapping[str, Any]) -> tuple[Any, ...]:
     """What a loss and its span have in common."""
-    return kind, entry.get("topic"), entry.get("count")
+    return damage.get("kind"), damage.get("topic"), damage.get("count")
+
+
+def _mark_of_span(span: DamagedSpan) -> tuple[Any, ...]:
+    return span.cause, span.topic, span.count
 
 
 def _origin(
@@ -283,8 +285,8 @@ def _record(target: Path, done: Converted, configuration: Configuration) -> None
 
 
 def _told(info: "StoreInfo") -> str:
-    topics = info.ledger.get("topics", {})
-    rows = sum(topic["rows"] for topic in topics.values())
+    topics = info.ledger.topics
+    rows = sum(topic.rows for topic in topics.values())
     ends = [info.metadata.get(key) for key in ("clip.from_s", "clip.to_s")]
     start, end = (f"{float(text):.3f} s" if text else word for text, word in zip(ends, ("start", "end"), strict=True))
     return f"{rows} records of {len(topics)} topics, {start} to {end} of {info.metadata[CUT_FROM]}"

@@ -1,18 +1,17 @@
 """A log becomes an MCAP: its clock is repaired, its ledger is kept beside the data."""
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from importlib import metadata as installed
 from pathlib import Path
-from typing import Any
 
 from groundstation import __version__
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.findings import Finding, Severity
+from groundstation.base.ledger import TopicEntry
 from groundstation.base.records import Damage, RecordBatch, Remark
+from groundstation.integrity.ledger import damage_entry
 from groundstation.integrity.ledger_findings import TOPIC_CODES, topic_findings
 from groundstation.integrity.limits import Thresholds, shipped
-from groundstation.integrity.spans import is_span
 from groundstation.integrity.survey import Census
 from groundstation.pipeline.log import Log
 from groundstation.store.info import StoreInfo
@@ -70,8 +69,9 @@ def _convert_recorded(log: Log, target: Path, limits: Thresholds) -> Converted:
         metadata={**found.header.metadata, **_derivations(found.remarks)},
         has_utc=found.clock.is_absolute,
         start_ns=min(topic.first_ns for topic in found.ledger.topics),
-        clock=found.clock.to_dict(),
-        ledger={**found.ledger.to_dict(), "findings": [asdict(finding) for finding in findings]},
+        clock=found.clock.document(),
+        ledger=found.ledger.document(),
+        findings=findings,
         remarks=[asdict(remark) for remark in found.remarks],
         damages=[asdict(damage) for damage in found.damages],
     )
@@ -111,17 +111,17 @@ def _copy_store(log: Log, target: Path, limits: Thresholds) -> Converted:
             raise UnreadableLogError(log.path.name, "no intact record", "", "the file is damaged beyond its index")
         if damages or has_other_limits(info, limits):
             info = writer.info = recounted(info, damages, census)
-    return Converted(info, stored_findings(info), any(entry.get("loses_data") for entry in info.damages))
+    return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages))
 
 
 def census_of(info: StoreInfo, limits: Thresholds) -> Census:
     """Counts what is in a store file anew, by its kind of clock."""
-    return Census(info.has_utc, limits, is_counting=bool(info.clock.get("is_counting")))
+    return Census(info.has_utc, limits, is_counting=info.clock.is_counting)
 
 
 def has_other_limits(info: StoreInfo, limits: Thresholds) -> bool:
     """Whether the ledger in a store file was made with other thresholds."""
-    return bool(info.ledger.get("thresholds", {}).get("sha256") != limits.sha256)
+    return info.ledger.thresholds.sha256 != limits.sha256
 
 
 def recounted(info: StoreInfo, damages: list[Damage], census: Census) -> StoreInfo:
@@ -129,40 +129,35 @@ def recounted(info: StoreInfo, damages: list[Damage], census: Census) -> StoreIn
 
     What only the log could tell (its clock, the order of its records, what its reader lost) stays as it was found.
     """
-    listed = [asdict(damage) for damage in damages]
-    ledger = census.ledger(damages)
-    plain, before = ledger.to_dict(), info.ledger
-    for name, topic in plain["topics"].items():
-        known = before.get("topics", {}).get(name, {})
-        topic.update({key: known[key] for key in ("backward_steps", "stray_rows") if key in known})
-        losses = known.get("losses", {})
-        topic["losses"] = {kind: count for kind, count in losses.items() if type(count) is int} | topic["losses"]
-    kept = [entry for entry in before.get("spans", ()) if is_span(entry) and entry["cause"] not in COUNTED_CAUSES]
-    if not damages:
-        plain.update({key: before[key] for key in ("bytes_skipped", "skipped_spans", "truncated") if key in before})
-    findings = [
-        *(entry for entry in before.get("findings", ()) if entry.get("code") not in TOPIC_CODES),
-        *(asdict(finding) for finding in topic_findings(ledger)),
-        *(asdict(damage_finding(damage)) for damage in damages),
-    ]
-    plain.update(
-        spans=sorted([*kept, *plain["spans"]], key=lambda entry: float(entry["start_s"])),
-        damages=[*before.get("damages", ()), *listed],
-        remarks=list(before.get("remarks", ())),
-        findings=findings,
+    counts, before = census.ledger(damages), info.ledger
+    anew = counts.document()
+    kept = [span for span in before.spans if span.cause not in COUNTED_CAUSES]
+    # Of a file that is whole, what was skipped and cut is what the log had of it.
+    told = anew if damages else before
+    ledger = replace(
+        anew,
+        topics={name: _with_what_the_log_told(topic, before.topics.get(name)) for name, topic in anew.topics.items()},
+        bytes_skipped=told.bytes_skipped,
+        skipped_spans=told.skipped_spans,
+        truncated=told.truncated,
+        spans=tuple(sorted((*kept, *anew.spans), key=lambda span: span.start_s)),
+        damages=(*before.damages, *map(damage_entry, damages)),
+        remarks=before.remarks,
     )
-    return replace(info, ledger=plain, damages=(*info.damages, *listed))
+    findings = (
+        *(finding for finding in info.findings if finding.code not in TOPIC_CODES),
+        *topic_findings(counts),
+        *map(damage_finding, damages),
+    )
+    return replace(info, ledger=ledger, findings=findings, damages=(*info.damages, *map(asdict, damages)))
 
 
-def stored_findings(info: StoreInfo) -> tuple[Finding, ...]:
-    """Findings kept in an MCAP when the log was converted."""
-    return tuple(finding_from(entry) for entry in info.ledger.get("findings", ()))
-
-
-def finding_from(entry: Mapping[str, Any]) -> Finding:
-    """A finding from its plain form."""
-    known = ("severity", "code", "text", "topic", "place", "count")
-    return Finding(**{name: entry[name] for name in known if name in entry})
+def _with_what_the_log_told(topic: TopicEntry, before: TopicEntry | None) -> TopicEntry:
+    """A topic counted anew, with what was out of order and unreadable in the log it came from."""
+    if before is None:
+        return topic
+    losses = dict(sorted({**before.losses, **topic.losses}.items()))
+    return replace(topic, backward_steps=before.backward_steps, stray_rows=before.stray_rows, losses=losses)
 
 
 def damage_finding(damage: Damage) -> Finding:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.base.findings import Finding
+from groundstation.base.ledger import Ledger
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.pipeline.log import Log, open_log
 from groundstation.store.info import StoreInfo
@@ -81,14 +82,14 @@ def _recorded(log: Log) -> Description:
     for item in items:
         if isinstance(item, RecordBatch):
             fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
-    ledger = found.ledger.to_dict()
+    ledger = found.ledger.document()
     facts = facts_of(log, dict(found.header.metadata), ledger)
     lost = any(damage.loses_data for damage in found.damages)
     return Description(facts, _topics(ledger, fields), ledger_findings(found.ledger), lost)
 
 
 def _stored(log: Log) -> Description:
-    from groundstation.pipeline.convert import damage_finding, stored_findings
+    from groundstation.pipeline.convert import damage_finding
     from groundstation.store.reader import read_info
 
     info = read_info(log.path)
@@ -99,10 +100,10 @@ def _stored(log: Log) -> Description:
             fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
         elif isinstance(item, Damage):
             damages.append(item)
-    facts = facts_of(log, dict(info.metadata), dict(info.ledger))
+    facts = facts_of(log, dict(info.metadata), info.ledger)
     facts["log"] = f"{info.source_name}, read as {info.reader}"
-    findings = (*stored_findings(info), *(damage_finding(damage) for damage in damages))
-    return Description(facts, _topics(dict(info.ledger), fields), findings, _has_lost(info, damages))
+    findings = (*info.findings, *(damage_finding(damage) for damage in damages))
+    return Description(facts, _topics(info.ledger, fields), findings, _has_lost(info, damages))
 
 
 def _has_lost(info: StoreInfo, damages: list[Damage]) -> bool:
@@ -110,7 +111,7 @@ def _has_lost(info: StoreInfo, damages: list[Damage]) -> bool:
     return any(entry.get("loses_data") for entry in info.damages) or any(damage.loses_data for damage in damages)
 
 
-def facts_of(log: Log, metadata: Mapping[str, str], ledger: Mapping[str, Any]) -> dict[str, str]:
+def facts_of(log: Log, metadata: Mapping[str, str], ledger: Ledger) -> dict[str, str]:
     """What a log is, name to text: file, size, format, first and last sample, metadata."""
     facts = {
         "file": log.source.name,
@@ -118,21 +119,19 @@ def facts_of(log: Log, metadata: Mapping[str, str], ledger: Mapping[str, Any]) -
         "sha256": log.source.sha256,
         "format": log.source.reader,
     }
-    topics = ledger.get("topics", {}).values()
+    topics = ledger.topics.values()
     if topics:
         # Texts of one clock sort as their times do: ISO UTC, or +mm:ss padded by what has the most digits.
-        facts["first sample"] = min((topic["first"] for topic in topics), key=lambda text: (len(text), text))
-        facts["last sample"] = max((topic["last"] for topic in topics), key=lambda text: (len(text), text))
+        facts["first sample"] = min((topic.first for topic in topics), key=lambda text: (len(text), text))
+        facts["last sample"] = max((topic.last for topic in topics), key=lambda text: (len(text), text))
     return {**facts, **{key: metadata[key] for key in sorted(metadata)}}
 
 
-def _topics(ledger: dict[str, Any], fields: dict[str, dict[str, None]]) -> tuple[TopicDescription, ...]:
-    described = []
-    for name, entry in sorted(ledger.get("topics", {}).items()):
-        known = tuple(fields.get(name, ()))
-        rate_hz, span_s = entry.get("nominal_rate_hz"), entry.get("span_s")
-        described.append(TopicDescription(name, entry["rows"], rate_hz, span_s, known))
-    return tuple(described)
+def _topics(ledger: Ledger, fields: dict[str, dict[str, None]]) -> tuple[TopicDescription, ...]:
+    return tuple(
+        TopicDescription(name, entry.rows, entry.nominal_rate_hz, entry.span_s, tuple(fields.get(name, ())))
+        for name, entry in sorted(ledger.topics.items())
+    )
 
 
 def _foreign(path: Path) -> Description:

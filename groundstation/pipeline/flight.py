@@ -16,7 +16,7 @@ from groundstation.estimators.analyses import FLIGHT_ANALYSES
 from groundstation.pipeline.analyse import Given, analyse
 from groundstation.pipeline.apply_deviation import apply_deviation, corrected_name, write_corrected
 from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.convert import Converted, convert_log, stored_findings
+from groundstation.pipeline.convert import Converted, convert_log
 from groundstation.pipeline.identity import flight_id, sha256_of
 from groundstation.pipeline.log import Log, open_log
 from groundstation.pipeline.manifest import manifest_of
@@ -205,7 +205,7 @@ def _taken_over(mcap: Path, target: Path) -> Converted:
     except OSError:  # no links here, or another file system
         shutil.copyfile(mcap, target)
     info = read_info(target)
-    return Converted(info, stored_findings(info), any(entry.get("loses_data") for entry in info.damages))
+    return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages))
 
 
 def given_of(log: Log, converted: Converted, identity: str) -> Given:

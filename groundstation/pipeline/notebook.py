@@ -10,10 +10,12 @@ from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from groundstation.base.clock import Clock
 from groundstation.base.errors import GroundstationError, NotAssessableError, UsageError, told_in_a_line
+from groundstation.base.ledger import Ledger
 from groundstation.pipeline.flight import sentence
 from groundstation.results.answer import A
-from groundstation.results.files import SavedFlight, mapping
+from groundstation.results.files import SavedFlight
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.heading import HeadingResult
@@ -42,12 +44,12 @@ class OpenFlight(ABC):
 
     @property
     @abstractmethod
-    def ledger(self) -> Mapping[str, Any]:
+    def ledger(self) -> Ledger:
         """Integrity ledger: rates, gaps, losses and odd values of every topic."""
 
     @property
     @abstractmethod
-    def clock(self) -> Mapping[str, Any]:
+    def clock(self) -> Clock:
         """How the recorder's clock was read and repaired."""
 
     @property
@@ -227,8 +229,7 @@ class OpenFlight(ABC):
         if told.verdict is not None:
             rows.insert(0, ("Verdict", told.verdict.text))
         rows += [(name, f"{value}, {remark}" if remark else value) for name, value, remark in told.figures]
-        counted = mapping(self.ledger, "topics")
-        topics = [f"{name} ({mapping(counted, name).get('rows')})" for name in sorted(counted)]
+        topics = [f"{name} ({topic.rows})" for name, topic in sorted(self.ledger.topics.items())]
         more = f" and {len(topics) - MOST_TOPICS} more" if len(topics) > MOST_TOPICS else ""
         rows.append(("Topics (rows)", ", ".join(topics[:MOST_TOPICS]) + more))
         left = 'style="text-align:left"'

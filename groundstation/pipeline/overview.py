@@ -1,11 +1,12 @@
 """Arrays of the overview and data-quality figures: the flight thinned, its phases and states, GNSS, the ledger."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.ledger import Ledger
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
 from groundstation.integrity.limits import Thresholds
@@ -206,22 +207,24 @@ def state_lanes(flight: Flight) -> FigureData | None:
     return FigureData("state_lanes", columns, {"start_s": 2, "end_s": 2})
 
 
-def ledger_figures(flight: Flight, ledger: Mapping[str, Any], thresholds: Thresholds) -> tuple[FigureData, ...]:
+def ledger_figures(flight: Flight, ledger: Ledger, thresholds: Thresholds) -> tuple[FigureData, ...]:
     """The ledger's topics and gaps as figure data, times in flight seconds."""
-    counts = ledger.get("topics", {})
-    names = [topic for topic in flight.topics() if topic in counts]
-    rates = ("nominal_rate_hz", "actual_rate_hz", "coverage")
+    names = [topic for topic in flight.topics() if topic in ledger.topics]
+    topics = [ledger.topics[name] for name in names]
     columns: dict[str, NDArray[Any]] = {"topic": np.array(names, dtype=np.str_)}
-    for key in ("rows", "duplicates", "backward_steps", "stray_rows"):
-        columns[key] = np.array([counts[name][key] for name in names], dtype=np.int64)
-    for key in rates:
-        columns[key] = np.array([_number(counts[name][key]) for name in names])
-    columns["gaps"] = np.array([counts[name]["gaps"]["count"] for name in names], dtype=np.int64)
-    columns["longest_gap_s"] = np.array([counts[name]["gaps"]["longest_s"] for name in names], dtype=float)
-    columns["dropped_rows"] = np.array([_dropped(ledger, name) for name in names], dtype=np.int64)
-    columns["lost_by_counter"] = np.array([_missing(counts[name]) for name in names], dtype=np.int64)
-    columns["out_of_range"] = np.array([_odd_values(counts[name], "out_of_range") for name in names], dtype=np.int64)
-    columns["stuck"] = np.array([_odd_values(counts[name], "stuck") for name in names], dtype=np.int64)
+    columns["rows"] = _counts(one.rows for one in topics)
+    columns["duplicates"] = _counts(one.duplicates for one in topics)
+    columns["backward_steps"] = _counts(one.backward_steps for one in topics)
+    columns["stray_rows"] = _counts(one.stray_rows for one in topics)
+    columns["nominal_rate_hz"] = _numbers(one.nominal_rate_hz for one in topics)
+    columns["actual_rate_hz"] = _numbers(one.actual_rate_hz for one in topics)
+    columns["coverage"] = _numbers(one.coverage for one in topics)
+    columns["gaps"] = _counts(one.gaps.count for one in topics)
+    columns["longest_gap_s"] = _numbers(one.gaps.longest_s for one in topics)
+    columns["dropped_rows"] = _counts(_dropped(ledger, name) for name in names)
+    columns["lost_by_counter"] = _counts(one.missing for one in topics)
+    columns["out_of_range"] = _counts(one.out_of_range for one in topics)
+    columns["stuck"] = _counts(one.stuck for one in topics)
     columns["first_s"] = np.array([flight.time_s(name)[0] for name in names])
     columns["last_s"] = np.array([flight.time_s(name)[-1] for name in names])
     digits = {"coverage": 4, "nominal_rate_hz": 3, "actual_rate_hz": 3, "longest_gap_s": 2, "first_s": 2, "last_s": 2}
@@ -240,21 +243,13 @@ def _gap_figure(flight: Flight, names: list[str], thresholds: Thresholds) -> Fig
     return FigureData("gaps", columns, {"start_s": 2, "length_s": 2})
 
 
-def _dropped(ledger: Mapping[str, Any], topic: str) -> int:
-    damages = ledger.get("damages", ())
-    return sum(entry["count"] for entry in damages if entry["topic"] == topic and entry["kind"] == "dropped_rows")
+def _dropped(ledger: Ledger, topic: str) -> int:
+    return sum(one.count for one in ledger.damages if one.topic == topic and one.kind == "dropped_rows")
 
 
-def _missing(topic: Mapping[str, Any]) -> int:
-    """Records that the counters of a topic miss."""
-    return sum(entry["lost"] for entry in topic.get("sequences", ()) if type(entry.get("lost")) is int)
+def _counts(values: Iterable[int]) -> NDArray[np.int64]:
+    return np.array(list(values), dtype=np.int64)
 
 
-def _odd_values(topic: Mapping[str, Any], what: str) -> int:
-    """Values outside their range, or stretches in which a value was stuck."""
-    found = [entry.get(what) for entry in topic.get("fields", {}).values() if isinstance(entry, Mapping)]
-    return sum(one if type(one) is int else len(one) if isinstance(one, list) else 0 for one in found)
-
-
-def _number(value: Any) -> float:
-    return float("nan") if value is None else float(value)
+def _numbers(values: Iterable[float | None]) -> NDArray[np.float64]:
+    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)

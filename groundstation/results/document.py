@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
+from groundstation.base.ledger import Ledger
 from groundstation.results.flight import NotAssessable, Source, Status
 
 SCHEMA_VERSION = 1
@@ -31,8 +33,8 @@ class SummaryDocument:
     flight: FlightDocument
     status: Status
     completeness: Mapping[str, float] = field(default_factory=dict)
-    ledger: Mapping[str, Any] = field(default_factory=dict)
-    clock: Mapping[str, Any] = field(default_factory=dict)
+    ledger: Ledger = field(default_factory=Ledger)
+    clock: Clock = field(default_factory=Clock)
     findings: tuple[Finding, ...] = ()
     not_assessable: tuple[NotAssessable, ...] = ()
     results: Mapping[str, Any] = field(default_factory=dict)

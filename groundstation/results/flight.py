@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
+from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
+from groundstation.base.ledger import Ledger
 from groundstation.results.answer import A, Answers, answer_of
 from groundstation.results.figures import FigureData
 from groundstation.results.frames import Tabular, no_such_table
@@ -49,8 +51,8 @@ class FlightResults(Tabular):
     status : {'ok', 'degraded', 'failed'}
         degraded: data was lost or a finding is grave; failed: nothing could be computed.
     completeness : mapping of topic to share of expected samples, 0 to 1
-    ledger, clock : mapping
-        As written to summary.json.
+    ledger : Ledger
+    clock : Clock
     findings, not_assessable : tuples
     answers : mapping of str to Answer
         By the name of the analysis, in the order they are shown.
@@ -65,8 +67,8 @@ class FlightResults(Tabular):
     duration_s: float
     status: Status
     completeness: Mapping[str, float] = field(default_factory=dict)
-    ledger: Mapping[str, Any] = field(default_factory=dict)
-    clock: Mapping[str, Any] = field(default_factory=dict)
+    ledger: Ledger = field(default_factory=Ledger)
+    clock: Clock = field(default_factory=Clock)
     findings: tuple[Finding, ...] = ()
     not_assessable: tuple[NotAssessable, ...] = ()
     answers: Answers = field(default_factory=dict)

@@ -7,14 +7,24 @@ from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import Any
 
-from groundstation.store.shape import sound_damages, sound_ledger, sound_remarks
+from groundstation.base.clock import Clock
+from groundstation.base.findings import Finding
+from groundstation.base.ledger import Ledger
+from groundstation.base.serial import salvaged, to_json_exactly
+from groundstation.store.shape import sound_damages, sound_remarks
 
 METADATA_NAME = "groundstation"
 COPY_NAME = "groundstation_copy"  # the same record before the end of data: one flip cannot take both
 FORMAT_VERSION = "1"
 MAX_START_NS = 1 << 62  # first sample in the year 2116: later ones are damage
+_TYPED = ("clock", "ledger", "findings")
 _TEXTS = {"versions", "metadata"}  # mappings whose values are text
 _CHECKSUM, _FORMAT, _DEFINITIONS = "crc32", "format", "definitions_crc32"
+
+
+@dataclass(frozen=True)
+class _WithFindings:
+    findings: tuple[Finding, ...] = ()
 
 
 def _plain(value: Any) -> Any:
@@ -37,8 +47,8 @@ def _json(value: Any) -> str:
 class StoreInfo:
     """Facts about a store file.
 
-    Mappings and lists are normalised through JSON (tuples become lists, numpy scalars plain numbers), so what is read
-    equals what was written.
+    Untyped mappings and lists are normalised through JSON (tuples become lists, numpy scalars plain numbers): what is
+    read equals what was written.
 
     Parameters
     ----------
@@ -58,10 +68,12 @@ class StoreInfo:
         Whether times are UTC nanoseconds since 1970; False: nanoseconds since the log's own zero (NOTIME).
     start_ns : int, optional
         Corrected time of the first sample: flight time zero.
-    clock : mapping, json-able
-        The clock model that made corrected time from device time.
-    ledger : mapping, json-able
+    clock : Clock
+        How the recorder's clock was read and repaired.
+    ledger : Ledger
         The integrity ledger.
+    findings : tuple of Finding
+        What the log gave when it was converted; kept with the ledger.
     remarks, damages : sequence, json-able
         What the reader derived or assumed, and what of the log was lost.
 
@@ -79,13 +91,16 @@ class StoreInfo:
     metadata: Mapping[str, str] = field(default_factory=dict)
     has_utc: bool = False
     start_ns: int | None = None
-    clock: Mapping[str, Any] = field(default_factory=dict)
-    ledger: Mapping[str, Any] = field(default_factory=dict)
+    clock: Clock = field(default_factory=Clock)
+    ledger: Ledger = field(default_factory=Ledger)
+    findings: tuple[Finding, ...] = ()
     remarks: Sequence[Any] = ()
     damages: Sequence[Any] = ()
 
     def __post_init__(self) -> None:
         for entry in fields(self):
+            if entry.name in _TYPED:
+                continue
             value = json.loads(_json(getattr(self, entry.name)))
             if isinstance(value, dict):
                 value = MappingProxyType(value)
@@ -102,8 +117,14 @@ class StoreInfo:
             Checksums of the file's schema and channel records, which have none of their own.
         """
         out = {_FORMAT: FORMAT_VERSION, _DEFINITIONS: _json(definitions_crc32)}
+        kept = {
+            "clock": to_json_exactly(self.clock),
+            "ledger": {**to_json_exactly(self.ledger), "findings": to_json_exactly(self.findings)},
+        }
         for entry in fields(self):
-            value = getattr(self, entry.name)
+            if entry.name == "findings":
+                continue
+            value = kept.get(entry.name, getattr(self, entry.name))
             out[entry.name] = value if isinstance(value, str) else _json(value)
         out = dict(sorted(out.items()))
         return {**out, _CHECKSUM: checksum(out)}
@@ -125,18 +146,21 @@ def from_strings(strings: Mapping[str, str]) -> StoreInfo:
     values: dict[str, Any] = {}
     defaults = StoreInfo()
     for entry in fields(StoreInfo):
-        default = getattr(defaults, entry.name)
+        default = {} if entry.name in _TYPED else getattr(defaults, entry.name)
         text = strings.get(entry.name, "")
         try:
             value = text if isinstance(default, str) else json.loads(text)
         except (ValueError, RecursionError):
             continue
-        if _fits(value, default):
+        if entry.name != "findings" and _fits(value, default):
             values[entry.name] = value
     for name in _TEXTS & values.keys():
         values[name] = {key: value if isinstance(value, str) else str(value) for key, value in values[name].items()}
     if "ledger" in values:
-        values["ledger"] = sound_ledger(values["ledger"])
+        values["findings"] = salvaged(_WithFindings, values["ledger"]).findings
+        values["ledger"] = salvaged(Ledger, values["ledger"])
+    if "clock" in values:
+        values["clock"] = salvaged(Clock, values["clock"])
     for name, sound in (("damages", sound_damages), ("remarks", sound_remarks)):
         values[name] = sound(values.get(name))
     if abs(values.get("start_ns") or 0) > MAX_START_NS:

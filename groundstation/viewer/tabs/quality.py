@@ -1,8 +1,11 @@
 """Data quality: what each topic delivered, where data is missing, and how good GNSS said it was."""
 
+from dataclasses import replace
+
 import numpy as np
 import rerun.blueprint as rrb
 
+from groundstation.base.serial import to_json_exactly
 from groundstation.base.signals import topics_of_kind
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
@@ -122,11 +125,12 @@ def _ledger_text(results: FlightResults) -> str:
             [markdown_text(topic), f"{100.0 * share:.2f} %"] for topic, share in sorted(results.completeness.items())
         ]
         parts.append(table(["topic", "share of expected samples"], rows) if rows else "No ledger.")
-    if results.clock:
-        plain = {name: value for name, value in results.clock.items() if name != "relations"}
-        for relation in results.clock.get("relations", ()):
-            told = [f"{one['offset']}, {one['drift']}" for one in relation["segments"]] or [relation["reason"]]
-            plain[f"{relation['clock']}: {relation['source']}"] = "; ".join(told)
+    if results.clock.first_device_time:
+        plain = to_json_exactly(replace(results.clock, relations=()))
+        del plain["relations"]
+        for relation in results.clock.relations:
+            told = [f"{one.offset}, {one.drift}" for one in relation.segments] or [relation.reason]
+            plain[f"{relation.clock}: {relation.source}"] = "; ".join(told)
         clock = [[markdown_text(words(str(name))), markdown_text(str(value))] for name, value in plain.items()]
         parts += ["## Clock", table(["clock", "value"], clock)]
     latencies = results.answer(Latencies)

@@ -1,0 +1,111 @@
+"""The clock of a recorder as it is kept: where it began, how it was set, how it runs by other clocks of the log.
+
+Times are text for people. Fields stand in alphabetical order, as the JSON of the MCAP has its keys.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Start = Literal["utc", "unset", "own_zero"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepEntry:
+    """A step of the clock: what came before it was moved by ``shift_of_earlier_s``; ``mistake`` names it if it can."""
+
+    kind: str
+    mistake: str
+    record_index: int
+    records_before: int
+    set_s: float
+    shift_of_earlier_s: float
+    size_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class SegmentEntry:
+    """A stretch over which two clocks run at constant rates; ``offset`` and ``drift`` in words with their sigmas.
+
+    ``offset_s`` is the other clock less the recorder's. Drift is positive where the recorder is fast, None where it
+    cannot be observed.
+    """
+
+    drift: str
+    drift_ppm: float | None
+    drift_sigma_ppm: float | None
+    length_s: float
+    offset: str
+    offset_s: float
+    offset_sigma_s: float
+    samples: int
+    start: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class BreakEntry:
+    """Where two clocks part: one was set (``step``), or changed its rate (``rate``)."""
+
+    drift_change_ppm: float | None
+    kind: str
+    step_s: float
+    step_sigma_s: float
+    time: str
+    time_sigma_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class MistakeEntry:
+    """An error of one of two clocks that has a name; ``time`` is None where it holds throughout."""
+
+    kind: str
+    size_s: float
+    text: str
+    time: str | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelationEntry:
+    """The recorder's clock by another clock of the log; ``reason`` says why nothing is known."""
+
+    breaks: tuple[BreakEntry, ...] = ()
+    clock: str
+    mistakes: tuple[MistakeEntry, ...] = ()
+    reason: str
+    residual_s: float
+    resolution_s: float
+    samples: int
+    segments: tuple[SegmentEntry, ...] = ()
+    source: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clock:
+    """The recorder's clock, as it was read and repaired.
+
+    Parameters
+    ----------
+    first_device_time : str
+        Reading of the clock at the first record; empty where nothing is known of the clock.
+    is_absolute : bool
+        Whether corrected time is UTC.
+    is_counting : bool
+        Records of several sources may share a time.
+    shift_s : float
+        What was added to all times so that none is negative.
+    start : {'utc', 'unset', 'own_zero'}
+        Where it began: at a date, at one before its recorder can have been built, or at its own zero.
+    """
+
+    first_device_time: str = ""
+    implausible_times: int = 0
+    is_absolute: bool = False
+    is_counting: bool = False
+    is_unordered: bool = False
+    missing_times: int = 0
+    nominal_period_s: float = 0.0
+    relations: tuple[RelationEntry, ...] = ()
+    shift_s: float = 0.0
+    stale_times: int = 0
+    start: Start = "own_zero"
+    steps: tuple[StepEntry, ...] = ()
+    stray_rows: int = 0

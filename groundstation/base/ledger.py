@@ -1,0 +1,210 @@
+"""The integrity ledger of a log as it is kept: in the MCAP, in summary.json, in reports. Times are text for people.
+
+Fields stand in alphabetical order, as the JSON of the MCAP has its keys: what was read back is written equal.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from groundstation.base.serial import LEFT_OUT_WHEN_DEFAULT
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThresholdsUsed:
+    """Whose thresholds the ledger was made with, their layout's version and the digest of their values."""
+
+    name: str = ""
+    sha256: str = ""
+    version: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class GapDefinition:
+    """A gap is a step longer than ``periods`` nominal periods and than ``min_s`` seconds."""
+
+    min_s: float = 0.0
+    periods: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutOfRange:
+    """The first value outside its range: record, time, and the range (None where it has no end)."""
+
+    range: tuple[float | None, float | None]
+    record: int | None
+    time: str | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class StuckStretch:
+    """A stretch in which a field was stuck at ``value``, and what says so."""
+
+    length_s: float
+    record: int
+    samples: int
+    start: str
+    value: float
+    why: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class FieldEntry:
+    """One field: samples present, NaN the device wrote, values outside the physical range, stuck stretches."""
+
+    first_out_of_range: OutOfRange | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)
+    nan: int = 0
+    out_of_range: int = 0
+    present: int = 0
+    stuck: tuple[StuckStretch, ...] = field(default=(), metadata=LEFT_OUT_WHEN_DEFAULT)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TopicGaps:
+    """Gaps of a topic; ``listed`` are the first: last sample before it, and seconds to the next."""
+
+    count: int
+    listed: tuple[tuple[str, float], ...] = ()
+    longest_s: float
+    total_s: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class CounterEntry:
+    """What one counter says (``kind``: of ``records`` or of ``losses``); ``listed``: record after a loss, how many."""
+
+    before: int = 0
+    field: str
+    kind: str
+    listed: tuple[tuple[str, int], ...] = ()
+    lost: int
+    resets: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class TopicEntry:
+    """One topic; rate and coverage are None where no step is usual. ``losses`` counts by kind what was unreadable."""
+
+    actual_rate_hz: float | None
+    backward_steps: int
+    coverage: float | None
+    duplicates: int
+    fields: Mapping[str, FieldEntry] = field(default_factory=dict)
+    first: str
+    gaps: TopicGaps
+    last: str
+    losses: Mapping[str, int] = field(default_factory=dict)
+    nominal_rate_hz: float | None
+    rows: int
+    sequences: tuple[CounterEntry, ...] = ()
+    span_s: float
+    stray_rows: int
+
+    @property
+    def missing(self) -> int:
+        """Records that its counters miss."""
+        return sum(counter.lost for counter in self.sequences)
+
+    @property
+    def out_of_range(self) -> int:
+        """Values outside their range."""
+        return sum(one.out_of_range for one in self.fields.values())
+
+    @property
+    def stuck(self) -> int:
+        """Stretches in which a value was stuck."""
+        return sum(len(one.stuck) for one in self.fields.values())
+
+
+@dataclass(frozen=True, kw_only=True)
+class DamagedSpan:
+    """A span of time with damage; ``start_s`` counts from the first record of the log, as flight time does.
+
+    An empty topic is the whole log, an empty field the whole topic. ``is_exact``: everything within is damaged; else
+    the damage lies somewhere within.
+    """
+
+    cause: str
+    count: int
+    field: str
+    is_exact: bool
+    length_s: float
+    start: str
+    start_s: float
+    topic: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class DamageEntry:
+    """Data that was lost or is odd: kind, place, how many of what."""
+
+    count: int
+    kind: str
+    loses_data: bool
+    place: str
+    topic: str
+    what: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class RemarkEntry:
+    """Something the reader derived, converted or assumed."""
+
+    code: str
+    text: str
+    topic: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dropouts:
+    """How often, and for how long together, the recorder could not write; a whole 0 where it always could."""
+
+    count: int = 0
+    total_s: float | int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Truncation:
+    """Where a log is cut, and what is lost of it."""
+
+    count: int
+    place: str
+    what: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ledger:
+    """What a log holds, topic by topic, and what is odd about it.
+
+    Parameters
+    ----------
+    bytes_skipped : int
+        Bytes that no record was made of; ``skipped_spans`` are [first, last, bytes].
+    damages, remarks : tuples
+        What the reader lost, and what it remarked.
+    spans, spans_more
+        Damaged spans of time, in order of time; how many more there are.
+    topics : mapping of topic to TopicEntry
+        In alphabetical order.
+    """
+
+    bytes_skipped: int = 0
+    damages: tuple[DamageEntry, ...] = ()
+    dropouts: Dropouts = field(default_factory=Dropouts)
+    gap_definition: GapDefinition = field(default_factory=GapDefinition)
+    remarks: tuple[RemarkEntry, ...] = ()
+    skipped_spans: tuple[tuple[int, int, int], ...] = ()
+    spans: tuple[DamagedSpan, ...] = ()
+    spans_more: int = 0
+    thresholds: ThresholdsUsed = field(default_factory=ThresholdsUsed)
+    topics: Mapping[str, TopicEntry] = field(default_factory=dict)
+    truncated: Truncation | None = None
+
+    @property
+    def completeness(self) -> dict[str, float]:
+        """Share of expected samples by topic, where it is known."""
+        return {name: topic.coverage for name, topic in self.topics.items() if topic.coverage is not None}
+
+    @property
+    def loses_data(self) -> bool:
+        """Whether anything recorded could not be read, or the log is cut."""
+        return self.truncated is not None or any(damage.loses_data for damage in self.damages)
