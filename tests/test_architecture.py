@@ -14,16 +14,17 @@ MAY_IMPORT: dict[str, set[str]] = {
     "integrity": {"base"},
     "tables": {"base"},
     "results": {"base"},
+    "chapters": {"base", "results"},
     "estimators": {"base", "tables", "results"},
     "simulation": {"base", "tables"},
     "studies": {"base", "tables", "results", "estimators", "simulation"},
-    "viewer": {"base", "tables", "results"},
-    "reports": {"base", "tables", "results"},
+    "viewer": {"base", "tables", "results", "chapters"},
+    "reports": {"base", "tables", "results", "chapters"},
     "pipeline": {
         *("base", "readers", "store", "integrity", "tables", "results"),
-        *("estimators", "simulation", "studies", "viewer", "reports"),
+        *("chapters", "estimators", "simulation", "studies", "viewer", "reports"),
     },
-    "cli": {"base", "results", "pipeline"},
+    "cli": {"base", "results", "chapters", "pipeline"},
 }
 ONLY_ROOM_OF = {"mcap": "store", "google": "store", "foxglove_schemas_protobuf": "store", "rerun": "viewer"}
 

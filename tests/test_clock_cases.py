@@ -14,6 +14,7 @@ from groundstation.base.records import Column, Int64Array
 from groundstation.base.serial import to_json_exactly
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
+from groundstation.chapters.parts import Facts, Grid
 from groundstation.cli.check_table import text_of
 from groundstation.integrity import Survey, ledger_findings, survey
 from groundstation.integrity.clock_relation import ROLLOVER_S
@@ -21,7 +22,6 @@ from groundstation.pipeline.check import check_many
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.conversions import convert_many
 from groundstation.readers import registry
-from groundstation.reports.parts import Facts, Grid
 from groundstation.reports.sections import quality
 from groundstation.results.files import SavedFlight
 from groundstation.simulation.faults import BackwardStep, ClockDrift, Dropout, Fault, ForwardStep, apply_faults

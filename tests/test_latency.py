@@ -12,6 +12,7 @@ import pytest
 from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
+from groundstation.chapters.latency import latency
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.known import AircraftData
@@ -21,7 +22,6 @@ from groundstation.estimators.latency.settings import LatencySettings
 from groundstation.estimators.latency.windows import Series
 from groundstation.pipeline.analyse import Answered, known_of, run_analyses
 from groundstation.pipeline.configuration import Configuration
-from groundstation.reports.sections.latency import build
 from groundstation.results import latency as answers
 from groundstation.results.files import load, save
 from groundstation.simulation.flight import simulate
@@ -259,9 +259,9 @@ def test_results_are_saved_obey_the_schema_and_are_told(tmp_path: Path) -> None:
     saved = load(tmp_path)
     jsonschema.Draft202012Validator(SCHEMA).validate(saved.summary)
     assert saved.summary["results"]["latency"]["rows"][0]["latency_s"] == pytest.approx(0.2, abs=NOISY_S)
-    section = build(saved)
+    section = latency(saved.results)
     assert section is not None
-    assert [part.kind for part in section.parts] == ["grid", "drawing"]
+    assert [part.kind for part in section.parts] == ["grid", "figure"]
 
 
 @pytest.mark.parametrize(("definition", "dataclass"), [("latencies", answers.Latencies), ("latency", answers.Latency)])

@@ -409,7 +409,8 @@ def test_the_deviation_rests_on_the_take_off_run_and_says_so() -> None:
 def test_what_the_user_set_reaches_the_alignment() -> None:
     """The event of the scenario at 5 s, and the take-off run excluded: taxi alone is left."""
     flight = simulate(load_scenario("magnetic-eight")).flight
-    given = Given("NOTIME_abababab", Source("flight.csv", "ab" * 32, 1, "flat-csv"), Ledger(), Clock(), (), has_lost_data=False)
+    source = Source("flight.csv", "ab" * 32, 1, "flat-csv")
+    given = Given("NOTIME_abababab", source, Ledger(), Clock(), (), has_lost_data=False)
     run = configured.Interval(str(lift_off_s(flight) - 40.0), str(lift_off_s(flight)))
     configuration = Configuration({"magnetic": {"alignment_event": "alignment"}}, exclude=(run,))
     magnetic = analyse(flight, given, configuration).answer(MagneticResult)

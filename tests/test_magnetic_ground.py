@@ -17,6 +17,7 @@ from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.records import Column
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
+from groundstation.chapters.parts import Grid, Note
 from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.analysis import MAGNETIC_GROUND
 from groundstation.estimators.magnetic.ground_fit import fit_curve
@@ -27,7 +28,7 @@ from groundstation.pipeline.configuration import Configuration, load_configurati
 from groundstation.pipeline.convert import convert_log
 from groundstation.pipeline.flight import read_flight, sentence
 from groundstation.pipeline.log import open_log
-from groundstation.reports.parts import Drawing, Grid, Note
+from groundstation.reports.drawing import Drawing
 from groundstation.reports.sections.magnetic import build
 from groundstation.results import magnetic_ground as answers
 from groundstation.results.files import load, save

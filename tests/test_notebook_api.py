@@ -151,7 +151,7 @@ def test_every_figure_of_the_report_can_be_had(flight: OpenLog) -> None:
 
 
 def test_sketching_leaves_the_report_as_it_is(flight: OpenLog) -> None:
-    from groundstation.reports.sections import heading_figures
+    from groundstation.reports.figures import heading as heading_figures
 
     before = heading_figures.density(flight._saved())
     with drawing.sketching():
@@ -214,7 +214,7 @@ def test_saved_results_are_restored_as_they_were(make: Callable[[], FlightResult
     results = make()
     save(tmp_path / "flight", results, {})
     saved = load(tmp_path / "flight")
-    again = saved.results_with_figures()
+    again = saved.results
     assert summary_of(again) == saved.summary
     assert {figure.name for figure in again.figures} == {figure.name for figure in results.figures}
     assert list(again.answers) == list(results.answers)

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from groundstation.reports.drawing import sketching
-from groundstation.reports.parts import Drawing, Grid, Note, Section
+from groundstation.chapters.parts import Grid, Note, Section
+from groundstation.reports.drawing import Drawing, sketching
 from groundstation.reports.sections.magnetic import build
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SUMMARY, load, save

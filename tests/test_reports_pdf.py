@@ -11,12 +11,13 @@ from typing import Any
 import pytest
 from pypdf import PdfReader
 
+from groundstation.chapters.parts import Cell, Document, Facts, Front, Grid, Head, Mark, Note, Section
 from groundstation.pipeline.batch import run_many
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.publishing import report_again
 from groundstation.reports import pdf
+from groundstation.reports.drawing import Drawing
 from groundstation.reports.flight_report import PDF, REPORT, flight_document, write_flight_report
-from groundstation.reports.parts import Cell, Document, Drawing, Facts, Front, Grid, Head, Mark, Note, Section
 from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults

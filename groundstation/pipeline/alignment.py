@@ -9,8 +9,9 @@ from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.timescales import duration_text, iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.clip import zero_s
-from groundstation.reports.sections.saved import mapping, numbers, objects, texts
+from groundstation.reports.sections.saved import mapping, objects
 from groundstation.results.comparison import Alignment, Event
+from groundstation.results.figures import numbers, texts
 from groundstation.results.files import SavedFlight
 
 EVENTS: tuple[Event, ...] = get_args(Event)

@@ -204,7 +204,7 @@ class SavedRun(OpenFlight):
 
     @cached_property
     def results(self) -> FlightResults:
-        return self.saved.results_with_figures()
+        return self.saved.results
 
     @property
     def source(self) -> Source:

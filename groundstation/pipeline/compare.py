@@ -11,11 +11,11 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.errors import UsageError
 from groundstation.base.findings import SEVERITIES, Finding
 from groundstation.base.signals import is_canonical
+from groundstation.chapters.wording import is_number
 from groundstation.pipeline.alignment import align
 from groundstation.pipeline.clip import CUT_SHA256
 from groundstation.pipeline.inputs import COMPARISON_MARKS, COMPARISON_RECORDING, is_ours
 from groundstation.reports.sections.saved import mapping, objects
-from groundstation.reports.wording import is_number
 from groundstation.results.comparison import Comparison, Delta, Event, SettingPair, Side, Value
 from groundstation.results.files import MANIFEST, SavedFlight, csv_text, load, write_text
 from groundstation.results.flight import NotAssessable

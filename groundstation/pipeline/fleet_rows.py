@@ -19,8 +19,8 @@ from groundstation.estimators.fleet.skill import SkillOfFlight
 from groundstation.estimators.heading.figures import IN_PAUSE
 from groundstation.estimators.heading.references import REFERENCE_SIGMA_DEG, logged_reference
 from groundstation.reports.index import index_row
-from groundstation.reports.sections.saved import flags, heading_of, mapping, numbers, objects, texts
-from groundstation.results.figures import FigureData
+from groundstation.reports.sections.saved import heading_of, mapping, objects
+from groundstation.results.figures import FigureData, flags, numbers, texts
 from groundstation.results.files import SavedFlight, utf8_text
 from groundstation.results.fleet import FLIGHT_COLUMNS, Kind
 

@@ -27,8 +27,7 @@ from groundstation.tables.table import Flight, TimedTable, timed
 
 if TYPE_CHECKING:
     from groundstation.pipeline.api import OpenLog
-    from groundstation.reports.drawing import Sketch
-    from groundstation.reports.parts import Drawing
+    from groundstation.reports.drawing import Drawing, Sketch
 
 AnyPath = str | PathLike[str]
 MOST_TOPICS = 12  # named in the card of a flight

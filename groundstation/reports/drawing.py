@@ -4,16 +4,17 @@ matplotlib is used through its object-oriented interface alone: no pyplot, no gl
 """
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.reports.wording import clean, clock
+from groundstation.chapters.parts import Part
+from groundstation.chapters.wording import clean, clock
 
 WIDTH_MM = 178.0  # the printable width of A4
 MAX_POINTS = 5000
@@ -88,6 +89,28 @@ _GEOMETRY = re.compile(r'(?<= (?:d|x|y)=")[^"]*|(?<= points=")[^"]*')
 _LONG_DECIMAL = re.compile(r"-?\d+\.\d{3,}")
 _NAME = re.compile(r'((?<= id=")|(?<=url\(#)|(?<=xlink:href="#))')
 _BETWEEN = re.compile(r">\s+<")
+
+
+@dataclass(frozen=True)
+class Drawing(Part):
+    """One figure.
+
+    Parameters
+    ----------
+    title, caption, alt : str
+        The caption says what one sees, how many samples, what the lines are; alt is for those who cannot see it.
+    svg : str
+        The only text that the page passes on unescaped: made by reports.drawing alone.
+    numbers : sequence of str
+        Names of the figure data; the readable copies are tables/<name>.csv.
+    """
+
+    kind: ClassVar[str] = "drawing"
+    title: str
+    caption: str
+    alt: str
+    svg: str
+    numbers: Sequence[str] = ()
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,11 @@ import hashlib
 from dataclasses import replace
 from pathlib import Path
 
+from groundstation.chapters.parts import Document, Grid, Part
+from groundstation.chapters.wording import number
 from groundstation.reports.fleet import CHAPTERS, flights, front
 from groundstation.reports.flight_report import Written, write_pages
 from groundstation.reports.page import TEMPLATES, render
-from groundstation.reports.parts import Document, Grid, Part
-from groundstation.reports.wording import number
 from groundstation.results.fleet import FleetResults
 
 PAGE = "summary.html"

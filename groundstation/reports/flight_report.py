@@ -4,8 +4,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from groundstation.chapters.parts import Document
 from groundstation.reports.page import TEMPLATES, render
-from groundstation.reports.parts import Document
 from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.reports.sections import CHAPTERS, front
 from groundstation.reports.sections.saved import mapping

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.base.findings import SEVERITIES
+from groundstation.chapters.wording import is_number
 from groundstation.reports.sections.saved import heading_of, mapping, objects
-from groundstation.reports.wording import is_number
 from groundstation.results.files import SavedFlight, json_text, text_cell, write_text
 from groundstation.results.magnetic import LETTERS
 from groundstation.results.summary import SCHEMA_VERSION, digits_of

@@ -5,9 +5,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from groundstation.reports.drawing import MM_PER_INCH, Sketch, report_style, sketching
+from groundstation.reports.drawing import MM_PER_INCH, Drawing, Sketch, report_style, sketching
 from groundstation.reports.flight_report import flight_document
-from groundstation.reports.parts import Drawing
 from groundstation.results.files import SavedFlight
 
 SHOWN_DPI = 144  # sharp on screens of two pixels a point

@@ -4,7 +4,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from groundstation.reports.wording import clean
+from groundstation.chapters.wording import clean
 
 TEMPLATES = Path(__file__).parent / "templates"
 # Nothing may be loaded or run: the page needs its own style alone. SVG sets style attributes, hence unsafe-inline.

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.base.errors import GroundstationError
+from groundstation.chapters.parts import Mark
+from groundstation.chapters.wording import clean
+from groundstation.reports.drawing import Drawing
 from groundstation.reports.page import TEMPLATES
-from groundstation.reports.parts import Drawing, Mark
-from groundstation.reports.wording import clean
 from groundstation.results.files import write_bytes
 
 TEMPLATE = TEMPLATES / "report.typ"
@@ -24,7 +25,7 @@ class PdfError(GroundstationError):
 
 
 def write_pdf(document: object, path: Path, template: Path | None = None) -> None:
-    """Write a report (:class:`~groundstation.reports.parts.Document`) as PDF on A4; equal documents give equal bytes.
+    """Write a report (:class:`~groundstation.chapters.parts.Document`) as PDF on A4; equal documents give equal bytes.
 
     Another dataclass is set by a template of its own.
 

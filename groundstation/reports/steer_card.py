@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from groundstation.chapters.parts import Mark
+from groundstation.chapters.wording import ABSENT, is_number, number, typeset
 from groundstation.reports.page import TEMPLATES
-from groundstation.reports.parts import Mark
 from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.reports.sections.saved import mapping, objects
-from groundstation.reports.wording import ABSENT, is_number, number, typeset
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD, deviation_csv
 from groundstation.results.files import SavedFlight, write_text
 from groundstation.results.magnetic import ADVISORY, METHOD_TITLES

@@ -1,9 +1,9 @@
 """Arrays behind the figures: small named tables whose columns carry their units."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,3 +52,50 @@ class FigureData:
         import pandas as pd
 
         return pd.DataFrame({name: values.copy() for name, values in self.columns.items()})
+
+
+class FigureSet(Sequence[FigureData]):
+    """Figures by name that are read when they are first asked for, each once."""
+
+    def __init__(self, names: Iterable[str], read: Callable[[str], FigureData]) -> None:
+        self.names, self._read, self._known = tuple(names), read, dict[str, FigureData]()
+
+    def named(self, name: str) -> FigureData | None:
+        """The figure of that name, None where there is none."""
+        if name not in self._known and name in self.names:
+            self._known[name] = self._read(name)
+        return self._known.get(name)
+
+    @overload
+    def __getitem__(self, place: int) -> FigureData: ...
+    @overload
+    def __getitem__(self, place: slice) -> tuple[FigureData, ...]: ...
+    def __getitem__(self, place: int | slice) -> FigureData | tuple[FigureData, ...]:
+        if isinstance(place, slice):
+            return tuple(self[one] for one in range(*place.indices(len(self))))
+        found = self.named(self.names[place])
+        assert found is not None
+        return found
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+def numbers(figure: FigureData, name: str) -> NDArray[np.float64]:
+    """A column as float64; NaN throughout when the figure lacks it or it is text."""
+    values = figure.columns.get(name)
+    if values is None or values.dtype.kind not in "fiub":
+        return np.full(len(figure), np.nan)
+    return np.asarray(values, dtype=np.float64)
+
+
+def flags(figure: FigureData, name: str) -> NDArray[np.bool_]:
+    """A column as bool; False throughout when the figure lacks it."""
+    values = numbers(figure, name)
+    return np.asarray(np.isfinite(values) & (values != 0.0), dtype=np.bool_)
+
+
+def texts(figure: FigureData, name: str) -> NDArray[np.str_]:
+    """A column as text; empty throughout when the figure lacks it."""
+    values = figure.columns.get(name)
+    return np.full(len(figure), "") if values is None else values.astype(np.str_)

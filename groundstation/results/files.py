@@ -13,7 +13,7 @@ import numpy as np
 
 from groundstation.base.errors import UnreadableLogError
 from groundstation.results.answer import Answer
-from groundstation.results.figures import FigureData
+from groundstation.results.figures import FigureData, FigureSet
 from groundstation.results.flight import FlightResults
 from groundstation.results.restore import ANSWER_TYPES, restored
 from groundstation.results.summary import digits_of, summary_of
@@ -28,8 +28,8 @@ PARQUET_LEAST_BYTES = 12  # both, and the length of what describes the file
 class SavedFlight:
     """What a flight folder holds, as the report, ``compare`` and the fleet read it.
 
-    ``results`` are the answers as the run had them, but for their arrays: ``figures`` maps a name to those, which are
-    read when they are asked for. ``summary`` and ``manifest`` are the JSON documents.
+    ``results`` are the answers as the run had them; the arrays in ``figures`` are read when they are asked for.
+    ``summary`` and ``manifest`` are the JSON documents.
     """
 
     folder: Path
@@ -40,18 +40,15 @@ class SavedFlight:
 
     @cached_property
     def results(self) -> FlightResults:
-        """The answers, rounded as they were written, without arrays.
+        """The answers, rounded as they were written; their arrays are read when they are asked for.
 
         Raises
         ------
         UnreadableLogError
             When the summary lacks what a result needs.
         """
-        return restored(self.summary, str(self.folder / SUMMARY), self.answer_types)
-
-    def results_with_figures(self) -> FlightResults:
-        """The answers with every array, which is read for it."""
-        return replace(self.results, figures=tuple(self.figures.values()))
+        results = restored(self.summary, str(self.folder / SUMMARY), self.answer_types)
+        return replace(results, figures=FigureSet(self.figures, self.figures.__getitem__))
 
     def figure(self, name: str) -> FigureData | None:
         """The figure data of that name, None when the flight has none or it is empty."""

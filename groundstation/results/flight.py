@@ -1,6 +1,6 @@
 """Everything found out about one flight, in one frozen object: what the recording and the report are made from."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
@@ -8,7 +8,7 @@ from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.results.answer import A, Answers, answer_of
-from groundstation.results.figures import FigureData
+from groundstation.results.figures import FigureData, FigureSet
 from groundstation.results.frames import Tabular, no_such_table
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class FlightResults(Tabular):
     findings, not_assessable : tuples
     answers : mapping of str to Answer
         By the name of the analysis, in the order they are shown.
-    figures : tuple of FigureData
+    figures : sequence of FigureData
         Arrays behind every figure, those of the analyses among them.
     """
 
@@ -72,7 +72,7 @@ class FlightResults(Tabular):
     findings: tuple[Finding, ...] = ()
     not_assessable: tuple[NotAssessable, ...] = ()
     answers: Answers = field(default_factory=dict)
-    figures: tuple[FigureData, ...] = ()
+    figures: Sequence[FigureData] = ()
 
     def answer(self, kind: type[A]) -> A | None:
         """The answer of that type, None where its analysis has none."""
@@ -84,7 +84,14 @@ class FlightResults(Tabular):
 
     def figure(self, name: str) -> FigureData | None:
         """The figure data of that name, None when the flight has none."""
+        if isinstance(self.figures, FigureSet):
+            return self.figures.named(name)
         return next((figure for figure in self.figures if figure.name == name), None)
+
+    def figure_with_rows(self, name: str) -> FigureData | None:
+        """The figure data of that name, None when the flight has none or it is empty."""
+        found = self.figure(name)
+        return found if found is not None and len(found) else None
 
     def table_names(self) -> tuple[str, ...]:
         """Names that :meth:`to_frame` takes: findings, what was not assessable, the arrays behind the figures."""

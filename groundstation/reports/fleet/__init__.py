@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
+from groundstation.chapters.parts import Section
 from groundstation.reports.fleet import aircraft, calibration, densities, deviation, flights, rest, skill, trend
-from groundstation.reports.parts import Section
 from groundstation.results.fleet import FleetResults
 
 CHAPTERS: tuple[Callable[[FleetResults], Section | None], ...] = (

@@ -4,7 +4,11 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.chapters.parts import Grid, Head, Note, Section
+from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.figures.inertial import plain_log
 from groundstation.reports.fleet.common import (
     ROW_MM,
     aircraft_name,
@@ -16,10 +20,7 @@ from groundstation.reports.fleet.common import (
     rows_shown,
     span_of,
 )
-from groundstation.reports.parts import Drawing, Grid, Head, Note, Section
 from groundstation.reports.sections.inertial import percent
-from groundstation.reports.sections.inertial_figures import plain_log
-from groundstation.reports.wording import number
 from groundstation.results.fleet import AircraftRow, FleetResults
 
 MOST_DOTS = 2000

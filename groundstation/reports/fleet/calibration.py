@@ -4,11 +4,12 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.chapters.parts import Grid, Head, Mark, Note, Section
+from groundstation.chapters.wording import number, typeset
 from groundstation.reports import drawing as d
+from groundstation.reports.drawing import Drawing
 from groundstation.reports.fleet.common import name_axis, plural
-from groundstation.reports.parts import Drawing, Grid, Head, Mark, Note, Section
 from groundstation.reports.sections.inertial import percent
-from groundstation.reports.wording import number, typeset
 from groundstation.results.fleet import FleetCalibration, FleetResults
 
 LEAD = "Are the stated intervals honest? Of something known independently, 95 % should lie inside."

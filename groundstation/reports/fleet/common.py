@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.chapters.wording import ABSENT, clean, is_number, named_quantity, number
 from groundstation.reports import drawing as d
 from groundstation.reports.sections.front import VERDICTS
-from groundstation.reports.wording import ABSENT, clean, is_number, named_quantity, number
 from groundstation.results.fleet import FleetResults
 
 NOT_NAMED = "not named"

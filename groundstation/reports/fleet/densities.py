@@ -5,10 +5,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.chapters.parts import Grid, Head, Note, Part, Section
+from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
+from groundstation.reports.drawing import Drawing
 from groundstation.reports.fleet.common import aircraft_name, colours_of, left_out, plural, rows_shown
-from groundstation.reports.parts import Drawing, Grid, Head, Note, Part, Section
-from groundstation.reports.wording import number
 from groundstation.results.fleet import Densities, FittedNormal, FleetResults
 
 MOST_LINES = 150  # flights drawn as lines; more become bands of quantiles

@@ -4,12 +4,13 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.chapters.parts import Cell, Grid, Head, Mark, Part, Section
+from groundstation.chapters.wording import ABSENT, number
 from groundstation.reports import drawing as d
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.figures.magnetic import METHODS
 from groundstation.reports.fleet.common import aircraft_name, bounded, colours_of
-from groundstation.reports.parts import Cell, Drawing, Grid, Head, Mark, Part, Section
 from groundstation.reports.sections.magnetic import TONES
-from groundstation.reports.sections.magnetic_figures import METHODS
-from groundstation.reports.wording import ABSENT, number
 from groundstation.results.fleet import DeviationRow, FleetResults
 from groundstation.results.magnetic import ADVISORY, LETTERS
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Section, Tone
+from groundstation.chapters.wording import ABSENT, clean, number, typeset
 from groundstation.reports.fleet.common import aircraft_name, bounded, plural, title_of
-from groundstation.reports.parts import Cell, Grid, Head, Mark, Note, Section, Tone
 from groundstation.reports.sections.front import VERDICTS
-from groundstation.reports.wording import ABSENT, clean, number, typeset
 from groundstation.results.fleet import FleetResults
 
 KEY = "flights"

@@ -2,10 +2,10 @@
 
 from collections.abc import Callable
 
+from groundstation.chapters.parts import Facts, Grid, Head, Mark, Note, Section
+from groundstation.chapters.wording import ABSENT, number, significant, words
 from groundstation.reports.fleet.common import aircraft_name, figure_of, title_of
-from groundstation.reports.parts import Facts, Grid, Head, Mark, Note, Section
 from groundstation.reports.sections.inertial import percent
-from groundstation.reports.wording import ABSENT, number, significant, words
 from groundstation.results.fleet import FleetResults
 
 KINDS = {"failed": Mark("bad", "failed"), "skipped": Mark("plain", "skipped")}

@@ -6,7 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.chapters.parts import Cell, Grid, Head, Note, Part, Section
+from groundstation.chapters.wording import number, significant
 from groundstation.reports import drawing as d
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.figures.inertial import plain_log
 from groundstation.reports.fleet.aircraft import log_limits
 from groundstation.reports.fleet.common import (
     aircraft_name,
@@ -18,9 +22,6 @@ from groundstation.reports.fleet.common import (
     plural,
     title_of,
 )
-from groundstation.reports.parts import Cell, Drawing, Grid, Head, Note, Part, Section
-from groundstation.reports.sections.inertial_figures import plain_log
-from groundstation.reports.wording import number, significant
 from groundstation.results.fleet import ChangePoint, FleetResults
 
 MOST_PANELS = 8

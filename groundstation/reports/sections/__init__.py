@@ -6,13 +6,14 @@ to :data:`CHAPTERS`.
 
 from collections.abc import Callable
 
-from groundstation.reports.parts import Section
+from groundstation.chapters.latency import latency
+from groundstation.chapters.parts import Section
+from groundstation.reports.figures import with_drawings
 from groundstation.reports.sections import (
     findings,
     forecast,
     heading,
     inertial,
-    latency,
     magnetic,
     overview,
     provenance,
@@ -20,11 +21,17 @@ from groundstation.reports.sections import (
 )
 from groundstation.results.files import SavedFlight
 
+
+def _latency(saved: SavedFlight) -> Section | None:
+    section = latency(saved.results)
+    return None if section is None else with_drawings(section, saved.results)
+
+
 CHAPTERS: tuple[Callable[[SavedFlight], Section | None], ...] = (
     heading.build,
     inertial.build,
     forecast.build,
-    latency.build,
+    _latency,
     magnetic.build,
     overview.build,
     quality.build,

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from groundstation.base.findings import Finding
-from groundstation.reports.parts import Cell, Grid, Head, Mark, Note, Part, Section
+from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Part, Section
+from groundstation.chapters.wording import is_number, number
 from groundstation.reports.sections.saved import objects
-from groundstation.reports.wording import is_number, number
 from groundstation.results.explain import explained
 from groundstation.results.files import SavedFlight
 from groundstation.results.noticed import grouped

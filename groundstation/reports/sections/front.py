@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
-from groundstation.reports.parts import Front, Mark, Tone
+from groundstation.chapters.parts import Front, Mark, Tone
+from groundstation.chapters.wording import ABSENT, clock, interval, is_number, number, step_places, typeset
 from groundstation.reports.sections.saved import heading_of, mapping, not_assessable_reason, objects
-from groundstation.reports.wording import ABSENT, clock, interval, is_number, number, step_places, typeset
 from groundstation.results.files import SavedFlight
 
 PUBLISHED_LIMIT_ARCMIN = 20.0

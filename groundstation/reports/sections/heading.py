@@ -3,10 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from groundstation.reports.parts import Cell, Drawing, Facts, Grid, Head, Mark, Note, Part, Section
-from groundstation.reports.sections import heading_figures, standstill_figures
-from groundstation.reports.sections.saved import heading_of, mapping, not_assessable_reason, objects
-from groundstation.reports.wording import (
+from groundstation.chapters.parts import Cell, Facts, Grid, Head, Mark, Note, Part, Section
+from groundstation.chapters.wording import (
     ABSENT,
     any_value,
     clock,
@@ -20,6 +18,10 @@ from groundstation.reports.wording import (
     typeset,
     unit_sign,
 )
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.figures import heading as heading_figures
+from groundstation.reports.figures import standstill as standstill_figures
+from groundstation.reports.sections.saved import heading_of, mapping, not_assessable_reason, objects
 from groundstation.results.files import SavedFlight
 
 SENSE_SIGNS = {"at_most": "≤ ", "at_least": "≥ "}

@@ -3,10 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from groundstation.reports.parts import Cell, Facts, Grid, Head, Mark, Note, Part, Section, Tone
-from groundstation.reports.sections import inertial_figures
-from groundstation.reports.sections.saved import mapping, not_assessable_reason, objects
-from groundstation.reports.wording import (
+from groundstation.chapters.parts import Cell, Facts, Grid, Head, Mark, Note, Part, Section, Tone
+from groundstation.chapters.wording import (
     ABSENT,
     any_value,
     clock,
@@ -16,6 +14,8 @@ from groundstation.reports.wording import (
     typeset,
     unit_sign,
 )
+from groundstation.reports.figures import inertial as inertial_figures
+from groundstation.reports.sections.saved import mapping, not_assessable_reason, objects
 from groundstation.results.files import SavedFlight
 from groundstation.results.inertial import MISSING, is_left_alone
 

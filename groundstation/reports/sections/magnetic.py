@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
-from groundstation.reports.parts import Cell, Facts, Grid, Head, Mark, Note, Part, Section, Tone
-from groundstation.reports.sections import magnetic_figures, magnetic_ground
+from groundstation.chapters.parts import Cell, Facts, Grid, Head, Mark, Note, Part, Section, Tone
+from groundstation.chapters.wording import ABSENT, clock, is_number, number, significant, typeset
+from groundstation.reports.figures import magnetic as magnetic_figures
+from groundstation.reports.sections import magnetic_ground
 from groundstation.reports.sections.heading import gate_grid, setting_facts
 from groundstation.reports.sections.saved import mapping, not_assessable_reason, objects
-from groundstation.reports.wording import ABSENT, clock, is_number, number, significant, typeset
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.files import SavedFlight
 from groundstation.results.magnetic import ADVISORY, LETTERS

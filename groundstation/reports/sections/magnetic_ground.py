@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.chapters.parts import Cell, Facts, Grid, Head, Mark, Note, Part
+from groundstation.chapters.wording import ABSENT, clock, is_number, number, typeset
 from groundstation.reports import drawing as d
-from groundstation.reports.parts import Cell, Drawing, Facts, Grid, Head, Mark, Note, Part
+from groundstation.reports.drawing import Drawing
 from groundstation.reports.sections.heading import setting_facts
-from groundstation.reports.sections.saved import flags, mapping, numbers, objects
-from groundstation.reports.wording import ABSENT, clock, is_number, number, typeset
+from groundstation.reports.sections.saved import mapping, objects
+from groundstation.results.figures import flags, numbers
 from groundstation.results.files import SavedFlight
 from groundstation.results.magnetic import ADVISORY
 

@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.geodesy import north_east_m
+from groundstation.chapters.parts import Section
+from groundstation.chapters.wording import is_number, number, words
 from groundstation.reports import drawing as d
-from groundstation.reports.parts import Drawing, Section
-from groundstation.reports.sections.saved import heading_of, numbers, objects, texts
-from groundstation.reports.wording import is_number, number, words
-from groundstation.results.figures import FigureData
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.sections.saved import heading_of, objects
+from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.files import SavedFlight
 
 SMALLEST_TAXI_M = 10.0  # less is no taxi worth enlarging: a receiver at rest, or a start by hand

@@ -1,8 +1,8 @@
 """Chapter: where the numbers come from. Time of run, host and versions stand in manifest.json alone."""
 
-from groundstation.reports.parts import Facts, Note, Part, Section
+from groundstation.chapters.parts import Facts, Note, Part, Section
+from groundstation.chapters.wording import ABSENT, clean, number
 from groundstation.reports.sections.saved import mapping
-from groundstation.reports.wording import ABSENT, clean, number
 from groundstation.results.files import SavedFlight
 
 LONG_LISTS = ("parameter.", "units.")  # of autopilot logs, hundreds of them

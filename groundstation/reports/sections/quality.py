@@ -5,10 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.reports import drawing as d
-from groundstation.reports.parts import Drawing, Facts, Grid, Head, Note, Section
-from groundstation.reports.sections.saved import mapping, numbers, objects, texts
-from groundstation.reports.wording import (
+from groundstation.chapters.parts import Facts, Grid, Head, Note, Section
+from groundstation.chapters.wording import (
     any_value,
     named_quantity,
     number,
@@ -17,7 +15,10 @@ from groundstation.reports.wording import (
     typeset,
     words,
 )
-from groundstation.results.figures import FigureData
+from groundstation.reports import drawing as d
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.sections.saved import mapping, objects
+from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.files import SavedFlight
 
 MOST_TOPICS = 60

@@ -7,12 +7,14 @@ import rerun.blueprint as rrb
 
 from groundstation.base.serial import to_json_exactly
 from groundstation.base.signals import topics_of_kind
+from groundstation.chapters.latency import latency
+from groundstation.chapters.markdown import markdown
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
-from groundstation.results.latency import Latencies, Latency
+from groundstation.results.latency import Latencies
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer import colours
-from groundstation.viewer.markdown import markdown_text, number, table
+from groundstation.viewer.markdown import markdown_text, table
 from groundstation.viewer.names import label, path_parts, topic_label, words
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after
@@ -133,19 +135,10 @@ def _ledger_text(results: FlightResults) -> str:
             plain[f"{relation.clock}: {relation.source}"] = "; ".join(told)
         clock = [[markdown_text(words(str(name))), markdown_text(str(value))] for name, value in plain.items()]
         parts += ["## Clock", table(["clock", "value"], clock)]
-    latencies = results.answer(Latencies)
-    if latencies:
-        heads = ["sensor", "quantity", "latency, s", "95 % interval, s", "what it rests on, or why not"]
-        parts += ["## Latency behind the INS", table(heads, [_latency(row) for row in latencies.rows])]
+    section = latency(results) if results.answer(Latencies) else None
+    if section is not None:
+        parts.append(markdown(section, level=2))
     return "\n\n".join(parts)
-
-
-def _latency(row: Latency) -> list[str]:
-    bounds = "–" if row.confidence95_s is None else " … ".join(f"{end:+.3f}" for end in row.confidence95_s)
-    return [
-        *(markdown_text(f"{row.other} against {row.reference}"), row.quantity, number(row.latency_s, 3, sign=True)),
-        *(bounds, markdown_text(row.reason)),
-    ]
 
 
 def _cell(name: str, value: object) -> str:

@@ -1,7 +1,7 @@
-"""What a report is made of: a front, sections, and in them drawings, tables, facts and notes, without a word of markup.
+"""What a page is made of: a front, sections, and in them figures, tables, facts and notes, without a word of markup.
 
-A section module builds these; page.py turns them into HTML and pdf.py into PDF, each with its template, and escaping
-happens there, once, for everything.
+A chapter builds them from the answers, once. HTML, typst, Markdown and the terminal are renderers of them; escaping
+happens there, for everything.
 """
 
 from collections.abc import Sequence
@@ -29,26 +29,22 @@ class Mark:
 Cell: TypeAlias = str | Mark
 
 
-@dataclass(frozen=True)
-class Drawing:
-    """One figure.
+class Part:
+    """Base of what a section is made of; ``kind`` tells a template which it has before it."""
 
-    Parameters
-    ----------
-    title, caption, alt : str
-        The caption says what one sees, how many samples, what the lines are; alt is for those who cannot see it.
-    svg : str
-        The only text that the page passes on unescaped: made by reports.drawing alone.
-    numbers : sequence of str
-        Names of the figure data; the readable copies are tables/<name>.csv.
+    kind: ClassVar[str]
+
+
+@dataclass(frozen=True)
+class Figure(Part):
+    """Where a figure stands, by its name; a page that has figures draws it there, others leave it out.
+
+    ``of`` says which of several alike: a state, a horizon.
     """
 
-    kind: ClassVar[str] = "drawing"
-    title: str
-    caption: str
-    alt: str
-    svg: str
-    numbers: Sequence[str] = ()
+    kind: ClassVar[str] = "figure"
+    name: str
+    of: str = ""
 
 
 @dataclass(frozen=True)
@@ -60,8 +56,8 @@ class Head:
 
 
 @dataclass(frozen=True)
-class Grid:
-    """A table; ``numbers`` as in :class:`Drawing`."""
+class Grid(Part):
+    """A table; ``numbers`` names the arrays behind it."""
 
     kind: ClassVar[str] = "grid"
     title: str
@@ -72,7 +68,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Facts:
+class Facts(Part):
     """Pairs of a label and a value, each with an optional remark; ``compact`` sets many short ones in columns."""
 
     kind: ClassVar[str] = "facts"
@@ -83,16 +79,13 @@ class Facts:
 
 
 @dataclass(frozen=True)
-class Note:
+class Note(Part):
     """A paragraph, set off in the colour of its tone; ``files`` beside the report are named, and linked on a screen."""
 
     kind: ClassVar[str] = "note"
     text: str
     tone: Tone = "plain"
     files: Sequence[str] = ()
-
-
-Part: TypeAlias = Drawing | Grid | Facts | Note
 
 
 @dataclass(frozen=True)

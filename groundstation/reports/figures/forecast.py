@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.chapters.wording import is_number, number
 from groundstation.reports import drawing as d
-from groundstation.reports.parts import Drawing
-from groundstation.reports.sections.inertial_figures import has_values, plain_log
-from groundstation.reports.sections.saved import mapping, numbers, objects
-from groundstation.reports.wording import is_number, number
-from groundstation.results.figures import FigureData
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.figures.inertial import has_values, plain_log
+from groundstation.reports.sections.saved import mapping, objects
+from groundstation.results.figures import FigureData, numbers
 from groundstation.results.files import SavedFlight
 from groundstation.results.forecast import FEWEST_STARTS, METHODS
 

@@ -5,10 +5,11 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.geodesy import north_east_m
+from groundstation.chapters.wording import is_number, number
 from groundstation.reports import drawing as d
-from groundstation.reports.parts import Drawing
-from groundstation.reports.sections.saved import flags, mapping, numbers, objects, texts
-from groundstation.reports.wording import is_number, number
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.sections.saved import mapping, objects
+from groundstation.results.figures import flags, numbers, texts
 from groundstation.results.files import SavedFlight
 from groundstation.results.magnetic import METHOD_TITLES
 

@@ -4,10 +4,11 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.chapters.wording import is_number, number
 from groundstation.reports import drawing as d
-from groundstation.reports.parts import Drawing
-from groundstation.reports.sections.saved import flags, heading_of, mapping, numbers
-from groundstation.reports.wording import is_number, number
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.sections.saved import heading_of, mapping
+from groundstation.results.figures import flags, numbers
 from groundstation.results.files import SavedFlight
 
 RAW_LIMIT_MPS = 0.2

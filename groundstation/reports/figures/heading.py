@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.chapters.wording import clock, interval, is_number, number
 from groundstation.reports import drawing as d
-from groundstation.reports.parts import Drawing
-from groundstation.reports.sections.saved import flags, heading_of, mapping, numbers, objects, texts
-from groundstation.reports.wording import clock, interval, is_number, number
-from groundstation.results.figures import FigureData
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.sections.saved import heading_of, mapping, objects
+from groundstation.results.figures import FigureData, flags, numbers, texts
 from groundstation.results.files import SavedFlight
 
 NORMAL_95 = 1.96  # half width of the 95 % interval of a normal distribution, in sigmas

@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.reports import drawing as d
-from groundstation.reports.parts import Drawing
-from groundstation.reports.sections.saved import flags, numbers
-from groundstation.results.figures import FigureData
+from groundstation.reports.drawing import Drawing
+from groundstation.results.figures import FigureData, flags, numbers
 from groundstation.results.files import SavedFlight
 
 CHANNELS = ("north", "east")

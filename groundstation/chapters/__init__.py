@@ -1,0 +1,1 @@
+"""Chapters: what the answers of a flight say, told once, without markup."""

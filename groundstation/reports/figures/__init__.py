@@ -1,0 +1,29 @@
+"""The figures of a report, drawn where a chapter says one stands."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from groundstation.chapters.parts import Figure, Part, Section
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.figures import latency
+from groundstation.results.flight import FlightResults
+
+Drawn = Drawing | Sequence[Drawing] | None
+
+# By the name that a chapter gives; a figure that is one of several alike gets which.
+DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, str], Drawn]] = {
+    "latency.search": latency.search,
+}
+
+
+def with_drawings(section: Section, results: FlightResults) -> Section:
+    """The section with its figures drawn; one whose arrays are missing is left out."""
+    parts: list[Part] = []
+    for part in section.parts:
+        if not isinstance(part, Figure):
+            parts.append(part)
+            continue
+        drawer = DRAWERS[part.name]
+        drawn = drawer(results, part.of) if part.of else drawer(results)  # type: ignore[call-arg]
+        parts += () if drawn is None else [drawn] if isinstance(drawn, Drawing) else drawn
+    return replace(section, parts=tuple(parts))
