@@ -1,0 +1,225 @@
+"""Compiled loop of the filter over epochs: gates, rejections, reopening, what is written down. Letters: ``kernels``."""
+
+import numpy as np
+
+from groundstation.base.compile import compiled
+from groundstation.base.records import Int64Array
+from groundstation.estimators.kalman.arrays import (
+    ABSENT,
+    REJECTED,
+    USED,
+    Drive,
+    Dynamics,
+    FloatArray,
+    Lines,
+    Marks,
+    Now,
+    Record,
+    Rules,
+    Schedule,
+    States,
+)
+from groundstation.estimators.kalman.kernels import (
+    add_noise,
+    predict_covariance,
+    predict_states,
+    predicted,
+    predicted_variance,
+    update_covariance,
+)
+
+
+@compiled
+def judge(
+    starts: Int64Array,
+    columns: Int64Array,
+    values: FloatArray,
+    variance: FloatArray,
+    believed: FloatArray,
+    gate: float,
+    row: Int64Array,
+    z: FloatArray,
+    begin: int,
+    end: int,
+    x: FloatArray,
+    p: FloatArray,
+    y: FloatArray,
+    S: FloatArray,
+    mark: Marks,
+) -> int:
+    """Fill innovations, variances and marks of measurements ``begin`` to ``end``, which are judged together.
+
+    Returns
+    -------
+    int
+        USED where all that are there pass the gate, REJECTED where one does not, ABSENT where none is there.
+    """
+    verdict = ABSENT
+    for m in range(begin, end):
+        r = row[m]
+        first, last = starts[r], starts[r + 1]
+        own, is_known, is_inside = 0.0, True, True
+        for e in range(first, last):
+            for f in range(first, last):
+                own += values[e] * p[columns[e], columns[f]] * values[f]
+        for c in range(z.shape[1]):
+            residual = z[m, c]
+            for e in range(first, last):
+                residual -= values[e] * x[c, columns[e]]
+            y[m, c] = residual
+            if not np.isfinite(residual):
+                is_known = False
+            elif residual * residual > gate * (own + believed[r]):
+                is_inside = False
+        mark[m], S[m] = ABSENT, np.nan
+        if is_known:
+            mark[m], S[m] = USED, own + variance[r]
+            if not is_inside:
+                verdict = REJECTED
+            elif verdict == ABSENT:
+                verdict = USED
+    return verdict
+
+
+@compiled
+def open_again(
+    starts: Int64Array,
+    columns: Int64Array,
+    values: FloatArray,
+    variance: FloatArray,
+    row: Int64Array,
+    begin: int,
+    end: int,
+    opened: FloatArray,
+    is_by_innovation: bool,
+    p: FloatArray,
+    y: FloatArray,
+    S: FloatArray,
+    mark: Marks,
+) -> None:
+    """Widen the covariance for measurements ``begin`` to ``end``, which were rejected too often."""
+    for i in range(len(opened)):
+        p[i, i] += opened[i]
+    if is_by_innovation:
+        for m in range(begin, end):
+            for e in range(starts[row[m]], starts[row[m] + 1]):
+                for c in range(y.shape[1]):
+                    if mark[m] != ABSENT:
+                        p[columns[e], columns[e]] += (y[m, c] / values[e]) ** 2
+    for m in range(begin, end):
+        if mark[m] != ABSENT:
+            r = row[m]
+            S[m] = predicted_variance(columns, values, starts[r], starts[r + 1], p) + variance[r]
+
+
+@compiled
+def run_filter(
+    states: States,
+    dynamics: Dynamics,
+    schedule: Schedule,
+    lines: Lines,
+    rules: Rules,
+    drive: Drive,
+    z: FloatArray,
+    held: Int64Array,
+    now: Now,
+    out: Record,
+) -> int:
+    """Run the filter over epochs; ``z`` (m, c) are the measurements, NaN absent. Return how often it was opened."""
+    n, channels = len(states), z.shape[1]
+    pattern, F, noise_rows, noise_columns, before, after = dynamics
+    step, jump, jumps, first, row = schedule
+    starts, columns, values, variance, believed, kind = lines
+    gate, patience, opened, is_by_innovation = rules
+    driven, mix, push = drive
+    x, p, in_a_row = now
+    out_x, out_P, out_variance, out_K, y, S, mark, judged_innovation, judged_variance = out
+    w, g, K, moved = np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(channels)
+    reopened = 0
+    for k in range(len(step)):
+        if step[k] >= 0:
+            if len(before) > 0:
+                add_noise(states, noise_rows, noise_columns, before, step[k], p)
+            predict_covariance(states, pattern, F, step[k], p, w)
+            if len(after) > 0:
+                add_noise(states, noise_rows, noise_columns, after, step[k], p)
+            if len(push) > 0:
+                for c in range(channels):
+                    moved[c] = push[k, c]
+                    for j in range(channels):
+                        moved[c] += mix[k, c, j] * x[j, driven]
+            predict_states(states, pattern, F, step[k], x, w)
+            if len(push) > 0:
+                for c in range(channels):
+                    x[c, driven] += moved[c]
+        if jump[k] >= 0:
+            for i in range(n):
+                p[i, i] += jumps[jump[k], i]
+        begin, stop = first[k], first[k + 1]
+        while begin < stop:
+            group = kind[row[begin]]
+            end = begin + 1
+            while end < stop and kind[row[end]] == group:
+                end += 1
+            verdict = judge(starts, columns, values, variance, believed, gate, row, z, begin, end, x, p, y, S, mark)
+            if verdict == USED:
+                in_a_row[group] = 0
+            elif verdict == REJECTED:
+                in_a_row[group] += 1
+                if in_a_row[group] > patience[group]:
+                    open_again(
+                        starts,
+                        columns,
+                        values,
+                        variance,
+                        row,
+                        begin,
+                        end,
+                        opened[group],
+                        is_by_innovation,
+                        p,
+                        y,
+                        S,
+                        mark,
+                    )
+                    in_a_row[:] = 0
+                    reopened += 1
+                    verdict = USED
+            if len(judged_variance) > 0:
+                for m in range(begin, end):
+                    judged_variance[m] = S[m]
+                    for c in range(channels):
+                        judged_innovation[m, c] = y[m, c]
+            for m in range(begin, end):
+                if mark[m] == USED and verdict == USED:
+                    r = row[m]
+                    if m > begin:
+                        for c in range(channels):
+                            y[m, c] = z[m, c] - predicted(columns, values, starts[r], starts[r + 1], x, c)
+                    S[m] = update_covariance(
+                        states, columns, values, starts[r], starts[r + 1], variance[r], held, p, g, K
+                    )
+                    for c in range(channels):
+                        for i in range(n):
+                            x[c, i] += K[i] * y[m, c]
+                else:
+                    if mark[m] == USED:
+                        mark[m] = REJECTED
+                    for i in range(n):
+                        K[i] = 0.0
+                if len(out_K) > 0:
+                    for i in range(n):
+                        out_K[m, i] = K[i]
+            begin = end
+        if len(out_x) > 0:
+            for c in range(channels):
+                for i in range(n):
+                    out_x[k, i, c] = x[c, i]
+        if len(out_P) > 0:
+            for i in range(n):
+                for j in range(n):
+                    out_P[k, i, j] = p[i, j]
+        if len(out_variance) > 0:
+            for i in range(n):
+                out_variance[k, i] = p[i, i]
+    return reopened
