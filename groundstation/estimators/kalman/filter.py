@@ -216,8 +216,7 @@ class Measurements:
         weighted = np.broadcast_to(np.asarray(variance, dtype=np.float64), at.shape)
         given = weighted if believed is None else np.broadcast_to(np.asarray(believed, dtype=np.float64), at.shape)
         kinds = _place_within(at) if kind is None else np.broadcast_to(np.asarray(kind, dtype=np.int64), at.shape)
-        each = [np.array(part) for part in (weighted, given)]
-        lines = Lines(starts, where[kept], weights[kept], *each, np.array(kinds))
+        lines = Lines(starts, where[kept], weights[kept], np.array(weighted), np.array(given), np.array(kinds))
         return cls(at, np.asarray(value), np.arange(len(at)), lines)
 
 
@@ -401,7 +400,8 @@ def run_filter(
     now = start.now(_kinds(lines))
     channels = measurements.value.shape[1]
     _check_run(transition, steps, measurements, now)
-    first = np.searchsorted(measurements.epoch, np.arange(n + 1)).astype(np.int64)
+    first = np.zeros(n + 1, dtype=np.int64)
+    np.cumsum(np.bincount(measurements.epoch, minlength=n), out=first[1:])
     jumped = np.full(n, NO_STEP, dtype=np.int64) if jump is None else np.ascontiguousarray(jump, dtype=np.int64)
     added = np.zeros((0, size)) if jumps is None else np.ascontiguousarray(jumps, dtype=np.float64)
     schedule = Schedule(*map(frozen, (steps, jumped, added, first, measurements.row)))
@@ -477,25 +477,88 @@ def smooth(run: FilterRun, begin: int = 0, end: int | None = None) -> Smoothed:
     """
     from groundstation.estimators.kalman import smoother_runs
 
+    last = len(run.schedule.step) - 1 if end is None else end
+    x, variance = np.full(run.x.shape, np.nan), np.full(run.x.shape[:2], np.nan)
+    smoother_runs.run_smoother(*_history(run), begin, last, x, variance)
+    return Smoothed(x, variance)
+
+
+def smooth_lags(run: FilterRun, begin: Int64Array, end: Int64Array) -> FloatArray:
+    """Smooth epoch ``begin[i]`` with the data up to ``end[i]``, for each i: states alone, shape (s, states, c)."""
+    from groundstation.estimators.kalman import smoother_runs
+
+    past = np.empty((len(begin), *run.x.shape[1:]))
+    smoother_runs.run_fixed_lag(*_history(run), _index(begin), _index(end), past)
+    return past
+
+
+def lag_covariances(run: FilterRun, begin: Int64Array, end: Int64Array) -> tuple[FloatArray, FloatArray]:
+    """Covariance of epoch ``begin[i]`` given the data up to ``end[i]``, and how errors travel between, for each i.
+
+    Returns
+    -------
+    smoothed : ndarray, shape (s, states, states)
+    closed : ndarray, shape (s, states, states)
+        Product of (I - K h) F from begin to end: error at end that an error at begin leaves.
+    """
+    from groundstation.estimators.kalman import smoother_runs
+
+    smoothed, closed = (np.empty((len(begin), *run.P.shape[1:])) for _ in range(2))
+    smoother_runs.run_lag_covariance(*_history(run), _index(begin), _index(end), smoothed, closed)
+    return smoothed, closed
+
+
+def _history(run: FilterRun) -> tuple[States, Dynamics, Schedule, Lines, Record]:
+    """What the smoothers go back over.
+
+    Raises
+    ------
+    ValueError
+        Where the run kept too little, or held states: a smoother goes back over optimal gains alone.
+    """
     n = len(run.schedule.step)
     if not run.is_optimal:
         raise ValueError("a run with held states cannot be smoothed: estimate them")
     if not len(run.x) == len(run.P) == n or len(run.record.K) != len(run.measurements):
         raise ValueError("smoothing needs states, covariances and gains: run the filter with them kept")
-    last = n - 1 if end is None else end
-    x, variance = np.full(run.x.shape, np.nan), np.full(run.x.shape[:2], np.nan)
-    smoother_runs.run_smoother(
-        run.transition.states,
-        run.transition.dynamics,
-        run.schedule,
-        run.measurements.lines,
-        run.record,
-        begin,
-        last,
-        x,
-        variance,
-    )
-    return Smoothed(x, variance)
+    return run.transition.states, run.transition.dynamics, run.schedule, run.measurements.lines, run.record
+
+
+def _index(values: Int64Array) -> Int64Array:
+    return frozen(np.ascontiguousarray(values, dtype=np.int64))
+
+
+def forecast(
+    transition: Transition, step: Int64Array, start: FloatArray, known: FloatArray, every: int, drive: Drive
+) -> FloatArray:
+    """Carry many starts forward together: what one state of each builds up.
+
+    Parameters
+    ----------
+    transition : Transition
+        Sparse.
+    step : ndarray of int, shape (k,)
+        Which of the transition's steps follow each other.
+    start : ndarray, shape (states, c, s)
+    known : ndarray, shape (c, s)
+        What the driven state had built up before the start: it is dragged as well.
+    every : int
+        Steps between two leads.
+    drive : Drive
+        ``mix`` of shape (k, c, c, s) or without length; ``push`` is not used.
+
+    Returns
+    -------
+    ndarray, shape (k // every, c, s)
+    """
+    from groundstation.estimators.kalman import runs
+
+    x = np.array(start, order="C")
+    built_up = np.zeros((len(step) // every, *x.shape[1:]))
+    moved = Drive(drive.state, frozen(drive.mix), frozen(drive.push))
+    inputs = frozen(np.ascontiguousarray(known))
+    runs.run_forecast(transition.dynamics, _index(step), moved, inputs, every, x, np.empty_like(x), built_up)
+    return built_up
 
 
 def distinct_steps(interval_s: FloatArray, resolution_s: float, most: int) -> tuple[FloatArray, Int64Array]:

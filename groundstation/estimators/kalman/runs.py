@@ -30,58 +30,6 @@ from groundstation.estimators.kalman.kernels import (
 
 
 @compiled
-def judge(
-    starts: Int64Array,
-    columns: Int64Array,
-    values: FloatArray,
-    variance: FloatArray,
-    believed: FloatArray,
-    gate: float,
-    row: Int64Array,
-    z: FloatArray,
-    begin: int,
-    end: int,
-    x: FloatArray,
-    p: FloatArray,
-    y: FloatArray,
-    S: FloatArray,
-    mark: Marks,
-) -> int:
-    """Fill innovations, variances and marks of measurements ``begin`` to ``end``, which are judged together.
-
-    Returns
-    -------
-    int
-        USED where all that are there pass the gate, REJECTED where one does not, ABSENT where none is there.
-    """
-    verdict = ABSENT
-    for m in range(begin, end):
-        r = row[m]
-        first, last = starts[r], starts[r + 1]
-        own, is_known, is_inside = 0.0, True, True
-        for e in range(first, last):
-            for f in range(first, last):
-                own += values[e] * p[columns[e], columns[f]] * values[f]
-        for c in range(z.shape[1]):
-            residual = z[m, c]
-            for e in range(first, last):
-                residual -= values[e] * x[c, columns[e]]
-            y[m, c] = residual
-            if not np.isfinite(residual):
-                is_known = False
-            elif residual * residual > gate * (own + believed[r]):
-                is_inside = False
-        mark[m], S[m] = ABSENT, np.nan
-        if is_known:
-            mark[m], S[m] = USED, own + variance[r]
-            if not is_inside:
-                verdict = REJECTED
-            elif verdict == ABSENT:
-                verdict = USED
-    return verdict
-
-
-@compiled
 def open_again(
     starts: Int64Array,
     columns: Int64Array,
@@ -161,7 +109,31 @@ def run_filter(
             end = begin + 1
             while end < stop and kind[row[end]] == group:
                 end += 1
-            verdict = judge(starts, columns, values, variance, believed, gate, row, z, begin, end, x, p, y, S, mark)
+            verdict = ABSENT
+            for m in range(begin, end):
+                r = row[m]
+                own, is_known, is_inside = 0.0, True, True
+                for e in range(starts[r], starts[r + 1]):
+                    inner = 0.0
+                    for f in range(starts[r], starts[r + 1]):
+                        inner += values[f] * p[columns[e], columns[f]]
+                    own += values[e] * inner
+                for c in range(channels):
+                    residual = z[m, c]
+                    for e in range(starts[r], starts[r + 1]):
+                        residual -= values[e] * x[c, columns[e]]
+                    y[m, c] = residual
+                    if not np.isfinite(residual):
+                        is_known = False
+                    elif residual * residual > gate * (own + believed[r]):
+                        is_inside = False
+                mark[m], S[m] = ABSENT, np.nan
+                if is_known:
+                    mark[m], S[m] = USED, own + variance[r]
+                    if not is_inside:
+                        verdict = REJECTED
+                    elif verdict == ABSENT:
+                        verdict = USED
             if verdict == USED:
                 in_a_row[group] = 0
             elif verdict == REJECTED:
@@ -223,3 +195,63 @@ def run_filter(
             for i in range(n):
                 out_variance[k, i] = p[i, i]
     return reopened
+
+
+@compiled
+def run_forecast(
+    dynamics: Dynamics,
+    step: Int64Array,
+    drive: Drive,
+    known: FloatArray,
+    every: int,
+    x: FloatArray,
+    w: FloatArray,
+    built_up: FloatArray,
+) -> None:
+    """Carry the states of many starts forward together and write down one of them: what it builds up.
+
+    Parameters
+    ----------
+    dynamics : Dynamics
+        Sparse.
+    step : ndarray of int, shape (k,)
+        Which of the distinct steps each is; k = ``every`` times the leads.
+    drive : Drive
+        ``mix`` of shape (k, c, c, s), or of no length; it drags what stands in the state and ``known`` together.
+    known : ndarray, shape (c, s)
+        What the state had built up before the start.
+    x, w : ndarrays, shape (n, c, s)
+        States of s starts, changed in place, and room.
+    built_up : ndarray, shape (leads, c, s)
+        Filled: the driven state after every ``every`` steps.
+    """
+    rows, starts, columns = dynamics.pattern
+    F, driven, mix = dynamics.F, drive.state, drive.mix
+    channels, count = x.shape[1], x.shape[2]
+    dragged = np.zeros((channels, count))
+    for k in range(len(step)):
+        for c in range(channels if len(mix) > 0 else 0):
+            for s in range(count):
+                dragged[c, s] = 0.0
+            for j in range(channels):
+                for s in range(count):
+                    dragged[c, s] += mix[k, c, j, s] * (known[j, s] + x[driven, j, s])
+        for t in range(len(rows)):
+            for c in range(channels):
+                for s in range(count):
+                    w[t, c, s] = 0.0
+                for e in range(starts[t], starts[t + 1]):
+                    a, r = F[step[k], e], columns[e]
+                    for s in range(count):
+                        w[t, c, s] += a * x[r, c, s]
+        for t in range(len(rows)):
+            for c in range(channels):
+                for s in range(count):
+                    x[rows[t], c, s] = w[t, c, s]
+        for c in range(channels):
+            for s in range(count):
+                x[driven, c, s] += dragged[c, s]
+        if (k + 1) % every == 0:
+            for c in range(channels):
+                for s in range(count):
+                    built_up[(k + 1) // every - 1, c, s] = x[driven, c, s]

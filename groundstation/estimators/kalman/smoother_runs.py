@@ -71,16 +71,19 @@ def absorb_states(
     last: int,
     K: FloatArray,
     m: int,
-    whitened: float,
+    y: FloatArray,
+    s: float,
     a: FloatArray,
-    c: int,
 ) -> None:
-    """a <- (I - K h)' a - h' y / S, right-hand side c; ``whitened`` is y / S."""
-    total = whitened
-    for i in range(len(states)):
-        total += K[m, i] * a[c, i]
-    for e in range(first, last):
-        a[c, columns[e]] -= values[e] * total
+    """a <- (I - K h)' a - h' y / S, every right-hand side; of a ``y`` without length: as if it were zero."""
+    for c in range(a.shape[0]):
+        total = 0.0
+        for i in range(len(states)):
+            total += K[m, i] * a[c, i]
+        if len(y) > 0:
+            total += y[m, c] / s
+        for e in range(first, last):
+            a[c, columns[e]] -= values[e] * total
 
 
 @compiled
@@ -94,17 +97,17 @@ def carry_covariance_back(
             for j in range(n):
                 w[i, j] = 0.0
             for r in range(n):
-                value = A[i, r]
-                for j in range(n):
-                    w[i, j] += value * F[step, r, j]
-        for i in range(n):
-            for j in range(n):
-                A[i, j] = 0.0
-            for r in range(n):
                 value = F[step, r, i]
                 if value != 0.0:
                     for j in range(n):
-                        A[i, j] += value * w[r, j]
+                        w[i, j] += value * A[r, j]
+        for i in range(n):
+            for j in range(i, n):
+                total = 0.0
+                for r in range(n):
+                    total += F[step, r, j] * w[i, r]
+                A[i, j] = total
+                A[j, i] = total
     else:
         rows, starts, columns = pattern
         for i in range(n):
@@ -126,36 +129,34 @@ def carry_covariance_back(
             for t in range(len(rows)):
                 for e in range(starts[t], starts[t + 1]):
                     A[i, columns[e]] += w[i, rows[t]] * F[step, e]
-    for i in range(n):
-        for j in range(i):
-            A[i, j] = A[j, i]
+        for i in range(n):
+            for j in range(i):
+                A[i, j] = A[j, i]
 
 
 @compiled
-def carry_states_back(
-    states: States, pattern: Pattern, F: FloatArray, step: int, a: FloatArray, c: int, w: FloatArray
-) -> None:
-    """a <- F' a, right-hand side c. The first row of ``w`` is room."""
+def carry_states_back(states: States, pattern: Pattern, F: FloatArray, step: int, a: FloatArray, w: FloatArray) -> None:
+    """a <- F' a, every right-hand side. The first row of ``w`` is room."""
     n = len(states)
-    if F.ndim == 3:
-        for j in range(n):
-            w[0, j] = 0.0
-        for i in range(n):
-            value = a[c, i]
+    rows, starts, columns = pattern
+    for c in range(a.shape[0]):
+        if F.ndim == 3:
             for j in range(n):
-                w[0, j] += F[step, i, j] * value
-    else:
-        rows, starts, columns = pattern
+                total = 0.0
+                for i in range(n):
+                    total += F[step, i, j] * a[c, i]
+                w[0, j] = total
+        else:
+            for j in range(n):
+                w[0, j] = a[c, j]
+            for t in range(len(rows)):
+                w[0, rows[t]] = 0.0
+            for t in range(len(rows)):
+                value = a[c, rows[t]]
+                for e in range(starts[t], starts[t + 1]):
+                    w[0, columns[e]] += F[step, e] * value
         for j in range(n):
-            w[0, j] = a[c, j]
-        for t in range(len(rows)):
-            w[0, rows[t]] = 0.0
-        for t in range(len(rows)):
-            value = a[c, rows[t]]
-            for e in range(starts[t], starts[t + 1]):
-                w[0, columns[e]] += F[step, e] * value
-    for j in range(n):
-        a[c, j] = w[0, j]
+            a[c, j] = w[0, j]
 
 
 @compiled
@@ -201,13 +202,11 @@ def run_smoother(
                 xs[k, i, c] = back
         for m in range(bounds[k + 1] - 1, bounds[k] - 1 if k > begin else bounds[k + 1] - 1, -1):
             first, last = starts[row[m]], starts[row[m] + 1]
-            for c in range(channels if mark[m] == USED else 0):
-                absorb_states(states, columns, values, first, last, K, m, y[m, c] / S[m], a, c)
             if mark[m] == USED:
+                absorb_states(states, columns, values, first, last, K, m, y, S[m], a)
                 absorb_covariance(states, columns, values, first, last, K, m, S[m], A, u)
         if k > begin and step[k] >= 0:
-            for c in range(channels):
-                carry_states_back(states, pattern, F, step[k], a, c, w)
+            carry_states_back(states, pattern, F, step[k], a, w)
             carry_covariance_back(states, pattern, F, step[k], A, w)
 
 
@@ -234,10 +233,10 @@ def run_fixed_lag(
         for k in range(end[s], begin[s], -1):
             for m in range(bounds[k + 1] - 1, bounds[k] - 1, -1):
                 first, last = starts[row[m]], starts[row[m] + 1]
-                for c in range(channels if mark[m] == USED else 0):
-                    absorb_states(states, columns, values, first, last, K, m, y[m, c] / S[m], a, c)
-            for c in range(channels if step[k] >= 0 else 0):
-                carry_states_back(states, pattern, F, step[k], a, c, w)
+                if mark[m] == USED:
+                    absorb_states(states, columns, values, first, last, K, m, y, S[m], a)
+            if step[k] >= 0:
+                carry_states_back(states, pattern, F, step[k], a, w)
         k = begin[s]
         for i in range(n):
             for c in range(channels):
@@ -274,6 +273,7 @@ def run_lag_covariance(
     starts, columns, values = lines.starts, lines.columns, lines.values
     P, K, S, mark = record.P, record.K, record.S, record.mark
     A, w, C, u = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
+    nothing = record.y[:0]
     for s in range(len(begin)):
         for i in range(n):
             for j in range(n):
@@ -282,14 +282,12 @@ def run_lag_covariance(
         for k in range(end[s], begin[s], -1):
             for m in range(bounds[k + 1] - 1, bounds[k] - 1, -1):
                 first, last = starts[row[m]], starts[row[m] + 1]
-                for i in range(n if mark[m] == USED else 0):
-                    absorb_states(states, columns, values, first, last, K, m, 0.0, C, i)
                 if mark[m] == USED:
+                    absorb_states(states, columns, values, first, last, K, m, nothing, S[m], C)
                     absorb_covariance(states, columns, values, first, last, K, m, S[m], A, u)
             if step[k] >= 0:
                 carry_covariance_back(states, pattern, F, step[k], A, w)
-                for i in range(n):
-                    carry_states_back(states, pattern, F, step[k], C, i, w)
+                carry_states_back(states, pattern, F, step[k], C, w)
         k = begin[s]
         for i in range(n):
             for j in range(n):
