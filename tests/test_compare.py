@@ -25,6 +25,7 @@ from groundstation.reports.comparison import comparison_html
 from groundstation.results.comparison import Comparison, Delta
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, load, save
+from groundstation.results.manifest import Manifest
 from groundstation.simulation.samples import write_scenario
 from groundstation.viewer.comparison import write_comparison
 from tests.recording_contents import Contents
@@ -74,7 +75,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 def saved_example(folder: Path, **changes: Any) -> SavedFlight:
     """A saved flight with figures of every analysis."""
     flight = make_flight(240.0, 20.0)
-    save(folder, replace(make_results(flight), **changes), {"configuration": {}})
+    save(folder, replace(make_results(flight), **changes), Manifest())
     return load(folder)
 
 
@@ -226,7 +227,7 @@ def lanes(**columns: Any) -> FigureData:
 def test_events_that_a_log_did_not_see_are_none(phases: list[str], expected: dict[str, float]) -> None:
     start_s = 10.0 * np.arange(len(phases))
     figures = {"phases": lanes(start_s=start_s, end_s=start_s + 10.0, phase=phases)}
-    assert events_of(SavedFlight(Path("x"), {}, {}, figures)) == expected
+    assert events_of(SavedFlight(Path("x"), {}, Manifest(), figures)) == expected
 
 
 def test_an_outage_is_the_first_interval_without_gnss() -> None:
@@ -235,10 +236,10 @@ def test_an_outage_is_the_first_interval_without_gnss() -> None:
     figures = {
         "gnss_lanes": lanes(start_s=[0.0, 95.0, 99.0], end_s=[95.0, 99.0, 120.0], state=["good", "no GNSS", "good"])
     }
-    assert events_of(SavedFlight(Path("x"), document, {}, {}))["outage"] == 90.0
-    assert events_of(SavedFlight(Path("x"), {}, {}, figures))["outage"] == 95.0
-    other = SavedFlight(Path("y"), document, {}, figures)
-    assert align(other, SavedFlight(Path("x"), {}, {}, figures), "outage", is_same_log=False).offset_s == -5.0
+    assert events_of(SavedFlight(Path("x"), document, Manifest(), {}))["outage"] == 90.0
+    assert events_of(SavedFlight(Path("x"), {}, Manifest(), figures))["outage"] == 95.0
+    other = SavedFlight(Path("y"), document, Manifest(), figures)
+    assert align(other, SavedFlight(Path("x"), {}, Manifest(), figures), "outage", is_same_log=False).offset_s == -5.0
 
 
 # ---------------------------------------------------------------------------------------------------- files
@@ -373,7 +374,7 @@ def test_only_flight_folders_are_taken_and_nothing_is_overwritten(folders: dict[
 
 @pytest.mark.parametrize("forecast", [[], "none", 1.0])
 def test_a_forecast_of_another_kind_is_none(tmp_path: Path, forecast: Any) -> None:
-    save(tmp_path / "a", make_results(make_flight()), {})
+    save(tmp_path / "a", make_results(make_flight()), Manifest())
     shutil.copytree(tmp_path / "a", tmp_path / "b")
     summary = json.loads((tmp_path / "b" / "summary.json").read_text(encoding="utf-8"))
     summary["results"]["forecast"] = forecast

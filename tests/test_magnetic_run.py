@@ -26,6 +26,7 @@ from groundstation.results import magnetic as answers
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.magnetic import LETTERS
+from groundstation.results.manifest import Manifest
 from groundstation.simulation.deviation import BIN_MIDDLES_DEG, scenario_deviation
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
@@ -127,7 +128,7 @@ def test_recorded_flights_are_refused_with_the_reason(name: str, reason: str, tm
 
 @pytest.mark.parametrize("name", [field.name for field in fields(answers.MagneticResult)])
 def test_every_answer_is_saved_and_comes_back(name: str, tmp_path: Path) -> None:
-    save(tmp_path, figure_eight(), {})
+    save(tmp_path, figure_eight(), Manifest())
     before, after = figure_eight().magnetic, load(tmp_path).results.magnetic
     if name == "figures":
         assert {"magnetic_samples", "magnetic_table", "magnetic_modulus"} <= set(load(tmp_path).figures)
@@ -141,7 +142,7 @@ def test_every_answer_is_saved_and_comes_back(name: str, tmp_path: Path) -> None
 
 
 def test_index_and_front_page_tell_the_deviation(tmp_path: Path) -> None:
-    save(tmp_path, figure_eight(), {})
+    save(tmp_path, figure_eight(), Manifest())
     found, row, saved = figure_eight().magnetic, index_row(load(tmp_path)), load(tmp_path)
     assert found is not None and found.residual_rms_deg is not None
     method = found.method(found.recommended_method)
@@ -156,7 +157,7 @@ def test_index_and_front_page_tell_the_deviation(tmp_path: Path) -> None:
 
 
 def test_summary_obeys_the_schema(tmp_path: Path) -> None:
-    save(tmp_path, figure_eight(), {})
+    save(tmp_path, figure_eight(), Manifest())
     summary = load(tmp_path).summary
     own = {"$schema": SCHEMA["$schema"], "$ref": "#/$defs/magnetic", "$defs": SCHEMA["$defs"]}
     jsonschema.Draft202012Validator(own).validate(summary["results"]["magnetic"])

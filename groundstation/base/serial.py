@@ -113,15 +113,19 @@ def _object_writer(cls: type, writer: cattrs.Converter, digits: int | None) -> C
         for field in dataclasses.fields(cls)
     }
     make: Callable[..., Callable[[Any], dict[str, Any]]] = cattrs.gen.make_dict_unstructure_fn
-    write, spread = make(cls, writer, **parts), spread_of(cls)
+    write, spread, names = make(cls, writer, **parts), spread_of(cls), list(parts)
 
     def written(value: Any) -> dict[str, Any]:
+        found = write(value)
         out: dict[str, Any] = {}
-        for name, part in write(value).items():
-            out |= {item["name"]: item for item in part} if name in spread else {name: part}
+        for name in names:  # cattrs writes what may be left out behind the rest
+            if name in spread:
+                out |= {item["name"]: item for item in found[name]}
+            elif name in found:
+                out[name] = found[name]
         return out
 
-    return written if spread else write
+    return written if spread or any(part.omit_if_default for part in parts.values()) else write
 
 
 def spread_of(cls: type) -> dict[str, tuple[str, ...]]:

@@ -254,10 +254,10 @@ def _settings(a: SavedFlight, b: SavedFlight) -> tuple[SettingPair, ...]:
 
 def _settings_of(saved: SavedFlight, analyses: AbstractSet[str]) -> dict[str, Value]:
     """What the user set and, over it, what the analyses say they used."""
-    found = dict(_leaves("", mapping(saved.manifest, "configuration")))
+    found = dict(_leaves("", saved.manifest.configuration))
     for analysis in sorted(analyses):
         found |= dict(_leaves(f"{analysis}.", mapping(saved.summary, "results", analysis, "settings")))
-    versions = {"groundstation": saved.manifest.get("groundstation"), **mapping(saved.manifest, "versions")}
+    versions = {"groundstation": saved.manifest.groundstation, **saved.manifest.versions}
     return found | dict(_leaves("version.", versions))
 
 
