@@ -143,7 +143,7 @@ def test_every_answer_is_saved_and_comes_back(name: str, tmp_path: Path) -> None
 
 def test_index_and_front_page_tell_the_deviation(tmp_path: Path) -> None:
     save(tmp_path, figure_eight(), Manifest())
-    found, row, saved = figure_eight().magnetic, index_row(load(tmp_path)), load(tmp_path)
+    found, row, saved = figure_eight().magnetic, vars(index_row(load(tmp_path))), load(tmp_path)
     assert found is not None and found.residual_rms_deg is not None
     method = found.method(found.recommended_method)
     assert (row["magnetic_verdict"], row["magnetic_method"]) == (found.verdict, found.recommended_method)
