@@ -106,7 +106,7 @@ def _object_writer(cls: type, writer: cattrs.Converter, digits: int | None) -> C
     hints = typing.get_type_hints(cls)
     parts = {
         field.name: cattrs.gen.override(
-            omit=_is_kept_apart(hints[field.name]),
+            omit=is_kept_apart(hints[field.name]),
             omit_if_default="left_out_when_default" in field.metadata,
             unstruct_hook=_writer_of(field.name, digits).unstructure,
         )
@@ -133,8 +133,9 @@ def spread_of(cls: type) -> dict[str, tuple[str, ...]]:
     return {one.name: one.metadata["spread"] for one in dataclasses.fields(cls) if "spread" in one.metadata}
 
 
-def _is_kept_apart(hint: Any) -> bool:
-    return getattr(hint, "is_kept_apart", False) is True or any(map(_is_kept_apart, typing.get_args(hint)))
+def is_kept_apart(hint: Any) -> bool:
+    """Whether a type holds what has files of its own."""
+    return getattr(hint, "is_kept_apart", False) is True or any(map(is_kept_apart, typing.get_args(hint)))
 
 
 # ------------------------------------------------------------------------------------------------ reading
