@@ -47,6 +47,7 @@ from groundstation.results.files import SUMMARY, SavedFlight, load, save
 from groundstation.results.flight import FlightResults
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import ADVISORY, MagneticResult
+from groundstation.results.manifest import Manifest
 from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
@@ -185,7 +186,7 @@ def test_a_magnetometer_turned_by_2_5_deg_is_put_right(tmp_path: Path) -> None:
     mounted = ((cos, sin, 0.0), (-sin, cos, 0.0), (0.0, 0.0, 1.0))  # its nose 2.5 deg to the right of the aircraft's
     made = magnetic_example.make(hard_nt=(0.0, 0.0, 0.0), soft=mounted)
     results = analysed(made.flight)
-    save(tmp_path, results, {})
+    save(tmp_path, results, Manifest())
     paths, problem = write_exports(load(tmp_path), with_pdf=False)
     assert ([path.name for path in paths], problem) == ([DEVIATION_CSV], "")
     rows = list(csv.DictReader(io.StringIO((tmp_path / DEVIATION_CSV).read_text(encoding="utf-8"), newline="")))
@@ -463,7 +464,7 @@ def test_the_table_is_rfc_4180_with_360_rows(first: Path) -> None:
 
 def test_a_name_is_no_formula_and_comes_back(tmp_path: Path) -> None:
     results = replace(figure_eight(), metadata={"aircraft": '=HYPERLINK("x"),1'})
-    save(tmp_path, results, {})
+    save(tmp_path, results, Manifest())
     text = deviation_csv(load(tmp_path))
     assert text is not None and '"\'=HYPERLINK(""x""),1"' in text
     found = deviation_from_csv(text, "x.csv")
@@ -472,16 +473,16 @@ def test_a_name_is_no_formula_and_comes_back(tmp_path: Path) -> None:
 
 
 def test_without_a_deviation_there_are_no_files_and_old_ones_go(tmp_path: Path) -> None:
-    save(tmp_path, figure_eight(), {})
+    save(tmp_path, figure_eight(), Manifest())
     write_exports(load(tmp_path), with_pdf=True)
     assert (tmp_path / DEVIATION_CSV).exists() and (tmp_path / STEER_CARD).exists()
-    save(tmp_path, replace(figure_eight(), magnetic=None, figures=()), {})
+    save(tmp_path, replace(figure_eight(), magnetic=None, figures=()), Manifest())
     assert write_exports(load(tmp_path), with_pdf=True) == ((), "")
     assert not (tmp_path / DEVIATION_CSV).exists() and not (tmp_path / STEER_CARD).exists()
 
 
 def test_arrays_that_are_missing_are_told(tmp_path: Path) -> None:
-    save(tmp_path, replace(figure_eight(), figures=()), {})
+    save(tmp_path, replace(figure_eight(), figures=()), Manifest())
     paths, problem = write_exports(load(tmp_path), with_pdf=False)
     assert (paths, problem[:26]) == ((), "deviation.csv: not written")
 
@@ -499,7 +500,7 @@ def printed(folder: Path, **fields: Any) -> str:
     """Text of the card of the figure-eight with some answers changed."""
     saved = load(folder)
     magnetic = saved.summary["results"]["magnetic"] | fields
-    changed = SavedFlight(folder, {**saved.summary, "results": {"magnetic": magnetic}}, {}, {})
+    changed = SavedFlight(folder, {**saved.summary, "results": {"magnetic": magnetic}}, Manifest(), {})
     write_pdf(steer_card(changed), folder / "card.pdf", TEMPLATE)
     return text_of(folder / "card.pdf")
 
@@ -507,7 +508,7 @@ def printed(folder: Path, **fields: Any) -> str:
 @pytest.fixture(scope="module")
 def eight(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("eight")
-    save(folder, figure_eight(), {})
+    save(folder, figure_eight(), Manifest())
     return folder
 
 

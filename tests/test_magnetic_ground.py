@@ -9,7 +9,6 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from groundstation.on_ground import GroundDeviation
 from scipy.signal import lfilter
 
 from groundstation.base.angles import wrap_180, wrap_360
@@ -34,6 +33,8 @@ from groundstation.results import magnetic_ground as answers
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.magnetic import LETTERS
+from groundstation.results.magnetic_ground import GroundDeviation
+from groundstation.results.manifest import Manifest
 from groundstation.tables.declination import declination_along
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer.recording import write_recording
@@ -449,7 +450,7 @@ def test_a_whole_run_tells_it_and_saves_it(tmp_path: Path) -> None:
     (finding,) = (one for one in results.findings if one.code.startswith("magnetic_ground."))
     assert (finding.severity, finding.code) == ("info", "magnetic_ground.found")
     assert finding.text in sentence(results)
-    save(tmp_path, results, {})
+    save(tmp_path, results, Manifest())
     saved = load(tmp_path)
     assert {"magnetic_ground_epochs", "magnetic_ground_curve"} <= set(saved.figures)
     own = {"$schema": SCHEMA["$schema"], "$ref": "#/$defs/magnetic_ground", "$defs": SCHEMA["$defs"]}
@@ -463,7 +464,7 @@ def test_a_whole_run_tells_it_and_saves_it(tmp_path: Path) -> None:
 
 
 def test_the_report_shows_the_runs_without_system_3(tmp_path: Path) -> None:
-    save(tmp_path, whole(), {})
+    save(tmp_path, whole(), Manifest())
     section = build(load(tmp_path))
     assert section is not None
     titles = [part.title for part in section.parts if isinstance(part, Grid | Drawing)]

@@ -25,6 +25,7 @@ from groundstation.results import magnetic as answers
 from groundstation.results.files import SavedFlight, load, save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.magnetic import LETTERS, MagneticResult
+from groundstation.results.manifest import Manifest
 from groundstation.simulation.deviation import BIN_MIDDLES_DEG, scenario_deviation
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
@@ -125,7 +126,7 @@ def test_recorded_flights_are_refused_with_the_reason(name: str, reason: str, tm
 def saved(tmp_path_factory: pytest.TempPathFactory) -> SavedFlight:
     """The figure of eight as it was saved."""
     folder = tmp_path_factory.mktemp("eight")
-    save(folder, figure_eight(), {})
+    save(folder, figure_eight(), Manifest())
     return load(folder)
 
 
@@ -144,7 +145,7 @@ def test_every_answer_is_saved_and_comes_back(name: str, saved: SavedFlight) -> 
 
 
 def test_index_and_front_page_tell_the_deviation(saved: SavedFlight) -> None:
-    found, row = figure_eight().answer(MagneticResult), index_row(saved)
+    found, row = figure_eight().answer(MagneticResult), vars(index_row(saved))
     assert found is not None and found.residual_rms_deg is not None
     method = found.method(found.recommended_method)
     assert (row["magnetic_verdict"], row["magnetic_method"]) == (found.verdict, found.recommended_method)

@@ -14,6 +14,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.files import SUMMARY, load, save
 from groundstation.results.flight import FlightResults, NotAssessable
 from groundstation.results.magnetic import ADVISORY, MagneticResult
+from groundstation.results.manifest import Manifest
 from tests.report_example import example
 from tests.test_magnetic_run import figure_eight
 from tests.test_reports import HOSTILE, Page, report
@@ -25,7 +26,7 @@ TABLES = ("Coefficients", "Steer card", "Gates", "Methods side by side", "Turns 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("eight")
-    save(path, figure_eight(), {})
+    save(path, figure_eight(), Manifest())
     return path
 
 
@@ -112,9 +113,9 @@ def test_a_page_without_figures_and_with_empty_ones(folder: Path) -> None:
 
 def test_without_a_result_the_chapter_says_why(tmp_path: Path) -> None:
     results: FlightResults = example(None, not_assessable=(NotAssessable("magnetic", "no opposite turns"),))
-    save(tmp_path, results, {})
+    save(tmp_path, results, Manifest())
     (note,) = chapter(tmp_path).parts
     assert isinstance(note, Note)
     assert note.text == "Not assessable: no opposite turns"
-    save(tmp_path, replace(results, not_assessable=()), {})
+    save(tmp_path, replace(results, not_assessable=()), Manifest())
     assert build(load(tmp_path)) is None

@@ -14,11 +14,13 @@ from groundstation.results import heading as answers
 from groundstation.results import inertial as errors
 from groundstation.results.files import json_text
 from groundstation.results.flight import FlightResults, NotAssessable, Source
+from groundstation.results.schema import schema_text
 from groundstation.results.summary import SCHEMA_VERSION, summary_of
 from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import example, heading_result
 
-SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
+SCHEMA_FILE = Path(__file__).parents[1] / "schemas" / "summary.schema.json"
+SCHEMA = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
 
 
@@ -64,6 +66,10 @@ def least_inertial() -> errors.InertialResult:
 
 def least_forecast() -> outlook.ForecastResult:
     return outlook.ForecastResult("last_estimate", float("nan"), 300.0, False, "short", ())
+
+
+def test_the_kept_schema_is_the_one_the_types_give() -> None:
+    assert SCHEMA_FILE.read_text(encoding="utf-8") == schema_text(), "run `make schemas`"
 
 
 def test_schema_is_a_schema() -> None:
@@ -130,7 +136,8 @@ def test_channels_of_the_ins_errors_stand_under_their_names() -> None:
 
 
 def test_methods_of_the_schema_are_those_of_the_forecast() -> None:
-    assert SCHEMA["$defs"]["method"]["enum"] == list(outlook.METHODS)
+    for name, field in (("skill", "method"), ("forecast", "default_method")):
+        assert SCHEMA["$defs"][name]["properties"][field]["enum"] == list(outlook.METHODS)
 
 
 def test_top_level_keys_stand_in_the_order_of_the_contract() -> None:

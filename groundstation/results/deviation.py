@@ -143,9 +143,10 @@ def deviation_csv(saved: SavedFlight) -> str | None:
 
     Source of the form: RFC 4180, Common Format and MIME Type for CSV Files, 2005.
     """
-    magnetic = mapping(saved.summary, "results", "magnetic")
+    results = saved.results
+    magnetic = results.answer(MagneticResult)
     curves, table = saved.figure("magnetic_curves"), saved.figure("magnetic_table")
-    if not magnetic or curves is None or table is None:
+    if magnetic is None or curves is None or table is None:
         return None
     wanted = (
         (READING, table, "magnetic_heading_deg"),
@@ -159,14 +160,13 @@ def deviation_csv(saved: SavedFlight) -> str | None:
         return None
     columns = {name: figure[column] for name, figure, column in wanted}
     columns[COVERAGE] = np.where(columns[COVERAGE], "interpolated", "covered")
-    flight = mapping(saved.summary, "flight")
     owner = {
-        METHOD: magnetic.get("recommended_method"),
-        VERDICT: magnetic.get("verdict"),
-        FLIGHT: flight.get("id"),
-        AIRCRAFT: flight.get("aircraft"),
+        METHOD: magnetic.recommended_method,
+        VERDICT: magnetic.verdict,
+        FLIGHT: results.flight_id,
+        AIRCRAFT: results.metadata.get("aircraft", ""),
     }
-    columns |= {name: np.full(len(table), str(value or "")) for name, value in owner.items()}
+    columns |= {name: np.full(len(table), text) for name, text in owner.items()}
     return csv_text(FigureData("deviation", columns, {}), "\r\n")
 
 
