@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from groundstation.base.angles import wrap_180, wrap_360
+from groundstation.base.clock import Clock
 from groundstation.base.errors import SettingsError
+from groundstation.base.ledger import Ledger
 from groundstation.base.records import Column
 from groundstation.base.toml_settings import settings_from
 from groundstation.base.units import NS_PER_S
@@ -407,7 +409,9 @@ def test_the_deviation_rests_on_the_take_off_run_and_says_so() -> None:
 def test_what_the_user_set_reaches_the_alignment() -> None:
     """The event of the scenario at 5 s, and the take-off run excluded: taxi alone is left."""
     flight = simulate(load_scenario("magnetic-eight")).flight
-    given = Given("NOTIME_abababab", Source("flight.csv", "ab" * 32, 1, "flat-csv"), {}, {}, (), has_lost_data=False)
+    given = Given(
+        "NOTIME_abababab", Source("flight.csv", "ab" * 32, 1, "flat-csv"), Ledger(), Clock(), (), has_lost_data=False
+    )
     run = configured.Interval(str(lift_off_s(flight) - 40.0), str(lift_off_s(flight)))
     configuration = Configuration(magnetic={"alignment_event": "alignment"}, exclude=(run,))
     magnetic = analyse(flight, given, configuration).magnetic

@@ -12,7 +12,9 @@ import pytest
 from scipy.signal import lfilter
 
 from groundstation.base.angles import wrap_180, wrap_360
+from groundstation.base.clock import Clock
 from groundstation.base.errors import NotAssessableError, SettingsError
+from groundstation.base.ledger import Ledger
 from groundstation.base.records import Column
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
@@ -433,7 +435,7 @@ def test_recorded_flights(name: str, used: int, rejected: int, found_letters: st
 @cache
 def whole() -> FlightResults:
     source = Source("made.csv", "ab" * 32, 1, "flat-csv")
-    given = Given("NOTIME_abababab", source, {}, {}, (), has_lost_data=False)
+    given = Given("NOTIME_abababab", source, Ledger(), Clock(), (), has_lost_data=False)
     flight = make(heading_noise_deg=0.3, velocity_noise_mps=0.03, place_deg=0.3, flown=True, step_deg=0.1)
     return analyse(flight, given, Configuration())
 

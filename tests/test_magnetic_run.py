@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.clock import Clock
 from groundstation.base.errors import SettingsError
+from groundstation.base.ledger import Ledger
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.settings import MagneticSettings
@@ -43,7 +45,7 @@ def simulated(name: str) -> Simulated:
 
 def analysed(flight: Flight, configuration: Configuration | None = None) -> FlightResults:
     source = Source("flight.csv", "ab" * 32, 1, "flat-csv")
-    given = Given("NOTIME_abababab", source, {}, {}, (), has_lost_data=False)
+    given = Given("NOTIME_abababab", source, Ledger(), Clock(), (), has_lost_data=False)
     return analyse(flight, given, configuration or Configuration())
 
 
