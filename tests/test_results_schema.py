@@ -9,14 +9,17 @@ import jsonschema
 import pytest
 
 from groundstation.base.findings import Finding
+from groundstation.pipeline.batch import run_many
+from groundstation.pipeline.configuration import Configuration
 from groundstation.results import forecast as outlook
 from groundstation.results import heading as answers
 from groundstation.results import inertial as errors
-from groundstation.results.files import json_text
+from groundstation.results.files import json_text, load
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.schema import schema_text
 from groundstation.results.summary import SCHEMA_VERSION, summary_of
 from tests.inertial_example import forecast_result, inertial_result
+from tests.real_logs import real_log
 from tests.report_example import example, heading_result
 
 SCHEMA_FILE = Path(__file__).parents[1] / "schemas" / "summary.schema.json"
@@ -70,6 +73,19 @@ def least_forecast() -> outlook.ForecastResult:
 
 def test_the_kept_schema_is_the_one_the_types_give() -> None:
     assert SCHEMA_FILE.read_text(encoding="utf-8") == schema_text(), "run `make schemas`"
+
+
+SAMPLES = ("taxi-good.csv", "taxi-damaged.csv", "taxi-notime.csv")
+RECORDED = ("g1000/log_220502_135932_EGPN.csv", "dataflash/erle_plane_4-12-2014_329.BIN", "inertial/gv_ff02.csv")
+
+
+@pytest.mark.parametrize("log", [*SAMPLES, *RECORDED])
+def test_what_a_run_writes_obeys_the_schema_and_comes_back_equal(log: str, tmp_path: Path) -> None:
+    path = Path(__file__).parents[1] / "sample_logs" / log if log in SAMPLES else real_log(log)
+    (outcome,) = run_many([path], tmp_path / "out", Configuration(), jobs=1, with_pdf=False)
+    text = (Path(outcome.folder) / "summary.json").read_text(encoding="utf-8")
+    VALIDATOR.validate(json.loads(text))
+    assert json_text(summary_of(load(Path(outcome.folder)).results)) == text
 
 
 def test_schema_is_a_schema() -> None:
