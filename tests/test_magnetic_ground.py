@@ -18,7 +18,10 @@ from groundstation.base.ledger import Ledger
 from groundstation.base.records import Column
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
+from groundstation.chapters.magnetic import magnetic
+from groundstation.chapters.markdown import escaped
 from groundstation.chapters.parts import Grid, Note
+from groundstation.chapters.wording import number
 from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.analysis import MAGNETIC_GROUND
 from groundstation.estimators.magnetic.ground_fit import fit_curve
@@ -29,8 +32,8 @@ from groundstation.pipeline.configuration import Configuration, load_configurati
 from groundstation.pipeline.convert import convert_log
 from groundstation.pipeline.flight import read_flight, sentence
 from groundstation.pipeline.log import open_log
-from groundstation.reports.drawing import Drawing
-from groundstation.reports.sections.magnetic import build
+from groundstation.reports.drawing import Drawing, sketching
+from groundstation.reports.figures import with_drawings
 from groundstation.results import magnetic_ground as answers
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults, Source
@@ -40,7 +43,6 @@ from groundstation.results.manifest import Manifest
 from groundstation.tables.declination import declination_along
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer.recording import write_recording
-from groundstation.viewer.tabs.magnetic_text import magnetic_text
 from tests.real_logs import real_log
 from tests.recording_contents import Contents
 from tests.schema_fields import SCHEMA, expect_fields
@@ -467,8 +469,10 @@ def test_a_whole_run_tells_it_and_saves_it(tmp_path: Path) -> None:
 
 def test_the_report_shows_the_runs_without_system_3(tmp_path: Path) -> None:
     save(tmp_path, whole(), Manifest())
-    section = build(load(tmp_path))
+    section = magnetic(load(tmp_path).results)
     assert section is not None
+    with sketching():
+        section = with_drawings(section, load(tmp_path).results)
     titles = [part.title for part in section.parts if isinstance(part, Grid | Drawing)]
     assert titles[:3] == ["Ground runs: error by heading", "Ground runs", "Ground runs: coefficients"]
     notes = [part.text for part in section.parts if isinstance(part, Note)]
@@ -482,9 +486,11 @@ def test_the_tab_shows_the_runs_without_system_3(tmp_path: Path) -> None:
     assert "/magnetic/ground/curves" in Contents(tmp_path / "flight.rrd").fixed
     on_ground = results.answer(GroundDeviation)
     assert on_ground is not None
-    text = magnetic_text(None, ["no three-axis magnetometer in the log"], on_ground)
+    text = Contents(tmp_path / "flight.rrd").text("/magnetic/answer")
+    assert text.startswith("# Magnetic deviation not assessed")
     run = on_ground.used[0]
-    assert f"{run.error_deg:+.2f} ± {run.sigma_deg:.2f}" in text.replace("−", "-")
+    assert run.error_deg is not None and run.sigma_deg is not None
+    assert escaped(f"{number(run.error_deg, 2, signed=True)} ± {run.sigma_deg:.2f}") in text
 
 
 @pytest.mark.parametrize(

@@ -44,13 +44,15 @@ def markdown(section: Section, *, level: int = 1) -> str:
     level : int
         Of its heading: 1 is ``#``.
     """
-    parts = [f"{'#' * level} {escaped(section.title)}"]
+    parts = [f"{'#' * level} {escaped(section.headline or section.title)}"]
     for part in section.parts:
         parts += _part(part, level + 1)
     return "\n\n".join(parts)
 
 
 def _part(part: Part, level: int) -> list[str]:
+    if isinstance(part, Note) and part.files:  # they lie beside a report
+        return []
     if isinstance(part, Note):
         return [f"**{mark}** {escaped(part.text)}" if (mark := Mark(part.tone, "").symbol) else escaped(part.text)]
     if isinstance(part, Facts):

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from groundstation.base.errors import UsageError
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.parts import Mark
 from groundstation.chapters.wording import ABSENT, is_number, number, typeset
@@ -12,6 +11,7 @@ from groundstation.reports.page import TEMPLATES
 from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD, deviation_csv
 from groundstation.results.files import SavedFlight, write_text
+from groundstation.results.flight import FlightResults
 from groundstation.results.magnetic import ADVISORY, METHOD_TITLES, CardRow, MagneticResult
 
 TEMPLATE = TEMPLATES / "steer_card.typ"
@@ -62,13 +62,14 @@ def write_exports(saved: SavedFlight, *, with_pdf: bool) -> tuple[tuple[Path, ..
     tuple of Path, str
         What was written, and why one of them was not.
     """
+    answer = saved.results.answer(MagneticResult)
     table, card = saved.folder / DEVIATION_CSV, saved.folder / STEER_CARD
     for path in (table, card):
         path.unlink(missing_ok=True)
-    if saved.results.answer(MagneticResult) is None:
+    if answer is None:
         return (), ""
     paths, problems = [], []
-    text = deviation_csv(saved)
+    text = deviation_csv(saved.results)
     if text is None:
         problems.append(f"{DEVIATION_CSV}: not written, its arrays are missing in results.parquet: run the log again")
     else:
@@ -76,54 +77,40 @@ def write_exports(saved: SavedFlight, *, with_pdf: bool) -> tuple[tuple[Path, ..
         paths.append(table)
     if with_pdf:
         try:
-            write_pdf(steer_card(saved), card, TEMPLATE)
+            write_pdf(steer_card(saved.results, answer), card, TEMPLATE)
             paths.append(card)
         except PdfError as error:
             problems.append(str(error))
     return tuple(paths), "; ".join(problems)
 
 
-def steer_card(saved: SavedFlight) -> SteerCard:
-    """Build the card of a flight that has a magnetic deviation.
-
-    Raises
-    ------
-    UsageError
-        When it has none.
-    """
-    results = saved.results
-    magnetic, start_ns = results.answer(MagneticResult), results.start_utc_ns
-    if magnetic is None:
-        raise UsageError(str(saved.folder), "no magnetic deviation", "a flight that has one")
+def steer_card(results: FlightResults, answer: MagneticResult) -> SteerCard:
+    """Build the card of a flight from its deviation."""
+    start_ns = results.start_utc_ns
     pairs = (
         ("Flight", _shorter(results.flight_id, 2 * MOST_LETTERS)),
         ("Date", "not known" if start_ns is None else utc_ns_to_iso(start_ns)[:10]),
-        ("Magnetometer", _shorter(magnetic.magnetometer_topic)),
-        ("Swung against", _shorter(magnetic.ins_topic)),
+        ("Magnetometer", _shorter(answer.magnetometer_topic)),
+        ("Swung against", _shorter(answer.ins_topic)),
     )
-    state, reason = _state(magnetic)
-    rows = _thinned(magnetic.card)
+    state, reason = _state(answer)
+    rows = answer.card[:: max(1, -(-len(answer.card) // MOST_ROWS))]  # every k-th, so that they fit on the page
     return SteerCard(
         _shorter(results.metadata.get("aircraft") or "aircraft not named"),
         pairs,
         state,
         reason,
         tuple(_line(row) for row in rows),
-        _remarks(magnetic, rows),
+        _remarks(answer, rows),
     )
 
 
-def _state(magnetic: MagneticResult) -> tuple[Mark, str]:
+def _state(answer: MagneticResult) -> tuple[Mark, str]:
     """The verdict; anything but accept is told largely."""
-    reason = _shorter(typeset(magnetic.verdict_reason), MOST_OF_A_REASON)
-    if magnetic.verdict == "accept":
+    reason = _shorter(typeset(answer.verdict_reason), MOST_OF_A_REASON)
+    if answer.verdict == "accept":
         return Mark("good", "Accepted"), reason
-    return Mark("bad", "NOT ACCEPTED"), reason if magnetic.verdict == "reject" else f"{magnetic.verdict}: {reason}"
-
-
-def _thinned(rows: Sequence[CardRow]) -> Sequence[CardRow]:
-    """Every k-th row, so that they fit on the page."""
-    return rows[:: max(1, -(-len(rows) // MOST_ROWS))]
+    return Mark("bad", "NOT ACCEPTED"), reason if answer.verdict == "reject" else f"{answer.verdict}: {reason}"
 
 
 def _line(row: CardRow) -> CardLine:
@@ -141,18 +128,18 @@ def _three_digits(heading_deg: float) -> str:
     return f"{round(heading_deg) % 360:03d}" if is_number(heading_deg) else ABSENT
 
 
-def _remarks(magnetic: MagneticResult, rows: Sequence[CardRow]) -> tuple[str, ...]:
-    residual = magnetic.residual_rms_deg
+def _remarks(answer: MagneticResult, rows: Sequence[CardRow]) -> tuple[str, ...]:
+    residual = answer.residual_rms_deg
     left = (
         f"RMS error in level flight {number(residual.before, 2, '°')} before, {number(residual.after, 2, '°')} after."
         if residual
         else "RMS error after: not measured."
     )
-    told = [f"By the {METHOD_TITLES[magnetic.recommended_method]}. {left}"]
+    told = [f"By the {METHOD_TITLES[answer.recommended_method]}. {left}"]
     told.append("Steer: the uncorrected reading. Add: its deviation ± σ, east positive.")
     if any(row.is_interpolated for row in rows):
         told.append("* no reading of both turns near it: interpolated.")
-    if len(rows) < len(magnetic.card):
+    if len(rows) < len(answer.card):
         told.append(f"Every degree: {DEVIATION_CSV}.")
     return tuple(told)
 

@@ -13,6 +13,7 @@ from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.results.comparison import Comparison
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight
+from groundstation.results.forecast import ForecastResult
 from groundstation.viewer import colours
 from groundstation.viewer.chart import Axis, Chart, unbroken
 from groundstation.viewer.colours import Colour
@@ -248,7 +249,7 @@ def _forecast(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | Non
     """RMS of the forecast by horizon, the shipped method and the INS without one; both axes logarithmic."""
     curves: list[tuple[FloatArray, FloatArray, Line]] = []
     for half in halves:
-        forecast = half.saved.results.forecast
+        forecast = half.saved.results.answer(ForecastResult)
         default = forecast.default_method if forecast else ""
         for method, width in ((default, half.width), ("raw_ins", THIN)):
             figure = half.figure("forecast_growth", "horizon_min", f"{method}_rms_m")

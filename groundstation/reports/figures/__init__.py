@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.figures import latency
+from groundstation.reports.figures import latency, magnetic, magnetic_ground
 from groundstation.results.flight import FlightResults
 
 Drawn = Drawing | Sequence[Drawing] | None
@@ -13,6 +13,12 @@ Drawn = Drawing | Sequence[Drawing] | None
 # By the name that a chapter gives; a figure that is one of several alike gets which.
 DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, str], Drawn]] = {
     "latency.search": latency.search,
+    "magnetic.deviation": magnetic.deviation,
+    "magnetic.held_out": magnetic.held_out,
+    "magnetic.track": magnetic.track,
+    "magnetic.branches": magnetic.branches,
+    "magnetic.modulus": magnetic.modulus,
+    "magnetic.ground_runs": magnetic_ground.ground_runs,
 }
 
 
