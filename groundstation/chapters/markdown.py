@@ -52,6 +52,11 @@ def markdown(section: Section, *, level: int = 1) -> str:
     return "\n\n".join(parts)
 
 
+def part_markdown(part: Part, *, level: int = 2) -> str:
+    """A part of a section alone."""
+    return "\n\n".join(_part(part, level))
+
+
 def front_markdown(front: Front) -> str:
     """The front of a report as a Markdown document: what flight it is, the verdict, and why."""
     parts = [
@@ -92,23 +97,16 @@ def _facts(facts: Facts, level: int) -> list[str]:
 
 
 def _grid(grid: Grid, level: int) -> list[str]:
+    """A table; where a column has long remarks they stand below it, each under the name of its row."""
     rows = [[_cell(cell) for cell in row] for row in grid.rows]
-    long = {place for row in grid.rows for place, cell in enumerate(row) if place and len(_text(cell)) > WIDEST_CELL}
-    shown = [place for place in range(len(grid.heads)) if place not in long]
+    named = min((place for row in grid.rows for place, cell in enumerate(row) if isinstance(cell, str)), default=0)
+    long = {place for row in grid.rows for place, cell in enumerate(row) if len(_text(cell)) > WIDEST_CELL}
+    shown = [place for place in range(len(grid.heads)) if place == named or place not in long]
+    shown.sort(key=lambda place: place == named and place in long)  # long names last: the figures stay in sight
     heads = [escaped(grid.heads[place].title) for place in shown]
-    cells = table(heads, [[row[place] for place in shown] for row in rows])
-    below = [
-        f"{_name(cells)}: {row[place]}"
-        for cells, row in zip(grid.rows, rows, strict=True)
-        for place in sorted(long)
-        if row[place]
-    ]
-    return [*_title(grid.title, level), cells, *below, *_caption(grid.caption)]
-
-
-def _name(row: Sequence[Cell]) -> str:
-    """What a row is about: its first cell that is no mark."""
-    return escaped(next((cell for cell in row if isinstance(cell, str)), ""))
+    cells = [table(heads, [[row[place] for place in shown] for row in rows])] if shown != [named] else []
+    below = [f"{row[named]}: {row[place]}" for row in rows for place in sorted(long - {named}) if row[place]]
+    return [*_title(grid.title, level), *cells, *below, *_caption(grid.caption)]
 
 
 def _title(title: str, level: int) -> list[str]:
