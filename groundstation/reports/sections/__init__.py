@@ -1,35 +1,36 @@
-"""Chapters of the flight report: one module each.
+"""Chapters of the flight report, in its order, with their figures drawn.
 
-``build(saved)`` gives a Section, or None when there is nothing to say. A later system adds its module here and its name
-to :data:`CHAPTERS`.
+``build(saved)`` gives a Section, or None when there is nothing to say. A later system adds its chapter to
+:data:`CHAPTERS`.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from groundstation.chapters.findings import findings
+from groundstation.chapters.heading import heading as heading_chapter
 from groundstation.chapters.latency import latency
 from groundstation.chapters.magnetic import magnetic
+from groundstation.chapters.overview import overview
 from groundstation.chapters.parts import Note, Section
+from groundstation.chapters.provenance import provenance
+from groundstation.chapters.quality import quality
 from groundstation.reports.figures import with_drawings
-from groundstation.reports.sections import (
-    findings,
-    forecast,
-    heading,
-    inertial,
-    overview,
-    provenance,
-    quality,
-)
+from groundstation.reports.sections import forecast, inertial
+from groundstation.results.chosen import chosen_intervals
 from groundstation.results.files import SavedFlight
+from groundstation.results.flight import FlightResults
 
 
-def _latency(saved: SavedFlight) -> Section | None:
-    return on_a_page(latency(saved.results), saved)
+def _drawn(tell: Callable[[FlightResults], Section | None]) -> Callable[[SavedFlight], Section | None]:
+    """A chapter of the results alone; None where it has nothing to say, or nothing but figures without arrays."""
 
+    def build(saved: SavedFlight) -> Section | None:
+        drawn = on_a_page(tell(saved.results), saved)
+        return drawn if drawn is not None and drawn.parts else None
 
-def _magnetic(saved: SavedFlight) -> Section | None:
-    return on_a_page(magnetic(saved.results), saved)
+    return build
 
 
 def on_a_page(section: Section | None, saved: SavedFlight) -> Section | None:
@@ -48,14 +49,18 @@ def _of_files_there(note: Note, folder: Path) -> Note | None:
     return replace(note, files=files) if files else None
 
 
+def _heading(saved: SavedFlight) -> Section:
+    return with_drawings(heading_chapter(saved.results, chosen_intervals(saved.manifest.configuration)), saved.results)
+
+
 CHAPTERS: tuple[Callable[[SavedFlight], Section | None], ...] = (
-    heading.build,
+    _heading,
     inertial.build,
     forecast.build,
-    _latency,
-    _magnetic,
-    overview.build,
-    quality.build,
-    findings.build,
-    provenance.build,
+    _drawn(latency),
+    _drawn(magnetic),
+    _drawn(overview),
+    _drawn(quality),
+    _drawn(findings),
+    _drawn(provenance),
 )
