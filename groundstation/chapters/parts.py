@@ -90,12 +90,16 @@ class Note(Part):
 
 @dataclass(frozen=True)
 class Section:
-    """One chapter of the report. ``key`` is its anchor; ``lead`` says in a sentence what it answers."""
+    """One chapter of the report. ``key`` is its anchor; ``lead`` says in a sentence what it answers.
+
+    ``headline`` is the answer itself in a few words, where a renderer has no other place for it (text panels).
+    """
 
     key: str
     title: str
     lead: str
     parts: Sequence[Part] = field(default_factory=tuple)
+    headline: str = ""
 
 
 @dataclass(frozen=True)
