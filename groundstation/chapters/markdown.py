@@ -44,7 +44,7 @@ def markdown(section: Section, *, level: int = 1) -> str:
     level : int
         Of its heading: 1 is ``#``.
     """
-    parts = [f"{'#' * level} {escaped(section.title)}"]
+    parts = [f"{'#' * level} {escaped(section.headline or section.title)}"]
     for part in section.parts:
         parts += _part(part, level + 1)
     return "\n\n".join(parts)

@@ -6,6 +6,7 @@ to :data:`CHAPTERS`.
 
 from collections.abc import Callable
 
+from groundstation.chapters.inertial import inertial
 from groundstation.chapters.latency import latency
 from groundstation.chapters.parts import Section
 from groundstation.reports.figures import with_drawings
@@ -13,13 +14,17 @@ from groundstation.reports.sections import (
     findings,
     forecast,
     heading,
-    inertial,
     magnetic,
     overview,
     provenance,
     quality,
 )
 from groundstation.results.files import SavedFlight
+
+
+def _inertial(saved: SavedFlight) -> Section | None:
+    section = inertial(saved.results)
+    return None if section is None else with_drawings(section, saved.results)
 
 
 def _latency(saved: SavedFlight) -> Section | None:
@@ -29,7 +34,7 @@ def _latency(saved: SavedFlight) -> Section | None:
 
 CHAPTERS: tuple[Callable[[SavedFlight], Section | None], ...] = (
     heading.build,
-    inertial.build,
+    _inertial,
     forecast.build,
     _latency,
     magnetic.build,
