@@ -5,13 +5,17 @@ from dataclasses import replace
 
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.figures import inertial, latency
+from groundstation.reports.figures import forecast, inertial, latency
 from groundstation.results.flight import FlightResults
 
 Drawn = Drawing | Sequence[Drawing] | None
 
 # By the name that a chapter gives; a figure that is one of several alike gets which.
 DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, str], Drawn]] = {
+    "forecast.growth": forecast.growth,
+    "forecast.calibration": forecast.calibration,
+    "forecast.hindcast_map": forecast.hindcast_map,
+    "forecast.classic": forecast.classic,
     "inertial.state": inertial.state,
     "inertial.tilt_and_drift": inertial.tilt_and_drift,
     "inertial.radial": inertial.radial,

@@ -6,13 +6,13 @@ to :data:`CHAPTERS`.
 
 from collections.abc import Callable
 
+from groundstation.chapters.forecast import forecast
 from groundstation.chapters.inertial import inertial
 from groundstation.chapters.latency import latency
 from groundstation.chapters.parts import Section
 from groundstation.reports.figures import with_drawings
 from groundstation.reports.sections import (
     findings,
-    forecast,
     heading,
     magnetic,
     overview,
@@ -27,6 +27,11 @@ def _inertial(saved: SavedFlight) -> Section | None:
     return None if section is None else with_drawings(section, saved.results)
 
 
+def _forecast(saved: SavedFlight) -> Section | None:
+    section = forecast(saved.results)
+    return None if section is None else with_drawings(section, saved.results)
+
+
 def _latency(saved: SavedFlight) -> Section | None:
     section = latency(saved.results)
     return None if section is None else with_drawings(section, saved.results)
@@ -35,7 +40,7 @@ def _latency(saved: SavedFlight) -> Section | None:
 CHAPTERS: tuple[Callable[[SavedFlight], Section | None], ...] = (
     heading.build,
     _inertial,
-    forecast.build,
+    _forecast,
     _latency,
     magnetic.build,
     overview.build,
