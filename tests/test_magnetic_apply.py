@@ -19,8 +19,9 @@ from pypdf import PdfReader
 from typer.testing import CliRunner
 
 from groundstation.base.angles import wrap_180
-from groundstation.base.errors import UsageError
+from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.base.records import Column
+from groundstation.base.serial import to_json
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.cli.main import app
 from groundstation.estimators.magnetic.corrected import CorrectedHeading, correct_heading
@@ -45,7 +46,7 @@ from groundstation.results.deviation import (
 )
 from groundstation.results.files import SUMMARY, SavedFlight, load, save
 from groundstation.results.flight import FlightResults
-from groundstation.results.magnetic import ADVISORY
+from groundstation.results.magnetic import ADVISORY, CardRow
 from groundstation.results.manifest import Manifest
 from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import Simulated, simulate
@@ -536,19 +537,25 @@ def test_a_card_that_is_not_accepted_says_so(eight: Path, verdict: str, shown: s
 
 @pytest.mark.parametrize("step_deg", [180, 90, 45, 30, 20, 15, 10, 7, 1])
 def test_a_card_of_any_step_is_one_page(eight: Path, step_deg: int) -> None:
-    card = [
-        {"magnetic_heading_deg": float(at), "steer_deg": at + 0.4, "deviation_deg": -0.4, "sigma_deg": 0.1}
-        for at in range(0, 360, step_deg)
-    ]
+    card = [to_json(CardRow(float(at), at + 0.4, -0.4, 0.1, is_interpolated=False)) for at in range(0, 360, step_deg)]
     text = printed(eight, card=card)
     assert text.count("± 0.1") == min(len(card), -(-len(card) // -(-len(card) // MOST_ROWS)))
     assert ("Every degree: deviation.csv" in text) == (len(card) > MOST_ROWS)
 
 
 def test_a_card_whatever_stands_in_the_log(eight: Path) -> None:
-    for value in (None, [], {}, "?", HOSTILE, "a" * 300, 7):
-        for name in ("verdict", "verdict_reason", "card", "residual_rms_deg", "recommended_method", "ins_topic"):
+    for value in ("", "?", HOSTILE, "a" * 300):
+        for name in ("verdict_reason", "ins_topic", "magnetometer_topic"):
             assert ADVISORY.split()[0] in printed(eight, **{name: value})
+    for nothing in ({"card": []}, {"residual_rms_deg": None}):
+        assert ADVISORY.split()[0] in printed(eight, **nothing)
+
+
+@pytest.mark.parametrize("name", ["verdict", "verdict_reason", "card", "residual_rms_deg", "recommended_method"])
+def test_a_card_of_answers_of_another_kind_is_refused(eight: Path, name: str) -> None:
+    for value in ({}, 7, [3]):
+        with pytest.raises(UnreadableLogError, match=rf"results\.magnetic\.{name}"):
+            printed(eight, **{name: value})
 
 
 def test_the_template_of_the_card_reads_and_imports_nothing() -> None:
