@@ -86,8 +86,8 @@ class SessionErrors:
 class LinkSettings:
     """The data link: a frame of slots, one transmitter a slot, all others receive.
 
-    ``quantum_m`` rounds pseudo-ranges; ``lost_share`` of the receptions is lost at random, ``outlier_share`` is wrong by
-    ``outlier_m`` (one sigma). ``bias_m`` is the sigma of a constant bias of each receiver.
+    ``quantum_m`` rounds pseudo-ranges; ``lost_share`` of the receptions is lost at random, ``outlier_share`` is wrong
+    by ``outlier_m`` (one sigma). ``bias_m`` is the sigma of a constant bias of each receiver.
     """
 
     range_sigma_m: float = number(10.0, 0.0)

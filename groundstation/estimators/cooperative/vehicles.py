@@ -5,13 +5,14 @@ reckoning: corrected = reading - estimated error. A wheeled vehicle's state is i
 the scale errors of its odometry.
 """
 
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import EARTH_RATE_RADPS
-from groundstation.estimators.cooperative.settings import CooperativeSettings, InsBelief
+from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.estimators.cooperative.transition import discretise, global_dynamics, local_dynamics
 from groundstation.tables.session import DeadReckoning, Frame, Odometry
 
@@ -157,8 +158,10 @@ class InertialVehicle:
         cuts = self._track.time_s[(self._track.time_s > from_s + SAME_TIME_S) & (self._track.time_s < to_s)]
         edges = [from_s, *cuts.tolist(), to_s]
         transition, noise = np.eye(self.size), np.zeros((self.size, self.size))
-        for one, two in zip(edges[:-1], edges[1:], strict=True):
-            at = int(np.clip(np.searchsorted(self._track.time_s, 0.5 * (one + two)) - 1, 0, max(len(self._track) - 2, 0)))
+        for one, two in pairwise(edges):
+            at = int(
+                np.clip(np.searchsorted(self._track.time_s, 0.5 * (one + two)) - 1, 0, max(len(self._track) - 2, 0))
+            )
             phi, q = discretise(self._dynamics(at), self._density, two - one)
             transition, noise = phi @ transition, phi @ noise @ phi.T + q
         return transition, noise
@@ -205,7 +208,11 @@ class InertialVehicle:
         return density
 
 
-_PLATFORM = tuple(f"{what}_{axis}_{unit}" for what, unit in (("tilt", "rad"), ("drift", "radps")) for axis in ("north", "east", "down"))
+_PLATFORM = tuple(
+    f"{what}_{axis}_{unit}"
+    for what, unit in (("tilt", "rad"), ("drift", "radps"))
+    for axis in ("north", "east", "down")
+)
 
 
 def _specific_force(latitude_deg: float, height_m: float, velocity: FloatArray, change: FloatArray) -> FloatArray:
@@ -275,7 +282,7 @@ class WheeledVehicle:
         last = max(int(np.searchsorted(track.time_s, to_s - SAME_TIME_S)) - 1, first)
         edges = [from_s, *track.time_s[first + 1 : last + 1].tolist(), to_s]
         x, transition, noise = x.copy(), np.eye(n), np.zeros((n, n))
-        for k, (one, two) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+        for k, (one, two) in enumerate(pairwise(edges)):
             x, phi, q = self._short_step(x, first + k, two - one)
             transition, noise = phi @ transition, phi @ noise @ phi.T + q
         return x, transition, noise
@@ -330,8 +337,3 @@ def vehicle_of(track: DeadReckoning | Odometry, frame: Frame, settings: Cooperat
     if isinstance(track, Odometry):
         return WheeledVehicle(track, settings)
     return InertialVehicle(track, frame, settings)
-
-
-def belief_of(settings: CooperativeSettings) -> InsBelief:
-    """What the filter believes of an INS."""
-    return settings.ins
