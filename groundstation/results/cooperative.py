@@ -124,10 +124,10 @@ class CooperativeResult(Tabular):
     settings : dict
         Every parameter as used.
     figures : tuple of FigureData
-        ``cooperative_tracks`` (time_s, vehicle, algorithm, north_m, east_m, down_m, sigma_north_m, sigma_east_m,
-        two_sigma_r_m, error_m, nees), ``cooperative_geometry`` (time_s, vehicle, sources, hdop, gdop, determinant,
-        eigenvalue, gram_determinant, bound_m), ``cooperative_map`` (time_s, algorithm, spectral_radius),
-        ``cooperative_links`` (time_s, receiver, source, residual_m, sigma_m, mark), ``cooperative_traffic`` (algorithm,
+        ``cooperative_tracks`` (time_s, vehicle, algorithm, x_m, y_m, z_m in the frame of the session, sigma_north_m,
+        sigma_east_m, two_sigma_r_m, error_m, nees), ``cooperative_geometry`` (time_s, vehicle, sources, hdop, gdop,
+        determinant, eigenvalue, gram_determinant, bound_m), ``cooperative_map`` (time_s, algorithm, spectral_radius),
+        ``cooperative_links`` (time_s, receiver, source, innovation, sigma, mark), ``cooperative_traffic`` (algorithm,
         vehicle, messages, bytes).
     """
 

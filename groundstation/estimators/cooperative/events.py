@@ -1,6 +1,6 @@
 """A session as events in order of time, with what could not be used counted."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,6 +59,7 @@ class Prepared:
     Parameters
     ----------
     session : Session
+        Without the vehicles and rows of dead reckoning that cannot be used.
     vehicles : tuple of Vehicle
     events : tuple of Event
         In order of time; peers among vehicles that are there.
@@ -110,7 +111,8 @@ def prepare(session: Session, settings: CooperativeSettings) -> Prepared:
             latitude, longitude, _ = geodetic_deg_m(np.array(point.position_m))
             axes[index] = ecef_from_n(latitude, longitude)[:, :2]
     ranks = tuple(session.ranks.get(vehicle.name, LOWEST_RANK) for vehicle in vehicles)
-    return Prepared(session, vehicles, tuple(events), axes, ranks, tuple(findings))
+    kept = replace(session, vehicles=tuple(tracks))
+    return Prepared(kept, vehicles, tuple(events), axes, ranks, tuple(findings))
 
 
 def _clean(track: DeadReckoning | Odometry, findings: list[Finding]) -> DeadReckoning | Odometry | None:

@@ -84,7 +84,7 @@ def geometry_of(session: Session, settings: CooperativeSettings, run: AlgorithmR
         place = b"" if event.place_m is None or event.kind != SATELLITE else event.place_m.tobytes()
         frames[event.receiver].setdefault(number, {})[(event.kind, event.source, place)] = event
     return tuple(
-        _one(vehicle, heard, run.tracks, index, settings, session)
+        _one(vehicle, heard, run.tracks, index, settings, prepared.session)
         for index, (vehicle, heard) in enumerate(zip(prepared.vehicles, frames, strict=True))
     )
 
@@ -97,7 +97,7 @@ def _one(
     settings: CooperativeSettings,
     session: Session,
 ) -> Geometry:
-    track = session.vehicles[index] if index < len(session.vehicles) else None
+    track = session.vehicles[index]
     has_clock = vehicle.clock >= 0 and not session.ranges.is_two_way
     rows: list[tuple[float, ...]] = []
     history: list[tuple[float, FloatArray]] = []

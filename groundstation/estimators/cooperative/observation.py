@@ -98,11 +98,9 @@ def _range_row(
     direction: FloatArray,
     distance: float,
 ) -> Row:
+    if event.kind == SATELLITE:
+        direction, distance = _while_the_earth_turns(place, source, distance)
     predicted = distance
-    if event.kind == SATELLITE:  # the Earth turns while the signal travels
-        turn = EARTH_RATE_RADPS / LIGHT_MPS
-        predicted += turn * float(source[0] * place[1] - source[1] * place[0])
-        direction = direction + turn * np.array([-source[1], source[0], 0.0])
     h = direction @ derivative
     clock, by_clock = vehicle.receiver_clock if event.kind == SATELLITE else vehicle.clock, 0.0
     if clock >= 0 and not event.is_two_way:
@@ -113,6 +111,18 @@ def _range_row(
         predicted += float(x[vehicle.bias])
         h[vehicle.bias] += 1.0
     return Row(event.value_m - predicted, h, -direction, by_clock, event.variance_m2)
+
+
+def _while_the_earth_turns(place: FloatArray, source: FloatArray, distance: float) -> tuple[FloatArray, float]:
+    """Direction and distance from where a satellite was at emission, in the ECEF axes of the instant of reception."""
+    line = place - source
+    for _ in range(3):  # each gains six digits
+        turn = EARTH_RATE_RADPS * distance / LIGHT_MPS
+        cosine, sine = np.cos(turn), np.sin(turn)
+        x, y = cosine * source[0] + sine * source[1], cosine * source[1] - sine * source[0]
+        line = place - np.array([x, y, source[2]])
+        distance = float(np.sqrt(line @ line))
+    return line / distance, distance
 
 
 def _bearing_row(event: Event, vehicle: Vehicle, x: FloatArray, derivative: FloatArray, line: FloatArray) -> Row:
