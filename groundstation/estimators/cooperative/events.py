@@ -121,7 +121,7 @@ def _clean(track: DeadReckoning | Odometry, findings: list[Finding]) -> DeadReck
     needed = [value for name, value in parts.items() if name not in ("latitude_deg", "heading_deg")]
     good = np.ones(len(track), dtype=bool)
     for value in needed:
-        good &= np.isfinite(value.reshape(len(track), -1)).all(axis=1)
+        good &= np.isfinite(value).reshape(len(track), -1 if value.size else 0).all(axis=1)
     latest = -np.inf
     for row in np.flatnonzero(good).tolist():
         if track.time_s[row] <= latest:

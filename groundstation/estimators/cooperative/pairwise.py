@@ -2,8 +2,9 @@
 
 Each vehicle i keeps its own state and, for every other j, a factor s_ij so that the cross-covariance is s_ij s_ji'. It
 moves the factor on and corrects it by itself; only the two vehicles of a range exchange anything, and they update as
-one filter of both. Factors towards third vehicles are scaled by P_i(after) P_i(before)^-1, the method's one
-approximation. The receiver answers in the same slot: latency has no meaning here.
+one filter of both. What one of them alone sees corrects nobody else (suboptimal, yet the factors stay right). Factors
+towards third vehicles are scaled by P_i(after) P_i(before)^-1: that is the method's one approximation. The receiver
+answers in the same slot: latency has no meaning here.
 
 Source: Luft, Schubert, Roumeliotis and Burgard, Recursive decentralized localization for multi-robot systems with
 asynchronous pairwise communication, International Journal of Robotics Research 37(10), 2018, algorithm 1 and section 4.
