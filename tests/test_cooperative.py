@@ -172,7 +172,7 @@ def test_two_aircraft_pairwise_is_the_centralised_filter() -> None:
     """With two members, and nothing that one of them sees alone, nothing is approximated."""
     pair = replace(LOCAL, aircraft=LOCAL.aircraft[:2], points=())
     simulated = simulate_session(pair, 5)
-    settings = believed(pair)
+    settings = believed(pair, derivatives="estimate")
     one, other = (
         run_algorithm(prepare(simulated.session, settings), settings, name) for name in ("centralised", "pairwise")
     )

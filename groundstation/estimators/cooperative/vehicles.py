@@ -59,16 +59,15 @@ class Vehicle(Protocol):
 class InertialVehicle:
     """An aircraft with INS, barometric altimeter and clock: 7 states in a local frame, 13 or 15 in the global one."""
 
-    heading = -1
+    heading: int = -1
 
     def __init__(self, track: DeadReckoning, frame: Frame, settings: CooperativeSettings) -> None:
         self.name, self._track, self._frame, self._settings = track.name, track, frame, settings
         self.first_s, self.last_s = float(track.time_s[0]), float(track.time_s[-1])
         belief = settings.ins
-        if frame == "local":
-            self.states = ("north_m", "east_m", "velocity_north_mps", "velocity_east_mps")
-        else:
-            self.states = ("north_m", "east_m", "velocity_north_mps", "velocity_east_mps", *_PLATFORM)
+        self.states: tuple[str, ...] = ("north_m", "east_m", "velocity_north_mps", "velocity_east_mps")
+        if frame == "ecef":
+            self.states += _PLATFORM
         self.height = len(self.states)
         self.clock = self.receiver_clock = self.height + 1
         self.states += ("height_m", "clock_m", "clock_mps")
@@ -238,8 +237,10 @@ def _specific_force(latitude_deg: float, height_m: float, velocity: FloatArray, 
 class WheeledVehicle:
     """A ground vehicle with odometry: north, east, heading, and scale errors of speed and turn where believed."""
 
-    clock = receiver_clock = height = -1
-    heading = 2
+    clock: int = -1
+    receiver_clock: int = -1
+    height: int = -1
+    heading: int = 2
 
     def __init__(self, track: Odometry, settings: CooperativeSettings) -> None:
         self.name, self._track, self._settings = track.name, track, settings
