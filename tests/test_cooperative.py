@@ -346,11 +346,10 @@ def test_outliers_are_gated_and_counted() -> None:
 
 
 def test_range_bias_is_estimated() -> None:
-    """Two-way ranges between aircraft that points hold in place: every receiver reads 25 m too long."""
+    """Two-way ranges: every receiver reads 25 m too long, of aircraft and of points."""
     session = simulate_session(replace(LOCAL, duration_s=120.0), 1, scale=0.0).session
     ranges = session.ranges
-    peers = np.isin(ranges.source, ["A", "B", "C"])
-    biased = replace(ranges, pseudorange_m=ranges.pseudorange_m + np.where(peers, 25.0, 0.0), is_two_way=True)
+    biased = replace(ranges, pseudorange_m=ranges.pseudorange_m + 25.0, is_two_way=True)
     settings = believed(LOCAL, range_bias_m=50.0)
     prepared = prepare(replace(session, ranges=biased), settings)
     assert prepared.vehicles[0].states[-1] == "range_bias_m" and prepared.vehicles[0].size == 8

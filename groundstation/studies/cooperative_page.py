@@ -108,9 +108,10 @@ def page(cases: Sequence[Case], table: FigureData, runs: int, seed: int) -> str:
     lines = [
         "# Study: navigation between aircraft",
         "",
-        f"{runs} simulated sessions a case, seed {seed}; sessions are the TOML files of simulation/sessions, the "
-        "filter believes exactly what they draw from. Computed: what the filter says of itself; measured: errors against "
-        "truth over the runs. 2 sigma_r unless the metric in tables/cooperative_published.csv says otherwise. NEES of "
+        f"{runs} simulated sessions a case, seed {seed}; sessions are the TOML files of simulation/sessions, "
+        "the filter believes exactly what they draw from. Computed: what the filter says of itself; measured: errors "
+        "against truth over the runs. 2 sigma_r unless the metric in tables/cooperative_published.csv says otherwise. "
+        "NEES of "
         "the judged aircraft's position at the time of the figure, with the 95 % limits of that many independent runs. "
         f"Diverges: error over computed sigma_r above {DIVERGED:g} in the last tenth, root mean square over all "
         "aircraft and runs (in brackets: middle, end; median spectral radius of the joint error map over 10 s).",

@@ -115,7 +115,7 @@ def _range_row(
         predicted += float(x[clock]) - source_clock_m
         h[clock] += 1.0
         by_clock = 0.0 if event.kind in (POINT, SATELLITE) else -1.0
-    if vehicle.bias >= 0 and event.kind not in (POINT, SATELLITE):
+    if vehicle.bias >= 0 and event.kind != SATELLITE:
         predicted += float(x[vehicle.bias])
         h[vehicle.bias] += 1.0
     return Row(event.value_m - predicted, h, -direction, by_clock, event.variance_m2)
