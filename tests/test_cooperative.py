@@ -109,6 +109,9 @@ def test_motion_of_a_wheeled_vehicle_against_central_differences() -> None:
         step[at] = 1e-5
         numeric = (vehicle.step(x + step, 0.3, 3.6)[0] - vehicle.step(x - step, 0.3, 3.6)[0]) / 2e-5
         assert phi[:, at] == pytest.approx(numeric, abs=1e-8)
+    there, forth, _ = vehicle.step(x, 0.3, 3.6)
+    again, back, _ = vehicle.step(there, 3.6, 0.3)
+    assert again == pytest.approx(x, abs=1e-12) and back @ forth == pytest.approx(np.eye(vehicle.size), abs=1e-12)
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)

@@ -91,8 +91,8 @@ def fly(case: Case, seed: int, run: int) -> Outcome:
     who = simulated.session.names.index(case.aircraft)
     errors = []
     for track, truth in zip(done.tracks, simulated.truth, strict=True):
-        at = np.searchsorted(truth.time_s, track.time_s - 1e-6)
-        errors.append(track.state[:, :2] - truth.states[at, :2])
+        epochs = np.searchsorted(truth.time_s, track.time_s - 1e-6)
+        errors.append(track.state[:, :2] - truth.states[epochs, :2])
     track, truth = done.tracks[who], simulated.truth[who]
     place = len(track.time_s) - 1 if case.at_s is None else int(np.argmin(np.abs(track.time_s - case.at_s)))
     covariance = track.horizontal_m2[place]

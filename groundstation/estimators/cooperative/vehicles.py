@@ -277,12 +277,16 @@ class WheeledVehicle:
     def step(self, x: FloatArray, from_s: float, to_s: float) -> Step:
         """Integrate odometry, each reading held until the next; derivative by the state with it."""
         track, n = self._track, self.size
-        first = max(int(np.searchsorted(track.time_s, from_s + SAME_TIME_S)) - 1, 0)
-        last = max(int(np.searchsorted(track.time_s, to_s - SAME_TIME_S)) - 1, first)
-        edges = [from_s, *track.time_s[first + 1 : last + 1].tolist(), to_s]
+        early, late = min(from_s, to_s), max(from_s, to_s)
+        first = max(int(np.searchsorted(track.time_s, early + SAME_TIME_S)) - 1, 0)
+        last = max(int(np.searchsorted(track.time_s, late - SAME_TIME_S)) - 1, first)
+        edges = [early, *track.time_s[first + 1 : last + 1].tolist(), late]
+        epochs = list(range(first, first + len(edges) - 1))
+        if to_s < from_s:  # back in time, for measurements that are used together
+            edges, epochs = edges[::-1], epochs[::-1]
         x, transition, noise = x.copy(), np.eye(n), np.zeros((n, n))
-        for k, (one, two) in enumerate(pairwise(edges)):
-            x, phi, q = self._short_step(x, first + k, two - one)
+        for epoch, (one, two) in zip(epochs, pairwise(edges), strict=True):
+            x, phi, q = self._short_step(x, epoch, two - one)
             transition, noise = phi @ transition, phi @ noise @ phi.T + q
         return x, transition, noise
 
