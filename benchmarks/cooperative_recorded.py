@@ -187,7 +187,8 @@ def main() -> None:
         bearing_sigma_deg=given.bearing_sigma,
     )
     if given.calibrate > 0.0:
-        camera = calibrate(recorded, given.calibrate)
+        seen = load_utias(given.folder, blind=False, lag_s=given.lag, range_sigma_m=1.0, bearing_sigma_deg=1.0)
+        camera = calibrate(seen, given.calibrate)  # of all cameras on all they saw, blind robots included
         print(camera)
         recorded = corrected(recorded, camera, given.inflation)
     belief = OdometryBelief(
