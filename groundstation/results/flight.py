@@ -93,9 +93,16 @@ class FlightResults(Tabular):
         found = self.figure(name)
         return found if found is not None and len(found) else None
 
+    @property
+    def figure_names(self) -> tuple[str, ...]:
+        """Names of the figure data, none of which is read for it."""
+        if isinstance(self.figures, FigureSet):
+            return self.figures.names
+        return tuple(figure.name for figure in self.figures)
+
     def table_names(self) -> tuple[str, ...]:
         """Names that :meth:`to_frame` takes: findings, what was not assessable, the arrays behind the figures."""
-        return (*super().table_names(), *(figure.name for figure in self.figures))
+        return (*super().table_names(), *self.figure_names)
 
     def to_frame(self, table: str = "findings") -> "pd.DataFrame":
         """A table of the flight as a frame: a list of rows, or the arrays behind a figure.

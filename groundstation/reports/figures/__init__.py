@@ -3,15 +3,17 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.figures import latency, magnetic, magnetic_ground
+from groundstation.reports.figures import generic, latency, magnetic, magnetic_ground
 from groundstation.results.flight import FlightResults
 
 Drawn = Drawing | Sequence[Drawing] | None
 
 # By the name that a chapter gives; a figure that is one of several alike gets which.
 DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, str], Drawn]] = {
+    GENERIC_SERIES: generic.series,
     "latency.search": latency.search,
     "magnetic.deviation": magnetic.deviation,
     "magnetic.held_out": magnetic.held_out,
