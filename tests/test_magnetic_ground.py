@@ -324,6 +324,11 @@ def test_short_and_curved_runs_are_rejected_with_the_reason() -> None:
         found(flight)
 
 
+def answered(flight: Flight) -> Answered:
+    """The analysis of ground runs alone."""
+    return run_analyses((MAGNETIC_GROUND,), flight, known_of(flight, Configuration()))
+
+
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
@@ -338,11 +343,6 @@ def test_short_and_curved_runs_are_rejected_with_the_reason() -> None:
         (lambda flight: replace(flight, tables={}), "no magnetic heading in the log"),
     ],
 )
-def answered(flight: Flight) -> Answered:
-    """The analysis of ground runs alone."""
-    return run_analyses((MAGNETIC_GROUND,), flight, known_of(flight, Configuration()))
-
-
 def test_what_lacks_is_said_in_a_line(change: Callable[[Flight], Flight], reason: str) -> None:
     flight = change(make())
     with pytest.raises(NotAssessableError, match=reason) as told:
