@@ -1,8 +1,8 @@
-"""The chapter of an answer that has none of its own: verdict, numbers, rows and figures, told by the names of its fields.
+"""The chapter of an answer that has none of its own, told by the names and kinds of its fields.
 
-A field's name gives words and unit, its kind the part: a number or a text is a fact, a tuple of rows a grid, a dataclass
-facts under its own title. ``verdict`` and ``verdict_reason``, ``gates``, ``remarks`` and ``settings`` are told as every
-chapter tells them.
+A name gives words and unit. A number or a text is a fact, a tuple of rows a grid, a dataclass facts under a title of
+their own. ``verdict`` with ``verdict_reason``, ``gates``, ``remarks`` and ``settings`` are told as every chapter tells
+them.
 """
 
 import inspect
@@ -41,9 +41,7 @@ def generic(results: FlightResults, answer: Answer) -> Section:
         setting_facts(getattr(answer, "settings", {})),
     )
     headline = f"{title}: {verdict}" if verdict else ""
-    return Section(
-        answer.analysis, title, _lead(answer), tuple(part for part in parts if part is not None), headline
-    )
+    return Section(answer.analysis, title, _lead(answer), tuple(part for part in parts if part is not None), headline)
 
 
 def figures_over_time(results: FlightResults, analysis: str) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.figures import generic, latency, magnetic, magnetic_ground
+from groundstation.reports.figures import generic, inertial, latency, magnetic, magnetic_ground
 from groundstation.results.flight import FlightResults
 
 Drawn = Drawing | Sequence[Drawing] | None
@@ -14,6 +14,11 @@ Drawn = Drawing | Sequence[Drawing] | None
 # By the name that a chapter gives; a figure that is one of several alike gets which.
 DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, str], Drawn]] = {
     GENERIC_SERIES: generic.series,
+    "inertial.state": inertial.state,
+    "inertial.tilt_and_drift": inertial.tilt_and_drift,
+    "inertial.radial": inertial.radial,
+    "inertial.innovations": inertial.innovations,
+    "inertial.observability": inertial.observability,
     "latency.search": latency.search,
     "magnetic.deviation": magnetic.deviation,
     "magnetic.held_out": magnetic.held_out,

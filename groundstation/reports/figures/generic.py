@@ -32,7 +32,9 @@ def series(results: FlightResults, name: str) -> Drawing | None:
             for column, colour in zip(columns, d.SERIES, strict=False):
                 x, y = d.broken_at_gaps(time, numbers(data, column)[order])
                 d.line(axes, x, y, colour, 1.0, label=d.label(quantity(column)[0]))
-            axes.set_ylabel(d.label(", ".join(filter(None, (quantity(columns[0])[0] if len(columns) == 1 else "", unit)))))
+            axes.set_ylabel(
+                d.label(", ".join(filter(None, (quantity(columns[0])[0] if len(columns) == 1 else "", unit))))
+            )
             d.time_axis(axes, *d.padded(float(np.nanmin(time)), float(np.nanmax(time))), title=place == 0)
             d.legend_above(axes, 4)
 

@@ -5,12 +5,11 @@ from collections import Counter
 import numpy as np
 
 from groundstation.chapters.parts import Cell, Front, Mark
-from groundstation.chapters.wording import ABSENT, number
+from groundstation.chapters.wording import ABSENT, number, percent
 from groundstation.reports.fleet import skill
 from groundstation.reports.fleet.aircraft import median_rate
 from groundstation.reports.fleet.common import aircraft_name, bounded, day, figure_of, plural, title_of, verdict_words
 from groundstation.reports.sections.front import VERDICTS
-from groundstation.reports.sections.inertial import percent
 from groundstation.results.fleet import FleetResults
 
 MOST_NAMES = 6

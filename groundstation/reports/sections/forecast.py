@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Part, Section, Tone
-from groundstation.chapters.wording import clock, is_number, number, typeset, words
+from groundstation.chapters.wording import clock, is_number, number, percent, typeset, words
 from groundstation.reports.figures import forecast as forecast_figures
-from groundstation.reports.sections.inertial import percent
 from groundstation.reports.sections.saved import mapping, not_assessable_reason, objects
 from groundstation.results.files import SavedFlight
 from groundstation.results.forecast import FEWEST_STARTS, METHODS, honesty
