@@ -30,7 +30,7 @@ MOST_ROWS, MOST_VALUES = 40, 12
 
 def generic(results: FlightResults, answer: Answer) -> Section:
     """The chapter of an answer, whatever it holds."""
-    title, verdict = _title(words(answer.analysis)), str(getattr(answer, "verdict", ""))
+    title, verdict = titled(words(answer.analysis)), str(getattr(answer, "verdict", ""))
     plain = {name: value for name, value in _fields(answer) if name not in TOLD_ALIKE}
     parts: tuple[Part | None, ...] = (
         _verdict(verdict, str(getattr(answer, "verdict_reason", ""))),
@@ -96,8 +96,14 @@ def _is_of(name: str, analysis: str) -> bool:
     return name == analysis or name.startswith(f"{analysis}_")
 
 
-def _title(text: str) -> str:
-    """Words as a title; what people write in capitals stands so."""
+def titled(text: str) -> str:
+    """Words as a title; what people write in capitals stands so.
+
+    Examples
+    --------
+    >>> titled("gnss noise"), titled("speed rms")
+    ('GNSS noise', 'Speed RMS')
+    """
     told = " ".join(ACRONYMS.get(word, word) for word in text.split(" "))
     return told[:1].upper() + told[1:]
 
@@ -116,7 +122,7 @@ def _lead(answer: Answer) -> str:
 def _verdict(verdict: str, reason: str) -> Note | None:
     if not verdict:
         return None
-    text = f"{_title(verdict)}: {sentence(reason)}" if reason else f"{_title(verdict)}."
+    text = f"{titled(verdict)}: {sentence(reason)}" if reason else f"{titled(verdict)}."
     return Note(text, VERDICTS.get(verdict, "plain"))
 
 
@@ -127,7 +133,7 @@ def _has_parts(value: Any) -> bool:
 
 
 def _part(name: str, value: Any) -> Part | None:
-    title = _title(quantity(name)[0])
+    title = titled(quantity(name)[0])
     if isinstance(value, tuple):
         return _grid(title, value)
     pairs = dict(value) if isinstance(value, Mapping) else dict(_fields(value))
@@ -139,7 +145,7 @@ def _facts(title: str, values: Mapping[str, Any], unit_of_all: str = "") -> Fact
     pairs = []
     for name, value in values.items():
         label, unit = quantity(str(name))
-        pairs.append((_title(label), _told(str(name), value, unit or unit_of_all), ""))
+        pairs.append((titled(label), _told(str(name), value, unit or unit_of_all), ""))
     return Facts(title, pairs) if pairs else None
 
 
@@ -149,7 +155,7 @@ def _grid(title: str, rows: Sequence[Any]) -> Grid:
     for name in names:
         label, unit = quantity(name)
         is_numeric = all(getattr(row, name) is None or is_number(getattr(row, name)) for row in rows)
-        heads.append(Head(f"{_title(label)}, {unit}" if unit else _title(label), is_numeric))
+        heads.append(Head(f"{titled(label)}, {unit}" if unit else titled(label), is_numeric))
     cells: list[tuple[Cell, ...]] = [
         tuple(_told(name, getattr(row, name), "") for name in names) for row in rows[:MOST_ROWS]
     ]

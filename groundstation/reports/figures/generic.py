@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.chapters.generic import columns_by_unit, quantity
+from groundstation.chapters.generic import columns_by_unit, quantity, titled
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
 from groundstation.results.figures import numbers
@@ -38,8 +38,8 @@ def series(results: FlightResults, name: str) -> Drawing | None:
             d.time_axis(axes, *d.padded(float(np.nanmin(time)), float(np.nanmax(time))), title=place == 0)
             d.legend_above(axes, 4)
 
-    title = quantity(name)[0]
+    title = titled(quantity(name)[0])
     caption = f"Over flight time, n = {len(data)} rows; a line breaks where values are missing."
     alt = f"{title} over flight time."
     sketch = d.draw(f"series-{name}", height, paint)
-    return Drawing(title[:1].upper() + title[1:], caption, alt, sketch, (name,))
+    return Drawing(title, caption, alt, sketch, (name,))

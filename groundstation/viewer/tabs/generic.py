@@ -3,7 +3,7 @@
 import numpy as np
 import rerun.blueprint as rrb
 
-from groundstation.chapters.generic import columns_by_unit, figures_over_time, generic, quantity
+from groundstation.chapters.generic import columns_by_unit, figures_over_time, generic, quantity, titled
 from groundstation.chapters.markdown import markdown
 from groundstation.results.answer import Answer
 from groundstation.results.figures import numbers
@@ -48,4 +48,4 @@ def _plots(recorder: Recorder, results: FlightResults, path: str, name: str) -> 
 
 def _title(name: str, columns: tuple[str, ...]) -> str:
     told = f"{quantity(name)[0]}: {quantity(columns[0])[0]}" if len(columns) == 1 else quantity(name)[0]
-    return told[:1].upper() + told[1:]
+    return titled(told)
