@@ -16,8 +16,7 @@ from groundstation.tables.table import Flight
 from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.recording import write_recording
-from groundstation.viewer.tabs.forecast_text import forecast_text
-from tests.inertial_example import forecast_result, inertial_result
+from tests.inertial_example import inertial_result
 from tests.recording_contents import Contents
 from tests.viewer_example import START_NS, make_flight, make_results
 
@@ -91,8 +90,9 @@ def test_figures_asked_first_stand_in_the_panels(contents: Contents) -> None:
     first = plain(contents.text("/inertial/answer"))
     assert first.startswith("# Unaided INS, 0.41 nmi/h (median)\n")
     assert "| Platform tilt, arcsec | +11.2 | 1.5 | 0.81 |" in first and "| **○ GNSS did not return** |" in first
-    skill = contents.text("/forecast/answer")
-    assert "| drift windows (shipped) | **24** |" in skill and "| starts | 43 |" in skill
+    skill = plain(contents.text("/forecast/answer"))
+    assert skill.startswith("# Shipped method: windows of the drift alone\n")
+    assert "| windows of the drift alone (shipped) | **✓ 24** |" in skill and "| Starts | 43 |" in skill
 
 
 def test_an_aided_ins_is_told_in_both_panels(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
@@ -138,19 +138,6 @@ def test_a_recording_is_written_whatever_the_figures_lack(
     bare = by_analysis(*(replace(answer, figures=()) for answer in answers if answer))
     contents = written(tmp_path, flight, replace(results, answers=bare, figures=shown))
     assert "nmi/h" in plain(contents.text("/inertial/answer"))
-
-
-def test_calibration_panel_judges_from_enough_starts_only() -> None:
-    few = tuple(replace(row, independent_starts=4) for row in forecast_result().calibration)
-    text = forecast_text(forecast_result(calibration=few), kind="unknown")
-    assert "| too few to judge |" in text and "| within limits |" not in text
-    assert "**cannot be told**" in text and "fourteen states" in text
-    assert "| within limits |" in forecast_text(forecast_result())
-
-
-def test_panels_hold_no_markup_of_a_log() -> None:
-    text = forecast_text(forecast_result(is_calibrated=False, calibration_reason="<i>"))
-    assert "**Not calibrated**: \\<i\\>" in text
 
 
 def test_a_chart_scales_values_into_its_box(tmp_path: Path) -> None:

@@ -3,7 +3,9 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
+from groundstation.chapters.forecast import forecast
 from groundstation.chapters.generic import generic
+from groundstation.chapters.heading import heading
 from groundstation.chapters.inertial import inertial
 from groundstation.chapters.latency import latency
 from groundstation.chapters.magnetic import magnetic
@@ -27,11 +29,12 @@ class Chapter(NamedTuple):
 
 # In the order of the report. An answer that none of them tells has the generic chapter.
 FLIGHT_CHAPTERS: tuple[Chapter, ...] = (
+    Chapter((HeadingResult,), heading),
     Chapter((InertialResult,), inertial),
+    Chapter((ForecastResult,), forecast),
     Chapter((Latencies,), latency),
     Chapter((MagneticResult, GroundDeviation), magnetic),
 )
-TOLD_BESIDE = (HeadingResult, ForecastResult)  # by reports/sections
 
 
 def chapters_of(results: FlightResults) -> tuple[Section, ...]:
@@ -45,5 +48,5 @@ def chapters_of(results: FlightResults) -> tuple[Section, ...]:
 
 def without_chapter(results: FlightResults) -> tuple[Answer, ...]:
     """The answers that no chapter of its own tells."""
-    told = (*TOLD_BESIDE, *(kind for chapter in FLIGHT_CHAPTERS for kind in chapter.answers))
+    told = tuple(kind for chapter in FLIGHT_CHAPTERS for kind in chapter.answers)
     return tuple(answer for answer in results.answers.values() if not isinstance(answer, told))

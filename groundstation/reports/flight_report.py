@@ -5,11 +5,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from groundstation.chapters.front import front
 from groundstation.chapters.parts import Document
 from groundstation.reports.page import TEMPLATES, render
 from groundstation.reports.pdf import PdfError, write_pdf
-from groundstation.reports.sections import flight_sections, front
-from groundstation.reports.sections.saved import mapping
+from groundstation.reports.sections import flight_sections
 from groundstation.reports.steer_card import write_exports
 from groundstation.results.answer import Answer
 from groundstation.results.files import SavedFlight, load, write_text
@@ -72,8 +72,7 @@ def write_pages(page: Path, html: str, document: Document, *, with_pdf: bool) ->
 
 def flight_document(saved: SavedFlight) -> Document:
     """Put the report of one saved flight together."""
-    flight_id = str(mapping(saved.summary, "flight").get("id", ""))
-    return Document("Flight report", flight_id, front.build(saved), flight_sections(saved))
+    return Document("Flight report", saved.results.flight_id, front(saved.results), flight_sections(saved))
 
 
 def flight_report_html(document: Document) -> str:

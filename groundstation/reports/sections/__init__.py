@@ -4,26 +4,26 @@ from dataclasses import replace
 from pathlib import Path
 
 from groundstation.chapters import chapters_of
+from groundstation.chapters.findings import findings
+from groundstation.chapters.overview import overview
 from groundstation.chapters.parts import Note, Section
+from groundstation.chapters.provenance import provenance
+from groundstation.chapters.quality import quality
 from groundstation.reports.figures import with_drawings
-from groundstation.reports.sections import findings, forecast, heading, overview, provenance, quality
 from groundstation.results.files import SavedFlight
 
-FORECAST_IS_BEHIND = "inertial"
+ON_THE_FLIGHT = (overview, quality, findings, provenance)  # behind the chapters on its answers
 
 
 def flight_sections(saved: SavedFlight) -> tuple[Section, ...]:
-    """The chapters of a flight: those on its answers, then the flight itself, its data and findings, its source."""
-    told = [on_a_page(section, saved) for section in chapters_of(saved.results)]
-    place = sum(section.key == FORECAST_IS_BEHIND for section in told)  # it stands first where there is one
-    sections = (
-        heading.build(saved),
-        *told[:place],
-        forecast.build(saved),
-        *told[place:],
-        *(module.build(saved) for module in (overview, quality, findings, provenance)),
-    )
-    return tuple(section for section in sections if section is not None)
+    """The chapters of a flight: those on its answers, then the flight itself, its data and findings, its source.
+
+    A chapter that has nothing to say is left out, and one of nothing but figures without arrays.
+    """
+    results = saved.results
+    told = (*chapters_of(results), *(build(results) for build in ON_THE_FLIGHT))
+    drawn = (on_a_page(section, saved) for section in told if section is not None)
+    return tuple(section for section in drawn if section.parts)
 
 
 def on_a_page(section: Section, saved: SavedFlight) -> Section:
