@@ -1,6 +1,5 @@
 """A flight's results with plausible figures, made without readers or estimators: what the report's tests show."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -21,15 +20,16 @@ from groundstation.results.heading import (
     Standstill,
     TaxiSegment,
 )
+from groundstation.results.manifest import Host, Manifest
 from groundstation.simulation.processes import damped_oscillation, gauss_markov
 
 ERROR_DEG = 1.04
-MANIFEST: Mapping[str, Any] = {
-    "groundstation": "0.1.0",
-    "made_utc": "2031-01-02T03:04:05Z",
-    "host": {"platform": "somewhere"},
-    "configuration": {"exclude": [{"from": "+03:10", "to": "+03:15", "reason": "towed"}]},
-}
+MANIFEST = Manifest(
+    groundstation="0.1.0",
+    made_utc="2031-01-02T03:04:05Z",
+    host=Host(platform="somewhere"),
+    configuration={"exclude": [{"from": "+03:10", "to": "+03:15", "reason": "towed"}]},
+)
 
 
 def figure(name: str, **columns: Any) -> FigureData:

@@ -105,18 +105,25 @@ def _object_writer(cls: type, writer: cattrs.Converter, digits: int | None) -> C
     hints = typing.get_type_hints(cls)
     parts = {
         field.name: cattrs.gen.override(
-            omit=_is_kept_apart(hints[field.name]),
+            omit=is_kept_apart(hints[field.name]),
             omit_if_default="left_out_when_default" in field.metadata,
             unstruct_hook=_writer_of(field.name, digits).unstructure,
         )
         for field in dataclasses.fields(cls)
     }
     make: Callable[..., Callable[[Any], dict[str, Any]]] = cattrs.gen.make_dict_unstructure_fn
-    return make(cls, writer, **parts)
+    write, names = make(cls, writer, **parts), list(parts)
+
+    def written(value: Any) -> dict[str, Any]:
+        found = write(value)
+        return {name: found[name] for name in names if name in found}  # cattrs writes what may be left out last
+
+    return written if any(part.omit_if_default for part in parts.values()) else write
 
 
-def _is_kept_apart(hint: Any) -> bool:
-    return getattr(hint, "is_kept_apart", False) is True or any(map(_is_kept_apart, typing.get_args(hint)))
+def is_kept_apart(hint: Any) -> bool:
+    """Whether a type holds what has files of its own."""
+    return getattr(hint, "is_kept_apart", False) is True or any(map(is_kept_apart, typing.get_args(hint)))
 
 
 # ------------------------------------------------------------------------------------------------ reading

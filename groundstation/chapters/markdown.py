@@ -80,6 +80,8 @@ def answer_line(front: Front) -> str:
 def _part(part: Part | None, level: int) -> list[str]:
     if isinstance(part, Figure):
         return _part(part.instead, level)
+    if isinstance(part, Note) and part.files:  # they lie beside a report
+        return []
     if isinstance(part, Note):
         return [f"**{mark}** {escaped(part.text)}" if (mark := Mark(part.tone, "").symbol) else escaped(part.text)]
     if isinstance(part, Facts):

@@ -1,4 +1,4 @@
-"""Intervals that the user left out of the estimates, or forced into them, as the manifest of a run tells."""
+"""Intervals that the user left out of the estimates, or forced into them, as the configuration of a run has them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,17 +18,16 @@ class ChosenInterval:
     reason: str = ""
 
 
-def chosen_intervals(manifest: Mapping[str, Any]) -> tuple[ChosenInterval, ...]:
-    """The intervals of a manifest, those left out first.
+def chosen_intervals(configuration: Mapping[str, Any]) -> tuple[ChosenInterval, ...]:
+    """The intervals in the configuration of a run, those left out first.
 
     Examples
     --------
-    >>> chosen_intervals({"configuration": {"exclude": [{"from": "+03:10", "to": "+03:15", "reason": "towed"}]}})
+    >>> chosen_intervals({"exclude": [{"from": "+03:10", "to": "+03:15", "reason": "towed"}]})
     (ChosenInterval(use='exclude', start='+03:10', end='+03:15', reason='towed'),)
     >>> chosen_intervals({})
     ()
     """
-    configuration = manifest.get("configuration", {})
     return tuple(
         ChosenInterval(use, str(one["from"]), str(one["to"]), str(one.get("reason") or ""))
         for use in USES

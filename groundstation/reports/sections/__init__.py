@@ -5,44 +5,62 @@
 """
 
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 
 from groundstation.chapters.findings import findings
-from groundstation.chapters.heading import heading as heading_chapter
+from groundstation.chapters.heading import heading
 from groundstation.chapters.latency import latency
+from groundstation.chapters.magnetic import magnetic
 from groundstation.chapters.overview import overview
-from groundstation.chapters.parts import Section
+from groundstation.chapters.parts import Note, Section
 from groundstation.chapters.provenance import provenance
 from groundstation.chapters.quality import quality
 from groundstation.reports.figures import with_drawings
-from groundstation.reports.sections import forecast, inertial, magnetic
+from groundstation.reports.sections import forecast, inertial
 from groundstation.results.chosen import chosen_intervals
 from groundstation.results.files import SavedFlight
 from groundstation.results.flight import FlightResults
 
-
-def _drawn(tell: Callable[[FlightResults], Section | None]) -> Callable[[SavedFlight], Section | None]:
-    """A chapter of the results alone; None where it has nothing to say, or nothing but figures without arrays."""
-
-    def build(saved: SavedFlight) -> Section | None:
-        told = tell(saved.results)
-        drawn = None if told is None else with_drawings(told, saved.results)
-        return drawn if drawn is not None and drawn.parts else None
-
-    return build
+Chapter = Callable[[SavedFlight], Section | None]
 
 
-def _heading(saved: SavedFlight) -> Section:
-    return with_drawings(heading_chapter(saved.results, chosen_intervals(saved.manifest)), saved.results)
+def on_a_page(section: Section | None, saved: SavedFlight) -> Section | None:
+    """The section as a report shows it: its figures drawn, of the files beside the report those that are there.
+
+    None where nothing is left: there were figures alone, and no arrays.
+    """
+    if section is None:
+        return None
+    drawn = with_drawings(section, saved.results)
+    parts = (
+        _of_files_there(part, saved.folder) if isinstance(part, Note) and part.files else part for part in drawn.parts
+    )
+    shown = tuple(part for part in parts if part is not None)
+    return replace(drawn, parts=shown) if shown else None
 
 
-CHAPTERS: tuple[Callable[[SavedFlight], Section | None], ...] = (
+def _of_files_there(note: Note, folder: Path) -> Note | None:
+    files = [name for name in note.files if (folder / name).is_file()]
+    return replace(note, files=files) if files else None
+
+
+def _page(chapter: Callable[[FlightResults], Section | None]) -> Chapter:
+    return lambda saved: on_a_page(chapter(saved.results), saved)
+
+
+def _heading(saved: SavedFlight) -> Section | None:
+    return on_a_page(heading(saved.results, chosen_intervals(saved.manifest.configuration)), saved)
+
+
+CHAPTERS: tuple[Chapter, ...] = (
     _heading,
     inertial.build,
     forecast.build,
-    _drawn(latency),
-    magnetic.build,
-    _drawn(overview),
-    _drawn(quality),
-    _drawn(findings),
-    _drawn(provenance),
+    _page(latency),
+    _page(magnetic),
+    _page(overview),
+    _page(quality),
+    _page(findings),
+    _page(provenance),
 )
