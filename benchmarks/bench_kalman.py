@@ -24,9 +24,9 @@ from groundstation.estimators.kalman.filter import (  # noqa: E402
     Kept,
     Measurements,
     Start,
-    Transition,
     run_filter,
 )
+from groundstation.estimators.kalman.transition import Transition  # noqa: E402
 
 Array = NDArray[np.float64]
 SEED = 1960

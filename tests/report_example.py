@@ -298,7 +298,7 @@ def example(*answers: Answer | None, **changes: Any) -> FlightResults:
         duration_s=3000.0,
         status="ok",
         completeness={"gnss": 0.9897, "ins": 1.0},
-        clock=Clock(first_device_time="2026-05-04T06:00:00.000Z", is_absolute=True, nominal_period_s=0.02, start="utc"),
+        clock=Clock(first_device_time="12.000 s", nominal_period_s=0.02),
         findings=(
             Finding("info", "reader.derived", "GNSS velocity derived from track and ground speed", "gnss"),
             Finding(

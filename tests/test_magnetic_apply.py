@@ -24,10 +24,11 @@ from groundstation.base.records import Column
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.cli.main import app
 from groundstation.estimators.magnetic.corrected import CorrectedHeading, correct_heading
-from groundstation.pipeline.apply_deviation import APPLIED, NOT_APPLIED, Applied, Apply, apply_deviation, asked_for
+from groundstation.pipeline.apply_deviation import APPLIED, NOT_APPLIED, Applied, apply_deviation
 from groundstation.pipeline.batch import plan_many, run_many
 from groundstation.pipeline.check import check_many
 from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.deviation_to_apply import Apply, asked_for
 from groundstation.pipeline.elsewhere import FarFolder
 from groundstation.pipeline.inputs import file_in
 from groundstation.pipeline.outcome import Outcome

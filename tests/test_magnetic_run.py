@@ -65,7 +65,7 @@ def test_a_figure_eight_is_accepted_with_its_coefficients() -> None:
     assert found.poisson is not None
     assert flown.scenario.electric is not None
     electric = replace(flown.scenario.electric, base_a=found.poisson.current_reference_a)
-    truth = scenario_deviation(replace(flown, scenario=replace(flown.scenario, electric=electric)))
+    truth = scenario_deviation(replace(flown.scenario, electric=electric), flown.trajectory)
     assert truth is not None
     assert (found.verdict, found.recommended_method) == ("accept", "poisson_attitude")
     expected = harmonics.fit(BIN_MIDDLES_DEG, wrap_180(truth.compass_error_deg + truth.declination_deg))[0]

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import UsageError
+from groundstation.base.salvage import salvaged
 from groundstation.base.serial import (
     LEFT_OUT_WHEN_DEFAULT,
     MismatchError,
     from_json,
-    salvaged,
     to_json,
     to_json_exactly,
 )

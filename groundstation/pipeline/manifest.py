@@ -4,7 +4,7 @@ import platform
 import sys
 from datetime import UTC, datetime
 
-from groundstation import __version__
+from groundstation.base.version import __version__
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.log import Log
 from groundstation.pipeline.resume import versions

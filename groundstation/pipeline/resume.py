@@ -16,9 +16,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
-from groundstation import __version__
 from groundstation.base.errors import GroundstationError
 from groundstation.base.findings import Severity, worst
+from groundstation.base.version import __version__
 from groundstation.pipeline.apply_deviation import APPLIED, corrected_name
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.identity import plain_id

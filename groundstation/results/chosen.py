@@ -19,7 +19,7 @@ class ChosenInterval:
 
 
 def chosen_intervals(configuration: Mapping[str, Any]) -> tuple[ChosenInterval, ...]:
-    """The intervals in the configuration of a run, those left out first.
+    """The intervals in the configuration that a manifest keeps, those left out first.
 
     Examples
     --------

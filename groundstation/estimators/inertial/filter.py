@@ -11,7 +11,9 @@ from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.estimators.inertial.model import POSITION, SIZE, VELOCITY, ChannelModel, FloatArray
 from groundstation.estimators.inertial.noise import InsNoise
 from groundstation.estimators.kalman import filter as kalman
+from groundstation.estimators.kalman import smoother
 from groundstation.estimators.kalman.arrays import NO_STEP, REJECTED, Drive, Lines
+from groundstation.estimators.kalman.transition import Transition, distinct_steps
 
 TIME_RESOLUTION_S = 1e-4  # intervals that agree to this share one transition
 MOST_TRANSITIONS = 4096  # distinct intervals kept exactly; jittered clocks are rounded more coarsely beyond
@@ -62,6 +64,15 @@ class Epochs:
     def interval_s(self) -> float:
         """Median interval of the epochs, with GNSS or without, seconds; 1 for fewer than two."""
         return float(np.median(np.diff(self.time_s))) if len(self) > 1 else 1.0
+
+    @cached_property
+    def gnss_intervals_s(self) -> tuple[float, float]:
+        """Median interval of the epochs with a position and of those with a velocity; 1 s for fewer than two."""
+        found = []
+        for measured in (self.position_m, self.velocity_mps):
+            times = self.time_s[np.isfinite(measured).any(axis=1)]
+            found.append(float(np.median(np.diff(times))) if len(times) > 1 else 1.0)
+        return found[0], found[1]
 
     @property
     def has_gnss(self) -> BoolArray:
@@ -173,7 +184,7 @@ def initial_of(epochs: Epochs, noise: InsNoise) -> Initial:
 def steps_between(time_s: FloatArray, model: ChannelModel, noise: InsNoise) -> Steps:
     """Transition and noise of every interval; intervals equal to 0.1 ms share one."""
     interval = np.diff(time_s, prepend=time_s[:1])
-    seconds, index = kalman.distinct_steps(interval, TIME_RESOLUTION_S, MOST_TRANSITIONS)
+    seconds, index = distinct_steps(interval, TIME_RESOLUTION_S, MOST_TRANSITIONS)
     density = noise.densities()
     return Steps(
         index,
@@ -253,29 +264,20 @@ def _stacked(parts: list[FloatArray]) -> FloatArray:
     return parts[0][None] if len(parts) == 1 else np.stack(parts)
 
 
-def gnss_intervals_s(epochs: Epochs) -> tuple[float, float]:
-    """Median interval of the epochs with a position and of those with a velocity; 1 s for fewer than two."""
-    found = []
-    for measured in (epochs.position_m, epochs.velocity_mps):
-        times = epochs.time_s[np.isfinite(measured).any(axis=1)]
-        found.append(float(np.median(np.diff(times))) if len(times) > 1 else 1.0)
-    return found[0], found[1]
-
-
 def measurement_variances(epochs: Epochs, noise: InsNoise) -> tuple[FloatArray, FloatArray]:
     """Variances of position and velocity, shape (2,) each: as they are weighted, and as a single one errs.
 
     The first are inflated for slow errors; the second are not, or the gate would be as wide as the inflation, but leave
     room for a receiver worse than the class thinks and for the lag of a filter that weighs it little.
     """
-    weighted = [noise.gnss.variances(interval)[kind] for kind, interval in enumerate(gnss_intervals_s(epochs))]
+    weighted = [noise.gnss.variances(interval)[kind] for kind, interval in enumerate(epochs.gnss_intervals_s)]
     believed = replace(noise.gnss, is_inflated=False).variances(1.0)
     return np.array(weighted), ROOM_OF_THE_GATE**2 * np.array(believed)
 
 
 def patience_of(epochs: Epochs) -> Int64Array:
     """Rejections in a row of each kind, shape (2,), after which the filter takes GNSS to be right."""
-    return np.array([max(1, round(PATIENCE_S / interval)) for interval in gnss_intervals_s(epochs)], dtype=np.int64)
+    return np.array([max(1, round(PATIENCE_S / interval)) for interval in epochs.gnss_intervals_s], dtype=np.int64)
 
 
 def _pushed(drag: FloatArray, group: list[int], earlier: list[FloatArray]) -> FloatArray:
@@ -306,7 +308,7 @@ def _run_group(
     step = steps.index.copy()
     step[:1] = NO_STEP  # the start belongs to the first epoch
     return kalman.run_filter(
-        kalman.Transition.dense(steps.transitions, steps.noises),
+        Transition.dense(steps.transitions, steps.noises),
         step,
         kalman.Measurements(np.repeat(np.arange(n), 2), z.reshape(2 * n, channels), np.tile(both, n), lines),
         kalman.Start(first.of(group), first.covariance(group[0])),
@@ -330,7 +332,7 @@ def smooth(run: FilterRun, first: int = 0, last: int | None = None) -> Smoothed:
 
     Source: Rauch, Tung, Striebel, 1965, in the form of Bryson and Frazier (Bierman, 1973).
     """
-    parts = [kalman.smooth(part, first, last) for part in run.parts]
+    parts = [smoother.smooth(part, first, last) for part in run.parts]
     shapes = [(*part.variance.shape, len(group)) for part, group in zip(parts, run.groups, strict=True)]
     variances = [np.broadcast_to(part.variance[:, :, None], shape) for part, shape in zip(parts, shapes, strict=True)]
     return Smoothed(_joined([part.x for part in parts]), _joined(variances))

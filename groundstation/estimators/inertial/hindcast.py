@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.records import Int64Array
-from groundstation.estimators.inertial.filter import Epochs, FilterRun, gnss_intervals_s
+from groundstation.estimators.inertial.filter import Epochs, FilterRun
 from groundstation.estimators.inertial.model import POSITION, SIZE, VELOCITY, FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.starts import start_states
-from groundstation.estimators.kalman import filter as kalman
 from groundstation.estimators.kalman.arrays import Drive
+from groundstation.estimators.kalman.filter import forecast
+from groundstation.estimators.kalman.transition import Transition
 
 NEAREST_S = 1.0
 
@@ -120,7 +121,7 @@ def built_up(epochs: Epochs, at: Int64Array, lead_s: FloatArray) -> FloatArray:
 
 def nearest_s(epochs: Epochs) -> float:
     """How far from a start or a lead an epoch may be that is compared: one interval of GNSS, a second at least."""
-    return max(NEAREST_S, gnss_intervals_s(epochs)[0])
+    return max(NEAREST_S, epochs.gnss_intervals_s[0])
 
 
 def _forecast(
@@ -141,8 +142,8 @@ def _forecast(
     phi[POSITION, VELOCITY] = step_s  # the velocity is held and the model not used
     if method != "hold_velocity":
         phi = run.model.transition_over(step_s)
-    built = kalman.forecast(
-        kalman.Transition.blocks(phi[None], np.zeros((1, SIZE, SIZE)), 1),
+    built = forecast(
+        Transition.blocks(phi[None], np.zeros((1, SIZE, SIZE)), 1),
         np.zeros(every * leads, dtype=np.int64),
         np.ascontiguousarray(states.transpose(1, 2, 0)),
         known.T,

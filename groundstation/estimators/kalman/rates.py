@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.base.records import Int64Array, frozen
 from groundstation.estimators.kalman.arrays import FloatArray
-from groundstation.estimators.kalman.filter import Transition
+from groundstation.estimators.kalman.transition import Transition
 
 ORDER = 4
 

@@ -6,7 +6,9 @@ from dataclasses import replace
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures import (
+    forecast,
     heading,
+    inertial,
     latency,
     magnetic,
     magnetic_ground,
@@ -28,6 +30,15 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "heading.spectrum": heading.spectrum,
     "standstill.components": standstill.components,
     "standstill.mean_speed": standstill.mean_speed,
+    "forecast.growth": forecast.growth,
+    "forecast.calibration": forecast.calibration,
+    "forecast.hindcast_map": forecast.hindcast_map,
+    "forecast.classic": forecast.classic,
+    "inertial.state": inertial.state,
+    "inertial.tilt_and_drift": inertial.tilt_and_drift,
+    "inertial.radial": inertial.radial,
+    "inertial.innovations": inertial.innovations,
+    "inertial.observability": inertial.observability,
     "latency.search": latency.search,
     "magnetic.deviation": magnetic.deviation,
     "magnetic.held_out": magnetic.held_out,

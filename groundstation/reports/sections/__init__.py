@@ -9,7 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from groundstation.chapters.findings import findings
+from groundstation.chapters.forecast import forecast
 from groundstation.chapters.heading import heading
+from groundstation.chapters.inertial import inertial
 from groundstation.chapters.latency import latency
 from groundstation.chapters.magnetic import magnetic
 from groundstation.chapters.overview import overview
@@ -17,7 +19,6 @@ from groundstation.chapters.parts import Note, Section
 from groundstation.chapters.provenance import provenance
 from groundstation.chapters.quality import quality
 from groundstation.reports.figures import with_drawings
-from groundstation.reports.sections import forecast, inertial
 from groundstation.results.chosen import chosen_intervals
 from groundstation.results.files import SavedFlight
 from groundstation.results.flight import FlightResults
@@ -55,8 +56,8 @@ def _heading(saved: SavedFlight) -> Section | None:
 
 CHAPTERS: tuple[Chapter, ...] = (
     _heading,
-    inertial.build,
-    forecast.build,
+    _page(inertial),
+    _page(forecast),
     _page(latency),
     _page(magnetic),
     _page(overview),
