@@ -206,7 +206,7 @@ def test_intervals_chosen_by_hand_are_told_where_they_are_known() -> None:
     chosen = (ChosenInterval("exclude", "+03:10", "+03:15", "towed"), ChosenInterval("force", "1", "2"))
     part = next(
         part
-        for part in heading(example(heading_result()), chosen).parts
+        for part in heading(example(heading_result(), chosen=chosen)).parts
         if isinstance(part, Facts) and part.title == "Intervals chosen by hand"
     )
     assert part.pairs == [

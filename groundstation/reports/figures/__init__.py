@@ -3,10 +3,12 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures import (
     forecast,
+    generic,
     heading,
     inertial,
     latency,
@@ -22,6 +24,7 @@ Drawn = Drawing | Sequence[Drawing] | None
 
 # By the name that a chapter gives; a figure that is one of several alike gets which.
 DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, str], Drawn]] = {
+    GENERIC_SERIES: generic.series,
     "heading.difference": heading.difference,
     "heading.density": heading.density,
     "heading.convergence": heading.convergence,
