@@ -31,7 +31,7 @@ demo: $(RUNTIME) ## run the main job on sample_logs/ into demo_results/
 	@echo "Open demo_results/<flight>/report.html, or: $(BIN)/groundstation view demo_results/<flight>"
 
 test: $(DEV) ## the whole suite: tests and doctests
-	$(BIN)/python -m pytest -q -n auto
+	$(BIN)/python -m pytest -q -n auto --dist worksteal
 
 check: $(DEV) ## in half a minute: format, lint, types, the import rules between rooms
 	$(BIN)/ruff format --check .
@@ -40,14 +40,15 @@ check: $(DEV) ## in half a minute: format, lint, types, the import rules between
 	$(BIN)/python -m pytest -q tests/test_architecture.py
 
 slow: $(DEV) ## the long Monte Carlo tests
-	$(BIN)/python -m pytest -q -n auto -m slow
+	$(BIN)/python -m pytest -q -n auto --dist worksteal -m slow
 
 fuzz: $(DEV) ## mutated logs through every reader for three minutes; FUZZ=10000: so many of each format
 	$(BIN)/python -m tests.fuzz
 
-schemas: $(DEV) ## recompile schemas/*.proto into the package's descriptor set
+schemas: $(DEV) ## make the package's descriptor set from schemas/*.proto, schemas/summary.schema.json from the results
 	$(BIN)/python -m grpc_tools.protoc -Ischemas --include_imports \
 		--descriptor_set_out=groundstation/store/descriptors.binpb schemas/*.proto
+	$(BIN)/python -m groundstation.results.schema schemas/summary.schema.json
 
 bench: $(RUNTIME) ## benchmarks against peers, printed as ratios
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[bench]'

@@ -1,14 +1,24 @@
-"""Fixtures of the whole suite: the headless viewer."""
+"""Fixtures of the whole suite: the headless viewer, runs made once, reports without their figures."""
 
+import hashlib
 import os
+import pickle
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from contextvars import Context
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 from rerun.experimental import ViewerClient
 
+from groundstation.pipeline.batch import run_many
+from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.outcome import Outcome
+from groundstation.reports.drawing import sketching
 from tests.viewer_shots import NoViewerError, viewer
+
+SAMPLES = Path(__file__).parents[1] / "sample_logs"
 
 
 @pytest.fixture(scope="module")
@@ -29,3 +39,30 @@ def headless_viewer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callab
             pytest.skip(reason)
 
         yield start
+
+
+@pytest.fixture(scope="session")
+def finished_run(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Outcome]:
+    """Run a sample log with everything a run makes, once for all tests of all workers: copy it before you change it."""
+    is_worker = "PYTEST_XDIST_WORKER" in os.environ
+    shared = tmp_path_factory.getbasetemp().parent if is_worker else tmp_path_factory.getbasetemp()
+
+    def run(sample: str, configuration: Configuration | None = None) -> Outcome:
+        wanted = configuration or Configuration()
+        folder = shared / f"finished-{sample}-{hashlib.sha256(repr(wanted).encode()).hexdigest()[:8]}"
+        told = folder / "outcome.pickle"
+        with FileLock(f"{folder}.lock"):
+            if not told.exists():
+                # a context of its own: a test that leaves its figures unpainted may be the first to ask
+                (outcome,) = Context().run(run_many, [SAMPLES / f"{sample}.csv"], folder / "out", wanted, jobs=1)
+                told.write_bytes(pickle.dumps(outcome))
+        return pickle.loads(told.read_bytes())
+
+    return run
+
+
+@pytest.fixture
+def unpainted() -> Iterator[None]:
+    """Leave the figures of reports unpainted, three quarters of a run's work: for tests that look at no report."""
+    with sketching():
+        yield

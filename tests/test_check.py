@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from groundstation.cli.main import app
 from groundstation.pipeline.batch import run_many
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.conversions import convert_many
+from groundstation.pipeline.outcome import Outcome
 from groundstation.results.files import load
 from tests.dataflash_writer import DataFlash
 from tests.ulog_writer import ATTITUDE, BARO, UlogWriter
@@ -222,9 +224,9 @@ def test_thresholds_are_checked_and_a_file_wins_over_the_section(tmp_path: Path)
     assert not (tmp_path / "out").exists()
 
 
-def test_an_answer_that_leans_on_a_damaged_span_says_so(tmp_path: Path) -> None:
-    log = SAMPLES / "taxi-good.csv"
-    (sound,) = run_many([log], tmp_path / "sound", Configuration())
+@pytest.mark.usefixtures("unpainted")
+def test_an_answer_that_leans_on_a_damaged_span_says_so(finished_run: Callable[..., Outcome], tmp_path: Path) -> None:
+    sound = finished_run("taxi-good")
     summary = load(Path(sound.folder)).summary
     assert not [one for one in summary["findings"] if one["code"].endswith("damaged_span")]
     start_s = max(summary["results"]["heading"]["segments"], key=lambda one: one["end_s"] - one["start_s"])["start_s"]
@@ -237,7 +239,7 @@ def test_an_answer_that_leans_on_a_damaged_span_says_so(tmp_path: Path) -> None:
     cells = rows[head + 1 + at].split(",")
     rows[head + 1 + at] = ",".join(cells[:-2])  # a row too short, within the segment
     broken.write_text("\n".join(rows) + "\n", encoding="utf-8")
-    (outcome,) = run_many([broken], tmp_path / "out", Configuration({"thresholds": limits}))
+    (outcome,) = run_many([broken], tmp_path / "out", Configuration({"thresholds": limits}), with_pdf=False)
     summary = load(Path(outcome.folder)).summary
     (finding,) = (one for one in summary["findings"] if one["code"] == "heading.damaged_span")
     assert finding["severity"] == "warn" and "dropped rows" in finding["text"]
@@ -246,6 +248,6 @@ def test_an_answer_that_leans_on_a_damaged_span_says_so(tmp_path: Path) -> None:
     first[head + 1 + at] = ",".join(cells)
     first[head + 2] = "0"  # the same loss at the parking stand, which no answer rests on
     broken.write_text("\n".join(first) + "\n", encoding="utf-8")
-    (outcome,) = run_many([broken], tmp_path / "out2", Configuration())
+    (outcome,) = run_many([broken], tmp_path / "out2", Configuration(), with_pdf=False)
     codes = {one["code"] for one in load(Path(outcome.folder)).summary["findings"]}
     assert "data.dropped_rows" in codes and "heading.damaged_span" not in codes

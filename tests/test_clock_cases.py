@@ -24,6 +24,7 @@ from groundstation.pipeline.conversions import convert_many
 from groundstation.readers import registry
 from groundstation.reports.sections import quality
 from groundstation.results.files import SavedFlight
+from groundstation.results.manifest import Manifest
 from groundstation.simulation.faults import BackwardStep, ClockDrift, Dropout, Fault, ForwardStep, apply_faults
 from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import simulate
@@ -295,7 +296,7 @@ def test_autopilots_drift_and_week(
 def test_the_report_has_the_clocks_in_tables(tmp_path: Path) -> None:
     case = next(case for case in CASES if case.name == "a backward step of 5 s")
     clock = to_json_exactly(found_in(case, tmp_path).clock.document())
-    parts = quality.build(SavedFlight(tmp_path, {"clock": clock}, {}, {})).parts
+    parts = quality.build(SavedFlight(tmp_path, {"clock": clock}, Manifest(), {})).parts
     grids = {part.title: part.rows for part in parts if isinstance(part, Grid)}
     (step,), (relation,) = grids["Steps of the recorder's clock"], grids["The recorder's clock by others"]
     assert step[2] == "−5.000" and relation[0] == "GNSS · raw.recorder.gnss_time_utc_s"

@@ -31,6 +31,7 @@ from groundstation.estimators.inertial.noise import GnssNoise, InsNoise
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.start_covariance import WITH_COVARIANCE, start_covariance
 from groundstation.estimators.inertial.starts import start_states
+from groundstation.estimators.kalman import smoother
 from groundstation.simulation.channel_truth import RADIUS_M
 from groundstation.studies.forecast_consistency import consistency_table, matched_run
 
@@ -265,26 +266,16 @@ def test_last_smoothed_estimate_is_the_filters() -> None:
 
 def test_fixed_lag_is_smoothing_up_to_the_start() -> None:
     """States and covariance of epoch ``first`` given the data up to ``last``; (I - K H) Phi chained between."""
-    from groundstation.estimators.inertial import smoother_kernels
-
     run = run_filter(irregular_epochs(), MODEL, NOISE)
     assert (run.used == -1).sum() == 0
     first, last = np.array([0, 30, 150, 399]), np.array([250, 130, 320, 399])
+    past = smoother.smooth_lags(run.parts[0], first, last)
+    spread, closed = smoother.lag_covariances(run.parts[0], first, last)
     for channel in range(2):
-        y, S, used = (
-            np.ascontiguousarray(part[:, :, channel]) for part in (run.innovation, run.innovation_variance, run.used)
-        )
-        past = np.empty((len(first), SIZE))
-        x, P, K = np.ascontiguousarray(run.x[:, :, channel]), run.covariance(channel), run.gain[0]
-        smoother_kernels.run_fixed_lag(run.steps.index, run.steps.transitions, x, P, K, y, S, used, first, last, past)
-        spread, closed = np.empty((len(first), SIZE, SIZE)), np.empty((len(first), SIZE, SIZE))
-        smoother_kernels.run_lag_covariance(
-            run.steps.index, run.steps.transitions, P, K, S, used, first, last, spread, closed
-        )
         for row, (begin, end) in enumerate(zip(first, last, strict=True)):
             whole = smooth(run, int(begin), int(end))
             sigma = np.sqrt(whole.variance[begin, :, channel])
-            assert np.max(np.abs(past[row] - whole.x[begin, :, channel]) / sigma) < ROUNDING
+            assert np.max(np.abs(past[row, :, channel] - whole.x[begin, :, channel]) / sigma) < ROUNDING
             assert np.sqrt(np.diag(spread[row])) == pytest.approx(sigma, rel=ROUNDING)
             assert scaled(closed[row]) == pytest.approx(scaled(chained(run, begin, end)), rel=1e-7, abs=ROUNDING)
 

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.clock import Clock
 from groundstation.base.errors import SettingsError
+from groundstation.base.ledger import Ledger
 from groundstation.estimators.inertial.analysis import INERTIAL
 from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.analysis import MAGNETIC
@@ -22,9 +24,10 @@ from groundstation.pipeline.log import open_log
 from groundstation.reports.index import index_row
 from groundstation.reports.sections import front
 from groundstation.results import magnetic as answers
-from groundstation.results.files import load, save
+from groundstation.results.files import SavedFlight, load, save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.magnetic import LETTERS, MagneticResult
+from groundstation.results.manifest import Manifest
 from groundstation.simulation.deviation import BIN_MIDDLES_DEG, scenario_deviation
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
@@ -40,7 +43,7 @@ def simulated(name: str) -> Simulated:
 
 def analysed(flight: Flight, configuration: Configuration | None = None) -> FlightResults:
     source = Source("flight.csv", "ab" * 32, 1, "flat-csv")
-    given = Given("NOTIME_abababab", source, {}, {}, (), has_lost_data=False)
+    given = Given("NOTIME_abababab", source, Ledger(), Clock(), (), has_lost_data=False)
     return analyse(flight, given, configuration or Configuration())
 
 
@@ -62,7 +65,7 @@ def test_a_figure_eight_is_accepted_with_its_coefficients() -> None:
     assert found.poisson is not None
     assert flown.scenario.electric is not None
     electric = replace(flown.scenario.electric, base_a=found.poisson.current_reference_a)
-    truth = scenario_deviation(replace(flown, scenario=replace(flown.scenario, electric=electric)))
+    truth = scenario_deviation(replace(flown.scenario, electric=electric), flown.trajectory)
     assert truth is not None
     assert (found.verdict, found.recommended_method) == ("accept", "poisson_attitude")
     expected = harmonics.fit(BIN_MIDDLES_DEG, wrap_180(truth.compass_error_deg + truth.declination_deg))[0]
@@ -121,12 +124,19 @@ def test_recorded_flights_are_refused_with_the_reason(name: str, reason: str, tm
     assert found.reasons["magnetic"].startswith(reason)
 
 
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> SavedFlight:
+    """The figure of eight as it was saved."""
+    folder = tmp_path_factory.mktemp("eight")
+    save(folder, figure_eight(), Manifest())
+    return load(folder)
+
+
 @pytest.mark.parametrize("name", [field.name for field in fields(answers.MagneticResult)])
-def test_every_answer_is_saved_and_comes_back(name: str, tmp_path: Path) -> None:
-    save(tmp_path, figure_eight(), {})
-    before, after = (found.answer(MagneticResult) for found in (figure_eight(), load(tmp_path).results))
+def test_every_answer_is_saved_and_comes_back(name: str, saved: SavedFlight) -> None:
+    before, after = (found.answer(MagneticResult) for found in (figure_eight(), saved.results))
     if name == "figures":
-        assert {"magnetic_samples", "magnetic_table", "magnetic_modulus"} <= set(load(tmp_path).figures)
+        assert {"magnetic_samples", "magnetic_table", "magnetic_modulus"} <= set(saved.figures)
         return
     value, back = getattr(before, name), getattr(after, name)
     assert type(back) is type(value)
@@ -136,9 +146,8 @@ def test_every_answer_is_saved_and_comes_back(name: str, tmp_path: Path) -> None
         assert np.allclose(back, value, rtol=0.0, atol=1e-4)
 
 
-def test_index_and_front_page_tell_the_deviation(tmp_path: Path) -> None:
-    save(tmp_path, figure_eight(), {})
-    found, row, saved = figure_eight().answer(MagneticResult), index_row(load(tmp_path)), load(tmp_path)
+def test_index_and_front_page_tell_the_deviation(saved: SavedFlight) -> None:
+    found, row = figure_eight().answer(MagneticResult), vars(index_row(saved))
     assert found is not None and found.residual_rms_deg is not None
     method = found.method(found.recommended_method)
     assert (row["magnetic_verdict"], row["magnetic_method"]) == (found.verdict, found.recommended_method)
@@ -151,9 +160,8 @@ def test_index_and_front_page_tell_the_deviation(tmp_path: Path) -> None:
     assert f"{found.residual_rms_deg.after:.2f}" in tile[1]
 
 
-def test_summary_obeys_the_schema(tmp_path: Path) -> None:
-    save(tmp_path, figure_eight(), {})
-    summary = load(tmp_path).summary
+def test_summary_obeys_the_schema(saved: SavedFlight) -> None:
+    summary = saved.summary
     own = {"$schema": SCHEMA["$schema"], "$ref": "#/$defs/magnetic", "$defs": SCHEMA["$defs"]}
     jsonschema.Draft202012Validator(own).validate(summary["results"]["magnetic"])
     assert len(summary["results"]["magnetic"]["deviation_deg"]) == 360

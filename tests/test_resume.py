@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -42,10 +43,9 @@ def assert_equal_runs(one: Path, other: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("finished") / "out"
-    run_many([SHORT], out, Configuration())
-    return out
+def finished(finished_run: Callable[..., Outcome]) -> Path:
+    """OUT of a run of the short sample: shared, to be copied."""
+    return Path(finished_run(SHORT.stem).folder).parent
 
 
 def copied(finished: Path, target: Path) -> Path:
@@ -74,7 +74,9 @@ def stages(
     return outcome, told
 
 
-def test_what_is_finished_is_not_done_again(finished: Path, tmp_path: Path) -> None:
+def test_what_is_finished_is_not_done_again(
+    finished: Path, finished_run: Callable[..., Outcome], tmp_path: Path
+) -> None:
     out = copied(finished, tmp_path / "out")
     before = times(flight_in(out))
     (planned,) = plan_many([SHORT], out, Configuration())
@@ -82,11 +84,13 @@ def test_what_is_finished_is_not_done_again(finished: Path, tmp_path: Path) -> N
     assert (planned.text, told) == ("finished, nothing to do", set())
     assert times(flight_in(out)) == before
     assert_equal_runs(out, finished)
-    (first,) = run_many([SHORT], tmp_path / "new", Configuration())
+    first = finished_run(SHORT.stem)
     assert (outcome.text, outcome.state, outcome.flight_id) == (first.text, first.state, first.flight_id)
 
 
-def test_a_changed_setting_keeps_the_mcap_and_gives_what_a_new_run_gives(finished: Path, tmp_path: Path) -> None:
+def test_a_changed_setting_keeps_the_mcap_and_gives_what_a_new_run_gives(
+    finished: Path, finished_run: Callable[..., Outcome], tmp_path: Path
+) -> None:
     out = copied(finished, tmp_path / "out")
     mcap = next(flight_in(out).glob("*.mcap"))
     before = mcap.stat().st_ino
@@ -95,8 +99,7 @@ def test_a_changed_setting_keeps_the_mcap_and_gives_what_a_new_run_gives(finishe
     assert planned.text.startswith("to analyse again")
     assert "converting" not in told and {"estimating", "recording", "reporting"} <= told
     assert mcap.stat().st_ino == before
-    run_many([SHORT], tmp_path / "new", SETTINGS)
-    assert_equal_runs(out, tmp_path / "new")
+    assert_equal_runs(out, Path(finished_run(SHORT.stem, SETTINGS).folder).parent)
     assert plan_many([SHORT], out, SETTINGS)[0].text == "finished, nothing to do"
 
 
@@ -174,6 +177,7 @@ def test_a_log_that_is_written_to_while_it_is_read_has_failed(tmp_path: Path) ->
     assert [path.name for path in (tmp_path / "out").iterdir() if path.is_dir()] == []
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_a_log_that_is_merely_touched_is_run(tmp_path: Path) -> None:
     log = tmp_path / SHORT.name
     shutil.copy(SHORT, log)
@@ -183,7 +187,7 @@ def test_a_log_that_is_merely_touched_is_run(tmp_path: Path) -> None:
     assert outcome.state == "done"
 
 
-def test_an_interrupted_run_stops_at_once(tmp_path: Path) -> None:
+def test_an_interrupted_run_stops_at_once_and_keeps_its_index(tmp_path: Path) -> None:
     def interrupt(event: Event) -> None:
         if event.kind == "end":
             raise KeyboardInterrupt
@@ -195,6 +199,7 @@ def test_an_interrupted_run_stops_at_once(tmp_path: Path) -> None:
         time.sleep(0.05)
     assert caught.value is not None  # the frames of the run are alive: its processes ended all the same
     assert multiprocessing.active_children() == []
+    assert (tmp_path / "out" / "index.json").is_file()
 
 
 def tell_and_sleep(job: Job, listen: Listener) -> Outcome:

@@ -51,6 +51,8 @@ def markdown(section: Section, *, level: int = 1) -> str:
 
 
 def _part(part: Part, level: int) -> list[str]:
+    if isinstance(part, Note) and part.files:  # they lie beside a report
+        return []
     if isinstance(part, Note):
         return [f"**{mark}** {escaped(part.text)}" if (mark := Mark(part.tone, "").symbol) else escaped(part.text)]
     if isinstance(part, Facts):

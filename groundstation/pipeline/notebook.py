@@ -26,7 +26,6 @@ from groundstation.results.magnetic_ground import GroundDeviation
 from groundstation.tables.table import Flight, TimedTable, timed
 
 if TYPE_CHECKING:
-    from groundstation.pipeline.api import OpenLog
     from groundstation.reports.drawing import Drawing, Sketch
 
 AnyPath = str | PathLike[str]
@@ -67,7 +66,7 @@ class OpenFlight(ABC):
         """All answers; ``results.to_frame(name)`` gives findings and the arrays behind the figures."""
 
     @abstractmethod
-    def with_settings(self, **sections: Any) -> "OpenLog":
+    def with_settings(self, **sections: Any) -> "OpenFlight":
         """The same flight with other settings; the log is read again only for other ``thresholds`` of the ledger.
 
         Parameters

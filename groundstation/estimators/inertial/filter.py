@@ -10,13 +10,16 @@ from numpy.typing import NDArray
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.estimators.inertial.model import POSITION, SIZE, VELOCITY, ChannelModel, FloatArray
 from groundstation.estimators.inertial.noise import InsNoise
+from groundstation.estimators.kalman import filter as kalman
+from groundstation.estimators.kalman import smoother
+from groundstation.estimators.kalman.arrays import NO_STEP, REJECTED, Drive, Lines
+from groundstation.estimators.kalman.transition import Transition, distinct_steps
 
 TIME_RESOLUTION_S = 1e-4  # intervals that agree to this share one transition
 MOST_TRANSITIONS = 4096  # distinct intervals kept exactly; jittered clocks are rounded more coarsely beyond
 FIRST_SAMPLES = 15
 ROOM_OF_THE_GATE = 3.0  # times the sigma of a single measurement
 PATIENCE_S = 60.0  # GNSS rejected for so long is believed again
-REJECTED = -1
 STANDARD_GATE = 25.0  # squared sigmas
 RESET_POSITION_M, RESET_VELOCITY_MPS = 2e4, 20.0  # what a reset of the INS may change; tilt and drift are kept
 
@@ -99,6 +102,8 @@ class FilterRun:
 
     Parameters
     ----------
+    parts : tuple of kalman.FilterRun
+        What the core ran: one for both channels, which share a covariance then (g = 1), or one each (g = 2).
     x : ndarray, shape (n, 6, c)
         Estimates after each epoch (forecast where GNSS was absent).
     P : ndarray, shape (g, n, 6, 6)
@@ -117,6 +122,7 @@ class FilterRun:
     model: ChannelModel
     noise: InsNoise
     steps: Steps
+    parts: tuple[kalman.FilterRun, ...]
     x: FloatArray
     P: FloatArray
     innovation: FloatArray
@@ -124,6 +130,12 @@ class FilterRun:
     used: NDArray[np.int8]
     gain: FloatArray
     reopened: int = 0
+
+    @property
+    def groups(self) -> list[list[int]]:
+        """Channels of each part."""
+        channels = list(range(self.x.shape[2]))
+        return [channels] if len(self.parts) == 1 else [[channel] for channel in channels]
 
     def measured(self, kind: int) -> FloatArray:
         """Position (0) or velocity (1) differences, shape (n, c), NaN also where the filter rejected them."""
@@ -163,15 +175,10 @@ def initial_of(epochs: Epochs, noise: InsNoise) -> Initial:
 def steps_between(time_s: FloatArray, model: ChannelModel, noise: InsNoise) -> Steps:
     """Transition and noise of every interval; intervals equal to 0.1 ms share one."""
     interval = np.diff(time_s, prepend=time_s[:1])
-    resolution = TIME_RESOLUTION_S
-    rounded = np.round(interval / resolution).astype(np.int64)
-    while len(np.unique(rounded)) > MOST_TRANSITIONS:
-        resolution *= 10.0
-        rounded = np.round(interval / resolution).astype(np.int64)
-    distinct, index = np.unique(rounded, return_inverse=True)
-    seconds, density = distinct * resolution, noise.densities()
+    seconds, index = distinct_steps(interval, TIME_RESOLUTION_S, MOST_TRANSITIONS)
+    density = noise.densities()
     return Steps(
-        index.astype(np.int64),
+        index,
         np.stack([model.transition_over(float(part)) for part in seconds]),
         np.stack([model.process_noise_over(float(part), density) for part in seconds]),
     )
@@ -210,30 +217,35 @@ def run_filter(
     groups = [list(range(channels))] if together else [[channel] for channel in range(channels)]
     drag = epochs.drag_per_s * np.diff(epochs.time_s, prepend=epochs.time_s[:1])[:, None, None]
     first = initial or Initial(np.zeros((SIZE, channels)), np.diag(noise.initial_variances())[None])
-    parts: list[tuple[Any, ...]] = []
+    parts: list[kalman.FilterRun] = []
     for group in groups:  # the channel north comes first: it is not dragged by the other
-        pushed = _pushed(drag, group, [part[0] for part in parts])
-        own = np.ascontiguousarray(drag[:, group][:, :, group])
-        parts.append(_run_group(z[:, :, group], own, pushed, epochs, steps, noise, gate, first, group))
-    x, P, gain, innovation, variance, used, reopened = (list(part) for part in zip(*parts, strict=True))
-    spread = [np.repeat(item[:, :, None], len(group), axis=2) for item, group in zip(variance, groups, strict=True)]
-    marks = [np.repeat(item[:, :, None], len(group), axis=2) for item, group in zip(used, groups, strict=True)]
+        own, measured = (drag, z) if together else (np.ascontiguousarray(drag[:, group][:, :, group]), z[:, :, group])
+        drive = Drive(POSITION, own, _pushed(drag, group, [part.x for part in parts]))
+        parts.append(_run_group(measured, drive, epochs, steps, noise, gate, first, group))
+    records, n = [part.record for part in parts], len(epochs)
+    shared = [(len(group), record) for group, record in zip(groups, records, strict=True)]
     return FilterRun(
         epochs=epochs,
         model=model,
         noise=noise,
         steps=steps,
-        x=_joined(x),
-        P=_stacked(P),
-        innovation=_joined(innovation),
-        innovation_variance=np.concatenate(spread, axis=2),
-        used=np.concatenate(marks, axis=2),
-        gain=_stacked(gain),
-        reopened=max(reopened),
+        parts=tuple(parts),
+        x=_joined([record.x for record in records]),
+        P=_stacked([record.P for record in records]),
+        innovation=_joined([record.y.reshape(n, 2, -1) for record in records]),
+        innovation_variance=_joined([_shared(record.S, count) for count, record in shared]),
+        used=_joined([_shared(record.mark, count) for count, record in shared]),
+        gain=_stacked([record.K.reshape(n, 2, SIZE) for record in records]),
+        reopened=max(part.reopened for part in parts),
     )
 
 
-def _joined(parts: list[FloatArray]) -> FloatArray:
+def _shared(values: NDArray[Any], count: int) -> NDArray[Any]:
+    """A figure that channels share, shape (2 n,), as one of each, shape (n, 2, c); read-only."""
+    return np.broadcast_to(values.reshape(-1, 2, 1), (len(values) // 2, 2, count))
+
+
+def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
     """Groups of channels side by side; a single one is not copied."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2)
 
@@ -279,44 +291,32 @@ def _pushed(drag: FloatArray, group: list[int], earlier: list[FloatArray]) -> Fl
 
 def _run_group(
     z: FloatArray,
-    drag: FloatArray,
-    push: FloatArray,
+    drive: Drive,
     epochs: Epochs,
     steps: Steps,
     noise: InsNoise,
     gate: float,
     first: Initial,
     group: list[int],
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, NDArray[np.int8], int]:
-    from groundstation.estimators.inertial import kernels
-
+) -> kalman.FilterRun:
+    """Run the channels of a group, which share a covariance: two rows, position and velocity, at every epoch."""
     n, _, channels = z.shape
-    x, P, K = np.empty((n, SIZE, channels)), np.empty((n, SIZE, SIZE)), np.empty((n, 2, SIZE))
-    y, S, used = np.empty((n, 2, channels)), np.empty((n, 2)), np.zeros((n, 2), dtype=np.int8)
     weighted, believed = measurement_variances(epochs, noise)
-    opened = np.square([RESET_POSITION_M, RESET_VELOCITY_MPS])
-    reopened = kernels.run_filter(
-        steps.index,
-        steps.transitions,
-        steps.noises,
-        np.ascontiguousarray(z),
-        drag,
-        push,
-        np.where(epochs.is_reset[:, None], opened, 0.0),
-        first.of(group),
-        first.covariance(group[0]),
-        weighted,
-        believed,
-        gate,
-        patience_of(epochs),
-        x,
-        P,
-        K,
-        y,
-        S,
-        used,
+    both, opened = np.arange(2), np.zeros((1, SIZE))
+    opened[0, [POSITION, VELOCITY]] = np.square([RESET_POSITION_M, RESET_VELOCITY_MPS])
+    lines = Lines(np.arange(3), np.array([POSITION, VELOCITY]), np.ones(2), weighted, believed, both)
+    step = steps.index.copy()
+    step[:1] = NO_STEP  # the start belongs to the first epoch
+    return kalman.run_filter(
+        Transition.dense(steps.transitions, steps.noises),
+        step,
+        kalman.Measurements(np.repeat(np.arange(n), 2), z.reshape(2 * n, channels), np.tile(both, n), lines),
+        kalman.Start(first.of(group), first.covariance(group[0])),
+        gate=kalman.Gate(float(np.sqrt(gate)), patience_of(epochs), is_by_innovation=True),
+        jump=np.where(epochs.is_reset, 0, NO_STEP),
+        jumps=opened,
+        drive=drive,
     )
-    return x, P, K, y, S, used, reopened
 
 
 @dataclass(frozen=True)
@@ -332,27 +332,7 @@ def smooth(run: FilterRun, first: int = 0, last: int | None = None) -> Smoothed:
 
     Source: Rauch, Tung, Striebel, 1965, in the form of Bryson and Frazier (Bierman, 1973).
     """
-    from groundstation.estimators.inertial import smoother_kernels
-
-    n, _, channels = run.x.shape
-    last = n - 1 if last is None else last
-    x, variance = np.full((n, SIZE, channels), np.nan), np.full((n, SIZE, channels), np.nan)
-    groups = [list(range(channels))] if len(run.P) == 1 else [[channel] for channel in range(channels)]
-    for which, group in enumerate(groups):
-        part, spread = np.full((n, SIZE, len(group)), np.nan), np.full((n, SIZE), np.nan)
-        smoother_kernels.run_smoother(
-            run.steps.index,
-            run.steps.transitions,
-            np.ascontiguousarray(run.x[:, :, group]),
-            run.P[which],
-            run.gain[which],
-            np.ascontiguousarray(run.innovation[:, :, group]),
-            np.ascontiguousarray(run.innovation_variance[:, :, group[0]]),
-            np.ascontiguousarray(run.used[:, :, group[0]]),
-            first,
-            last,
-            part,
-            spread,
-        )
-        x[:, :, group], variance[:, :, group] = part, spread[:, :, None]
-    return Smoothed(x, variance)
+    parts = [smoother.smooth(part, first, last) for part in run.parts]
+    shapes = [(*part.variance.shape, len(group)) for part, group in zip(parts, run.groups, strict=True)]
+    variances = [np.broadcast_to(part.variance[:, :, None], shape) for part, shape in zip(parts, shapes, strict=True)]
+    return Smoothed(_joined([part.x for part in parts]), _joined(variances))

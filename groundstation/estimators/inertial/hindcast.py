@@ -7,9 +7,12 @@ import numpy as np
 
 from groundstation.base.records import Int64Array
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, gnss_intervals_s
-from groundstation.estimators.inertial.model import POSITION, FloatArray
+from groundstation.estimators.inertial.model import POSITION, SIZE, VELOCITY, FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.starts import start_states
+from groundstation.estimators.kalman.arrays import Drive
+from groundstation.estimators.kalman.filter import forecast
+from groundstation.estimators.kalman.transition import Transition
 
 NEAREST_S = 1.0
 
@@ -131,17 +134,27 @@ def _forecast(
     every: int,
     leads: int,
 ) -> FloatArray:
-    from groundstation.estimators.inertial import kernels
-
-    out = np.zeros((len(states), leads, states.shape[2]))
-    if method != "raw_ins" and leads:
-        phi, is_held = run.model.transition_over(step_s), method == "hold_velocity"
-        kernels.run_forecast(np.ascontiguousarray(states), phi, is_held, drag, known, every, out)
-    return out
+    """Forecast by a method, shape (s, leads, c), from states (s, 6, c); ``drag`` (steps, 2, 2, s), ``known`` (s, c)."""
+    count, _, channels = states.shape
+    if method == "raw_ins" or not leads:
+        return np.zeros((count, leads, channels))
+    phi = np.eye(SIZE)
+    phi[POSITION, VELOCITY] = step_s  # the velocity is held and the model not used
+    if method != "hold_velocity":
+        phi = run.model.transition_over(step_s)
+    built = forecast(
+        Transition.blocks(phi[None], np.zeros((1, SIZE, SIZE)), 1),
+        np.zeros(every * leads, dtype=np.int64),
+        np.ascontiguousarray(states.transpose(1, 2, 0)),
+        known.T,
+        every,
+        Drive(POSITION, drag if channels == 2 else drag[:0], np.zeros((0, channels))),
+    )
+    return np.ascontiguousarray(built.transpose(2, 0, 1))
 
 
 def _drag_along(epochs: Epochs, start_s: FloatArray, step_s: float, steps: int) -> FloatArray:
-    """Known drag of each forecast step, shape (s, steps, 2, 2): the INS itself knows where it flies."""
-    when = start_s[:, None] + (np.arange(steps) + 0.5)[None, :] * step_s
+    """Known drag of each forecast step, shape (steps, 2, 2, s): the INS itself knows where it flies."""
+    when = (np.arange(steps) + 0.5)[:, None] * step_s + start_s[None, :]
     nearest = np.minimum(np.searchsorted(epochs.time_s, when), len(epochs) - 1)
-    return np.ascontiguousarray(epochs.drag_per_s[nearest] * step_s)
+    return np.ascontiguousarray(np.moveaxis(epochs.drag_per_s[nearest], 1, 3) * step_s)

@@ -15,6 +15,7 @@ from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.model import POSITION, SIZE, FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.starts import windows_of
+from groundstation.estimators.kalman.smoother import lag_covariances
 
 WINDOW_METHODS = ("windows", "drift_windows", "consistent_windows")
 WITH_COVARIANCE = ("last_estimate", *WINDOW_METHODS, "smoothed_start")
@@ -55,23 +56,9 @@ def start_covariance(
 
 def _smoothed(run: FilterRun, at: Int64Array, channel: int, lag_s: float) -> FloatArray:
     """Q(L) - Phi P(s|t) Phi' + Phi P(s) Psi' + its transpose; P(t) itself for L = 0."""
-    from groundstation.estimators.inertial import smoother_kernels
-
     time_s, group = run.epochs.time_s, min(channel, len(run.P) - 1)
     first = np.maximum(np.searchsorted(time_s, time_s[at] - lag_s, side="left"), 0)
-    smoothed, closed = np.empty((len(at), SIZE, SIZE)), np.empty((len(at), SIZE, SIZE))
-    smoother_kernels.run_lag_covariance(
-        run.steps.index,
-        run.steps.transitions,
-        run.P[group],
-        run.gain[group],
-        np.ascontiguousarray(run.innovation_variance[:, :, channel]),
-        np.ascontiguousarray(run.used[:, :, channel]),
-        first,
-        np.asarray(at),
-        smoothed,
-        closed,
-    )
+    smoothed, closed = lag_covariances(run.parts[group], first, at)
     density = run.noise.densities()
     out = np.empty_like(smoothed)
     for row, seconds in enumerate(time_s[at] - time_s[first]):

@@ -16,6 +16,7 @@ from groundstation.estimators.inertial.model import (
     FloatArray,
 )
 from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.estimators.kalman.smoother import smooth_lags
 
 LAG_STEP_S = 20.0  # of the sums over past estimates that are carried forward one by one
 
@@ -156,31 +157,14 @@ def _carried_average(run: FilterRun, at: Int64Array, window: Window) -> FloatArr
 
 def _smoothed(run: FilterRun, at: Int64Array, lag_s: float) -> FloatArray:
     """The state ``lag_s`` before the start, smoothed with all data up to the start, carried forward by the model."""
-    from groundstation.estimators.inertial import smoother_kernels
-
     time_s = run.epochs.time_s
     states = np.empty((len(at), SIZE, run.x.shape[2]))
     first = np.maximum(np.searchsorted(time_s, time_s[at] - lag_s, side="left"), 0)
-    for channel in range(run.x.shape[2]):
-        group = min(channel, len(run.P) - 1)
-        past = np.empty((len(at), SIZE))
-        smoother_kernels.run_fixed_lag(
-            run.steps.index,
-            run.steps.transitions,
-            np.ascontiguousarray(run.x[:, :, channel]),
-            run.P[group],
-            run.gain[group],
-            np.ascontiguousarray(run.innovation[:, :, channel]),
-            np.ascontiguousarray(run.innovation_variance[:, :, channel]),
-            np.ascontiguousarray(run.used[:, :, channel]),
-            first,
-            np.asarray(at),
-            past,
-        )
-        seconds = time_s[at] - time_s[first]
-        carried = {float(part): run.model.transition_over(float(part)) for part in np.unique(seconds)}
-        forward = np.stack([carried[float(part)] for part in seconds]) if len(at) else np.zeros((0, SIZE, SIZE))
-        states[:, :, channel] = np.einsum("sij,sj->si", forward, past)
+    seconds = time_s[at] - time_s[first]
+    carried = {float(part): run.model.transition_over(float(part)) for part in np.unique(seconds)}
+    forward = np.stack([carried[float(part)] for part in seconds]) if len(at) else np.zeros((0, SIZE, SIZE))
+    for part, group in zip(run.parts, run.groups, strict=True):
+        states[:, :, group] = np.einsum("sij,sjc->sic", forward, smooth_lags(part, first, at))
     return states
 
 

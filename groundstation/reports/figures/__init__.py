@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.figures import forecast, inertial, latency
+from groundstation.reports.figures import forecast, inertial, latency, magnetic, magnetic_ground
 from groundstation.results.flight import FlightResults
 
 Drawn = Drawing | Sequence[Drawing] | None
@@ -22,6 +22,12 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "inertial.innovations": inertial.innovations,
     "inertial.observability": inertial.observability,
     "latency.search": latency.search,
+    "magnetic.deviation": magnetic.deviation,
+    "magnetic.held_out": magnetic.held_out,
+    "magnetic.track": magnetic.track,
+    "magnetic.branches": magnetic.branches,
+    "magnetic.modulus": magnetic.modulus,
+    "magnetic.ground_runs": magnetic_ground.ground_runs,
 }
 
 

@@ -267,7 +267,7 @@ def _latency(heading: Mapping[str, Any]) -> list[tuple[str, str, str]]:
 
 
 def _by_hand(saved: SavedFlight) -> Facts | None:
-    configuration = mapping(saved.manifest, "configuration")
+    configuration = saved.manifest.configuration
     titles = (("exclude", "Left out by hand"), ("force", "Used by hand against the gates"))
     pairs = [
         (title, f"{span.get('from')} – {span.get('to')}", str(span.get("reason") or ""))

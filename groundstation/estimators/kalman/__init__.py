@@ -1,0 +1,1 @@
+"""One Kalman core for every estimator: prediction and update at the cost of their entries, gates, smoothers."""
