@@ -12,6 +12,7 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.clock import Clock
 from groundstation.base.errors import SettingsError
 from groundstation.base.ledger import Ledger
+from groundstation.chapters.front import front
 from groundstation.estimators.inertial.analysis import INERTIAL
 from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.analysis import MAGNETIC
@@ -22,7 +23,6 @@ from groundstation.pipeline.convert import convert_log
 from groundstation.pipeline.flight import read_flight, sentence
 from groundstation.pipeline.log import open_log
 from groundstation.reports.index import index_row
-from groundstation.reports.sections import front
 from groundstation.results import magnetic as answers
 from groundstation.results.files import SavedFlight, load, save
 from groundstation.results.flight import FlightResults, Source
@@ -156,7 +156,7 @@ def test_index_and_front_page_tell_the_deviation(saved: SavedFlight) -> None:
         assert row[f"magnetic_{letter.lower()}_deg"] == pytest.approx(method.coefficients_deg[letter], abs=1e-4)
         sigma = row[f"magnetic_{letter.lower()}_sigma_deg"]
         assert sigma == pytest.approx(method.coefficients_sigma_deg[letter], abs=1e-4)
-    (tile,) = [figure for figure in front.build(saved).figures if figure[0] == "Magnetic heading"]
+    (tile,) = [figure for figure in front(saved.results).figures if figure[0] == "Magnetic heading"]
     assert f"{found.residual_rms_deg.after:.2f}" in tile[1]
 
 

@@ -154,10 +154,10 @@ def test_every_figure_of_the_report_can_be_had(flight: OpenLog) -> None:
 def test_sketching_leaves_the_report_as_it_is(flight: OpenLog) -> None:
     from groundstation.reports.figures import heading as heading_figures
 
-    before = heading_figures.density(flight._saved())
+    before = heading_figures.density(flight.results)
     with drawing.sketching():
-        assert heading_figures.density(flight._saved()).svg == "density"  # type: ignore[union-attr]
-    assert heading_figures.density(flight._saved()) == before
+        assert heading_figures.density(flight.results).svg == "density"  # type: ignore[union-attr]
+    assert heading_figures.density(flight.results) == before
 
 
 def test_a_setting_changes_the_answer_and_not_the_flight(flight: OpenLog) -> None:

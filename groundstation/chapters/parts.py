@@ -39,12 +39,13 @@ class Part:
 class Figure(Part):
     """Where a figure stands, by its name; a page that has figures draws it there, others leave it out.
 
-    ``of`` says which of several alike: a state, a horizon.
+    ``of`` says which of several alike: a state, a horizon. ``instead`` is what a page without figures shows there.
     """
 
     kind: ClassVar[str] = "figure"
     name: str
     of: str = ""
+    instead: Part | None = None
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,8 @@ class Note(Part):
 class Section:
     """One chapter of the report. ``key`` is its anchor; ``lead`` says in a sentence what it answers.
 
-    ``headline`` is the answer itself in a few words, where a renderer has no other place for it (text panels).
+    A page without a front (a text panel, the terminal) begins with ``headline``, the answer in a few words, and
+    ``above``, what the front of a report tells of it.
     """
 
     key: str
@@ -100,6 +102,7 @@ class Section:
     lead: str
     parts: Sequence[Part] = field(default_factory=tuple)
     headline: str = ""
+    above: Sequence[Part] = ()
 
 
 @dataclass(frozen=True)

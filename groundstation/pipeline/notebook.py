@@ -220,9 +220,9 @@ class OpenFlight(ABC):
 
     def _repr_html_(self) -> str:
         """The top of the report as a short table: verdict, correction, span, topics."""
-        from groundstation.reports.sections import front
+        from groundstation.chapters.front import front
 
-        told = front.build(self._saved())
+        told = front(self._saved().results)
         rows = [(name, value if isinstance(value, str) else value.text) for name, value in told.pairs]
         if told.verdict is not None:
             rows.insert(0, ("Verdict", told.verdict.text))

@@ -7,13 +7,13 @@ import numpy as np
 
 from groundstation.base.findings import Finding
 from groundstation.base.geodesy import north_east_m
+from groundstation.chapters.findings import MARKS
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Part, Section
 from groundstation.chapters.wording import ABSENT, any_value, number, significant
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.reports.page import TEMPLATES, render
-from groundstation.reports.sections.findings import MARKS
 from groundstation.results.comparison import Comparison, Delta, Value
 from groundstation.results.figures import FigureData, numbers
 from groundstation.results.files import SavedFlight

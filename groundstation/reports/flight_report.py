@@ -1,16 +1,19 @@
 """The report of one flight: one self-contained HTML file and its PDF, made from the saved results alone."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from groundstation.chapters.front import front
 from groundstation.chapters.parts import Document
 from groundstation.reports.page import TEMPLATES, render
 from groundstation.reports.pdf import PdfError, write_pdf
-from groundstation.reports.sections import CHAPTERS, front
-from groundstation.reports.sections.saved import mapping
+from groundstation.reports.sections import flight_sections
 from groundstation.reports.steer_card import write_exports
+from groundstation.results.answer import Answer
 from groundstation.results.files import SavedFlight, load, write_text
+from groundstation.results.restore import ANSWER_TYPES
 
 REPORT = "report.html"
 PDF = "report.pdf"
@@ -25,7 +28,9 @@ class Written:
     problem: str = ""
 
 
-def write_flight_report(folder: Path, *, with_pdf: bool = True) -> Written:
+def write_flight_report(
+    folder: Path, answer_types: Mapping[str, type[Answer]] = ANSWER_TYPES, *, with_pdf: bool = True
+) -> Written:
     """Write report.html and report.pdf into a flight folder; with a magnetic deviation its table and steer card too.
 
     Parameters
@@ -33,6 +38,8 @@ def write_flight_report(folder: Path, *, with_pdf: bool = True) -> Written:
     folder : Path
         Holds summary.json, manifest.json and results.parquet/: nothing else is read, and equal files give equal bytes
         whatever the time, the host or the number of workers.
+    answer_types : mapping of analysis name to dataclass
+        What its answers become.
     with_pdf : bool
         Without it there is neither report.pdf nor steer_card.pdf afterwards: those of an earlier run would tell of
         other results.
@@ -42,7 +49,7 @@ def write_flight_report(folder: Path, *, with_pdf: bool = True) -> Written:
     UnreadableLogError
         When the folder has no saved results.
     """
-    saved = load(folder)
+    saved = load(folder, answer_types)
     exports, problem = write_exports(saved, with_pdf=with_pdf)  # first: the report links to those that are there
     document = flight_document(saved)
     written = write_pages(folder / REPORT, flight_report_html(document), document, with_pdf=with_pdf)
@@ -65,9 +72,7 @@ def write_pages(page: Path, html: str, document: Document, *, with_pdf: bool) ->
 
 def flight_document(saved: SavedFlight) -> Document:
     """Put the report of one saved flight together."""
-    sections = tuple(section for section in (build(saved) for build in CHAPTERS) if section is not None)
-    flight_id = str(mapping(saved.summary, "flight").get("id", ""))
-    return Document("Flight report", flight_id, front.build(saved), sections)
+    return Document("Flight report", saved.results.flight_id, front(saved.results), flight_sections(saved))
 
 
 def flight_report_html(document: Document) -> str:

@@ -3,15 +3,36 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.figures import forecast, inertial, latency, magnetic, magnetic_ground
+from groundstation.reports.figures import (
+    forecast,
+    generic,
+    heading,
+    inertial,
+    latency,
+    magnetic,
+    magnetic_ground,
+    overview,
+    quality,
+    standstill,
+)
 from groundstation.results.flight import FlightResults
 
 Drawn = Drawing | Sequence[Drawing] | None
 
 # By the name that a chapter gives; a figure that is one of several alike gets which.
 DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, str], Drawn]] = {
+    GENERIC_SERIES: generic.series,
+    "heading.difference": heading.difference,
+    "heading.density": heading.density,
+    "heading.convergence": heading.convergence,
+    "heading.taxi": heading.taxi,
+    "heading.forest": heading.forest,
+    "heading.spectrum": heading.spectrum,
+    "standstill.components": standstill.components,
+    "standstill.mean_speed": standstill.mean_speed,
     "forecast.growth": forecast.growth,
     "forecast.calibration": forecast.calibration,
     "forecast.hindcast_map": forecast.hindcast_map,
@@ -28,6 +49,10 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "magnetic.branches": magnetic.branches,
     "magnetic.modulus": magnetic.modulus,
     "magnetic.ground_runs": magnetic_ground.ground_runs,
+    "overview.track": overview.track_map,
+    "overview.profile": overview.profile,
+    "overview.states": overview.states,
+    "quality.gaps": quality.gaps,
 }
 
 

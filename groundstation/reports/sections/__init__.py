@@ -1,49 +1,33 @@
-"""Chapters of the flight report: one module each.
+"""Chapters of the flight report, in its order, with their figures drawn."""
 
-``build(saved)`` gives a Section, or None when there is nothing to say. A later system adds its module here and its name
-to :data:`CHAPTERS`.
-"""
-
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from groundstation.chapters.forecast import forecast
-from groundstation.chapters.inertial import inertial
-from groundstation.chapters.latency import latency
-from groundstation.chapters.magnetic import magnetic
+from groundstation.chapters import chapters_of
+from groundstation.chapters.findings import findings
+from groundstation.chapters.overview import overview
 from groundstation.chapters.parts import Note, Section
+from groundstation.chapters.provenance import provenance
+from groundstation.chapters.quality import quality
 from groundstation.reports.figures import with_drawings
-from groundstation.reports.sections import (
-    findings,
-    heading,
-    overview,
-    provenance,
-    quality,
-)
 from groundstation.results.files import SavedFlight
 
-
-def _inertial(saved: SavedFlight) -> Section | None:
-    return on_a_page(inertial(saved.results), saved)
+ON_THE_FLIGHT = (overview, quality, findings, provenance)  # behind the chapters on its answers
 
 
-def _forecast(saved: SavedFlight) -> Section | None:
-    return on_a_page(forecast(saved.results), saved)
+def flight_sections(saved: SavedFlight) -> tuple[Section, ...]:
+    """The chapters of a flight: those on its answers, then the flight itself, its data and findings, its source.
+
+    A chapter that has nothing to say is left out, and one of nothing but figures without arrays.
+    """
+    results = saved.results
+    told = (*chapters_of(results), *(build(results) for build in ON_THE_FLIGHT))
+    drawn = (on_a_page(section, saved) for section in told if section is not None)
+    return tuple(section for section in drawn if section.parts)
 
 
-def _latency(saved: SavedFlight) -> Section | None:
-    return on_a_page(latency(saved.results), saved)
-
-
-def _magnetic(saved: SavedFlight) -> Section | None:
-    return on_a_page(magnetic(saved.results), saved)
-
-
-def on_a_page(section: Section | None, saved: SavedFlight) -> Section | None:
+def on_a_page(section: Section, saved: SavedFlight) -> Section:
     """The section as a report shows it: its figures drawn, of the files beside the report those that are there."""
-    if section is None:
-        return None
     drawn = with_drawings(section, saved.results)
     parts = (
         _of_files_there(part, saved.folder) if isinstance(part, Note) and part.files else part for part in drawn.parts
@@ -54,16 +38,3 @@ def on_a_page(section: Section | None, saved: SavedFlight) -> Section | None:
 def _of_files_there(note: Note, folder: Path) -> Note | None:
     files = [name for name in note.files if (folder / name).is_file()]
     return replace(note, files=files) if files else None
-
-
-CHAPTERS: tuple[Callable[[SavedFlight], Section | None], ...] = (
-    heading.build,
-    _inertial,
-    _forecast,
-    _latency,
-    _magnetic,
-    overview.build,
-    quality.build,
-    findings.build,
-    provenance.build,
-)

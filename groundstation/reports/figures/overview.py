@@ -1,0 +1,174 @@
+"""Figures of the flight at a glance: track map, altitude, speed, phases and the state of GNSS."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from groundstation.base.geodesy import north_east_m
+from groundstation.chapters.wording import number, words
+from groundstation.reports import drawing as d
+from groundstation.reports.drawing import Drawing
+from groundstation.results.figures import FigureData, numbers, texts
+from groundstation.results.flight import FlightResults
+from groundstation.results.heading import HeadingResult, TaxiSegment
+
+SMALLEST_TAXI_M = 10.0  # less is no taxi worth enlarging: a receiver at rest, or a start by hand
+SMALLEST_MAP_M = 2.0  # side of the map of an aircraft that did not move
+MOST_MODES = 12
+STATE_COLOURS = {"armed": "#b3261e", "on the ground": "#3a86c8"}
+GNSS_COLOURS = {"good": d.USED, "integrity lost": "#b3261e", "no GNSS": "#b3261e"}
+
+
+def track_map(results: FlightResults) -> Drawing | None:
+    """The track in local coordinates, with the taxi enlarged and the used stretches marked."""
+    data = results.figure_with_rows("overview")
+    if data is None:
+        return None
+    latitude, longitude = numbers(data, "latitude_deg"), numbers(data, "longitude_deg")
+    known = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
+    if not known.size:
+        return None
+    origin = float(latitude[known[0]]), float(longitude[known[0]])
+    north, east = north_east_m(latitude, longitude, *origin)
+    answer = results.answer(HeadingResult)
+    segments = () if answer is None else answer.segments
+    used = _used_rows(numbers(data, "time_s"), segments)
+    taxi = _taxi_rows(numbers(data, "time_s"), segments, results.figure_with_rows("phases"))
+    on_ground = _extent(north[taxi], east[taxi])
+    zoom = on_ground > SMALLEST_TAXI_M and _extent(north, east) > 2.0 * on_ground
+
+    def paint(figure: Any) -> None:
+        right = 86.0 if zoom else 174.0
+        _map(d.place(figure, 16, 12, right, 84), north, east, used, "Whole flight" if zoom else "")
+        if zoom:
+            _map(d.place(figure, 104, 12, 174, 84), north[taxi], east[taxi], used[taxi], "Taxi")
+
+    caption = (
+        f"Distances north and east of the first position (latitude {number(origin[0], 5, '°')}, longitude "
+        f"{number(origin[1], 5, '°')}), equal scales. Ring: start; green: straight stretches the heading error was "
+        "taken from."
+    )
+    alt = "Map of the track in metres north and east of the start."
+    return Drawing("Track", caption, alt, d.draw("map", 92, paint), ("overview",))
+
+
+def _used_rows(time: Any, segments: Sequence[TaxiSegment]) -> Any:
+    used = np.zeros(len(time), dtype=bool)
+    for segment in segments:
+        used |= (time >= segment.start_s) & (time <= segment.end_s)
+    return used
+
+
+def _taxi_rows(time: Any, segments: Sequence[TaxiSegment], phases: FigureData | None) -> Any:
+    if phases is not None:
+        airborne = np.flatnonzero(np.isin(texts(phases, "phase"), ("take-off run", "airborne")))
+        if airborne.size:
+            return time < float(numbers(phases, "start_s")[airborne[0]])
+    ends = [segment.end_s for segment in segments]
+    return time <= max(ends) if ends else np.zeros(len(time), dtype=bool)
+
+
+def _extent(north: Any, east: Any) -> float:
+    spans = [np.nanmax(values) - np.nanmin(values) for values in (north, east) if np.isfinite(values).any()]
+    return float(max(spans, default=0.0))
+
+
+def _map(axes: Any, north: Any, east: Any, used: Any, title: str) -> None:
+    kilometres = _extent(north, east) > 3000.0
+    scale, unit = (1e-3, "km") if kilometres else (1.0, "m")
+    north, east = north * scale, east * scale
+    axes.set_aspect("equal", adjustable="datalim")
+    d.line(axes, east, north, d.GNSS, 0.9)
+    d.line(axes, np.where(used, east, np.nan), np.where(used, north, np.nan), d.USED, 2.4, solid_capstyle="round")
+    first = int(np.flatnonzero(np.isfinite(north) & np.isfinite(east))[0])
+    axes.plot(
+        [east[first]], [north[first]], "o", color=d.INK, markersize=5, markerfacecolor="white", markeredgewidth=1.2
+    )
+    if _extent(north, east) * (1000.0 if kilometres else 1.0) < SMALLEST_MAP_M:  # scatter of a receiver at rest
+        half = 0.5 * SMALLEST_MAP_M
+        axes.update_datalim([(east[first] - half, north[first] - half), (east[first] + half, north[first] + half)])
+        axes.autoscale_view()
+    axes.set_xlabel(f"east, {unit}")
+    axes.set_ylabel(f"north, {unit}")
+    axes.set_title(title)
+
+
+def profile(results: FlightResults) -> Drawing | None:
+    """Altitude and ground speed over time, shaded by phase, above the state of GNSS."""
+    data = results.figure_with_rows("overview")
+    if data is None:
+        return None
+    phases, gnss = results.figure_with_rows("phases"), results.figure_with_rows("gnss_lanes")
+    time = numbers(data, "time_s")
+    altitude = "altitude_m" if np.isfinite(numbers(data, "altitude_m")).any() else "pressure_altitude_m"
+    altitude = altitude if altitude in data.columns else "altitude_m"
+    times = d.finite(time)
+    low, high = (float(times.min()), float(times.max())) if times.size else (0.0, 1.0)
+    states = (
+        [] if gnss is None else sorted(set(texts(gnss, "state").tolist()), key=lambda name: (name != "good", name))[:8]
+    )
+    lane_mm = 4.6 * len(states) + (3.0 if states else 0.0)
+
+    def paint(figure: Any) -> None:
+        base = 12.0 + lane_mm
+        upper, lower = d.place(figure, 30, base + 35, 174, base + 66), d.place(figure, 30, base, 174, base + 31)
+        for axes, column, text, colour in (
+            (upper, altitude, f"{words(altitude.removesuffix('_m'))}, m", d.INS),
+            (lower, "ground_speed_mps", "ground speed, m/s", d.GNSS),
+        ):
+            if phases is not None:
+                d.spans(
+                    axes, numbers(phases, "start_s"), numbers(phases, "end_s"), texts(phases, "phase"), d.PHASE_COLOURS
+                )
+            values = numbers(data, column)
+            d.line(axes, time, values, colour, 1.0)
+            axes.set_ylabel(text)
+            if not np.isfinite(values).any():
+                d.nothing(axes, f"no {text.partition(',')[0]} in the log")
+        d.time_axis(upper, low, high, title=False)
+        d.time_axis(lower, low, high, title=not states)
+        d.legend_above(upper)
+        if states and gnss is not None:
+            strip = d.place(figure, 30, 12, 174, 9 + lane_mm)
+            d.lanes(strip, numbers(gnss, "start_s"), numbers(gnss, "end_s"), texts(gnss, "state"), states, GNSS_COLOURS)
+            d.time_axis(strip, low, high)
+
+    names = tuple(name for name in ("overview", "phases", "gnss_lanes") if results.figure_with_rows(name) is not None)
+    caption = (
+        "Altitude and ground speed; the background is the phase of flight. Lanes: usability of GNSS."
+        if states
+        else ("Altitude and ground speed; the background is the phase of flight.")
+    )
+    alt = "Altitude and ground speed over flight time with phases shaded."
+    return Drawing("Altitude, speed and phases", caption, alt, d.draw("profile", 12 + lane_mm + 74, paint), names)
+
+
+def states(results: FlightResults) -> Drawing | None:
+    """Flight modes, arming and ground contact as the log tells them, a row for each state; None when it tells none."""
+    data = results.figure_with_rows("state_lanes")
+    if data is None:
+        return None
+    lane, state = texts(data, "lane"), texts(data, "state")
+    start, end = numbers(data, "start_s"), numbers(data, "end_s")
+    named = np.where(lane == "mode", np.char.add("mode ", state), state)
+    shown = ~np.isin(state, ("disarmed", "in the air", ""))  # what is not drawn is the opposite
+    modes = list(dict.fromkeys(named[shown & (lane == "mode")].tolist()))
+    rows = [*dict.fromkeys(named[shown & (lane != "mode")].tolist()), *modes[:MOST_MODES]]
+    times = d.finite(numbers(results.figure_with_rows("overview") or data, "time_s"), start, end)
+    if not rows or not times.size:
+        return None
+    height = 14.0 + 4.6 * len(rows)
+    colours = dict.fromkeys(rows, d.INS) | STATE_COLOURS
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 44, 12, 174, height - 2)
+        d.lanes(axes, start[shown], end[shown], named[shown], rows, colours)
+        d.time_axis(axes, min(float(times.min()), 0.0), float(times.max()))
+
+    flags = [name for name in dict.fromkeys(lane.tolist()) if name not in ("mode", "arming")]
+    caption = "What the log itself says of flight mode and arming"
+    caption += f"; ground contact by its {', '.join(flags)}." if flags else "."
+    caption += f" {len(modes) - MOST_MODES} more modes in the table." if len(modes) > MOST_MODES else ""
+    alt = "Strips of flight mode, arming and ground contact over flight time."
+    return Drawing("Modes and states", caption, alt, d.draw("states", height, paint), ("state_lanes",))

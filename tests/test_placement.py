@@ -1,0 +1,129 @@
+"""Finished flights are put into place: twins, clashing ids, ids that changed, places that cannot be written."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from groundstation.pipeline.flight import PARTIAL_PREFIX, remove
+from groundstation.pipeline.outcome import Outcome
+from groundstation.pipeline.output import LocalOutput
+from groundstation.pipeline.placement import Placement
+
+ONE, OTHER = "1" * 64, "2" * 64
+FLIGHT = "20260504T060000Z_A12"
+SUFFIXED = f"{FLIGHT}_{ONE[:8]}", f"{FLIGHT}_{OTHER[:8]}"
+
+
+def finished(out: Path, log: str, sha256: str, flight_id: str = FLIGHT, folder: str = "") -> Outcome:
+    """A flight folder in OUT, a partial one unless it has a name, and its outcome."""
+    path = out / (folder or f"{PARTIAL_PREFIX}{log}-{flight_id}")
+    path.mkdir(parents=True)
+    (path / "summary.json").write_text("{}")
+    manifest = {"source": {"path": str(Path(log).absolute()), "sha256": sha256}}
+    (path / "manifest.json").write_text(json.dumps(manifest))
+    (path / f"{flight_id}.mcap").write_text(log)
+    return Outcome(log, "done", "", flight_id=flight_id, folder=str(path), sha256=sha256)
+
+
+def run(out: Path, *outcomes: Outcome, again: bool = True) -> list[Outcome]:
+    """Put outcomes in their order; those that clash are run again, with success or without."""
+    placement = Placement(LocalOutput(out), [one.source for one in outcomes])
+    for number, outcome in enumerate(outcomes):
+        placement.put(number, outcome)
+    for number in placement.clashing():
+        one = outcomes[number]
+        flight_id = f"{FLIGHT}_{one.sha256[:8]}"
+        anew = finished(out, one.source, one.sha256, flight_id) if again else Outcome(one.source, "failed", "no memory")
+        placement.put_again(number, anew)
+    placement.sweep()
+    return list(placement.outcomes())
+
+
+def names(out: Path) -> list[str]:
+    return sorted(path.name for path in out.iterdir())
+
+
+def test_two_flights_of_one_id_get_their_digests(tmp_path: Path) -> None:
+    done = run(tmp_path, finished(tmp_path, "a", ONE), finished(tmp_path, "b", OTHER))
+    assert names(tmp_path) == list(SUFFIXED)
+    assert [one.flight_id for one in done] == list(SUFFIXED)
+
+
+def test_a_flight_that_fails_when_it_is_run_again_keeps_what_stood_there(tmp_path: Path) -> None:
+    done = run(tmp_path, finished(tmp_path, "a", ONE), finished(tmp_path, "b", OTHER), again=False)
+    assert names(tmp_path) == [FLIGHT]
+    assert [one.state for one in done] == ["failed", "failed"]
+
+
+def test_a_twin_of_a_clashing_flight_leaves_nothing_behind(tmp_path: Path) -> None:
+    kept, twin, other = (finished(tmp_path, log, sha) for log, sha in (("a", ONE), ("b", ONE), ("c", OTHER)))
+    placement = Placement(LocalOutput(tmp_path), ["a", "b", "c"])
+    for number, outcome in ((2, other), (1, twin), (0, kept)):  # the later twin is finished first
+        placement.put(number, outcome)
+    assert [one.state for one in placement.outcomes()] == ["done", "skipped", "done"]
+    assert placement.clashing() == (0, 2)
+    assert names(tmp_path) == [Path(kept.folder).name, FLIGHT]
+
+
+def test_a_flight_that_has_another_id_now_is_listed_once_and_notes_stay(tmp_path: Path) -> None:
+    for old in ("old", "annotated"):
+        finished(tmp_path, "a", ONE, old, folder=old)
+    (tmp_path / "annotated" / "notes.txt").write_text("mine")
+    finished(tmp_path, "elsewhere", OTHER, "kept", folder="kept")  # its log is not in this run
+    run(tmp_path, finished(tmp_path, "a", ONE))
+    assert names(tmp_path) == [FLIGHT, "annotated", "kept"]
+    assert names(tmp_path / "annotated") == ["notes.txt"]
+
+
+def test_a_flight_is_removed_at_once_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    finished(tmp_path, "a", ONE, folder=FLIGHT)
+
+    def killed(path: Path) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(shutil, "rmtree", killed)
+    with pytest.raises(KeyboardInterrupt):
+        remove(tmp_path / FLIGHT)
+    assert names(tmp_path) == [f"{PARTIAL_PREFIX}{FLIGHT}"]  # which the next run clears away
+
+
+def test_a_newer_version_of_a_log_takes_the_place_of_the_older_one(tmp_path: Path) -> None:
+    finished(tmp_path, "a", ONE, folder=FLIGHT)
+    run(tmp_path, finished(tmp_path, "a", OTHER))
+    assert names(tmp_path) == [FLIGHT]
+    assert json.loads((tmp_path / FLIGHT / "manifest.json").read_text())["source"]["sha256"] == OTHER
+
+
+def test_a_newer_version_of_a_log_that_clashed_removes_the_older_one(tmp_path: Path) -> None:
+    finished(tmp_path, "a", ONE, SUFFIXED[0], folder=SUFFIXED[0])
+    finished(tmp_path, "a", ONE, "another-day", folder="another-day")  # a recorder's card: one name, many flights
+    run(tmp_path, finished(tmp_path, "a", OTHER))
+    assert names(tmp_path) == [FLIGHT, "another-day"]
+
+
+def test_a_flight_that_clashed_before_is_put_where_it_was(tmp_path: Path) -> None:
+    for log, sha256, folder in (("a", ONE, SUFFIXED[0]), ("b", OTHER, SUFFIXED[1])):
+        finished(tmp_path, log, sha256, folder, folder=folder)
+    anew = [
+        finished(tmp_path, log, sha, name) for log, sha, name in (("a", ONE, SUFFIXED[0]), ("b", OTHER, SUFFIXED[1]))
+    ]
+    placement = Placement(LocalOutput(tmp_path), ["a", "b"])
+    for number, outcome in enumerate(anew):
+        placement.put(number, outcome)
+    placement.sweep()
+    assert placement.clashing() == () and names(tmp_path) == list(SUFFIXED)
+
+
+def test_another_log_does_not_take_the_place_of_one_that_is_not_in_this_run(tmp_path: Path) -> None:
+    finished(tmp_path, "a", ONE, folder=FLIGHT)
+    run(tmp_path, finished(tmp_path, "b", OTHER))
+    assert names(tmp_path) == [FLIGHT, SUFFIXED[1]]
+
+
+def test_a_flight_that_cannot_be_put_into_place_has_failed_and_stops_no_other(tmp_path: Path) -> None:
+    (tmp_path / FLIGHT).write_text("a file of somebody")
+    first, second = run(tmp_path, finished(tmp_path, "a", ONE), finished(tmp_path, "b", OTHER, "other"))
+    assert first.state == "failed" and first.text.startswith(f"{FLIGHT}: cannot be put into place (")
+    assert second.state == "done" and names(tmp_path) == [FLIGHT, "other"]

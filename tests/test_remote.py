@@ -1,0 +1,241 @@
+"""Logs and results in a bucket, and work on a cluster: the results are those of a run on this machine."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import fsspec
+import pytest
+from distributed import Client
+
+from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.pipeline.batch import plan_many, run_many
+from groundstation.pipeline.cluster import on_cluster
+from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.flight import Job
+from groundstation.pipeline.outcome import Outcome
+from groundstation.pipeline.progress import Event
+from groundstation.pipeline.remote import RemoteFolder, far_logs
+from groundstation.reports.drawing import sketching
+from tests.test_resume import SETTINGS, SHORT, assert_equal_runs, tell_and_sleep
+
+SAMPLES = SHORT.parent
+FEW = ("taxi-short.csv", "taxi-notime.csv")
+
+
+@pytest.fixture
+def memory() -> str:
+    """A store in the memory of this process."""
+    store = fsspec.filesystem("memory")
+    store.store.clear()
+    store.pseudo_dirs[:] = [""]
+    return "memory://"
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("logs")
+    for name in FEW:
+        shutil.copy(SAMPLES / name, folder)
+    (folder / "broken.csv").write_text("time_s,ins.true_heading_deg\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def whole(logs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run on this machine."""
+    out = tmp_path_factory.mktemp("whole") / "out"
+    run_many([logs], out, Configuration(), jobs=1)
+    return out
+
+
+def sent(folder: Path, url: str) -> str:
+    RemoteFolder(url).send(folder)
+    return url
+
+
+def fetched(url: str, target: Path) -> Path:
+    far = RemoteFolder(url)
+    for name in far.files():
+        if not name.startswith("."):
+            far.fetch(name, target / name)
+    return target
+
+
+def test_a_run_elsewhere_gives_what_a_run_here_gives(memory: str, logs: Path, whole: Path, tmp_path: Path) -> None:
+    source, out = sent(logs, f"{memory}logs"), f"{memory}out"
+    first = run_many([source], out, Configuration(), jobs=1)
+    assert [one.state for one in first] == ["failed", "done", "done"]
+    assert first[0].source == f"{source}/broken.csv"
+    copy = fetched(out, tmp_path / "copy")
+    # the one difference is where the logs are: the index names the broken one by its place
+    text = (copy / "index.json").read_text().replace(f"{source}/", f"{logs}/")
+    (copy / "index.json").write_text(text)
+    (copy / "index.csv").write_text((copy / "index.csv").read_text().replace(f"{source}/", f"{logs}/"))
+    (copy / ".lock").touch()
+    assert_equal_runs(copy, whole)
+    assert [name for name in RemoteFolder(out).names() if name == ".staging"] == []
+
+
+def test_what_is_finished_elsewhere_is_not_done_again(
+    memory: str, finished_run: Callable[..., Outcome], tmp_path: Path
+) -> None:
+    out, source = f"{memory}out", f"{memory}logs"
+    RemoteFolder(source).write(SHORT.name, SHORT.read_bytes())
+    run_many([source], out, Configuration(), jobs=1)
+    told: list[str] = []
+
+    def listen(event: Event) -> None:
+        told.append(event.text if event.kind == "stage" else "")
+
+    (again,) = run_many([source], out, Configuration(), jobs=1, listen=listen)
+    assert again.state == "done" and set(told) == {""}
+    run_many([source], out, SETTINGS, jobs=1, listen=listen)
+    assert "estimating" in told and "converting" not in told
+    copy = fetched(out, tmp_path / "copy")
+    (copy / ".lock").touch()
+    assert_equal_runs(copy, Path(finished_run(SHORT.stem, SETTINGS).folder).parent)
+
+
+def test_a_flight_elsewhere_loses_its_pdf_and_keeps_what_somebody_put_there(memory: str) -> None:
+    out, source = f"{memory}out", f"{memory}logs"
+    far = RemoteFolder(out)
+    RemoteFolder(source).write(SHORT.name, SHORT.read_bytes())
+    (done,) = run_many([source], out, Configuration(), jobs=1)
+    far.write(f"{done.flight_id}/notes.txt", b"mine")
+    assert json.loads(far.read(f"{done.flight_id}/manifest.json") or b"")["source"]["path"] == f"{source}/{SHORT.name}"
+    with sketching():
+        run_many([source], out, Configuration(), jobs=1, with_pdf=False)  # the reports alone
+    assert not {"report.pdf", "summary.pdf"} & {name.rpartition("/")[2] for name in far.files()}
+    with sketching():
+        run_many([source], out, SETTINGS, jobs=1, with_pdf=False)  # the analysis
+    assert far.read(f"{done.flight_id}/notes.txt") == b"mine"
+
+
+def test_places_that_cannot_be_reached_are_told_in_one_line(memory: str, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="no such file"):
+        far_logs(f"{memory}nothing")
+    with pytest.raises(UsageError, match="fsspec reaches"):
+        RemoteFolder("nosuchprotocol://x")
+    RemoteFolder(f"{memory}mine").write("photo.jpg", b"x")
+    with pytest.raises(UsageError, match="did not make"):
+        run_many([SHORT], f"{memory}mine", Configuration())
+    with pytest.raises(UsageError, match="local ones"):
+        plan_many([SHORT], f"{memory}out", Configuration())
+    with pytest.raises(GroundstationError):
+        RemoteFolder(f"{memory}out").fetch("nothing", tmp_path / "x")
+
+
+def test_what_groundstation_made_is_no_log(memory: str) -> None:
+    far = RemoteFolder(f"{memory}flights")
+    for name in (
+        "a.ulg",
+        "sub/b.csv",
+        ".hidden/c.csv",
+        "out/index.json",
+        "out/x/x.mcap",
+        "one/manifest.json",
+        "one/one.mcap",
+    ):
+        far.write(name, b"x")
+    assert [log.removeprefix(far.url) for log, _named in far_logs(far.url)] == ["/a.ulg", "/sub/b.csv"]
+    assert far_logs(f"{far.url}/a.ulg") == [(f"{far.url}/a.ulg", True)]
+
+
+@pytest.fixture
+def bucket(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """A bucket of a server on this machine."""
+    from moto.server import ThreadedMotoServer
+
+    server = ThreadedMotoServer(ip_address="127.0.0.1", port=0)
+    server.start()
+    host, port = server.get_host_and_port()
+    for name, value in {
+        "AWS_ENDPOINT_URL": f"http://{host}:{port}",
+        "AWS_ACCESS_KEY_ID": "test",
+        "AWS_SECRET_ACCESS_KEY": "test",
+        "AWS_DEFAULT_REGION": "us-east-1",
+    }.items():
+        monkeypatch.setenv(name, value)
+    fsspec.filesystem("s3").clear_instance_cache()
+    fsspec.filesystem("s3", skip_instance_cache=True).mkdir("flights")
+    yield "s3://flights"
+    fsspec.filesystem("s3").clear_instance_cache()
+    server.stop()
+
+
+def test_a_cluster_loses_nothing_when_a_worker_is_killed(bucket: str, logs: Path, whole: Path, tmp_path: Path) -> None:
+    from distributed import LocalCluster
+
+    source, out = sent(logs, f"{bucket}/logs"), f"{bucket}/out"
+    killed = threading.Event()
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+
+        def kill_when_busy() -> None:
+            while not any(worker.processing for worker in cluster.scheduler.workers.values()):
+                time.sleep(0.02)
+            time.sleep(1.0)
+            busy = next(
+                (worker for worker in cluster.scheduler.workers.values() if worker.processing),
+                next(iter(cluster.scheduler.workers.values())),
+            )
+            process = next(nanny for nanny in cluster.workers.values() if nanny.worker_address == busy.address).process
+            os.kill(process.pid, signal.SIGKILL)
+            killed.set()
+
+        thread = threading.Thread(target=kill_when_busy)
+        thread.start()
+        outcomes = run_many([source], out, Configuration(), scheduler=cluster.scheduler_address)
+        thread.join()
+    assert killed.is_set()
+    assert [one.state for one in outcomes] == ["failed", "done", "done"]
+    copy = fetched(out, tmp_path / "copy")
+    for name in ("index.json", "index.csv"):
+        (copy / name).write_text((copy / name).read_text().replace(f"{source}/", f"{logs}/"))
+    (copy / ".lock").touch()
+    assert_equal_runs(copy, whole)
+
+
+def test_a_scheduler_that_goes_away_is_told_in_one_line(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
+    scheduler_file = tmp_path / "scheduler.json"
+    scheduler = subprocess.Popen(
+        [*command, "--no-dashboard", "--scheduler-file", str(scheduler_file)], stderr=subprocess.DEVNULL
+    )
+    deadline = time.monotonic() + 60.0
+    while not scheduler_file.exists() or not scheduler_file.read_text():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    address = json.loads(scheduler_file.read_text())["address"]
+    worker = subprocess.Popen(
+        [sys.executable, "-m", "distributed.cli.dask_worker", address, "--no-nanny", "--no-dashboard"],
+        stderr=subprocess.DEVNULL,
+        cwd=SAMPLES.parent,
+    )
+    killer = threading.Timer(0.0, scheduler.kill)
+    try:
+        with Client(address, timeout=60, set_as_default=False) as client:
+            client.wait_for_workers(1, timeout=60)
+        job = Job(tmp_path / "x", tmp_path, Configuration())
+        waiting = on_cluster(iter([(0, job)]), tell_and_sleep, scheduler=address)
+        killer = threading.Timer(5.0, scheduler.kill)
+        killer.start()
+        with pytest.raises(GroundstationError, match="the scheduler is gone"):
+            list(waiting)
+        assert caplog.text == ""
+    finally:
+        killer.cancel()
+        scheduler.kill()
+        worker.kill()
+
+
+def test_a_scheduler_that_does_not_answer_is_told(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="no scheduler answers"):
+        run_many([SHORT], tmp_path / "out", Configuration(), scheduler="tcp://127.0.0.1:1")
