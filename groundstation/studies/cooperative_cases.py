@@ -258,8 +258,8 @@ CASES: tuple[Case, ...] = (
         "sigma_x 100 m",
         "C",
         295.0,
-        why="The computed sigma is the source's; errors against truth are larger because those of the primaries last for "
-        "minutes and are taken for white noise: over-confident, not divergent.",
+        why="The computed sigma is the source's; errors against truth are larger because those of the primaries last "
+        "for minutes and are taken for white noise: over-confident, not divergent.",
     ),
     Case(
         "turn-after",
@@ -271,8 +271,8 @@ CASES: tuple[Case, ...] = (
         20,
         "15-20 m",
         "C",
-        why="The computed sigma is the source's; errors against truth are larger because those of the primaries last for "
-        "minutes and are taken for white noise: over-confident, not divergent.",
+        why="The computed sigma is the source's; errors against truth are larger because those of the primaries last "
+        "for minutes and are taken for white noise: over-confident, not divergent.",
     ),
 )
 
