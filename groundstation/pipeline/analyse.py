@@ -19,8 +19,8 @@ from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline import configuration as configured
 from groundstation.pipeline import overview
 from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.damage import damage_finding
 from groundstation.pipeline.intervals import seconds_of
-from groundstation.pipeline.leaning import damage_finding
 from groundstation.results.answer import Answers
 from groundstation.results.chosen import chosen_intervals
 from groundstation.results.figures import FigureData

@@ -22,7 +22,7 @@ from groundstation.reports.sections.saved import mapping
 from groundstation.results.comparison import Comparison, Delta, Event, SettingPair, Side, Value
 from groundstation.results.files import MANIFEST, SavedFlight, csv_text, load, write_text
 from groundstation.results.flight import NotAssessable
-from groundstation.results.noticed import grouped
+from groundstation.results.grouped_findings import grouped
 
 (PAGE, TABLE), RECORDING = COMPARISON_MARKS, COMPARISON_RECORDING
 IDENTITY = (  # what tells the rows of a table in the results apart
