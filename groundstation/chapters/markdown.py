@@ -64,17 +64,11 @@ def front_markdown(front: Front) -> str:
         table(("", ""), [(escaped(label), _cell(cell)) for label, cell in front.pairs]),
     ]
     if front.headline:
-        parts.append(f"## {escaped(answer_line(front))}")
+        parts.append(f"## {escaped(front.line)}")
     parts += [escaped(sentence) for sentence in front.sentences]
     if front.figures:
         parts += _facts(Facts("", front.figures), 2)
     return "\n\n".join(parts)
-
-
-def answer_line(front: Front) -> str:
-    """Verdict and headline of a front in one line."""
-    verdict = "" if front.verdict is None else f"{front.verdict.symbol} {front.verdict.text}"
-    return " · ".join(filter(None, (verdict.strip(), front.headline)))
 
 
 def _part(part: Part | None, level: int) -> list[str]:

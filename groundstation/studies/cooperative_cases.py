@@ -271,7 +271,9 @@ CASES: tuple[Case, ...] = (
 
 
 def settings_of(scenario: SessionScenario, case: Case) -> CooperativeSettings:
-    """Settings whose belief is exactly what the session draws from."""
+    """Settings whose belief is exactly what the session draws from; no gate, as in the source."""
     errors = scenario.errors
     belief = InsBelief(**{item.name: getattr(errors, item.name) for item in fields(InsBelief)})
-    return CooperativeSettings(ins=belief, update=case.update, output_step_s=5.0, frame_s=scenario.link.frame_s)
+    return CooperativeSettings(
+        gate_sigma=0.0, ins=belief, update=case.update, output_step_s=5.0, frame_s=scenario.link.frame_s
+    )
