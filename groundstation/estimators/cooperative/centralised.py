@@ -1,0 +1,210 @@
+"""One extended Kalman filter of all vehicles: 7 k states in a local frame, 13 k (15 k) in the global one.
+
+A vehicle's block is moved on when a measurement or an output asks for it: noise of different vehicles is independent,
+so that blocks may stand at different times. Vehicles that are not there yet keep their start. Ground points whose own
+position is uncertain are constant states. Dead reckoning is the same filter without measurements.
+
+Source: Kalman, A new approach to linear filtering and prediction problems, 1960; sequential use of simultaneous
+measurements: Maybeck, Stochastic Models, Estimation, and Control, volume 1, 1979, section 5.6.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray
+from groundstation.estimators.cooperative.events import HEIGHT, PEER, POINT, Event, Prepared
+from groundstation.estimators.cooperative.messages import report_bytes
+from groundstation.estimators.cooperative.observation import Row, rows_of
+from groundstation.estimators.cooperative.settings import CooperativeSettings
+from groundstation.estimators.cooperative.timeline import timeline
+from groundstation.estimators.cooperative.tracks import GATED, USED, AlgorithmRun, Recorder
+
+PATIENCE = 30  # rejections of a vehicle in a row: then its clock has leapt
+LEAP_M = 1e5
+
+
+class _Joint:
+    """State x and covariance P of all vehicles and uncertain points."""
+
+    def __init__(self, prepared: Prepared) -> None:
+        self.prepared = prepared
+        starts = [vehicle.start() for vehicle in prepared.vehicles]
+        sizes = [len(x) for x, _ in starts]
+        edges = np.concatenate([[0], np.cumsum(sizes)])
+        self.slices = [slice(int(one), int(two)) for one, two in pairwise(edges)]
+        uncertain = [i for i, point in enumerate(prepared.session.points) if point.position_sigma_m > 0.0]
+        total = int(edges[-1])
+        self.points = {i: slice(total + 2 * k, total + 2 * k + 2) for k, i in enumerate(uncertain)}
+        total += 2 * len(uncertain)
+        self.x, self.P = np.zeros(total), np.zeros((total, total))
+        for place, (x, P) in zip(self.slices, starts, strict=True):
+            self.x[place], self.P[place, place] = x, P
+        for i, place in self.points.items():
+            self.P[place, place] = prepared.session.points[i].position_sigma_m ** 2 * np.eye(2)
+        self.times = [vehicle.first_s for vehicle in prepared.vehicles]
+
+    def advance(self, who: int, to_s: float) -> None:
+        """Move one vehicle's block on."""
+        if to_s <= self.times[who] + 1e-12:
+            return
+        place = self.slices[who]
+        x, phi, noise = self.prepared.vehicles[who].step(self.x[place], self.times[who], to_s)
+        self.x[place] = x
+        self.P[place] = phi @ self.P[place]
+        self.P[:, place] = self.P[:, place] @ phi.T
+        self.P[place, place] += noise
+        self.times[who] = to_s
+
+    def rows(self, event: Event) -> list[tuple[Row, FloatArray]]:
+        """Rows of an event at the vehicles' own times, each with its derivative by the whole state."""
+        vehicles, found = self.prepared.vehicles, []
+        here = self._at(event.receiver, event.time_s)
+        source_m, clock_m = None, 0.0
+        there: tuple[FloatArray, FloatArray] | None = None
+        derivative = np.zeros((3, 0))
+        if event.kind == PEER:
+            peer = vehicles[event.source]
+            there = self._at(event.source, event.time_s)
+            source_m, derivative = peer.place(there[0], event.time_s)
+            clock_m = float(there[0][peer.clock]) if peer.clock >= 0 else 0.0
+        elif event.kind == POINT and event.source in self.points:
+            assert event.place_m is not None
+            source_m = event.place_m - self.prepared.point_axes[event.source] @ self.x[self.points[event.source]]
+        for row in rows_of(event, vehicles[event.receiver], here[0], source_m, clock_m):
+            h = np.zeros(len(self.x))
+            h[self.slices[event.receiver]] = row.receiver @ here[1]
+            if there is not None:
+                h[self.slices[event.source]] = row.by_source(vehicles[event.source], derivative) @ there[1]
+            elif event.kind == POINT and event.source in self.points:
+                h[self.points[event.source]] = -row.place @ self.prepared.point_axes[event.source]
+            found.append((row, h))
+        return found
+
+    def _at(self, who: int, at_s: float) -> tuple[FloatArray, FloatArray]:
+        """State of a vehicle at a time not later than its own, and its derivative by the state it has."""
+        x = self.x[self.slices[who]]
+        if abs(at_s - self.times[who]) < 1e-12:
+            return x, np.eye(len(x))
+        moved, phi, _ = self.prepared.vehicles[who].step(x, self.times[who], at_s)
+        return moved, phi
+
+    def update(self, h: FloatArray, innovation: float, variance: float) -> None:
+        """One scalar measurement with the optimal gain; P stays symmetric to the last bit."""
+        shared = self.P @ h
+        total = float(h @ shared) + variance
+        self.x += shared * (innovation / total)
+        self.P -= np.outer(shared, shared / total)
+
+    def update_together(self, H: FloatArray, innovation: FloatArray, variance: FloatArray) -> None:
+        """Several measurements in one step."""
+        shared = self.P @ H.T
+        S = H @ shared + np.diag(variance)
+        gain = np.linalg.solve(S, shared.T).T
+        self.x += gain @ innovation
+        self.P -= gain @ shared.T
+        self.P = 0.5 * (self.P + self.P.T)
+
+
+def run_centralised(
+    prepared: Prepared, settings: CooperativeSettings, *, uses_measurements: bool = True, innovates: bool = True
+) -> AlgorithmRun:
+    """Run the centralised filter, or without measurements dead reckoning.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    settings : CooperativeSettings
+    uses_measurements : bool
+        False: the start and the noise alone.
+    innovates : bool
+        False: measurements shrink the covariance and leave the state where it is, as if each were predicted exactly.
+    """
+    joint, recorder = _Joint(prepared), Recorder(prepared.vehicles)
+    rejected = [0] * len(prepared.vehicles)
+    together = settings.update == "simultaneous"
+    for at_s, what in timeline(prepared, settings, together=together):
+        if isinstance(what, int):
+            joint.advance(what, at_s)
+            recorder.keep(what, at_s, joint.x[joint.slices[what]], joint.P[joint.slices[what], joint.slices[what]])
+        elif uses_measurements:
+            for who in sorted({one for event in what for one in _members(event)}):
+                joint.advance(who, at_s)
+            before = joint.x.copy()
+            if together:
+                _use_together(joint, what, settings, recorder, rejected)
+            else:
+                _use_one(joint, what[0], settings, recorder, rejected)
+            if not innovates:
+                joint.x[:] = before
+    if uses_measurements:
+        _count_messages(prepared, settings, recorder)
+    return recorder.finish("centralised" if uses_measurements else "dead_reckoning", settings.update)
+
+
+def _members(event: Event) -> tuple[int, ...]:
+    return (event.receiver, event.source) if event.kind == PEER else (event.receiver,)
+
+
+def _is_gated(joint: _Joint, row: Row, h: FloatArray, settings: CooperativeSettings) -> tuple[bool, float]:
+    total = float(h @ joint.P @ h) + row.variance
+    return settings.gate_sigma > 0.0 and row.innovation**2 > settings.gate_sigma**2 * total, total
+
+
+def _use_one(
+    joint: _Joint, event: Event, settings: CooperativeSettings, recorder: Recorder, rejected: list[int]
+) -> None:
+    rows = joint.rows(event)
+    if not rows:
+        recorder.counts["lost"] += 1
+    for k, (row, h) in enumerate(rows):
+        gated, total = _is_gated(joint, row, h, settings)
+        recorder.judge(event, row.innovation, total, GATED if gated else USED)
+        _count_rejections(joint, event, gated, rejected, recorder)
+        if gated:
+            break  # the bearing of a wrong range is another object's
+        joint.update(h, row.innovation, row.variance)
+        if k == 0 and len(rows) > 1:  # the second row about the new estimate
+            rows[1:] = joint.rows(event)[1:]
+
+
+def _use_together(
+    joint: _Joint, events: tuple[Event, ...], settings: CooperativeSettings, recorder: Recorder, rejected: list[int]
+) -> None:
+    kept = []
+    for event in events:
+        for row, h in joint.rows(event):
+            gated, total = _is_gated(joint, row, h, settings)
+            recorder.judge(event, row.innovation, total, GATED if gated else USED)
+            _count_rejections(joint, event, gated, rejected, recorder)
+            if not gated:
+                kept.append((row, h))
+    if kept:
+        joint.update_together(
+            np.array([h for _, h in kept]),
+            np.array([row.innovation for row, _ in kept]),
+            np.array([row.variance for row, _ in kept]),
+        )
+
+
+def _count_rejections(joint: _Joint, event: Event, gated: bool, rejected: list[int], recorder: Recorder) -> None:
+    """Open the clock of a vehicle none of whose ranges fits any more."""
+    for who in _members(event):
+        rejected[who] = rejected[who] + 1 if gated else 0
+        vehicle = joint.prepared.vehicles[who]
+        if rejected[who] >= PATIENCE and vehicle.clock >= 0 and event.kind != HEIGHT:
+            rejected[who] = 0
+            recorder.counts["clock_leaps"] += 1
+            for clock in {vehicle.clock, vehicle.receiver_clock}:
+                at = joint.slices[who].start + clock
+                joint.P[at, at] += LEAP_M**2
+
+
+def _count_messages(prepared: Prepared, settings: CooperativeSettings, recorder: Recorder) -> None:
+    """What the vehicles send to the centre: their dead reckoning and what they measured, once a frame."""
+    reports: dict[tuple[int, int], int] = {}
+    for event in prepared.events:
+        key = (int((event.time_s + 1e-9) // settings.frame_s), event.receiver)
+        reports[key] = reports.get(key, 0) + 1
+    for (_, who), ranges in reports.items():
+        recorder.sent(who, report_bytes(ranges))

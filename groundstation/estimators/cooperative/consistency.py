@@ -1,0 +1,79 @@
+"""How errors compare with the sigmas a filter claims, and whether it diverges."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray
+from groundstation.estimators.cooperative.tracks import Track
+from groundstation.tables.session import DeadReckoning, Odometry
+
+DIVERGED = 3.0  # horizontal error over the computed sigma_r
+LAST_PART = 0.1
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """One track against truth, horizontal.
+
+    Parameters
+    ----------
+    error_m : ndarray, shape (n, 2)
+        Estimate minus truth, north and east; NaN where there is no truth.
+    nees : ndarray, shape (n,)
+        Normalised squared error; 2 on average is honest.
+    """
+
+    error_m: FloatArray
+    nees: FloatArray
+
+    @property
+    def rms_m(self) -> float:
+        """Of the horizontal error over all epochs."""
+        return float(np.sqrt(np.nanmean((self.error_m**2).sum(axis=1)))) if np.isfinite(self.error_m).any() else np.nan
+
+    def diverges(self, track: Track) -> bool:
+        """Whether the error of the last tenth of the session is beyond three computed sigma_r."""
+        ratio = np.linalg.norm(self.error_m, axis=1) / (0.5 * track.two_sigma_r_m)
+        last = ratio[int((1.0 - LAST_PART) * len(ratio)) :]
+        last = last[np.isfinite(last)]
+        return bool(len(last) and np.sqrt(np.mean(last**2)) > DIVERGED)
+
+
+def judge(track: Track, vehicle: DeadReckoning | Odometry, time_s: FloatArray, position_m: FloatArray) -> Judgement:
+    """Hold a track against the true positions of its vehicle (m, 3), which are interpolated to its epochs."""
+    true = np.column_stack(
+        [np.interp(track.time_s, time_s, position_m[:, axis], left=np.nan, right=np.nan) for axis in range(3)]
+    )
+    error = track.position_m - true
+    if isinstance(vehicle, DeadReckoning):
+        nearest = np.clip(np.searchsorted(vehicle.time_s, track.time_s), 0, len(vehicle) - 1)
+        horizontal = np.einsum("nij,ni->nj", vehicle.axes[nearest], error)[:, :2]
+    else:
+        horizontal = error[:, :2]
+    return Judgement(horizontal, normalised(horizontal, track.horizontal_m2))
+
+
+def normalised(error: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Squared error over covariance, shape (n,), NaN where the error is."""
+    out = np.full(len(error), np.nan)
+    known = np.isfinite(error).all(axis=1)
+    if known.any():
+        solved = np.linalg.solve(covariance[known], error[known][..., None])[..., 0]
+        out[known] = (error[known] * solved).sum(axis=1)
+    return out
+
+
+def nees_limits(freedom: int, independent: int) -> tuple[float, float]:
+    """Limits of the mean of ``independent`` normalised squared errors of ``freedom`` degrees, 95 %.
+
+    Examples
+    --------
+    >>> low, high = nees_limits(2, 100)
+    >>> round(low, 2), round(high, 2)
+    (1.63, 2.41)
+    """
+    from scipy.stats import chi2
+
+    total = freedom * independent
+    return float(chi2.ppf(0.025, total) / independent), float(chi2.ppf(0.975, total) / independent)

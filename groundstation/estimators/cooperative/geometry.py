@@ -1,0 +1,154 @@
+"""Geometry of ranging: dilution of precision, determinant, smallest eigenvalue, Gram determinant, information bound.
+
+H holds one row for each source that a vehicle hears in a frame: the horizontal direction from the source to it (two
+columns), and 1 for its clock where ranges are one-way. Sources count as exact.
+
+Source: Skrypnik, Inter-aircraft navigation in air traffic management, 2010, chapters 4.3 and 5.2 (det(H'H), Gram);
+Misra and Enge, Global Positioning System, 2nd ed. 2006, section 6.1 (dilution); Tichavsky, Muravchik and Nehorai,
+Posterior Cramer-Rao bounds for discrete-time nonlinear filtering, 1998 (for a Gaussian model that is linear along the
+true tracks the bound is the covariance of the Kalman filter linearised there).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray
+from groundstation.base.records import frozen
+from groundstation.estimators.cooperative.centralised import run_centralised
+from groundstation.estimators.cooperative.events import HEIGHT, PEER, SATELLITE, Event, prepare
+from groundstation.estimators.cooperative.settings import CooperativeSettings
+from groundstation.estimators.cooperative.tracks import AlgorithmRun, Track
+from groundstation.estimators.cooperative.vehicles import Vehicle
+from groundstation.tables.session import DeadReckoning, Session
+
+GRAM_S = 60.0
+SINGULAR = 1e-12
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Geometry of one vehicle, a row a frame in which it hears anything.
+
+    Parameters
+    ----------
+    name : str
+    time_s, sources : ndarrays, shape (n,)
+    hdop, gdop : ndarrays, shape (n,)
+        Horizontal part, and with the clock; NaN where H is short of rank.
+    determinant, eigenvalue : ndarrays, shape (n,)
+        Of H'H, horizontal columns.
+    gram_determinant : ndarray, shape (n,)
+        Determinant of the mean of H'H over the last ``GRAM_S`` seconds.
+    """
+
+    name: str
+    time_s: FloatArray
+    sources: FloatArray
+    hdop: FloatArray
+    gdop: FloatArray
+    determinant: FloatArray
+    eigenvalue: FloatArray
+    gram_determinant: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("time_s", "sources", "hdop", "gdop", "determinant", "eigenvalue", "gram_determinant"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+
+def dilution(H: FloatArray, has_clock: bool) -> tuple[float, float]:
+    """HDOP and GDOP of horizontal directions (n, 2), NaN without a solution.
+
+    Examples
+    --------
+    >>> hdop, gdop = dilution(np.array([[1.0, 0.0], [0.0, 1.0]]), has_clock=False)
+    >>> round(hdop, 6), round(gdop, 6)
+    (1.414214, 1.414214)
+    """
+    full = np.column_stack([H, np.ones(len(H))]) if has_clock else H
+    information = full.T @ full
+    if len(full) < full.shape[1] or np.linalg.det(information) < SINGULAR:
+        return float("nan"), float("nan")
+    variance = np.diag(np.linalg.inv(information))
+    return float(np.sqrt(variance[:2].sum())), float(np.sqrt(variance.sum()))
+
+
+def geometry_of(session: Session, settings: CooperativeSettings, run: AlgorithmRun) -> tuple[Geometry, ...]:
+    """Geometry of every vehicle with time, seen from the positions of a run."""
+    prepared = prepare(session, settings)
+    frames: list[dict[int, dict[tuple[str, int, bytes], Event]]] = [{} for _ in prepared.vehicles]
+    for event in prepared.events:
+        if event.kind == HEIGHT or not np.isfinite(event.value_m):
+            continue
+        number = int((event.time_s + 1e-9) // settings.frame_s)
+        place = b"" if event.place_m is None or event.kind != SATELLITE else event.place_m.tobytes()
+        frames[event.receiver].setdefault(number, {})[(event.kind, event.source, place)] = event
+    return tuple(
+        _one(vehicle, heard, run.tracks, index, settings, prepared.session)
+        for index, (vehicle, heard) in enumerate(zip(prepared.vehicles, frames, strict=True))
+    )
+
+
+def _one(
+    vehicle: Vehicle,
+    heard: dict[int, dict[tuple[str, int, bytes], Event]],
+    tracks: tuple[Track, ...],
+    index: int,
+    settings: CooperativeSettings,
+    session: Session,
+) -> Geometry:
+    track = session.vehicles[index]
+    has_clock = vehicle.clock >= 0 and not session.ranges.is_two_way
+    rows: list[tuple[float, ...]] = []
+    history: list[tuple[float, FloatArray]] = []
+    for number in sorted(heard):
+        time_s = number * settings.frame_s
+        here = _position_at(tracks[index], time_s)
+        axes = np.eye(3)
+        if isinstance(track, DeadReckoning):
+            axes = track.axes[min(int(np.searchsorted(track.time_s, time_s)), len(track) - 1)]
+        lines = []
+        for event in heard[number].values():
+            there = _position_at(tracks[event.source], time_s) if event.kind == PEER else event.place_m
+            line = here - np.asarray(there)
+            lines.append((line / np.linalg.norm(line)) @ axes[:, :2])
+        H = np.array(lines)
+        information = H.T @ H
+        history = [(at, past) for at, past in history if at > time_s - GRAM_S] + [(time_s, information)]
+        gram = np.mean([past for _, past in history], axis=0)
+        eigenvalue = float(np.linalg.eigvalsh(information)[0])
+        rows.append((time_s, len(H), *dilution(H, has_clock), _det(information), max(eigenvalue, 0.0), _det(gram)))
+    columns = np.array(rows, dtype=np.float64).reshape(len(rows), 7).T
+    return Geometry(vehicle.name, *columns)
+
+
+def _det(matrix: FloatArray) -> float:
+    return max(float(np.linalg.det(matrix)), 0.0)
+
+
+def _position_at(track: Track, time_s: float) -> FloatArray:
+    """The position of the output nearest to a time."""
+    return track.position_m[int(np.argmin(np.abs(track.time_s - time_s)))] if len(track.time_s) else np.full(3, np.nan)
+
+
+Truth = dict[str, tuple[FloatArray, FloatArray]]
+
+
+def bound_of(session: Session, settings: CooperativeSettings, truth: Truth) -> AlgorithmRun:
+    """Run the centralised filter along the true tracks, without error in any reading: its covariance is the bound.
+
+    Vehicles without truth keep their own dead reckoning; then the bound is one along the tracks as they were read.
+    Measured values have no say in it: innovations far from zero only move the point of linearisation, so the gate is
+    off and every measurement is replaced by what is predicted.
+    """
+    vehicles = []
+    for vehicle in session.vehicles:
+        if isinstance(vehicle, DeadReckoning) and vehicle.name in truth:
+            time_s, position = truth[vehicle.name]
+            true = np.column_stack([np.interp(vehicle.time_s, time_s, position[:, axis]) for axis in range(3)])
+            vehicle = replace(vehicle, position_m=true)
+        vehicles.append(vehicle)
+    along = replace(session, vehicles=tuple(vehicles))
+    prepared = prepare(along, settings)
+    exact = replace(settings, gate_sigma=0.0)
+    return run_centralised(prepared, exact, innovates=False)

@@ -1,0 +1,106 @@
+"""Settings of the cooperative filters: what they believe of INS, odometry and clocks, and how they update."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from groundstation.base.toml_settings import check_ranges, number
+
+Update = Literal["sequential", "simultaneous"]
+ALGORITHMS: dict[str, str] = {
+    "dead_reckoning": "own INS alone",
+    "centralised": "one filter of all vehicles",
+    "neighbour_exact": "own states, neighbour's position taken as exact (DA)",
+    "ranked": "own states, neighbours of a higher rank with their covariance (multilevel)",
+    "modified": "ranked, correlated noise of the primaries",
+    "split_intersection": "own states, split covariance intersection",
+    "pairwise": "own states and stored pairwise cross-covariances (Luft et al.)",
+}
+
+
+@dataclass(frozen=True)
+class InsBelief:
+    """Sigmas that the filter starts from and is driven by; one aircraft with INS, baro and clocks.
+
+    Global frame: 13 states (15 with separate clocks): tilt, azimuth and gyro count, ``velocity_s`` does not. Local
+    frame: 7 states, ``velocity_s`` counts.
+    """
+
+    position_m: float = number(300.0, 0.0)
+    velocity_mps: float = number(0.2, 0.0)
+    velocity_s: float = number(1000.0, 1.0)
+    tilt_arcsec: float = number(4.0, 0.0)
+    azimuth_arcmin: float = number(5.0, 0.0)
+    gyro_dph: float = number(0.01, 0.0)
+    gyro_s: float = number(3600.0, 1.0)
+    baro_m: float = number(10.0, 0.0)
+    baro_s: float = number(3600.0, 1.0)
+    clock_m: float = number(30.0, 0.0)
+    clock_mps: float = number(3.0, 0.0)
+    clock_s: float = number(3600.0, 1.0)
+    has_separate_clocks: bool = False
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+@dataclass(frozen=True)
+class OdometryBelief:
+    """Sigmas of one wheeled vehicle: where it starts, noise of speed and turn rate, and their scale errors.
+
+    Speed and turn noise are densities: metres and degrees of a random walk over one second. ``slip_m_per_sqrt_m`` adds
+    noise along and across in proportion to the way. Scale states exist where their sigma is above 0.
+    """
+
+    position_m: float = number(0.05, 0.0)
+    heading_deg: float = number(2.0, 0.0)
+    along_m_per_sqrt_s: float = number(0.02, 0.0)
+    turn_deg_per_sqrt_s: float = number(2.0, 0.0)
+    slip_m_per_sqrt_m: float = number(0.0, 0.0)
+    speed_scale: float = number(0.0, 0.0, 1.0)
+    turn_scale: float = number(0.0, 0.0, 1.0)
+    scale_s: float = number(1e6, 1.0)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+@dataclass(frozen=True)
+class CooperativeSettings:
+    """How the cooperative filters work.
+
+    Parameters
+    ----------
+    update : {'sequential', 'simultaneous'}
+        Every measurement at its own time with its own linearisation, or all of one frame together.
+    frame_s : float
+        Length of a frame, for simultaneous updates and for the modified algorithm.
+    gate_sigma : float
+        Innovations beyond are rejected and counted; 0 switches the gate off.
+    latency_slots : int
+        A message tells what its sender knew so many slots ago.
+    range_bias_m, range_bias_s : float
+        Sigma and correlation time of a range bias of each vehicle's receiver; 0: no such state.
+    lever_arm_m : float
+        Sigma of an unknown lever arm (forward, right) of each aircraft's antenna; 0: no such states.
+    output_step_s : float
+    map_window_s : float
+        Length of the stretches whose joint error map is judged.
+    extra_range_sigma_m : float
+        Added to the stated sigma of peer ranges, in squares: what the stated one leaves out.
+    """
+
+    update: Update = "sequential"
+    frame_s: float = number(1.0, 0.01)
+    gate_sigma: float = number(6.0, 0.0)
+    latency_slots: int = number(1, 0, 10)
+    range_bias_m: float = number(0.0, 0.0)
+    range_bias_s: float = number(1e6, 1.0)
+    lever_arm_m: float = number(0.0, 0.0)
+    output_step_s: float = number(1.0, 0.01)
+    map_window_s: float = number(10.0, 0.1)
+    extra_range_sigma_m: float = number(0.0, 0.0)
+    ins: InsBelief = field(default_factory=InsBelief)
+    odometry: OdometryBelief = field(default_factory=OdometryBelief)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)

@@ -1,0 +1,245 @@
+"""A session of several vehicles as one input: their own dead reckoning, and what they measured between them.
+
+Vehicles, satellites and ground points come and go: one is there while its table has rows. Times are float seconds
+since the start of the session. Positions are in one frame for all: ECEF, or a local north-east-down frame.
+"""
+
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import FloatArray
+from groundstation.base.records import frozen
+
+Frame = Literal["ecef", "local"]
+NO_SLOT = -1
+
+
+def _freeze(table: Any) -> None:
+    """Make every array of a dataclass read-only; text stays text, everything else becomes float64."""
+    for item in fields(table):
+        value = getattr(table, item.name)
+        if isinstance(value, np.ndarray):
+            object.__setattr__(table, item.name, frozen(value))
+
+
+@dataclass(frozen=True)
+class DeadReckoning:
+    """What one aircraft's INS and barometric altimeter say, at its own epochs.
+
+    Parameters
+    ----------
+    name : str
+    time_s : ndarray, shape (n,)
+        Increasing.
+    position_m : ndarray, shape (n, 3)
+        In the frame of the session.
+    velocity_mps : ndarray, shape (n, 3)
+        North, east, down.
+    axes : ndarray, shape (n, 3, 3)
+        Columns: north, east and down in the frame of the session; the unit matrix in a local one.
+    latitude_deg : ndarray, shape (n,)
+        NaN in a local frame.
+    heading_deg : ndarray, shape (n,)
+        Of the nose, NaN where unknown; only a lever arm needs it.
+    """
+
+    name: str
+    time_s: FloatArray
+    position_m: FloatArray
+    velocity_mps: FloatArray
+    axes: FloatArray
+    latitude_deg: FloatArray
+    heading_deg: FloatArray
+
+    def __post_init__(self) -> None:
+        _freeze(self)
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+@dataclass(frozen=True)
+class Odometry:
+    """What the wheels of one ground vehicle say: speed and rate of turn, each held until the next epoch.
+
+    Parameters
+    ----------
+    name : str
+    time_s, speed_mps, turn_rate_dps : ndarrays, shape (n,)
+        Turn to the right positive (about down).
+    position_m : tuple of float
+        Where it stood at the first epoch, frame of the session (north, east).
+    heading_deg : float
+        Its heading then.
+    """
+
+    name: str
+    time_s: FloatArray
+    speed_mps: FloatArray
+    turn_rate_dps: FloatArray
+    position_m: tuple[float, float]
+    heading_deg: float
+
+    def __post_init__(self) -> None:
+        _freeze(self)
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+@dataclass(frozen=True)
+class GroundPoint:
+    """A navigation reference point that stands still.
+
+    Parameters
+    ----------
+    name : str
+    position_m : tuple of float
+        As everybody believes it, frame of the session.
+    position_sigma_m : float
+        Sigma of that belief along each horizontal axis; 0 for a surveyed point. The navigation controller sets origin
+        and axes of the local frame: its error is common to all who range to it.
+    """
+
+    name: str
+    position_m: tuple[float, float, float]
+    position_sigma_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """One-way pseudo-ranges over the link, and bearings where the sensor has them; one row a measurement.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (n,)
+        Of transmission, on the session's clock; not decreasing.
+    receiver, source : ndarrays of text, shape (n,)
+        The source is a vehicle or a ground point.
+    pseudorange_m, sigma_m : ndarrays, shape (n,)
+        Pseudo-range NaN for a bearing alone.
+    slot : ndarray of int, shape (n,)
+        Number of the time slot, rising through the session; ``NO_SLOT`` where the link has none.
+    bearing_deg, bearing_sigma_deg : ndarrays, shape (n,), optional
+        From the nose of the receiver, to the right positive.
+    is_two_way : bool
+        Two-way ranges: no clock stands in them.
+    """
+
+    time_s: FloatArray
+    receiver: NDArray[np.str_]
+    source: NDArray[np.str_]
+    pseudorange_m: FloatArray
+    sigma_m: FloatArray
+    slot: NDArray[np.int64]
+    bearing_deg: FloatArray | None = None
+    bearing_sigma_deg: FloatArray | None = None
+    is_two_way: bool = False
+
+    def __post_init__(self) -> None:
+        _freeze(self)
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @classmethod
+    def none(cls) -> "Ranges":
+        """No measurement at all."""
+        empty, names = np.zeros(0), np.zeros(0, dtype=np.str_)
+        return cls(empty, names, names, empty, empty, np.zeros(0, dtype=np.int64))
+
+    def take(self, rows: Any) -> "Ranges":
+        """The rows that a mask or positions select."""
+        parts = {
+            item.name: value if value is None or isinstance(value, bool) else value[rows]
+            for item in fields(self)
+            for value in (getattr(self, item.name),)
+        }
+        return Ranges(**parts)
+
+
+@dataclass(frozen=True)
+class SatelliteRanges:
+    """Pseudo-ranges to satellites.
+
+    Parameters
+    ----------
+    time_s, pseudorange_m, sigma_m : ndarrays, shape (n,)
+        Time of reception.
+    receiver, satellite : ndarrays of text, shape (n,)
+    position_m : ndarray, shape (n, 3)
+        Of the satellite at emission, ECEF of the instant of emission.
+    """
+
+    time_s: FloatArray
+    receiver: NDArray[np.str_]
+    satellite: NDArray[np.str_]
+    pseudorange_m: FloatArray
+    sigma_m: FloatArray
+    position_m: FloatArray
+
+    def __post_init__(self) -> None:
+        _freeze(self)
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @classmethod
+    def none(cls) -> "SatelliteRanges":
+        """No measurement at all."""
+        empty, names = np.zeros(0), np.zeros(0, dtype=np.str_)
+        return cls(empty, names, names, empty, empty, np.zeros((0, 3)))
+
+
+@dataclass(frozen=True)
+class Heights:
+    """Heights from another instrument than the one that damps the vertical channel; above the session's reference."""
+
+    time_s: FloatArray
+    aircraft: NDArray[np.str_]
+    height_m: FloatArray
+    sigma_m: FloatArray
+
+    def __post_init__(self) -> None:
+        _freeze(self)
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @classmethod
+    def none(cls) -> "Heights":
+        """No measurement at all."""
+        empty = np.zeros(0)
+        return cls(empty, np.zeros(0, dtype=np.str_), empty, empty)
+
+
+@dataclass(frozen=True)
+class Session:
+    """Everything the cooperative estimators are given.
+
+    Parameters
+    ----------
+    frame : {'ecef', 'local'}
+    vehicles : tuple of DeadReckoning or Odometry
+    points : tuple of GroundPoint
+    ranges, satellites, heights
+        Measurements.
+    ranks : dict of name to int
+        Rank of accuracy of vehicles and points, 0 the highest; who has none is of the lowest rank.
+    """
+
+    frame: Frame
+    vehicles: tuple[DeadReckoning | Odometry, ...]
+    points: tuple[GroundPoint, ...] = ()
+    ranges: Ranges = field(default_factory=Ranges.none)
+    satellites: SatelliteRanges = field(default_factory=SatelliteRanges.none)
+    heights: Heights = field(default_factory=Heights.none)
+    ranks: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the vehicles."""
+        return tuple(vehicle.name for vehicle in self.vehicles)
