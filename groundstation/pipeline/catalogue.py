@@ -16,7 +16,7 @@ def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict
         When the log is missing or cannot be read.
     """
     if log is None:
-        return [*_analyses(), *_formats(), *_scenarios(), *_studies()]
+        return [*_analyses(), *_formats(), *_scenarios(), *_sessions(), *_studies()]
     return _with_answers(log, profile)
 
 
@@ -63,6 +63,15 @@ def _scenarios() -> list[dict[str, Any]]:
     return [
         {"kind": "scenario", "name": name, "title": load_scenario(name).title, "needs": "nothing"}
         for name in scenario_names()
+    ]
+
+
+def _sessions() -> list[dict[str, Any]]:
+    from groundstation.simulation.session_scenario import load_session, session_names
+
+    return [
+        {"kind": "session", "name": name, "title": load_session(name).title, "needs": "nothing"}
+        for name in session_names()
     ]
 
 
