@@ -1,6 +1,5 @@
 """A flight's results with plausible figures, made without readers or estimators: what the report's tests show."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -21,15 +20,16 @@ from groundstation.results.heading import (
     Standstill,
     TaxiSegment,
 )
+from groundstation.results.manifest import Host, Manifest
 from groundstation.simulation.processes import damped_oscillation, gauss_markov
 
 ERROR_DEG = 1.04
-MANIFEST: Mapping[str, Any] = {
-    "groundstation": "0.1.0",
-    "made_utc": "2031-01-02T03:04:05Z",
-    "host": {"platform": "somewhere"},
-    "configuration": {"exclude": [{"from": "+03:10", "to": "+03:15", "reason": "towed"}]},
-}
+MANIFEST = Manifest(
+    groundstation="0.1.0",
+    made_utc="2031-01-02T03:04:05Z",
+    host=Host(platform="somewhere"),
+    configuration={"exclude": [{"from": "+03:10", "to": "+03:15", "reason": "towed"}]},
+)
 
 
 def figure(name: str, **columns: Any) -> FigureData:
@@ -298,7 +298,7 @@ def example(*answers: Answer | None, **changes: Any) -> FlightResults:
         duration_s=3000.0,
         status="ok",
         completeness={"gnss": 0.9897, "ins": 1.0},
-        clock=Clock(first_device_time="2026-05-04T06:00:00.000Z", is_absolute=True, nominal_period_s=0.02, start="utc"),
+        clock=Clock(first_device_time="12.000 s", nominal_period_s=0.02),
         findings=(
             Finding("info", "reader.derived", "GNSS velocity derived from track and ground speed", "gnss"),
             Finding(

@@ -1,6 +1,7 @@
 """Data flows one way: the rooms' import table, read off the syntax trees (imports inside functions count)."""
 
 import ast
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -79,3 +80,32 @@ def test_numba_is_imported_by_its_one_wrapper_alone() -> None:
     for path in modules():
         names = {name.partition(".")[0] for name, _ in imports_of(ast.parse(path.read_text(encoding="utf-8")))}
         assert "numba" not in names or path == PACKAGE / "base" / "compile.py", path
+
+
+def test_no_file_imports_itself_through_others() -> None:
+    """An import circle is one file in several: whoever changes one has to read all of them."""
+    files = {_name(path): path for path in modules()}
+    graph = {name: _imported(path, files) - {name} for name, path in files.items()}
+    left = dict(graph)
+    while removable := [name for name, imported in left.items() if not imported & left.keys()]:
+        for name in removable:
+            del left[name]
+    assert not left, f"in or behind an import circle: {', '.join(sorted(left))}"
+
+
+def _name(path: Path) -> str:
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def _imported(path: Path, files: Mapping[str, Path]) -> set[str]:
+    """Files that a file imports; ``from a import b`` means the file a.b where there is one, else a."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            found.update(
+                name if (name := f"{node.module}.{alias.name}") in files else node.module or "" for alias in node.names
+            )
+    return found & files.keys()

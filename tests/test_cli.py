@@ -13,6 +13,7 @@ from groundstation.cli.application import VERBS, app
 from groundstation.cli.main import LATER_VERBS
 
 HEAVY = (
+    "cattrs",
     *("numpy", "pandas", "pyarrow", "numba", "scipy", "rerun", "matplotlib", "mcap", "google.protobuf"),
     *("jinja2", "typst"),
     *("groundstation.pipeline.batch", "groundstation.readers", "groundstation.viewer"),

@@ -15,6 +15,7 @@ from groundstation.base.serial import to_json_exactly
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.chapters.parts import Facts, Grid
+from groundstation.chapters.quality import quality
 from groundstation.cli.check_table import text_of
 from groundstation.integrity import Survey, ledger_findings, survey
 from groundstation.integrity.clock_relation import ROLLOVER_S
@@ -22,13 +23,12 @@ from groundstation.pipeline.check import check_many
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.conversions import convert_many
 from groundstation.readers import registry
-from groundstation.reports.sections import quality
-from groundstation.results.files import SavedFlight
 from groundstation.simulation.faults import BackwardStep, ClockDrift, Dropout, Fault, ForwardStep, apply_faults
 from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import simulate
 from groundstation.tables.table import Flight
 from tests.dataflash_writer import DataFlash
+from tests.report_example import example
 from tests.simulated_flights import quiet
 from tests.ulog_writer import GPS, GPS_CODE, UlogWriter
 
@@ -294,8 +294,7 @@ def test_autopilots_drift_and_week(
 
 def test_the_report_has_the_clocks_in_tables(tmp_path: Path) -> None:
     case = next(case for case in CASES if case.name == "a backward step of 5 s")
-    clock = to_json_exactly(found_in(case, tmp_path).clock.document())
-    parts = quality.build(SavedFlight(tmp_path, {"clock": clock}, {}, {})).parts
+    parts = quality(example(None, clock=found_in(case, tmp_path).clock.document())).parts
     grids = {part.title: part.rows for part in parts if isinstance(part, Grid)}
     (step,), (relation,) = grids["Steps of the recorder's clock"], grids["The recorder's clock by others"]
     assert step[2] == "−5.000" and relation[0] == "GNSS · raw.recorder.gnss_time_utc_s"

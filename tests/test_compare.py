@@ -14,7 +14,7 @@ import pytest
 from rerun.experimental import ViewerClient
 from typer.testing import CliRunner
 
-from groundstation.base.errors import UsageError
+from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.cli.main import app
 from groundstation.pipeline.alignment import align, events_of
 from groundstation.pipeline.clip import Wanted, clip
@@ -27,8 +27,12 @@ from groundstation.reports.drawing import sketching
 from groundstation.results.comparison import Comparison, Delta
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, load, save
+from groundstation.results.inertial import InertialResult, RealOutage
+from groundstation.results.manifest import Manifest
+from groundstation.results.summary import summary_of
 from groundstation.simulation.samples import write_scenario
 from groundstation.viewer.comparison import write_comparison
+from tests.inertial_example import inertial_result
 from tests.recording_contents import Contents
 from tests.viewer_example import make_flight, make_results
 from tests.viewer_shots import colourful, pages, picture, settled
@@ -77,7 +81,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 def saved_example(folder: Path, **changes: Any) -> SavedFlight:
     """A saved flight with figures of every analysis."""
     flight = make_flight(240.0, 20.0)
-    save(folder, replace(make_results(flight), **changes), {"configuration": {}})
+    save(folder, replace(make_results(flight), **changes), Manifest())
     return load(folder)
 
 
@@ -215,6 +219,11 @@ def lanes(**columns: Any) -> FigureData:
     return FigureData("x", {name: np.array(values) for name, values in columns.items()}, {})
 
 
+def saved_with(figures: dict[str, FigureData], inertial: InertialResult | None = None) -> SavedFlight:
+    document = summary_of(replace(make_results(make_flight()), inertial=inertial, figures=()))
+    return SavedFlight(Path("x"), document, Manifest(), figures)
+
+
 @pytest.mark.parametrize(
     ("phases", "expected"),
     [
@@ -229,19 +238,20 @@ def lanes(**columns: Any) -> FigureData:
 def test_events_that_a_log_did_not_see_are_none(phases: list[str], expected: dict[str, float]) -> None:
     start_s = 10.0 * np.arange(len(phases))
     figures = {"phases": lanes(start_s=start_s, end_s=start_s + 10.0, phase=phases)}
-    assert events_of(SavedFlight(Path("x"), {}, {}, figures)) == expected
+    assert events_of(saved_with(figures)) == expected
 
 
 def test_an_outage_is_the_first_interval_without_gnss() -> None:
-    outages = [{"start_s": 40.0, "missing": "ins"}, {"start_s": 90.0, "missing": "gnss"}]
-    document = {"results": {"inertial": {"outages": outages}}}
+    ends_s = {"ins": 40.0, "gnss": 90.0}
+    outages = tuple(RealOutage(start_s, start_s + 5.0, 5.0, None, None, name) for name, start_s in ends_s.items())
+    inertial = replace(inertial_result(), outages=outages)
     figures = {
         "gnss_lanes": lanes(start_s=[0.0, 95.0, 99.0], end_s=[95.0, 99.0, 120.0], state=["good", "no GNSS", "good"])
     }
-    assert events_of(SavedFlight(Path("x"), document, {}, {}))["outage"] == 90.0
-    assert events_of(SavedFlight(Path("x"), {}, {}, figures))["outage"] == 95.0
-    other = SavedFlight(Path("y"), document, {}, figures)
-    assert align(other, SavedFlight(Path("x"), {}, {}, figures), "outage", is_same_log=False).offset_s == -5.0
+    assert events_of(saved_with({}, inertial))["outage"] == 90.0
+    assert events_of(saved_with(figures))["outage"] == 95.0
+    other = saved_with(figures, inertial)
+    assert align(other, saved_with(figures), "outage", is_same_log=False).offset_s == -5.0
 
 
 # ---------------------------------------------------------------------------------------------------- files
@@ -375,14 +385,14 @@ def test_only_flight_folders_are_taken_and_nothing_is_overwritten(folders: dict[
 
 
 @pytest.mark.parametrize("forecast", [[], "none", 1.0])
-def test_a_forecast_of_another_kind_is_none(tmp_path: Path, forecast: Any) -> None:
-    save(tmp_path / "a", make_results(make_flight()), {})
+def test_a_forecast_of_another_kind_is_refused(tmp_path: Path, forecast: Any) -> None:
+    save(tmp_path / "a", make_results(make_flight()), Manifest())
     shutil.copytree(tmp_path / "a", tmp_path / "b")
     summary = json.loads((tmp_path / "b" / "summary.json").read_text(encoding="utf-8"))
     summary["results"]["forecast"] = forecast
     (tmp_path / "b" / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
-    compare_to(tmp_path / "a", tmp_path / "b", tmp_path / "out")
-    assert (tmp_path / "out" / "compare.rrd").is_file()
+    with pytest.raises(UnreadableLogError, match=r"b.summary\.json.*results\.forecast: found .*run the log again"):
+        compare_to(tmp_path / "a", tmp_path / "b", tmp_path / "out")
 
 
 @pytest.mark.viewer

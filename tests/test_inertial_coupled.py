@@ -215,11 +215,11 @@ def test_schuler_and_foucault_periods_come_out() -> None:
 
 
 def test_exponential_of_the_filter_is_the_exponential() -> None:
-    from groundstation.estimators.inertial import coupled_kernels as kernels
-
     motion = craft(50.0, (100.0, 220.0), (3.0, -1.0))
-    E = np.empty((coupled.SIZE, coupled.SIZE))
-    kernels.exponential(coupled.ROWS, coupled.COLUMNS, coupled.coupled_values(motion, BETA)[0], 10.0, E)
+    values = coupled.coupled_values(motion, BETA)[:1]
+    transition = coupled.RATES.transition(values, np.array([10.0]), np.zeros(coupled.SIZE))
+    E = np.eye(coupled.SIZE)
+    E[coupled.RATES.reach()] = transition.dynamics.F[0]
     exact, term = np.eye(coupled.SIZE), np.eye(coupled.SIZE)
     for order in range(1, 12):
         term = term @ coupled.coupled_matrix(motion, BETA)[0] * 10.0 / order

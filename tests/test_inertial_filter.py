@@ -31,7 +31,7 @@ from groundstation.estimators.inertial.noise import GnssNoise, InsNoise
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.start_covariance import WITH_COVARIANCE, start_covariance
 from groundstation.estimators.inertial.starts import start_states
-from groundstation.estimators.kalman import filter as kalman
+from groundstation.estimators.kalman import smoother
 from groundstation.simulation.channel_truth import RADIUS_M
 from groundstation.studies.forecast_consistency import consistency_table, matched_run
 
@@ -269,8 +269,8 @@ def test_fixed_lag_is_smoothing_up_to_the_start() -> None:
     run = run_filter(irregular_epochs(), MODEL, NOISE)
     assert (run.used == -1).sum() == 0
     first, last = np.array([0, 30, 150, 399]), np.array([250, 130, 320, 399])
-    past = kalman.smooth_lags(run.parts[0], first, last)
-    spread, closed = kalman.lag_covariances(run.parts[0], first, last)
+    past = smoother.smooth_lags(run.parts[0], first, last)
+    spread, closed = smoother.lag_covariances(run.parts[0], first, last)
     for channel in range(2):
         for row, (begin, end) in enumerate(zip(first, last, strict=True)):
             whole = smooth(run, int(begin), int(end))

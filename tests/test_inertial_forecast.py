@@ -1,5 +1,6 @@
 """The forecast replayed: on simulated flights, on a real one against published figures, and never with the future."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -71,12 +72,7 @@ def test_the_scale_of_the_sigma_uses_only_outages_that_were_over(found: Estimati
     position = np.array(run.epochs.position_m)
     later = run.epochs.time_s > 7200.0
     position[later] += 5000.0 * np.sin(run.epochs.time_s[later] / 300.0)[:, None]
-    epochs = run.epochs
-    other = FilterRun(
-        Epochs(epochs.time_s, position, epochs.velocity_mps, epochs.drag_per_s, epochs.is_reset),
-        *(run.model, run.noise, run.steps, run.x, run.P),
-        *(run.innovation, run.innovation_variance, run.used, run.gain),
-    )
+    other = replace(run, epochs=replace(run.epochs, position_m=position))
     scales = []
     for each in (run, other):
         claimed = claimed_sigma(

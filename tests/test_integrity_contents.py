@@ -248,6 +248,7 @@ def test_skipped_bytes_lie_between_the_records_around_them() -> None:
         assert (span.cause, span.start_s, span.length_s, span.is_exact) == ("corrupt", *expected, False)
 
 
+@pytest.mark.usefixtures("unpainted")
 @pytest.mark.parametrize("write", [as_ulog, as_dataflash])
 def test_bytes_wiped_in_the_taxi_are_found_in_time_and_lean(tmp_path: Path, write: Callable[[Path], None]) -> None:
     """The span holds the times of all records that were lost and hardly more, and the answer says that it leans."""
@@ -259,7 +260,7 @@ def test_bytes_wiped_in_the_taxi_are_found_in_time_and_lean(tmp_path: Path, writ
     lost = [time_ns for _topic, time_ns in whole - records_of(path)]
     start_ns = min(time_ns for _topic, time_ns in whole)
     assert len(lost) > 5
-    (outcome,) = run_many([path], tmp_path / "out", Configuration())
+    (outcome,) = run_many([path], tmp_path / "out", Configuration(), with_pdf=False)
     summary = load(Path(outcome.folder)).summary
     (span,) = (one for one in summary["ledger"]["spans"] if one["cause"] == "corrupt")
     first_s, last_s = (round((time_ns - start_ns) / NS_PER_S, 3) for time_ns in (min(lost), max(lost)))

@@ -15,10 +15,10 @@ from groundstation.estimators.kalman.filter import (
     Kept,
     Measurements,
     Start,
-    Transition,
     run_filter,
-    smooth,
 )
+from groundstation.estimators.kalman.smoother import smooth
+from groundstation.estimators.kalman.transition import Transition
 
 ROUNDING = 1e-9  # of sigmas: double precision over some hundred products
 BATCH_ROUNDING = 1e-7  # of sigmas: the normal equations of 40 epochs

@@ -24,6 +24,7 @@ from groundstation.pipeline.analyse import Answered, known_of, run_analyses
 from groundstation.pipeline.configuration import Configuration
 from groundstation.results import latency as answers
 from groundstation.results.files import load, save
+from groundstation.results.manifest import Manifest
 from groundstation.simulation.flight import simulate
 from groundstation.simulation.scenario import load_scenario
 from groundstation.tables.table import Flight, Table
@@ -255,7 +256,7 @@ def test_heading_is_shifted_exactly() -> None:
 def test_results_are_saved_obey_the_schema_and_are_told(tmp_path: Path) -> None:
     found = estimate_latencies(flown())
     results = example(None, found)
-    save(tmp_path, replace(results, figures=(*results.figures, *found.figures)), {})
+    save(tmp_path, replace(results, figures=(*results.figures, *found.figures)), Manifest())
     saved = load(tmp_path)
     jsonschema.Draft202012Validator(SCHEMA).validate(saved.summary)
     assert saved.summary["results"]["latency"]["rows"][0]["latency_s"] == pytest.approx(0.2, abs=NOISY_S)

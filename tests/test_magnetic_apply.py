@@ -19,15 +19,16 @@ from pypdf import PdfReader
 from typer.testing import CliRunner
 
 from groundstation.base.angles import wrap_180
-from groundstation.base.errors import UsageError
+from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.base.records import Column
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.cli.main import app
 from groundstation.estimators.magnetic.corrected import CorrectedHeading, correct_heading
-from groundstation.pipeline.apply_deviation import APPLIED, NOT_APPLIED, Applied, Apply, apply_deviation, asked_for
+from groundstation.pipeline.apply_deviation import APPLIED, NOT_APPLIED, Applied, apply_deviation
 from groundstation.pipeline.batch import plan_many, run_many
 from groundstation.pipeline.check import check_many
 from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.deviation_to_apply import Apply, asked_for
 from groundstation.pipeline.elsewhere import FarFolder
 from groundstation.pipeline.inputs import file_in
 from groundstation.pipeline.outcome import Outcome
@@ -43,10 +44,11 @@ from groundstation.results.deviation import (
     deviation_from_csv,
     deviation_of,
 )
-from groundstation.results.files import SUMMARY, SavedFlight, load, save
+from groundstation.results.files import SUMMARY, load, save
 from groundstation.results.flight import FlightResults
 from groundstation.results.latency import Latencies
-from groundstation.results.magnetic import ADVISORY, MagneticResult
+from groundstation.results.magnetic import ADVISORY, CardRow, MagneticResult
+from groundstation.results.manifest import Manifest
 from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
@@ -185,7 +187,7 @@ def test_a_magnetometer_turned_by_2_5_deg_is_put_right(tmp_path: Path) -> None:
     mounted = ((cos, sin, 0.0), (-sin, cos, 0.0), (0.0, 0.0, 1.0))  # its nose 2.5 deg to the right of the aircraft's
     made = magnetic_example.make(hard_nt=(0.0, 0.0, 0.0), soft=mounted)
     results = analysed(made.flight)
-    save(tmp_path, results, {})
+    save(tmp_path, results, Manifest())
     paths, problem = write_exports(load(tmp_path), with_pdf=False)
     assert ([path.name for path in paths], problem) == ([DEVIATION_CSV], "")
     rows = list(csv.DictReader(io.StringIO((tmp_path / DEVIATION_CSV).read_text(encoding="utf-8"), newline="")))
@@ -463,8 +465,8 @@ def test_the_table_is_rfc_4180_with_360_rows(first: Path) -> None:
 
 def test_a_name_is_no_formula_and_comes_back(tmp_path: Path) -> None:
     results = replace(figure_eight(), metadata={"aircraft": '=HYPERLINK("x"),1'})
-    save(tmp_path, results, {})
-    text = deviation_csv(load(tmp_path))
+    save(tmp_path, results, Manifest())
+    text = deviation_csv(load(tmp_path).results)
     assert text is not None and '"\'=HYPERLINK(""x""),1"' in text
     found = deviation_from_csv(text, "x.csv")
     assert (found.aircraft, found.verdict) == ('=HYPERLINK("x"),1', "accept")
@@ -472,16 +474,16 @@ def test_a_name_is_no_formula_and_comes_back(tmp_path: Path) -> None:
 
 
 def test_without_a_deviation_there_are_no_files_and_old_ones_go(tmp_path: Path) -> None:
-    save(tmp_path, figure_eight(), {})
+    save(tmp_path, figure_eight(), Manifest())
     write_exports(load(tmp_path), with_pdf=True)
     assert (tmp_path / DEVIATION_CSV).exists() and (tmp_path / STEER_CARD).exists()
-    save(tmp_path, replace(figure_eight(), magnetic=None, figures=()), {})
+    save(tmp_path, replace(figure_eight(), answers={}, figures=()), Manifest())
     assert write_exports(load(tmp_path), with_pdf=True) == ((), "")
     assert not (tmp_path / DEVIATION_CSV).exists() and not (tmp_path / STEER_CARD).exists()
 
 
 def test_arrays_that_are_missing_are_told(tmp_path: Path) -> None:
-    save(tmp_path, replace(figure_eight(), figures=()), {})
+    save(tmp_path, replace(figure_eight(), figures=()), Manifest())
     paths, problem = write_exports(load(tmp_path), with_pdf=False)
     assert (paths, problem[:26]) == ((), "deviation.csv: not written")
 
@@ -496,19 +498,11 @@ def text_of(path: Path) -> str:
 
 
 def printed(folder: Path, **fields: Any) -> str:
-    """Text of the card of the figure-eight with some answers changed."""
-    saved = load(folder)
-    magnetic = saved.summary["results"]["magnetic"] | fields
-    changed = SavedFlight(folder, {**saved.summary, "results": {"magnetic": magnetic}}, {}, {})
-    write_pdf(steer_card(changed), folder / "card.pdf", TEMPLATE)
+    """Text of the card of the figure-eight with some of its answer changed."""
+    found = figure_eight().answer(MagneticResult)
+    assert found is not None
+    write_pdf(steer_card(figure_eight(), replace(found, **fields)), folder / "card.pdf", TEMPLATE)
     return text_of(folder / "card.pdf")
-
-
-@pytest.fixture(scope="module")
-def eight(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("eight")
-    save(folder, figure_eight(), {})
-    return folder
 
 
 def test_the_card_shows_every_row(first: Path) -> None:
@@ -530,26 +524,46 @@ def test_the_card_shows_every_row(first: Path) -> None:
 @pytest.mark.parametrize(
     ("verdict", "shown"), [("reject", "NOT ACCEPTED Coverage"), ("undecided", "NOT ACCEPTED undecided: Coverage")]
 )
-def test_a_card_that_is_not_accepted_says_so(eight: Path, verdict: str, shown: str) -> None:
-    text = printed(eight, verdict=verdict, verdict_reason="Coverage: 0.9, at least 0.98")
+def test_a_card_that_is_not_accepted_says_so(tmp_path: Path, verdict: str, shown: str) -> None:
+    text = printed(tmp_path, verdict=verdict, verdict_reason="Coverage: 0.9, at least 0.98")
     assert shown in text and "Accepted" not in text
 
 
 @pytest.mark.parametrize("step_deg", [180, 90, 45, 30, 20, 15, 10, 7, 1])
-def test_a_card_of_any_step_is_one_page(eight: Path, step_deg: int) -> None:
-    card = [
-        {"magnetic_heading_deg": float(at), "steer_deg": at + 0.4, "deviation_deg": -0.4, "sigma_deg": 0.1}
-        for at in range(0, 360, step_deg)
-    ]
-    text = printed(eight, card=card)
+def test_a_card_of_any_step_is_one_page(tmp_path: Path, step_deg: int) -> None:
+    card = tuple(CardRow(float(at), at + 0.4, -0.4, 0.1, False) for at in range(0, 360, step_deg))
+    text = printed(tmp_path, card=card)
     assert text.count("± 0.1") == min(len(card), -(-len(card) // -(-len(card) // MOST_ROWS)))
     assert ("Every degree: deviation.csv" in text) == (len(card) > MOST_ROWS)
 
 
-def test_a_card_whatever_stands_in_the_log(eight: Path) -> None:
-    for value in (None, [], {}, "?", HOSTILE, "a" * 300, 7):
-        for name in ("verdict", "verdict_reason", "card", "residual_rms_deg", "recommended_method", "ins_topic"):
-            assert ADVISORY.split()[0] in printed(eight, **{name: value})
+@pytest.mark.parametrize("name", ["verdict_reason", "ins_topic", "magnetometer_topic"])
+@pytest.mark.parametrize("text", ["", "?", HOSTILE, "a" * 300])
+def test_a_card_whatever_stands_in_the_log(tmp_path: Path, name: str, text: str) -> None:
+    assert ADVISORY.split()[0] in printed(tmp_path, **{name: text})
+
+
+def test_a_card_of_what_is_not_known_has_dashes(tmp_path: Path) -> None:
+    unknown = float("nan")
+    row = CardRow(unknown, unknown, unknown, unknown, True)
+    text = printed(tmp_path, card=(row,), residual_rms_deg=None)
+    assert "— — — ± —" in text and "not measured" in text and "interpolated" in text
+    assert "Advisory" in printed(tmp_path, card=())
+
+
+def test_a_damaged_answer_is_one_line_and_leaves_no_new_report(tmp_path: Path) -> None:
+    folder = tmp_path / "out" / "NOTIME_abababab"
+    save(folder, figure_eight(), Manifest())
+    summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+    summary["results"]["magnetic"]["card"] = "?"
+    (folder / SUMMARY).write_text(json.dumps(summary), encoding="utf-8")
+    with pytest.raises(UnreadableLogError, match=r"results\.magnetic\.card"):
+        write_exports(load(folder), with_pdf=False)
+    answer = CliRunner().invoke(app, ["report", str(folder.parent)])
+    assert answer.exit_code == 1
+    (line,) = (line for line in answer.stderr.splitlines() if "results.magnetic.card" in line)
+    assert "run the log again" in line
+    assert not (folder / "report.html").exists() and not (folder / STEER_CARD).exists()
 
 
 def test_the_template_of_the_card_reads_and_imports_nothing() -> None:

@@ -9,15 +9,19 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from groundstation.on_ground import GroundDeviation
 from scipy.signal import lfilter
 
 from groundstation.base.angles import wrap_180, wrap_360
+from groundstation.base.clock import Clock
 from groundstation.base.errors import NotAssessableError, SettingsError
+from groundstation.base.ledger import Ledger
 from groundstation.base.records import Column
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
+from groundstation.chapters.magnetic import magnetic
+from groundstation.chapters.markdown import escaped
 from groundstation.chapters.parts import Grid, Note
+from groundstation.chapters.wording import number
 from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.analysis import MAGNETIC_GROUND
 from groundstation.estimators.magnetic.ground_fit import fit_curve
@@ -28,16 +32,17 @@ from groundstation.pipeline.configuration import Configuration, load_configurati
 from groundstation.pipeline.convert import convert_log
 from groundstation.pipeline.flight import read_flight, sentence
 from groundstation.pipeline.log import open_log
-from groundstation.reports.drawing import Drawing
-from groundstation.reports.sections.magnetic import build
+from groundstation.reports.drawing import Drawing, sketching
+from groundstation.reports.figures import with_drawings
 from groundstation.results import magnetic_ground as answers
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.magnetic import LETTERS
+from groundstation.results.magnetic_ground import GroundDeviation
+from groundstation.results.manifest import Manifest
 from groundstation.tables.declination import declination_along
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer.recording import write_recording
-from groundstation.viewer.tabs.magnetic_text import magnetic_text
 from tests.real_logs import real_log
 from tests.recording_contents import Contents
 from tests.schema_fields import SCHEMA, expect_fields
@@ -319,6 +324,11 @@ def test_short_and_curved_runs_are_rejected_with_the_reason() -> None:
         found(flight)
 
 
+def answered(flight: Flight) -> Answered:
+    """The analysis of ground runs alone."""
+    return run_analyses((MAGNETIC_GROUND,), flight, known_of(flight, Configuration()))
+
+
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
@@ -333,11 +343,6 @@ def test_short_and_curved_runs_are_rejected_with_the_reason() -> None:
         (lambda flight: replace(flight, tables={}), "no magnetic heading in the log"),
     ],
 )
-def answered(flight: Flight) -> Answered:
-    """The analysis of ground runs alone."""
-    return run_analyses((MAGNETIC_GROUND,), flight, known_of(flight, Configuration()))
-
-
 def test_what_lacks_is_said_in_a_line(change: Callable[[Flight], Flight], reason: str) -> None:
     flight = change(make())
     with pytest.raises(NotAssessableError, match=reason) as told:
@@ -437,7 +442,7 @@ def test_recorded_flights(name: str, used: int, rejected: int, found_letters: st
 @cache
 def whole() -> FlightResults:
     source = Source("made.csv", "ab" * 32, 1, "flat-csv")
-    given = Given("NOTIME_abababab", source, {}, {}, (), has_lost_data=False)
+    given = Given("NOTIME_abababab", source, Ledger(), Clock(), (), has_lost_data=False)
     flight = make(heading_noise_deg=0.3, velocity_noise_mps=0.03, place_deg=0.3, flown=True, step_deg=0.1)
     return analyse(flight, given, Configuration())
 
@@ -449,7 +454,7 @@ def test_a_whole_run_tells_it_and_saves_it(tmp_path: Path) -> None:
     (finding,) = (one for one in results.findings if one.code.startswith("magnetic_ground."))
     assert (finding.severity, finding.code) == ("info", "magnetic_ground.found")
     assert finding.text in sentence(results)
-    save(tmp_path, results, {})
+    save(tmp_path, results, Manifest())
     saved = load(tmp_path)
     assert {"magnetic_ground_epochs", "magnetic_ground_curve"} <= set(saved.figures)
     own = {"$schema": SCHEMA["$schema"], "$ref": "#/$defs/magnetic_ground", "$defs": SCHEMA["$defs"]}
@@ -463,9 +468,11 @@ def test_a_whole_run_tells_it_and_saves_it(tmp_path: Path) -> None:
 
 
 def test_the_report_shows_the_runs_without_system_3(tmp_path: Path) -> None:
-    save(tmp_path, whole(), {})
-    section = build(load(tmp_path))
+    save(tmp_path, whole(), Manifest())
+    section = magnetic(load(tmp_path).results)
     assert section is not None
+    with sketching():
+        section = with_drawings(section, load(tmp_path).results)
     titles = [part.title for part in section.parts if isinstance(part, Grid | Drawing)]
     assert titles[:3] == ["Ground runs: error by heading", "Ground runs", "Ground runs: coefficients"]
     notes = [part.text for part in section.parts if isinstance(part, Note)]
@@ -479,9 +486,11 @@ def test_the_tab_shows_the_runs_without_system_3(tmp_path: Path) -> None:
     assert "/magnetic/ground/curves" in Contents(tmp_path / "flight.rrd").fixed
     on_ground = results.answer(GroundDeviation)
     assert on_ground is not None
-    text = magnetic_text(None, ["no three-axis magnetometer in the log"], on_ground)
+    text = Contents(tmp_path / "flight.rrd").text("/magnetic/answer")
+    assert text.startswith("# Magnetic deviation not assessed")
     run = on_ground.used[0]
-    assert f"{run.error_deg:+.2f} ± {run.sigma_deg:.2f}" in text.replace("−", "-")
+    assert run.error_deg is not None and run.sigma_deg is not None
+    assert escaped(f"{number(run.error_deg, 2, signed=True)} ± {run.sigma_deg:.2f}") in text
 
 
 @pytest.mark.parametrize(

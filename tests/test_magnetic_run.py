@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.clock import Clock
 from groundstation.base.errors import SettingsError
+from groundstation.base.ledger import Ledger
+from groundstation.chapters.front import front
 from groundstation.estimators.inertial.analysis import INERTIAL
 from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.analysis import MAGNETIC
@@ -20,11 +23,11 @@ from groundstation.pipeline.convert import convert_log
 from groundstation.pipeline.flight import read_flight, sentence
 from groundstation.pipeline.log import open_log
 from groundstation.reports.index import index_row
-from groundstation.reports.sections import front
 from groundstation.results import magnetic as answers
 from groundstation.results.files import SavedFlight, load, save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.magnetic import LETTERS, MagneticResult
+from groundstation.results.manifest import Manifest
 from groundstation.simulation.deviation import BIN_MIDDLES_DEG, scenario_deviation
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
@@ -40,7 +43,7 @@ def simulated(name: str) -> Simulated:
 
 def analysed(flight: Flight, configuration: Configuration | None = None) -> FlightResults:
     source = Source("flight.csv", "ab" * 32, 1, "flat-csv")
-    given = Given("NOTIME_abababab", source, {}, {}, (), has_lost_data=False)
+    given = Given("NOTIME_abababab", source, Ledger(), Clock(), (), has_lost_data=False)
     return analyse(flight, given, configuration or Configuration())
 
 
@@ -62,7 +65,7 @@ def test_a_figure_eight_is_accepted_with_its_coefficients() -> None:
     assert found.poisson is not None
     assert flown.scenario.electric is not None
     electric = replace(flown.scenario.electric, base_a=found.poisson.current_reference_a)
-    truth = scenario_deviation(replace(flown, scenario=replace(flown.scenario, electric=electric)))
+    truth = scenario_deviation(replace(flown.scenario, electric=electric), flown.trajectory)
     assert truth is not None
     assert (found.verdict, found.recommended_method) == ("accept", "poisson_attitude")
     expected = harmonics.fit(BIN_MIDDLES_DEG, wrap_180(truth.compass_error_deg + truth.declination_deg))[0]
@@ -125,7 +128,7 @@ def test_recorded_flights_are_refused_with_the_reason(name: str, reason: str, tm
 def saved(tmp_path_factory: pytest.TempPathFactory) -> SavedFlight:
     """The figure of eight as it was saved."""
     folder = tmp_path_factory.mktemp("eight")
-    save(folder, figure_eight(), {})
+    save(folder, figure_eight(), Manifest())
     return load(folder)
 
 
@@ -144,7 +147,7 @@ def test_every_answer_is_saved_and_comes_back(name: str, saved: SavedFlight) -> 
 
 
 def test_index_and_front_page_tell_the_deviation(saved: SavedFlight) -> None:
-    found, row = figure_eight().answer(MagneticResult), index_row(saved)
+    found, row = figure_eight().answer(MagneticResult), vars(index_row(saved))
     assert found is not None and found.residual_rms_deg is not None
     method = found.method(found.recommended_method)
     assert (row["magnetic_verdict"], row["magnetic_method"]) == (found.verdict, found.recommended_method)
@@ -153,7 +156,7 @@ def test_index_and_front_page_tell_the_deviation(saved: SavedFlight) -> None:
         assert row[f"magnetic_{letter.lower()}_deg"] == pytest.approx(method.coefficients_deg[letter], abs=1e-4)
         sigma = row[f"magnetic_{letter.lower()}_sigma_deg"]
         assert sigma == pytest.approx(method.coefficients_sigma_deg[letter], abs=1e-4)
-    (tile,) = [figure for figure in front.build(saved).figures if figure[0] == "Magnetic heading"]
+    (tile,) = [figure for figure in front(saved.results).figures if figure[0] == "Magnetic heading"]
     assert f"{found.residual_rms_deg.after:.2f}" in tile[1]
 
 

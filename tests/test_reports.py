@@ -1,5 +1,6 @@
 """The flight report: safe with hostile logs, equal bytes for equal input, useful whatever is missing."""
 
+import json
 import os
 import re
 import subprocess
@@ -15,10 +16,9 @@ import pytest
 from groundstation.base.clock import Clock
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.findings import Finding
-from groundstation.base.ledger import DamageEntry, Ledger, RemarkEntry, ThresholdsUsed, Truncation
+from groundstation.base.ledger import DamageEntry, Ledger, ThresholdsUsed, Truncation
 from groundstation.reports import drawing
 from groundstation.reports.flight_report import PDF, REPORT, flight_document, flight_report_html, write_flight_report
-from groundstation.reports.sections.heading import limit_text
 from groundstation.results.answer import by_analysis
 from groundstation.results.figures import FigureData
 from groundstation.results.files import load, save
@@ -134,50 +134,12 @@ def test_verdict_stands_first_with_the_number_to_type(full: str) -> None:
     text = page.text
     assert text.index("Accept") < text.index("Enter −1.05°") < text.index("reads too high by 1.04°")
     assert text.index("Enter −1.05°") < text.index("Gates")
-    for shown in ("+1.038°", "+0.977° … +1.099°", "301.98°", "−3.6′", "2026-05-04 06:00:00 UTC", "9f" * 32):
-        assert shown in text, shown
 
 
-@pytest.mark.parametrize(
-    ("verdict", "headline"),
-    [
-        ("reject", "Enter no correction"),
-        ("extend", "No correction yet: measure longer"),
-        ("undecided", "No correction: a required gate was not measured"),
-    ],
-)
-def test_other_verdicts_give_no_number_to_type(tmp_path: Path, verdict: str, headline: str) -> None:
-    heading = heading_result(verdict=verdict, verdict_reason="a gate says so", correction_deg=None)
-    text = Page(report(tmp_path, example(heading))).text
-    front = text[: text.index("Gates")]
-    assert headline in front and "A gate says so." in front
-    assert "Enter −" not in front and "Enter +" not in front and "Signature" not in front
-    assert "an estimate, not to be entered" in front
-
-
-def test_accepted_error_below_half_a_step_needs_nothing_typed(tmp_path: Path) -> None:
-    heading = heading_result(error_deg=-0.011, correction_deg=None)
-    assert "Nothing to enter" in Page(report(tmp_path, example(heading))).text
-
-
-@pytest.mark.parametrize(("error_deg", "word"), [(1.5, "too high by 1.50°"), (-0.4, "too low by 0.40°")])
-def test_words_say_the_sense_of_the_error(tmp_path: Path, error_deg: float, word: str) -> None:
-    assert word in Page(report(tmp_path, example(heading_result(error_deg=error_deg)))).text
-
-
-def test_gates_show_state_in_words_and_symbols(full: str, tmp_path: Path) -> None:
+def test_states_of_gates_are_symbols_and_words(full: str) -> None:
     text = Page(full).text.replace("\u202f", " ")
     for shown in ("✓ passed", "▲ failed", "○ not measured", "≤ 0.01 m/s", "≥ 20 s"):
         assert shown in text, shown
-    assert "✗ failed" not in text  # the gate that failed only informs
-    stern = tuple(replace(gate, required=True) for gate in heading_result().gates)
-    assert "✗ failed" in Page(report(tmp_path, example(heading_result(gates=stern)))).text
-
-
-def test_least_values_are_told_from_largest_ones_even_on_the_limit() -> None:
-    ground = {"name": "ground", "value": 1.0, "limit": 1.0, "unit": "", "state": "passed", "sense": "at_least"}
-    assert limit_text(ground) == "≥ 1"
-    assert limit_text({**ground, "name": "ins_mode", "value": 0.0, "limit": 0.0, "sense": "at_most"}) == "≤ 0"
 
 
 def test_flight_without_heading_says_why_and_shows_the_rest(tmp_path: Path) -> None:
@@ -187,14 +149,6 @@ def test_flight_without_heading_says_why_and_shows_the_rest(tmp_path: Path) -> N
     assert "Heading correction: not assessable" in front and "No GNSS velocity in the log." in front
     assert page.tags.count("figure") == 4
     assert "Signature" not in page.text
-
-
-def test_log_without_absolute_time_names_no_date(tmp_path: Path) -> None:
-    results = example(None, start_utc_ns=None, metadata={}, flight_id="NOTIME_9f9f9f9f")
-    html = report(tmp_path, results)
-    text = Page(html).text
-    assert "no absolute time" in text and "not named in the log" in text
-    assert "2026-" not in text.replace("2026-05-04 A12 flight 17.csv", "")
 
 
 def test_report_holds_nothing_of_the_run_itself(full: str) -> None:
@@ -337,43 +291,24 @@ def test_bare_results_give_a_report(tmp_path: Path) -> None:
     assert "failed: nothing could be computed" in text and "No findings." in text
 
 
+def test_a_summary_that_cannot_be_read_is_refused_in_one_line(tmp_path: Path) -> None:
+    save(tmp_path, example(heading_result()), MANIFEST)
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    summary["results"]["heading"]["gates"][0]["limit"] = "wide"
+    (tmp_path / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    with pytest.raises(UnreadableLogError, match=r"summary\.json.*gates\[0\]\.limit.*run the log again") as refused:
+        write_flight_report(tmp_path)
+    assert "\n" not in str(refused.value) and not (tmp_path / REPORT).exists()
+
+
 def test_folder_without_results_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UnreadableLogError, match=r"summary\.json"):
         write_flight_report(tmp_path)
     assert not (tmp_path / REPORT).exists()
 
 
-def test_findings_stand_gravest_first(tmp_path: Path) -> None:
-    findings = tuple(Finding(severity, f"a.{severity}", f"text of {severity}") for severity in ("info", "fail", "warn"))
-    text = Page(report(tmp_path, example(None, findings=findings))).text
-    assert text.index("text of fail") < text.index("text of warn") < text.index("text of info")
-    assert "1 fail · 1 warn · 1 info" in text
-
-
-def test_remarks_on_raw_topics_are_one_line_and_the_losses_a_table(tmp_path: Path) -> None:
-    remarks = [Finding("info", "values.nan", f"raw.t.f{n}: NaN", "raw.t", "", 2) for n in range(50)]
-    findings = (*remarks, Finding("warn", "data.truncated", "cut", "", "byte 9", 1))
-    what = "bytes of a record"
-    damage = DamageEntry(kind="truncated", what=what, topic="", place="byte 9", count=7, loses_data=True)
-    remark = RemarkEntry(code="derived", text="told as a finding", topic="ins")
-    ledger = Ledger(damages=(damage,), remarks=(remark,))
-    text = Page(report(tmp_path / "lost", example(None, findings=findings, ledger=ledger))).text
-    assert "50 fields of raw topics hold NaN as the device wrote it: t 100 values.nan" in text
-    assert "summary.json lists all 51" in text and "raw.t.f7" not in text
-    assert "truncated bytes of a record byte 9 7 yes" in text and "told as a finding" not in text
-    clean = Page(report(tmp_path / "whole", example(None, ledger=Ledger()))).text
-    assert "No damage was found in the log" in clean
-
-
 def test_modes_and_states_stand_in_a_figure(full: str) -> None:
     assert "Modes and states" in full and "ground contact by its weight on wheels" in full
-
-
-def test_a_log_without_taxi_says_what_the_method_needs(tmp_path: Path) -> None:
-    reason = "no straight taxi: of 986 epochs above 6 m/s before lift-off: not proven ground 986"
-    text = Page(report(tmp_path, example(None, not_assessable=(NotAssessable("heading", reason),)))).text
-    front = text[: text.index("1 Heading correction")]
-    assert "ground contact not proven for 986. The method needs a straight run on the ground" in front
 
 
 def test_every_chapter_has_its_own_anchor(tmp_path: Path) -> None:

@@ -7,14 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from groundstation.base.serial import to_json_exactly
 from groundstation.reports.flight_report import write_flight_report
-from groundstation.reports.index import COLUMNS, failed_row, index_row, write_index
+from groundstation.reports.index import COLUMNS, IndexRow, failed_row, index_row, write_index
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults
 from tests.report_example import MANIFEST, example, heading_result
 
 
-def row_of(folder: Path, results: FlightResults) -> dict[str, Any]:
+def row_of(folder: Path, results: FlightResults) -> IndexRow:
     save(folder / results.flight_id, results, MANIFEST)
     write_flight_report(folder / results.flight_id)
     return index_row(load(folder / results.flight_id))
@@ -27,7 +28,7 @@ def written(out: Path) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
 
 def test_row_holds_the_answers_of_a_flight(tmp_path: Path) -> None:
     row = row_of(tmp_path, example(heading_result()))
-    assert tuple(row) == COLUMNS
+    assert tuple(to_json_exactly(row)) == COLUMNS
     expected = {
         "kind": "flight",
         "aircraft": "A12",
@@ -39,12 +40,12 @@ def test_row_holds_the_answers_of_a_flight(tmp_path: Path) -> None:
         "findings_warn": 1,
         "findings_info": 2,
         "findings_fail": 0,
-        "not_assessable": ["magnetic: no magnetometer in the log"],
+        "not_assessable": ("magnetic: no magnetometer in the log",),
         "report": "20260504T060000Z_A12_17/report.html",
         "recording": None,
         "reason": None,
     }
-    assert {name: row[name] for name in expected} == expected
+    assert {name: getattr(row, name) for name in expected} == expected
 
 
 def test_flights_stand_by_id_then_what_gave_none(tmp_path: Path) -> None:
@@ -74,7 +75,7 @@ def test_index_links_exist(tmp_path: Path) -> None:
 def test_links_follow_the_folder(tmp_path: Path) -> None:
     save(tmp_path / "renamed", example(heading_result(), flight_id="../elsewhere"), MANIFEST)
     row = index_row(load(tmp_path / "renamed"))
-    assert row["summary"] == "renamed/summary.json" and row["report"] is None
+    assert row.summary == "renamed/summary.json" and row.report is None
 
 
 def test_no_cell_of_the_csv_runs_as_a_formula(tmp_path: Path) -> None:

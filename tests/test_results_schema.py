@@ -9,16 +9,21 @@ import jsonschema
 import pytest
 
 from groundstation.base.findings import Finding
+from groundstation.pipeline.batch import run_many
+from groundstation.pipeline.configuration import Configuration
 from groundstation.results import forecast as outlook
 from groundstation.results import heading as answers
 from groundstation.results import inertial as errors
-from groundstation.results.files import json_text
+from groundstation.results.files import json_text, load
 from groundstation.results.flight import FlightResults, NotAssessable, Source
+from groundstation.results.schema import schema_text
 from groundstation.results.summary import SCHEMA_VERSION, summary_of
 from tests.inertial_example import forecast_result, inertial_result
+from tests.real_logs import real_log
 from tests.report_example import example, heading_result
 
-SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
+SCHEMA_FILE = Path(__file__).parents[1] / "schemas" / "summary.schema.json"
+SCHEMA = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
 
 
@@ -64,6 +69,23 @@ def least_inertial() -> errors.InertialResult:
 
 def least_forecast() -> outlook.ForecastResult:
     return outlook.ForecastResult("last_estimate", float("nan"), 300.0, False, "short", ())
+
+
+def test_the_kept_schema_is_the_one_the_types_give() -> None:
+    assert SCHEMA_FILE.read_text(encoding="utf-8") == schema_text(), "run `make schemas`"
+
+
+SAMPLES = ("taxi-good.csv", "taxi-damaged.csv", "taxi-notime.csv")
+RECORDED = ("g1000/log_220502_135932_EGPN.csv", "dataflash/erle_plane_4-12-2014_329.BIN", "inertial/gv_ff02.csv")
+
+
+@pytest.mark.parametrize("log", [*SAMPLES, *RECORDED])
+def test_what_a_run_writes_obeys_the_schema_and_comes_back_equal(log: str, tmp_path: Path) -> None:
+    path = Path(__file__).parents[1] / "sample_logs" / log if log in SAMPLES else real_log(log)
+    (outcome,) = run_many([path], tmp_path / "out", Configuration(), jobs=1, with_pdf=False)
+    text = (Path(outcome.folder) / "summary.json").read_text(encoding="utf-8")
+    VALIDATOR.validate(json.loads(text))
+    assert json_text(summary_of(load(Path(outcome.folder)).results)) == text
 
 
 def test_schema_is_a_schema() -> None:
@@ -130,7 +152,8 @@ def test_channels_of_the_ins_errors_stand_under_their_names() -> None:
 
 
 def test_methods_of_the_schema_are_those_of_the_forecast() -> None:
-    assert SCHEMA["$defs"]["method"]["enum"] == list(outlook.METHODS)
+    for name, field in (("skill", "method"), ("forecast", "default_method")):
+        assert SCHEMA["$defs"][name]["properties"][field]["enum"] == list(outlook.METHODS)
 
 
 def test_top_level_keys_stand_in_the_order_of_the_contract() -> None:

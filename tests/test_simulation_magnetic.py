@@ -158,7 +158,7 @@ def test_heading_shown_with_its_deviation_is_the_true_heading(name: str) -> None
     exact = replace(exact, world_field_nt=(16e3, 3e3, 50e3))
     ins = replace(loaded.ins, attitude_noise_deg=0.0, attitude_wander_deg=0.0, attitude_resolution_deg=1e-6)
     simulated = simulate(replace(loaded, magnetometer=exact, ins=ins))
-    deviation = scenario_deviation(simulated)
+    deviation = scenario_deviation(simulated.scenario, simulated.trajectory)
     assert deviation is not None and abs(scenario_truth(simulated)["deviation_b_deg"]) > 1.0
     flight = simulated.flight
     base = np.interp(flight["magnetometer"].time_ns, flight["electric"].time_ns, flight["electric"].values("current_a"))
@@ -176,7 +176,7 @@ def test_field_is_that_of_the_declination_tables() -> None:
     flight, motion = simulated.flight, simulated.trajectory
     here = motion.latitude_deg[:1], motion.longitude_deg[:1], motion.altitude_m[:1]
     expected = declination_along(*here, flight.start_ns)
-    found = scenario_deviation(simulated)
+    found = scenario_deviation(simulated.scenario, simulated.trajectory)
     # the decimal years of the two are up to three days apart, and the field changes by 0.15 deg and 50 nT a year
     assert found is not None and found.declination_deg == pytest.approx(float(expected.values_deg[0]), abs=2e-3)
     assert found.horizontal_nt == pytest.approx(float(expected.horizontal_nt[0]), abs=0.5)
@@ -328,7 +328,7 @@ def test_family_has_the_sizes_asked_for() -> None:
 def test_family_flight_is_whole_and_shows_its_deviation() -> None:
     settings = MagneticFamilySettings(load_a=20.0, attitude_error_sigma_deg=0.5, attitude_wander_deg=0.0, latency_s=0.0)
     simulated = next(simulate_magnetic_family(settings, [8]))
-    flight, deviation = simulated.flight, scenario_deviation(simulated)
+    flight, deviation = simulated.flight, scenario_deviation(simulated.scenario, simulated.trajectory)
     assert set(flight.topics()) == {"baro", "discrete", "electric", "gnss", "ins", "magnetometer", "truth"}
     assert [angle > 360.0 for angle, _, _ in turns_of(simulated)].count(True) == 4
     assert deviation is not None

@@ -6,11 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from groundstation.chapters.magnetic import magnetic
+from groundstation.chapters.markdown import escaped, markdown
+from groundstation.chapters.wording import number
 from groundstation.results.answer import by_analysis
+from groundstation.results.deviation import STEER_CARD
 from groundstation.results.flight import NotAssessable
 from groundstation.results.magnetic import ADVISORY, MagneticResult
 from groundstation.viewer.recording import write_recording
-from groundstation.viewer.tabs.magnetic_text import magnetic_text
 from tests.recording_contents import Contents
 from tests.test_magnetic_run import figure_eight, simulated
 
@@ -57,23 +60,30 @@ def test_sphere_and_eight_are_in_the_tab(contents: Contents) -> None:
     assert {"/magnetic/eight/track", "/magnetic/eight/grid"} <= set(contents.fixed)
 
 
-def test_text_holds_verdict_card_and_reasons() -> None:
+def test_text_holds_verdict_card_and_reasons(contents: Contents) -> None:
     found = figure_eight().answer(MagneticResult)
     assert found is not None
-    text = magnetic_text(found)
-    assert text.startswith("# Magnetic deviation: accept")
-    assert ADVISORY in text
-    assert f"| 90 | {found.card[3].steer_deg:.1f} | {found.card[3].deviation_deg:+.1f} |" in text
-    assert magnetic_text(None, ["no | turns"]).endswith("no \\| turns")
+    text = contents.text("/magnetic/answer")
+    assert text.startswith("# Magnetic deviation\\: accept\n")
+    section = magnetic(figure_eight())
+    assert section is not None
+    assert text == markdown(section)
+    assert escaped(ADVISORY) in text
+    row = found.card[3]
+    assert f"| 90° | {escaped(f'{row.steer_deg:.1f}°')} | {escaped(number(row.deviation_deg, 1, '°', True))} |" in text
+    assert STEER_CARD not in text
+    why = magnetic(replace(figure_eight(), answers={}, not_assessable=(NotAssessable("magnetic", "no | turns"),)))
+    assert why is not None
+    assert markdown(why).endswith("no \\| turns")
 
 
 def test_without_a_result_and_with_empty_figures_the_tab_stands(tmp_path: Path) -> None:
     flight, results = simulated("magnetic-eight").flight, figure_eight()
     reason = (NotAssessable("magnetic", "no opposite turns"),)
     write_recording(tmp_path / "a.rrd", flight, replace(results, answers={}, figures=(), not_assessable=reason))
-    magnetic = results.answer(MagneticResult)
-    assert magnetic is not None
-    bare = replace(results, answers=by_analysis(replace(magnetic, figures=())), figures=())
+    found = results.answer(MagneticResult)
+    assert found is not None
+    bare = replace(results, answers=by_analysis(replace(found, figures=())), figures=())
     write_recording(tmp_path / "b.rrd", flight, bare)
     assert Contents(tmp_path / "a.rrd").text("/magnetic/answer").startswith("# Magnetic deviation not assessed")
-    assert Contents(tmp_path / "b.rrd").text("/magnetic/answer").startswith("# Magnetic deviation: accept")
+    assert Contents(tmp_path / "b.rrd").text("/magnetic/answer").startswith("# Magnetic deviation\\: accept")

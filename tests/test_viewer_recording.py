@@ -244,8 +244,8 @@ def test_without_a_heading_the_tab_says_why(tmp_path: Path, flight: Flight) -> N
 
 def test_number_to_type_and_gates_stand_in_the_panel(contents: Contents) -> None:
     text = contents.text("/heading/verdict")
-    assert "# ACCEPT" in text and "Type -1.2 deg" in text
-    assert "no GDOP in the log" in text and "*not measured*" in text
+    assert text.splitlines()[0] == "# ✓ Accept · Enter −1\\.2°"
+    assert "no GDOP in the log" in text and "**○ not measured**" in text
 
 
 def test_hostile_names_reach_neither_paths_nor_markup(tmp_path: Path, flight: Flight) -> None:

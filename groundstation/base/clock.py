@@ -3,7 +3,7 @@
 Times are text for people. Fields stand in alphabetical order, as the JSON of the MCAP has its keys.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 Start = Literal["utc", "unset", "own_zero"]
@@ -13,8 +13,8 @@ Start = Literal["utc", "unset", "own_zero"]
 class StepEntry:
     """A step of the clock: what came before it was moved by ``shift_of_earlier_s``; ``mistake`` names it if it can."""
 
-    kind: str
-    mistake: str
+    kind: str = field(metadata={"one_of": ("backward", "forward")})
+    mistake: str = field(metadata={"one_of": ("", "week_number", "leap_seconds")})
     record_index: int
     records_before: int
     set_s: float
@@ -37,7 +37,7 @@ class SegmentEntry:
     offset: str
     offset_s: float
     offset_sigma_s: float
-    samples: int
+    samples: int = field(metadata={"least": 1})
     start: str
 
 
@@ -46,7 +46,7 @@ class BreakEntry:
     """Where two clocks part: one was set (``step``), or changed its rate (``rate``)."""
 
     drift_change_ppm: float | None
-    kind: str
+    kind: str = field(metadata={"one_of": ("step", "rate")})
     step_s: float
     step_sigma_s: float
     time: str
@@ -57,7 +57,7 @@ class BreakEntry:
 class MistakeEntry:
     """An error of one of two clocks that has a name; ``time`` is None where it holds throughout."""
 
-    kind: str
+    kind: str = field(metadata={"one_of": ("week_number", "leap_seconds", "time_zone")})
     size_s: float
     text: str
     time: str | None

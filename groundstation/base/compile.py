@@ -40,7 +40,17 @@ def compiled(function: Function) -> Function:
 
     Modules that use it are imported lazily: importing numba takes about half a second.
     """
+    return _compile(function, is_forced_into_callers=False)
+
+
+def inlined(function: Function) -> Function:
+    """The same for a small part of other compiled loops: its code is put into each of them and no call is made."""
+    return _compile(function, is_forced_into_callers=True)
+
+
+def _compile(function: Function, is_forced_into_callers: bool) -> Function:
     cache = _choose_cache()  # before numba is imported: it reads NUMBA_CACHE_DIR once
     import numba
 
-    return cast(Function, numba.njit(cache=cache, nogil=True, error_model="numpy")(function))
+    decorate = numba.njit(cache=cache, nogil=True, error_model="numpy", forceinline=is_forced_into_callers)
+    return cast(Function, decorate(function))

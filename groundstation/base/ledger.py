@@ -3,6 +3,7 @@
 Fields stand in alphabetical order, as the JSON of the MCAP has its keys: what was read back is written equal.
 """
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -14,7 +15,7 @@ class ThresholdsUsed:
     """Whose thresholds the ledger was made with, their layout's version and the digest of their values."""
 
     name: str = ""
-    sha256: str = ""
+    sha256: str = field(default="", metadata={"pattern": "^([0-9a-f]{64})?$"})
     version: int = 0
 
 
@@ -41,7 +42,7 @@ class StuckStretch:
 
     length_s: float
     record: int
-    samples: int
+    samples: int = field(metadata={"least": 1})
     start: str
     value: float
     why: str
@@ -74,7 +75,7 @@ class CounterEntry:
 
     before: int = 0
     field: str
-    kind: str
+    kind: str = dataclasses.field(metadata={"one_of": ("records", "losses")})
     listed: tuple[tuple[str, int], ...] = ()
     lost: int
     resets: int = 0

@@ -3,7 +3,7 @@
 Floats are rounded by the name of their field, NaN is null, tuples are lists. A field with ``left_out_when_default``
 in its metadata is absent while it has its default; a class with ``is_kept_apart = True`` (arrays, which have files of
 their own) is left out with the fields that hold it. What is read is checked: a value of another kind is a
-:class:`MismatchError` that names its place. Read leniently (:func:`salvaged`), it is left out instead.
+:class:`MismatchError` that names its place. ``base.salvage`` leaves it out instead.
 """
 
 import dataclasses
@@ -23,9 +23,8 @@ from groundstation.base.errors import GroundstationError
 
 Document = TypeVar("Document")
 Hook = Callable[[Any, Any], Any]
-LARGEST = 1 << 62  # of a number in a file that may be damaged
 LEFT_OUT_WHEN_DEFAULT: Mapping[str, Any] = {"left_out_when_default": True}
-_WANTED = {str: "text", float: "a number", int: "a whole number", bool: "true or false"}
+WANTED = {str: "text", float: "a number", int: "a whole number", bool: "true or false"}
 
 
 class MismatchError(Exception):
@@ -105,18 +104,25 @@ def _object_writer(cls: type, writer: cattrs.Converter, digits: int | None) -> C
     hints = typing.get_type_hints(cls)
     parts = {
         field.name: cattrs.gen.override(
-            omit=_is_kept_apart(hints[field.name]),
+            omit=is_kept_apart(hints[field.name]),
             omit_if_default="left_out_when_default" in field.metadata,
             unstruct_hook=_writer_of(field.name, digits).unstructure,
         )
         for field in dataclasses.fields(cls)
     }
     make: Callable[..., Callable[[Any], dict[str, Any]]] = cattrs.gen.make_dict_unstructure_fn
-    return make(cls, writer, **parts)
+    write, names = make(cls, writer, **parts), list(parts)
+
+    def written(value: Any) -> dict[str, Any]:
+        found = write(value)
+        return {name: found[name] for name in names if name in found}  # cattrs writes what may be left out last
+
+    return written if any(part.omit_if_default for part in parts.values()) else write
 
 
-def _is_kept_apart(hint: Any) -> bool:
-    return getattr(hint, "is_kept_apart", False) is True or any(map(_is_kept_apart, typing.get_args(hint)))
+def is_kept_apart(hint: Any) -> bool:
+    """Whether a type holds what has files of its own."""
+    return getattr(hint, "is_kept_apart", False) is True or any(map(is_kept_apart, typing.get_args(hint)))
 
 
 # ------------------------------------------------------------------------------------------------ reading
@@ -145,29 +151,6 @@ def from_json(cls: type[Document], document: Any) -> Document:
     groundstation.base.serial.MismatchError: levels_m[1]: found 'high', expected a number
     """
     return structured(_json_reader(), cls, document)
-
-
-def salvaged(cls: type[Document], document: Any) -> Document:
-    """Read what is sound of a document that may be damaged or written by anyone; the rest is left out.
-
-    A value of another kind gives its field's default, or drops the entry of a list or mapping it stands in. Whole
-    numbers are counts: not negative.
-
-    Raises
-    ------
-    MismatchError
-        When the document itself lacks what its class must have.
-
-    Examples
-    --------
-    >>> @dataclasses.dataclass(frozen=True)
-    ... class Wind:
-    ...     samples: int = 0
-    ...     levels_m: tuple[float, ...] = ()
-    >>> salvaged(Wind, {"samples": -3, "levels_m": [0, "high", 500]})
-    Wind(samples=0, levels_m=(0.0, 500.0))
-    """
-    return structured(_salvager(), cls, document)
 
 
 def structured(reader: cattrs.Converter, cls: type[Document], document: Any) -> Document:
@@ -216,7 +199,7 @@ def join(place: str, name: str) -> str:
 
 @cache
 def _json_reader() -> cattrs.Converter:
-    reader = new_reader(_WANTED, float_of=_json_number)
+    reader = new_reader(WANTED, float_of=_json_number)
     reader.register_structure_hook_factory(dataclasses.is_dataclass, lambda cls: _object_reader(cls, reader))
     return reader
 
@@ -250,22 +233,23 @@ def new_reader(
     for kind in (str, int, bool):
         reader.register_structure_hook(kind, partial(_plain, wanted=wanted))
     reader.register_structure_hook(float, partial(_number, float_of=float_of, wanted=wanted[float]))
-    reader.register_structure_hook_func(lambda hint: _origin(hint) is typing.Literal, _literal)
+    reader.register_structure_hook_func(lambda hint: origin_of(hint) is typing.Literal, _literal)
     reader.register_structure_hook_func(lambda hint: hint in (Any, object), lambda value, _hint: value)
     reader.register_structure_hook_factory(
-        lambda hint: _origin(hint) in (typing.Union, types.UnionType),
+        lambda hint: origin_of(hint) in (typing.Union, types.UnionType),
         lambda hint: _union_reader(hint, reader),
     )
     reader.register_structure_hook_factory(
-        lambda hint: _origin(hint) is tuple, lambda hint: _tuple_reader(typing.get_args(hint), reader)
+        lambda hint: origin_of(hint) is tuple, lambda hint: tuple_reader(typing.get_args(hint), reader)
     )
     reader.register_structure_hook_factory(
-        lambda hint: _origin(hint) in (Mapping, dict), lambda hint: _mapping_reader(hint, table, reader)
+        lambda hint: origin_of(hint) in (Mapping, dict), lambda hint: _mapping_reader(hint, table, reader)
     )
     return reader
 
 
-def _origin(hint: Any) -> Any:
+def origin_of(hint: Any) -> Any:
+    """What a generic type is made of (``tuple`` of ``tuple[int, ...]``); None of a plain one."""
     return typing.get_origin(hint)
 
 
@@ -296,7 +280,7 @@ def _literal(value: Any, hint: Any) -> Any:
     return value
 
 
-def _tuple_reader(hints: tuple[Any, ...], reader: cattrs.Converter) -> Hook:
+def tuple_reader(hints: tuple[Any, ...], reader: cattrs.Converter) -> Hook:
     """Reads tuples item by item, from lists alone."""
     is_fixed = len(hints) != 2 or hints[1] is not Ellipsis
 
@@ -357,7 +341,7 @@ def _union_reader(hint: Any, reader: cattrs.Converter) -> Hook:
 
 def _fits(value: Any, hint: Any) -> bool:
     """Whether a value looks like one of a kind, among the members of a union."""
-    origin = _origin(hint)
+    origin = origin_of(hint)
     if origin is tuple:
         return isinstance(value, list | tuple)
     if origin in (Mapping, dict) or dataclasses.is_dataclass(hint):
@@ -365,74 +349,3 @@ def _fits(value: Any, hint: Any) -> bool:
     if hint is float:
         return isinstance(value, int | float) and not isinstance(value, bool)
     return isinstance(hint, type) and type(value) is hint
-
-
-# ------------------------------------------------------------------------------------------------ salvage
-
-
-@cache
-def _salvager() -> cattrs.Converter:
-    reader = new_reader(_WANTED, float_of=_sound_number)
-    reader.register_structure_hook(int, _count)
-    reader.register_structure_hook_factory(
-        lambda hint: _origin(hint) in (tuple, Mapping, dict) and typing.get_args(hint)[-1] is not None,
-        lambda hint: _lenient_several(hint, reader),
-    )
-    reader.register_structure_hook_factory(dataclasses.is_dataclass, lambda cls: _lenient_object(cls, reader))
-    return reader
-
-
-def _sound_number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TypeError
-    if not abs(value) < LARGEST:
-        raise TypeError
-    return float(value)
-
-
-def _count(value: Any, _hint: Any) -> int:
-    if type(value) is not int or not 0 <= value < LARGEST:
-        raise MismatchError(repr(value), "a count")
-    return value
-
-
-def _sound(reader: cattrs.Converter, value: Any, hint: Any) -> tuple[Any, ...]:
-    """The value in a tuple of one; an empty one where it is not of its kind."""
-    try:
-        return (reader.structure(value, hint),)
-    except (MismatchError, cattrs.BaseValidationError, RecursionError):
-        return ()
-
-
-def _lenient_several(hint: Any, reader: cattrs.Converter) -> Hook:
-    arguments = typing.get_args(hint)
-    is_mapping = _origin(hint) is not tuple
-    if not is_mapping and arguments[-1] is not Ellipsis:
-        return _tuple_reader(arguments, reader)
-
-    def read(value: Any, _hint: Any) -> Any:
-        if is_mapping and isinstance(value, Mapping):
-            return {str(key): one for key, item in value.items() for one in _sound(reader, item, arguments[1])}
-        if is_mapping or not isinstance(value, list | tuple):
-            raise MismatchError(repr(value), "an object" if is_mapping else "a list")
-        return tuple(one for item in value for one in _sound(reader, item, arguments[0]))
-
-    return read
-
-
-def _lenient_object(cls: type, reader: cattrs.Converter) -> Hook:
-    hints, parts = typing.get_type_hints(cls), dataclasses.fields(cls)
-
-    def read(value: Any, _hint: Any) -> Any:
-        if not isinstance(value, Mapping):
-            raise MismatchError(repr(value), "an object")
-        found = {}
-        for part in parts:
-            sound = _sound(reader, value[part.name], hints[part.name]) if part.name in value else ()
-            if sound:
-                found[part.name] = sound[0]
-            elif part.default is dataclasses.MISSING and part.default_factory is dataclasses.MISSING:
-                raise MismatchError(repr(value.get(part.name)), "a value", part.name)
-        return cls(**found)
-
-    return read

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Sequence
 
-from groundstation.chapters.parts import Cell, Facts, Grid, Mark, Note, Part, Section
+from groundstation.chapters.parts import Cell, Facts, Figure, Front, Grid, Mark, Note, Part, Section
 from groundstation.chapters.wording import clean
 
 _MARKUP = re.compile(r"([\\`*_{}\[\]()<>#+\-.!|~&:])")
@@ -36,7 +36,9 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def markdown(section: Section, *, level: int = 1) -> str:
-    """A section as a Markdown document; its figures and the parts set small are left out.
+    """A section as a Markdown document, headed by its headline or its title.
+
+    The parts set small are left out, and figures, but for what stands in their place.
 
     Parameters
     ----------
@@ -44,13 +46,42 @@ def markdown(section: Section, *, level: int = 1) -> str:
     level : int
         Of its heading: 1 is ``#``.
     """
-    parts = [f"{'#' * level} {escaped(section.title)}"]
-    for part in section.parts:
+    parts = [f"{'#' * level} {escaped(section.headline or section.title)}"]
+    for part in (*section.above, *section.parts):
         parts += _part(part, level + 1)
     return "\n\n".join(parts)
 
 
-def _part(part: Part, level: int) -> list[str]:
+def part_markdown(part: Part, *, level: int = 2) -> str:
+    """A part of a section alone."""
+    return "\n\n".join(_part(part, level))
+
+
+def front_markdown(front: Front) -> str:
+    """The front of a report as a Markdown document: what flight it is, the verdict, and why."""
+    parts = [
+        f"# {escaped(front.title)}",
+        table(("", ""), [(escaped(label), _cell(cell)) for label, cell in front.pairs]),
+    ]
+    if front.headline:
+        parts.append(f"## {escaped(answer_line(front))}")
+    parts += [escaped(sentence) for sentence in front.sentences]
+    if front.figures:
+        parts += _facts(Facts("", front.figures), 2)
+    return "\n\n".join(parts)
+
+
+def answer_line(front: Front) -> str:
+    """Verdict and headline of a front in one line."""
+    verdict = "" if front.verdict is None else f"{front.verdict.symbol} {front.verdict.text}"
+    return " · ".join(filter(None, (verdict.strip(), front.headline)))
+
+
+def _part(part: Part | None, level: int) -> list[str]:
+    if isinstance(part, Figure):
+        return _part(part.instead, level)
+    if isinstance(part, Note) and part.files:  # they lie beside a report
+        return []
     if isinstance(part, Note):
         return [f"**{mark}** {escaped(part.text)}" if (mark := Mark(part.tone, "").symbol) else escaped(part.text)]
     if isinstance(part, Facts):
@@ -59,19 +90,29 @@ def _part(part: Part, level: int) -> list[str]:
 
 
 def _facts(facts: Facts, level: int) -> list[str]:
-    rows = [(escaped(label), escaped(value)) for label, value, _remark in facts.pairs]
-    return [f"{'#' * level} {escaped(facts.title)}", table(("", "value"), rows), *_caption(facts.caption)]
+    short = [remark if len(remark) <= WIDEST_CELL else "" for _label, _value, remark in facts.pairs]
+    rows = [(label, value, remark) for (label, value, _), remark in zip(facts.pairs, short, strict=True)]
+    shown = 3 if any(short) else 2
+    cells = table(("", "value", "")[:shown], [[escaped(text) for text in row[:shown]] for row in rows])
+    long = [f"{escaped(label)}: {escaped(remark)}" for label, _, remark in facts.pairs if len(remark) > WIDEST_CELL]
+    return [*_title(facts.title, level), cells, *long, *_caption(facts.caption)]
 
 
 def _grid(grid: Grid, level: int) -> list[str]:
-    title = [f"{'#' * level} {escaped(grid.title)}"] if grid.title else []
+    """A table; where a column has long remarks they stand below it, each under the name of its row."""
     rows = [[_cell(cell) for cell in row] for row in grid.rows]
-    long = {place for row in grid.rows for place, cell in enumerate(row) if place and len(_text(cell)) > WIDEST_CELL}
-    shown = [place for place in range(len(grid.heads)) if place not in long]
+    named = min((place for row in grid.rows for place, cell in enumerate(row) if isinstance(cell, str)), default=0)
+    long = {place for row in grid.rows for place, cell in enumerate(row) if len(_text(cell)) > WIDEST_CELL}
+    shown = [place for place in range(len(grid.heads)) if place == named or place not in long]
+    shown.sort(key=lambda place: place == named and place in long)  # long names last: the figures stay in sight
     heads = [escaped(grid.heads[place].title) for place in shown]
-    cells = table(heads, [[row[place] for place in shown] for row in rows])
-    below = [f"{row[0]}: {row[place]}" for row in rows for place in sorted(long) if row[place]]
-    return [*title, cells, *below, *_caption(grid.caption)]
+    cells = [table(heads, [[row[place] for place in shown] for row in rows])] if shown != [named] else []
+    below = [f"{row[named]}: {row[place]}" for row in rows for place in sorted(long - {named}) if row[place]]
+    return [*_title(grid.title, level), *cells, *below, *_caption(grid.caption)]
+
+
+def _title(title: str, level: int) -> list[str]:
+    return [f"{'#' * level} {escaped(title)}"] if title else []
 
 
 def _caption(caption: str) -> list[str]:

@@ -39,12 +39,13 @@ class Part:
 class Figure(Part):
     """Where a figure stands, by its name; a page that has figures draws it there, others leave it out.
 
-    ``of`` says which of several alike: a state, a horizon.
+    ``of`` says which of several alike: a state, a horizon. ``instead`` is what a page without figures shows there.
     """
 
     kind: ClassVar[str] = "figure"
     name: str
     of: str = ""
+    instead: Part | None = None
 
 
 @dataclass(frozen=True)
@@ -90,12 +91,18 @@ class Note(Part):
 
 @dataclass(frozen=True)
 class Section:
-    """One chapter of the report. ``key`` is its anchor; ``lead`` says in a sentence what it answers."""
+    """One chapter of the report. ``key`` is its anchor; ``lead`` says in a sentence what it answers.
+
+    A page without a front (a text panel, the terminal) begins with ``headline``, the answer in a few words, and
+    ``above``, what the front of a report tells of it.
+    """
 
     key: str
     title: str
     lead: str
     parts: Sequence[Part] = field(default_factory=tuple)
+    headline: str = ""
+    above: Sequence[Part] = ()
 
 
 @dataclass(frozen=True)

@@ -123,6 +123,18 @@ def typeset(text: str) -> str:
     return re.sub(r"(?<=\d) deg\b", "°", re.sub(r"(?<![\w.])-(?=\d)", MINUS, text))
 
 
+def sentence(text: str) -> str:
+    """Text written for a terminal as a sentence of a page.
+
+    Examples
+    --------
+    >>> sentence("coverage: 0.9, at least 0.98"), sentence("fit -1.2 deg.")
+    ('Coverage: 0.9, at least 0.98.', 'Fit −1.2°.')
+    """
+    told = typeset(text).strip().rstrip(".")
+    return f"{told[:1].upper()}{told[1:]}."
+
+
 def words(name: str) -> str:
     """A field name as words: ``largest_gap`` becomes ``largest gap``."""
     return clean(name).replace("_", " ").strip()

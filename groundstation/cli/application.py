@@ -10,6 +10,7 @@ import typer
 import typer.core
 
 from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.cli.text import as_json, printable
 
 DONE, FAILED, USAGE, DATA_LOST, LIMIT_REACHED = 0, 1, 2, 3, 4
 INTERRUPTED = 130
@@ -82,17 +83,6 @@ ThresholdsFile = Annotated[
 ]
 
 
-def printable(text: str) -> str:
-    """Text of a log without control characters: a log must not drive the terminal.
-
-    Examples
-    --------
-    >>> printable("L-39\\x1b[2J")
-    'L-39?[2J'
-    """
-    return "".join(character if character.isprintable() else "?" for character in text)
-
-
 def say(text: str) -> None:
     """Print a line on stderr."""
     typer.echo(printable(text), err=True)
@@ -100,8 +90,6 @@ def say(text: str) -> None:
 
 def tell_written(paths: Iterable[object], *, as_json_text: bool, quiet: bool) -> None:
     """Print the files that were written."""
-    from groundstation.cli.printing import as_json
-
     written = [str(path) for path in paths]
     if as_json_text:
         typer.echo(as_json({"written": written}))

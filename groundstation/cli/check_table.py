@@ -8,8 +8,8 @@ from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import FieldEntry, Ledger, TopicEntry
 from groundstation.base.signals import is_canonical
-from groundstation.cli.application import printable
-from groundstation.cli.printing import as_json, columns, totals
+from groundstation.cli.printing import columns, totals
+from groundstation.cli.text import as_json, printable
 from groundstation.pipeline.check import Checked
 
 MOST_LISTED = 8  # gaps or stretches of one topic; all are in the JSON

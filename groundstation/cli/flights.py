@@ -16,8 +16,8 @@ from groundstation.cli.application import (
     Verbose,
     answers_with_exit_code,
     app,
-    printable,
 )
+from groundstation.cli.text import printable
 
 if TYPE_CHECKING:
     from groundstation.results.comparison import Comparison, Value

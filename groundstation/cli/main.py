@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from groundstation import __version__
+from groundstation.base.version import __version__
 from groundstation.cli import fleets, flights
 from groundstation.cli.application import (
     DATA_LOST,

@@ -1,22 +1,15 @@
 """How results look on stdout: lines for people, JSON for programs."""
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import typer
 
-from groundstation.cli.application import printable
+from groundstation.cli.text import as_json, printable
 from groundstation.pipeline.describe import Description
 from groundstation.pipeline.outcome import Outcome, worst_code
 
 __all__ = ["as_json", "catalogue", "description", "outcomes", "worst_code"]
-
-
-def as_json(document: Any) -> str:
-    """Render a document as JSON text."""
-    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
-    return text.encode("utf-8", "backslashreplace").decode()  # file names need not be UTF-8
 
 
 def columns(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:

@@ -3,16 +3,14 @@
 import math
 from typing import get_args
 
-import numpy as np
-
-from groundstation.base.errors import GroundstationError, UsageError
-from groundstation.base.timescales import duration_text, iso_to_utc_ns
+from groundstation.base.errors import UsageError
+from groundstation.base.timescales import duration_text
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.clip import zero_s
-from groundstation.reports.sections.saved import mapping, objects
 from groundstation.results.comparison import Alignment, Event
 from groundstation.results.figures import numbers, texts
 from groundstation.results.files import SavedFlight
+from groundstation.results.inertial import InertialResult
 
 EVENTS: tuple[Event, ...] = get_args(Event)
 AT_REST, UNKNOWN, AIRBORNE = "standstill", "unknown", "airborne"
@@ -37,7 +35,7 @@ def align(a: SavedFlight, b: SavedFlight, event: Event | None, *, is_same_log: b
     if event is None:
         event = _default(a, b, is_same_log)
     if event == "utc":
-        start_a_ns, start_b_ns = (_start_utc_ns(saved) for saved in (a, b))
+        start_a_ns, start_b_ns = (saved.results.start_utc_ns for saved in (a, b))
         if start_a_ns is None or start_b_ns is None:
             raise _missing(a if start_a_ns is None else b, event)
         return Alignment(event, 0.0, (start_a_ns - start_b_ns) / NS_PER_S)
@@ -48,7 +46,7 @@ def align(a: SavedFlight, b: SavedFlight, event: Event | None, *, is_same_log: b
             raise _missing(saved, event)
         moments.append(found[event])
     if event == "start" and is_same_log:  # a part of a flight begins where it was cut
-        moments = [-zero_s(mapping(saved.summary, "flight", "metadata")) for saved in (a, b)]
+        moments = [-zero_s(saved.results.metadata) for saved in (a, b)]
     return Alignment(event, moments[0], moments[1])
 
 
@@ -75,29 +73,21 @@ def events_of(saved: SavedFlight) -> dict[Event, float]:
 
 
 def _first_outage_s(saved: SavedFlight) -> float | None:
-    outages = objects(mapping(saved.summary, "results", "inertial"), "outages")
-    starts = [one.get("start_s") for one in outages if one.get("missing") in ("gnss", "both")]
+    inertial = saved.results.answer(InertialResult)
+    starts = [one.start_s for one in inertial.outages if one.missing in ("gnss", "both")] if inertial else []
     lanes = saved.figure("gnss_lanes")
     if lanes is not None:
         starts += numbers(lanes, "start_s")[texts(lanes, "state") == NO_GNSS].tolist()
-    known = [float(start) for start in starts if isinstance(start, int | float) and np.isfinite(start)]
-    return min(known, default=None)
+    return min((start for start in starts if math.isfinite(start)), default=None)
 
 
 def _default(a: SavedFlight, b: SavedFlight, is_same_log: bool) -> Event:
     if is_same_log:
-        return "start" if None in (_start_utc_ns(a), _start_utc_ns(b)) else "utc"
+        return "start" if None in (a.results.start_utc_ns, b.results.start_utc_ns) else "utc"
     return "first-movement" if all("first-movement" in events_of(saved) for saved in (a, b)) else "start"
-
-
-def _start_utc_ns(saved: SavedFlight) -> int | None:
-    try:
-        return iso_to_utc_ns(str(mapping(saved.summary, "flight").get("start_utc")))[0]
-    except GroundstationError:
-        return None
 
 
 def _missing(saved: SavedFlight, event: Event) -> UsageError:
     has = [f"{name} (+{duration_text(moment)})" for name, moment in events_of(saved).items()]
-    has += ["utc"] if _start_utc_ns(saved) is not None else []
+    has += ["utc"] if saved.results.start_utc_ns is not None else []
     return UsageError(saved.folder.name, f"no {event}", f"one of {', '.join(has)}", "choose another --align")

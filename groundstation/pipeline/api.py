@@ -21,6 +21,7 @@ from groundstation.pipeline.log import Log, open_log
 from groundstation.pipeline.notebook import AnyPath, OpenFlight
 from groundstation.results.files import SavedFlight, load
 from groundstation.results.flight import FlightResults, Source
+from groundstation.results.manifest import Manifest
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:
@@ -190,7 +191,7 @@ class OpenLog(OpenFlight):
     def _saved(self) -> SavedFlight:
         from groundstation.results.summary import summary_of
 
-        manifest = {"configuration": self.configuration.to_dict()}
+        manifest = Manifest(configuration=self.configuration.to_dict())
         figures = {figure.name: figure for figure in self.results.figures}
         return SavedFlight(Path(), summary_of(self.results), manifest, figures)
 
@@ -230,8 +231,8 @@ class SavedRun(OpenFlight):
     def _log(self) -> OpenLog:
         """The flight anew, from the MCAP, with the settings of the run."""
         mcap = file_in(self.folder, ".mcap")
-        told = self.saved.manifest.get("configuration")
-        known = {name: value for name, value in told.items() if name in SECTIONS} if isinstance(told, dict) else {}
+        told = self.saved.manifest.configuration
+        known = {name: value for name, value in told.items() if name in SECTIONS}
         with told_in_a_line(mcap.name):
             return OpenLog(Conversion(open_log(mcap)), load_configuration(known))
 

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from itertools import islice
 from typing import TYPE_CHECKING
 
-from groundstation import __version__
 from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.base.version import __version__
 from groundstation.pipeline.outcome import Outcome
 from groundstation.pipeline.progress import Listener, silent
 from groundstation.pipeline.workers import AnyJob, Work

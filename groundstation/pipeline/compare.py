@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from collections.abc import Set as AbstractSet
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,12 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.errors import UsageError
 from groundstation.base.findings import SEVERITIES, Finding
 from groundstation.base.signals import is_canonical
+from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.wording import is_number
 from groundstation.pipeline.alignment import align
 from groundstation.pipeline.clip import CUT_SHA256
 from groundstation.pipeline.inputs import COMPARISON_MARKS, COMPARISON_RECORDING, is_ours
-from groundstation.reports.sections.saved import mapping, objects
+from groundstation.reports.sections.saved import mapping
 from groundstation.results.comparison import Comparison, Delta, Event, SettingPair, Side, Value
 from groundstation.results.files import MANIFEST, SavedFlight, csv_text, load, write_text
 from groundstation.results.flight import NotAssessable
@@ -115,24 +117,22 @@ def _load(folder: Path) -> SavedFlight:
 
 
 def _side(saved: SavedFlight) -> Side:
-    flight = mapping(saved.summary, "flight")
-    source = mapping(flight, "source")
-    start_utc, duration_s = flight.get("start_utc"), flight.get("duration_s")
+    results = saved.results
+    start_ns = results.start_utc_ns
     return Side(
-        str(flight.get("id") or saved.folder.name),
-        str(flight.get("aircraft") or ""),
-        str(flight.get("flight") or ""),
-        str(source.get("name") or ""),
-        str(source.get("sha256") or ""),
-        start_utc if isinstance(start_utc, str) else None,
-        duration_s if is_number(duration_s) else None,
+        results.flight_id or saved.folder.name,
+        results.metadata.get("aircraft", ""),
+        results.metadata.get("flight", ""),
+        results.source.name,
+        results.source.sha256,
+        None if start_ns is None else utc_ns_to_iso(start_ns),
+        results.duration_s if math.isfinite(results.duration_s) else None,
     )
 
 
 def _origin(saved: SavedFlight) -> str:
     """Digest of the log a flight came from; of a part, that of the whole."""
-    flight = mapping(saved.summary, "flight")
-    return str(mapping(flight, "metadata").get(CUT_SHA256) or mapping(flight, "source").get("sha256") or "")
+    return saved.results.metadata.get(CUT_SHA256) or saved.results.source.sha256
 
 
 # ---------------------------------------------------------------------------------------------------- answers
@@ -254,10 +254,10 @@ def _settings(a: SavedFlight, b: SavedFlight) -> tuple[SettingPair, ...]:
 
 def _settings_of(saved: SavedFlight, analyses: AbstractSet[str]) -> dict[str, Value]:
     """What the user set and, over it, what the analyses say they used."""
-    found = dict(_leaves("", mapping(saved.manifest, "configuration")))
+    found = dict(_leaves("", saved.manifest.configuration))
     for analysis in sorted(analyses):
         found |= dict(_leaves(f"{analysis}.", mapping(saved.summary, "results", analysis, "settings")))
-    versions = {"groundstation": saved.manifest.get("groundstation"), **mapping(saved.manifest, "versions")}
+    versions = {"groundstation": saved.manifest.groundstation, **saved.manifest.versions}
     return found | dict(_leaves("version.", versions))
 
 
@@ -271,11 +271,7 @@ def _leaves(path: str, node: Any) -> Iterator[tuple[str, Value]]:
 
 
 def _findings(saved: SavedFlight) -> tuple[Finding, ...]:
-    entries = [entry for entry in objects(saved.summary, "findings") if entry.get("severity") in SEVERITIES]
-    found = []
-    for entry in entries:
-        code, text, topic, place = (str(entry.get(key) or "") for key in ("code", "text", "topic", "place"))
-        found.append(Finding(entry["severity"], code, text, topic, place))
+    found = [replace(finding, count=None) for finding in saved.results.findings]
     return grouped(sorted(found, key=lambda finding: -SEVERITIES.index(finding.severity)))
 
 
@@ -285,6 +281,4 @@ def _only(findings: tuple[Finding, ...], others: tuple[Finding, ...]) -> tuple[F
 
 
 def _reasons(saved: SavedFlight) -> dict[str, NotAssessable]:
-    entries = objects(saved.summary, "not_assessable")
-    found = (NotAssessable(str(entry.get("analysis", "")), str(entry.get("reason", ""))) for entry in entries)
-    return {entry.analysis: entry for entry in found}
+    return {entry.analysis: entry for entry in saved.results.not_assessable}

@@ -5,16 +5,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import settings_from
 from groundstation.estimators.analyses import FLIGHT_ANALYSES
 from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.integrity.limits import Thresholds, thresholds_from
-
-if TYPE_CHECKING:
-    from groundstation.pipeline.apply_deviation import Apply
+from groundstation.pipeline.deviation_to_apply import Apply, asked_for
 
 S = TypeVar("S")
 FLIGHT_TABLES = tuple(dict.fromkeys(analysis.settings_table for analysis in FLIGHT_ANALYSES))
@@ -76,7 +74,7 @@ class Configuration:
     force: tuple[Interval, ...] = ()
     profile: str | None = None
     files: Mapping[str, str] = field(default_factory=dict)
-    apply: "Apply | None" = None
+    apply: Apply | None = None
     settings: UserSettings = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -187,8 +185,6 @@ def applying(configuration: Configuration, apply: str) -> Configuration:
     """
     if not apply:
         return configuration
-    from groundstation.pipeline.apply_deviation import asked_for
-
     return replace(configuration, apply=asked_for(apply))
 
 

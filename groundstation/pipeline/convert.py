@@ -4,11 +4,11 @@ from dataclasses import asdict, dataclass, replace
 from importlib import metadata as installed
 from pathlib import Path
 
-from groundstation import __version__
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.ledger import TopicEntry
 from groundstation.base.records import Damage, RecordBatch, Remark
+from groundstation.base.version import __version__
 from groundstation.integrity.ledger import damage_entry
 from groundstation.integrity.ledger_findings import TOPIC_CODES, topic_findings
 from groundstation.integrity.limits import Thresholds, shipped

@@ -9,20 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
-from groundstation.base.errors import GroundstationError
 from groundstation.base.records import MAX_TEXT_CHARACTERS
-from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.fleet.density import SampleHistogram, histogram_of
 from groundstation.estimators.fleet.moments import Moments, moments_of
 from groundstation.estimators.fleet.skill import SkillOfFlight
 from groundstation.estimators.heading.figures import IN_PAUSE
 from groundstation.estimators.heading.references import REFERENCE_SIGMA_DEG, logged_reference
-from groundstation.reports.index import index_row
-from groundstation.reports.sections.saved import heading_of, mapping, objects
+from groundstation.reports.index import index_row, reasons_of
 from groundstation.results.figures import FigureData, flags, numbers, texts
 from groundstation.results.files import SavedFlight, utf8_text
 from groundstation.results.fleet import FLIGHT_COLUMNS, Kind
+from groundstation.results.forecast import ForecastResult
+from groundstation.results.heading import HeadingResult
 
 FloatArray = NDArray[np.float64]
 NORMAL_95 = 1.959964
@@ -65,51 +64,32 @@ def to_number(value: Any) -> float:
     return float(value) if abs(value) <= LARGEST else math.nan
 
 
-def start_utc_ns(value: Any) -> int | None:
-    """Nanoseconds of the start as summary.json has it, None when it is missing or absurd.
-
-    Examples
-    --------
-    >>> start_utc_ns("2026-05-04T06:00:00.250Z"), start_utc_ns(None), start_utc_ns("9999-01-01T00:00")
-    (1777874400250000000, None, None)
-    """
-    try:
-        found = iso_to_utc_ns(value)[0] if isinstance(value, str) else None
-    except GroundstationError:
-        return None
-    return found if found is not None and abs(found) < LATEST_NS else None
-
-
 def flight_row(saved: SavedFlight, samples: HeadingSamples | None) -> dict[str, Any]:
     """Build the row of a flight: a value for every one of :data:`FLIGHT_COLUMNS`, of the type its kind has."""
-    heading = heading_of(saved)
-    start = start_utc_ns(mapping(saved.summary, "flight").get("start_utc"))
+    results = saved.results
+    start, heading = results.start_utc_ns, results.answer(HeadingResult)
+    start = start if start is not None and abs(start) < LATEST_NS else None
     moments = samples.moments if samples is not None else Moments()
-    found = index_row(saved) | {
+    standstill = heading.standstill if heading else None
+    found: dict[str, Any] = vars(index_row(saved)) | {
         "flight_id": saved.folder.name,
         "start_utc": start,
         "month": "" if start is None else str(np.datetime64(start, "ns").astype("datetime64[M]")),
-        "has_lost_data": _has_lost_data(mapping(saved.summary, "ledger")),
-        "not_assessable": "; ".join(_reasons(saved)),
-        "standstill_speed_of_mean_mps": mapping(heading, "standstill").get("speed_of_mean_mps"),
-        **{name: heading.get(name) for name in _MORE_OF_HEADING},
+        "has_lost_data": results.ledger.loses_data,
+        "not_assessable": "; ".join(reasons_of(results)),
+        "standstill_speed_of_mean_mps": standstill.speed_of_mean_mps if standstill else None,
     }
+    if heading is not None:
+        found |= {
+            "paper_error_deg": heading.paper_error_deg,
+            "drift_sigma_deg_per_h": heading.drift_sigma_deg_per_h,
+            "lever_arm_m": heading.lever_arm_m,
+            "time_offset_s": heading.time_offset_s,
+            "parking_sigma_deg": heading.parking_sigma_deg,
+        }
     if moments.count:
         found |= {"samples": moments.count, "sample_mean_deg": moments.mean, "sample_m2_deg2": moments.m2}
     return {column.name: _typed(column.kind, found.get(column.name)) for column in FLIGHT_COLUMNS}
-
-
-_MORE_OF_HEADING = (*("paper_error_deg", "drift_sigma_deg_per_h", "lever_arm_m", "time_offset_s", "parking_sigma_deg"),)
-
-
-def _has_lost_data(ledger: Mapping[str, Any]) -> bool:
-    damages = objects(ledger, "damages")
-    return bool(ledger.get("truncated")) or any(entry.get("loses_data") is True for entry in damages)
-
-
-def _reasons(saved: SavedFlight) -> list[str]:
-    entries = objects(saved.summary, "not_assessable")
-    return [f"{entry.get('analysis', '')}: {entry.get('reason', '')}" for entry in entries]
 
 
 def _typed(kind: Kind, value: Any) -> Any:
@@ -145,7 +125,8 @@ def heading_samples(saved: SavedFlight) -> HeadingSamples | None:
         return None
     is_epoch = texts(figure, "gate") != IN_PAUSE
     difference, used = numbers(figure, "difference_deg")[is_epoch], flags(figure, "used")[is_epoch]
-    centre = float(np.nan_to_num(wrap_180(to_number(heading_of(saved).get("error_deg")))))
+    heading = saved.results.answer(HeadingResult)
+    centre = float(np.nan_to_num(wrap_180(to_number(heading.error_deg if heading else None))))
     about_estimate = centre + wrap_180(difference[used] - centre)
     names = ("time_s", "segment", "heading_deg", "track_deg", "ground_speed_mps", "weight")
     columns = {name: numbers(figure, name)[is_epoch] for name in names}
@@ -155,25 +136,24 @@ def heading_samples(saved: SavedFlight) -> HeadingSamples | None:
 
 def checks_of(saved: SavedFlight) -> list[Check]:
     """Everything independent that the flight's heading was compared with."""
-    heading = heading_of(saved)
-    found = [_reference_check(heading, mapping(saved.summary, "flight", "metadata"))]
-    for runway in objects(heading, "runway"):
-        found.append(_check("runway", runway.get("difference_deg"), to_number(runway.get("sigma_deg"))))
-    difference = mapping(heading, "onboard").get("difference_error_deg")
-    found.append(_check("onboard", difference, to_number(heading.get("standard_error_deg"))))
+    heading = saved.results.answer(HeadingResult)
+    if heading is None:
+        return []
+    found = [_reference_check(heading, saved.results.metadata)]
+    found += [_check("runway", runway.difference_deg, runway.sigma_deg) for runway in heading.runway]
+    if heading.onboard is not None:
+        found.append(_check("onboard", heading.onboard.difference_error_deg, heading.standard_error_deg))
     return [check for check in found if check is not None]
 
 
-def _reference_check(heading: Mapping[str, Any], metadata: Mapping[str, Any]) -> Check | None:
-    reference = logged_reference({key: value for key, value in metadata.items() if isinstance(value, str)})
-    sigma = math.hypot(
-        to_number(heading.get("parking_sigma_deg")), reference.sigma_deg if reference else REFERENCE_SIGMA_DEG
-    )
-    return _check("reference", to_number(heading.get("reference_residual_arcmin")) / ARCMIN_PER_DEG, sigma)
+def _reference_check(heading: HeadingResult, metadata: Mapping[str, str]) -> Check | None:
+    reference, residual = logged_reference(metadata), heading.reference_residual_arcmin
+    sigma = math.hypot(to_number(heading.parking_sigma_deg), reference.sigma_deg if reference else REFERENCE_SIGMA_DEG)
+    return _check("reference", None if residual is None else residual / ARCMIN_PER_DEG, sigma)
 
 
-def _check(quantity: str, residual: Any, sigma_deg: float) -> Check | None:
-    residual_deg = to_number(residual)
+def _check(quantity: str, residual: float | None, sigma: float) -> Check | None:
+    residual_deg, sigma_deg = to_number(residual), to_number(sigma)
     if math.isnan(residual_deg) or not sigma_deg > 0.0:
         return None
     return Check(quantity, residual_deg, sigma_deg, abs(residual_deg) <= NORMAL_95 * sigma_deg)
@@ -181,11 +161,12 @@ def _check(quantity: str, residual: Any, sigma_deg: float) -> Check | None:
 
 def skill_of(saved: SavedFlight) -> tuple[str, list[SkillOfFlight]]:
     """The shipped method of a flight and its rows of forecast skill."""
-    forecast = mapping(saved.summary, "results", "forecast")
-    rows = []
-    for row in objects(forecast, "skill"):
-        starts, horizon = to_number(row.get("starts")), to_number(row.get("horizon_min"))
-        rms, coverage = to_number(row.get("rms_m")), to_number(row.get("coverage95"))
-        if starts >= 1.0 and math.isfinite(horizon + rms):
-            rows.append(SkillOfFlight(str(row.get("method")), horizon, int(starts), rms, coverage))
-    return str(forecast.get("default_method", "")), rows
+    forecast = saved.results.answer(ForecastResult)
+    if forecast is None:
+        return "", []
+    rows = [
+        SkillOfFlight(row.method, row.horizon_min, row.starts, row.rms_m, to_number(row.coverage95))
+        for row in forecast.skill
+        if row.starts >= 1 and math.isfinite(to_number(row.horizon_min) + to_number(row.rms_m))
+    ]
+    return forecast.default_method, rows

@@ -22,11 +22,12 @@ from groundstation.pipeline.log import Log, open_log
 from groundstation.pipeline.manifest import manifest_of
 from groundstation.pipeline.outcome import Outcome, State, reason_of
 from groundstation.pipeline.progress import Event, Listener, silent
-from groundstation.pipeline.resume import Finished, Keys, Step, keys_of, remember_reports, remembered
+from groundstation.pipeline.resume import Finished, Keys, Step, keys_of, remember_reports
 from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
+from groundstation.results.manifest import Resume
 from groundstation.tables.table import Flight
 
 PARTIAL_PREFIX = ".partial-"
@@ -161,7 +162,7 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         mcap.rename(partial / f"{identity}.mcap")
         text = sentence(results)
         keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf)
-        resume = remembered(keys, text, converted.has_lost_data)
+        resume = Resume(keys, text, converted.has_lost_data)
         save(partial, results, manifest_of(log, job.url, results, job.configuration, resume))
     with watch.stage("recording"):
         write_recording(partial / f"{identity}.rrd", flight, results)

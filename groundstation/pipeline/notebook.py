@@ -26,7 +26,6 @@ from groundstation.results.magnetic_ground import GroundDeviation
 from groundstation.tables.table import Flight, TimedTable, timed
 
 if TYPE_CHECKING:
-    from groundstation.pipeline.api import OpenLog
     from groundstation.reports.drawing import Drawing, Sketch
 
 AnyPath = str | PathLike[str]
@@ -67,7 +66,7 @@ class OpenFlight(ABC):
         """All answers; ``results.to_frame(name)`` gives findings and the arrays behind the figures."""
 
     @abstractmethod
-    def with_settings(self, **sections: Any) -> "OpenLog":
+    def with_settings(self, **sections: Any) -> "OpenFlight":
         """The same flight with other settings; the log is read again only for other ``thresholds`` of the ledger.
 
         Parameters
@@ -221,9 +220,9 @@ class OpenFlight(ABC):
 
     def _repr_html_(self) -> str:
         """The top of the report as a short table: verdict, correction, span, topics."""
-        from groundstation.reports.sections import front
+        from groundstation.chapters.front import front
 
-        told = front.build(self._saved())
+        told = front(self._saved().results)
         rows = [(name, value if isinstance(value, str) else value.text) for name, value in told.pairs]
         if told.verdict is not None:
             rows.insert(0, ("Verdict", told.verdict.text))

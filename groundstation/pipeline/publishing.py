@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
 from groundstation.pipeline.fleet import FLEET_PARQUET, write_fleet
@@ -11,14 +10,14 @@ from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, f
 from groundstation.pipeline.outcome import Outcome
 from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
 from groundstation.reports.fleet_report import write_fleet_report
-from groundstation.reports.index import INDEX_CSV, INDEX_JSON
+from groundstation.reports.index import INDEX_CSV, INDEX_JSON, IndexRow
 
 FLEET_RECORDING, FLEET_PDF = "fleet.rrd", str(Path(FLEET_PAGE).with_suffix(".pdf"))
 FLEET_FILES = (INDEX_JSON, INDEX_CSV, FLEET_PARQUET, SAMPLES, FLEET_RECORDING, FLEET_PAGE, FLEET_PDF)
 
 
 def write_beside(
-    out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[dict[str, Any]] = (), *, with_pdf: bool = True
+    out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[IndexRow] = (), *, with_pdf: bool = True
 ) -> tuple[Outcome, ...]:
     """Write everything that stands beside the flight folders; returns what could not be written or read."""
     from groundstation.viewer.fleet import write_fleet_recording
@@ -37,9 +36,7 @@ def write_beside(
     return tuple(problems)
 
 
-def write_index_of(
-    out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[dict[str, Any]] = ()
-) -> tuple[Outcome, ...]:
+def write_index_of(out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[IndexRow] = ()) -> tuple[Outcome, ...]:
     """Write index.json and index.csv: every flight in ``out``, and the logs of this run that gave none.
 
     Returns what could not be listed: flight folders that cannot be read, an index that cannot be written.
@@ -104,13 +101,16 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
     return [*paths, *(out / name for name in FLEET_FILES if (out / name).exists())], (*problems, *unread)
 
 
-def _rows_without_flight(out: Path) -> list[dict[str, Any]]:
+def _rows_without_flight(out: Path) -> list[IndexRow]:
     """Rows of the logs that gave no flight, from the index as it stands: nothing else remembers them."""
     import json
 
+    from groundstation.base.serial import MismatchError, from_json
+
     try:
-        rows = json.loads((out / OUT_FOLDER_MARK).read_text(encoding="utf-8"))["rows"]
-        folders = {str(folder) for folder in flight_folders(out)}
-        return [row for row in rows if row["kind"] != "flight" and row["source"] not in folders]
-    except (OSError, ValueError, KeyError, TypeError):
+        listed = json.loads((out / OUT_FOLDER_MARK).read_text(encoding="utf-8"))["rows"]
+        rows = [from_json(IndexRow, row) for row in listed]
+    except (OSError, ValueError, KeyError, TypeError, MismatchError):
         return []
+    folders = {str(folder) for folder in flight_folders(out)}
+    return [row for row in rows if row.kind != "flight" and row.source not in folders]

@@ -9,39 +9,32 @@ import hashlib
 import json
 import platform
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib import metadata as installed
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
-from groundstation import __version__
 from groundstation.base.errors import GroundstationError
-from groundstation.base.findings import SEVERITIES, Severity
+from groundstation.base.findings import Severity, worst
+from groundstation.base.version import __version__
 from groundstation.pipeline.apply_deviation import APPLIED, corrected_name
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.identity import plain_id
 from groundstation.reports.flight_report import PDF, REPORT
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
-from groundstation.results.files import MANIFEST, SUMMARY, json_text, write_text
+from groundstation.results.document import SummaryDocument
+from groundstation.results.files import load_document, load_manifest, save_manifest
 from groundstation.results.flight import Source
+from groundstation.results.manifest import Keys as Keys
+from groundstation.results.manifest import Manifest
 
 Step = Literal["everything", "analysis", "reports", "nothing"]  # what has to be done for a log
-KEYS = "keys"
 PACKAGES = (
     *("mcap", "numpy", "pandas", "numba", "scipy", "pyarrow", "rerun-sdk"),
     *("protobuf", "matplotlib", "typst", "pygeomag", "ppigrf"),
 )
-
-
-@dataclass(frozen=True)
-class Keys:
-    """Keys of the stages of one log's run, hexadecimal; each one covers those before it."""
-
-    conversion: str
-    analysis: str
-    reports: str
 
 
 @dataclass(frozen=True)
@@ -144,17 +137,12 @@ def _profile_of(configuration: Configuration) -> str:
         raise GroundstationError(configuration.profile, error.strerror or "cannot be read", "a profile") from error
 
 
-def remembered(keys: Keys, text: str, has_lost_data: bool) -> dict[str, Any]:
-    """What a manifest keeps so that a later run knows what it need not do."""
-    return {KEYS: asdict(keys), "text": text, "has_lost_data": has_lost_data}
-
-
 def remember_reports(flight: "Finished", *, with_pdf: bool) -> None:
     """Take down that the reports of a finished flight were made again."""
-    path = flight.folder / MANIFEST
-    manifest = json.loads(path.read_text(encoding="utf-8"))
-    manifest["resume"][KEYS]["reports"] = _digest(flight.keys.analysis, with_pdf)
-    write_text(path, json_text(manifest))
+    manifest = load_manifest(flight.folder)
+    if manifest.resume is not None:
+        keys = replace(manifest.resume.keys, reports=_digest(flight.keys.analysis, with_pdf))
+        save_manifest(flight.folder, replace(manifest, resume=replace(manifest.resume, keys=keys)))
 
 
 def finished_flights(folders: Iterable[Path]) -> dict[str, Finished]:
@@ -166,24 +154,26 @@ def finished_flights(folders: Iterable[Path]) -> dict[str, Finished]:
 def finished(folder: Path) -> Finished | None:
     """What a flight folder remembers; None when it is not whole, or was not made by such a run."""
     try:
-        manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
-        return _finished(folder, frozenset(path.name for path in folder.iterdir()), manifest, summary)
-    except (OSError, ValueError, KeyError, TypeError):
+        manifest, summary = load_manifest(folder), load_document(folder)
+        files = frozenset(path.name for path in folder.iterdir())
+    except (OSError, GroundstationError):
         return None
+    return _finished(folder, files, manifest, summary)
 
 
-def _finished(folder: Path, files: frozenset[str], manifest: Mapping[str, Any], summary: Mapping[str, Any]) -> Finished:
-    found = {str(finding["severity"]) for finding in summary["findings"]}
+def _finished(folder: Path, files: frozenset[str], manifest: Manifest, summary: SummaryDocument) -> Finished | None:
+    resume = manifest.resume
+    if resume is None:
+        return None
     return Finished(
         folder,
         files,
         folder.name,
-        str(manifest["source"]["sha256"]),
-        Keys(**manifest["resume"][KEYS]),
-        str(manifest["resume"]["text"]),
-        bool(manifest["resume"]["has_lost_data"]),
-        next((severity for severity in reversed(SEVERITIES) if severity in found), None),
-        bool(summary["results"].get("magnetic")),
-        any(finding["code"] == APPLIED for finding in summary["findings"]),
+        manifest.source.sha256,
+        resume.keys,
+        resume.text,
+        resume.has_lost_data,
+        worst(summary.findings),
+        bool(summary.results.get("magnetic")),
+        any(finding.code == APPLIED for finding in summary.findings),
     )

@@ -7,17 +7,17 @@ import numpy as np
 
 from groundstation.base.findings import Finding
 from groundstation.base.geodesy import north_east_m
+from groundstation.chapters.findings import MARKS
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Part, Section
 from groundstation.chapters.wording import ABSENT, any_value, number, significant
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.reports.page import TEMPLATES, render
-from groundstation.reports.sections.findings import MARKS
-from groundstation.reports.sections.saved import mapping
 from groundstation.results.comparison import Comparison, Delta, Value
 from groundstation.results.figures import FigureData, numbers
 from groundstation.results.files import SavedFlight
+from groundstation.results.forecast import ForecastResult
 
 A, B = d.INS, d.GNSS
 BAND = 1.96
@@ -226,7 +226,8 @@ def _growth(sides: Sequence[_Side]) -> Drawing | None:
     """RMS of the forecast by horizon, the shipped method and the INS without one."""
     curves = []
     for side in sides:
-        default = str(mapping(side.saved.summary, "results", "forecast").get("default_method", ""))
+        forecast = side.saved.results.answer(ForecastResult)
+        default = forecast.default_method if forecast else ""
         for method, style in ((default, "-"), ("raw_ins", ":")):
             data = side.figure("forecast_growth", "horizon_min", f"{method}_rms_m")
             if data is not None:

@@ -4,11 +4,11 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from groundstation.chapters.front import front
 from groundstation.chapters.parts import Document
 from groundstation.reports.page import TEMPLATES, render
 from groundstation.reports.pdf import PdfError, write_pdf
-from groundstation.reports.sections import CHAPTERS, front
-from groundstation.reports.sections.saved import mapping
+from groundstation.reports.sections import CHAPTERS
 from groundstation.reports.steer_card import write_exports
 from groundstation.results.files import SavedFlight, load, write_text
 
@@ -66,8 +66,7 @@ def write_pages(page: Path, html: str, document: Document, *, with_pdf: bool) ->
 def flight_document(saved: SavedFlight) -> Document:
     """Put the report of one saved flight together."""
     sections = tuple(section for section in (build(saved) for build in CHAPTERS) if section is not None)
-    flight_id = str(mapping(saved.summary, "flight").get("id", ""))
-    return Document("Flight report", flight_id, front.build(saved), sections)
+    return Document("Flight report", saved.results.flight_id, front(saved.results), sections)
 
 
 def flight_report_html(document: Document) -> str:

@@ -1,18 +1,18 @@
 """What a flight leaves beside its report for the cockpit: the deviation as a table and as a steer card on A6 paper."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.parts import Mark
 from groundstation.chapters.wording import ABSENT, is_number, number, typeset
 from groundstation.reports.page import TEMPLATES
 from groundstation.reports.pdf import PdfError, write_pdf
-from groundstation.reports.sections.saved import mapping, objects
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD, deviation_csv
 from groundstation.results.files import SavedFlight, write_text
-from groundstation.results.magnetic import ADVISORY, METHOD_TITLES
+from groundstation.results.flight import FlightResults
+from groundstation.results.magnetic import ADVISORY, METHOD_TITLES, CardRow, MagneticResult
 
 TEMPLATE = TEMPLATES / "steer_card.typ"
 MOST_ROWS = 36  # of a page of A6: every 10 deg
@@ -62,13 +62,14 @@ def write_exports(saved: SavedFlight, *, with_pdf: bool) -> tuple[tuple[Path, ..
     tuple of Path, str
         What was written, and why one of them was not.
     """
+    answer = saved.results.answer(MagneticResult)
     table, card = saved.folder / DEVIATION_CSV, saved.folder / STEER_CARD
     for path in (table, card):
         path.unlink(missing_ok=True)
-    if not mapping(saved.summary, "results", "magnetic"):
+    if answer is None:
         return (), ""
     paths, problems = [], []
-    text = deviation_csv(saved)
+    text = deviation_csv(saved.results)
     if text is None:
         problems.append(f"{DEVIATION_CSV}: not written, its arrays are missing in results.parquet: run the log again")
     else:
@@ -76,82 +77,73 @@ def write_exports(saved: SavedFlight, *, with_pdf: bool) -> tuple[tuple[Path, ..
         paths.append(table)
     if with_pdf:
         try:
-            write_pdf(steer_card(saved), card, TEMPLATE)
+            write_pdf(steer_card(saved.results, answer), card, TEMPLATE)
             paths.append(card)
         except PdfError as error:
             problems.append(str(error))
     return tuple(paths), "; ".join(problems)
 
 
-def steer_card(saved: SavedFlight) -> SteerCard:
-    """Build the card of a flight from what it saved, whatever is missing there."""
-    magnetic, flight = mapping(saved.summary, "results", "magnetic"), mapping(saved.summary, "flight")
-    start = flight.get("start_utc")
+def steer_card(results: FlightResults, answer: MagneticResult) -> SteerCard:
+    """Build the card of a flight from its deviation."""
+    start_ns = results.start_utc_ns
     pairs = (
-        ("Flight", _shorter(flight.get("id"), 2 * MOST_LETTERS)),
-        ("Date", str(start)[:10] if start else "not known"),
-        ("Magnetometer", _shorter(magnetic.get("magnetometer_topic"))),
-        ("Swung against", _shorter(magnetic.get("ins_topic"))),
+        ("Flight", _shorter(results.flight_id, 2 * MOST_LETTERS)),
+        ("Date", "not known" if start_ns is None else utc_ns_to_iso(start_ns)[:10]),
+        ("Magnetometer", _shorter(answer.magnetometer_topic)),
+        ("Swung against", _shorter(answer.ins_topic)),
     )
-    state, reason = _state(magnetic)
-    rows = _thinned(objects(magnetic, "card"))
+    state, reason = _state(answer)
+    rows = answer.card[:: max(1, -(-len(answer.card) // MOST_ROWS))]  # every k-th, so that they fit on the page
     return SteerCard(
-        _shorter(flight.get("aircraft") or "aircraft not named"),
+        _shorter(results.metadata.get("aircraft") or "aircraft not named"),
         pairs,
         state,
         reason,
         tuple(_line(row) for row in rows),
-        _remarks(magnetic, rows),
+        _remarks(answer, rows),
     )
 
 
-def _state(magnetic: Mapping[str, Any]) -> tuple[Mark, str]:
+def _state(answer: MagneticResult) -> tuple[Mark, str]:
     """The verdict; anything but accept is told largely."""
-    verdict = str(magnetic.get("verdict") or ABSENT)
-    reason = _shorter(typeset(str(magnetic.get("verdict_reason") or "")), MOST_OF_A_REASON)
-    if verdict == "accept":
+    reason = _shorter(typeset(answer.verdict_reason), MOST_OF_A_REASON)
+    if answer.verdict == "accept":
         return Mark("good", "Accepted"), reason
-    return Mark("bad", "NOT ACCEPTED"), reason if verdict == "reject" else f"{verdict}: {reason}"
+    return Mark("bad", "NOT ACCEPTED"), reason if answer.verdict == "reject" else f"{answer.verdict}: {reason}"
 
 
-def _thinned(rows: list[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Every k-th row, so that they fit on the page."""
-    return rows[:: max(1, -(-len(rows) // MOST_ROWS))]
-
-
-def _line(row: Mapping[str, Any]) -> CardLine:
+def _line(row: CardRow) -> CardLine:
     return CardLine(
-        _three_digits(row.get("magnetic_heading_deg")),
-        _three_digits(row.get("steer_deg")),
-        number(row.get("deviation_deg"), 1, signed=True),
-        number(row.get("sigma_deg"), 1),
-        bool(row.get("is_interpolated")),
+        _three_digits(row.magnetic_heading_deg),
+        _three_digits(row.steer_deg),
+        number(row.deviation_deg, 1, signed=True),
+        number(row.sigma_deg, 1),
+        row.is_interpolated,
     )
 
 
-def _three_digits(heading_deg: Any) -> str:
+def _three_digits(heading_deg: float) -> str:
     """A heading in whole degrees as it is spoken: 000 to 359."""
     return f"{round(heading_deg) % 360:03d}" if is_number(heading_deg) else ABSENT
 
 
-def _remarks(magnetic: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-    method = str(magnetic.get("recommended_method") or ABSENT)
-    residual = mapping(magnetic, "residual_rms_deg")
+def _remarks(answer: MagneticResult, rows: Sequence[CardRow]) -> tuple[str, ...]:
+    residual = answer.residual_rms_deg
     left = (
-        f"RMS error in level flight {number(residual.get('before'), 2, '°')} before, "
-        f"{number(residual.get('after'), 2, '°')} after."
+        f"RMS error in level flight {number(residual.before, 2, '°')} before, {number(residual.after, 2, '°')} after."
         if residual
         else "RMS error after: not measured."
     )
-    told = [f"By the {METHOD_TITLES.get(method, method)}. {left}"]  # type: ignore[call-overload]
+    told = [f"By the {METHOD_TITLES[answer.recommended_method]}. {left}"]
     told.append("Steer: the uncorrected reading. Add: its deviation ± σ, east positive.")
-    if any(row.get("is_interpolated") for row in rows):
+    if any(row.is_interpolated for row in rows):
         told.append("* no reading of both turns near it: interpolated.")
-    if len(rows) < len(objects(magnetic, "card")):
+    if len(rows) < len(answer.card):
         told.append(f"Every degree: {DEVIATION_CSV}.")
     return tuple(told)
 
 
-def _shorter(text: Any, most: int = MOST_LETTERS) -> str:
-    told = str(text or ABSENT)
+def _shorter(text: str, most: int = MOST_LETTERS) -> str:
+    told = text or ABSENT
     return told if len(told) <= most else told[: most - 1] + "…"

@@ -12,7 +12,8 @@ import numpy as np
 from groundstation.base.errors import UsageError
 from groundstation.base.serial import MismatchError
 from groundstation.results.figures import FigureData
-from groundstation.results.files import SavedFlight, csv_text, mapping
+from groundstation.results.files import csv_text, mapping
+from groundstation.results.flight import FlightResults
 from groundstation.results.magnetic import LETTERS, METHOD_TITLES, MagneticResult, MagneticVerdict, PoissonParameters
 from groundstation.results.restore import restored_answer
 
@@ -134,8 +135,8 @@ def deviation_from_csv(text: str, where: str) -> Deviation:
     return _checked(Deviation(told[FLIGHT], told[AIRCRAFT], told[METHOD], told[VERDICT], table_deg=tuple(table)), where)
 
 
-def deviation_csv(saved: SavedFlight) -> str | None:
-    """The deviation of a flight folder as a table of 360 rows; None when it has none, or lacks the arrays of it.
+def deviation_csv(results: FlightResults) -> str | None:
+    """The deviation of a flight as a table of 360 rows; None when it has none, or lacks the arrays of it.
 
     Columns: the uncorrected magnetic heading in the middle of its bin; what is to be added to it, with its sigma, by
     the recommended method and by the table of branches; whether both branches covered the bin; whose it is. Deviations
@@ -143,9 +144,9 @@ def deviation_csv(saved: SavedFlight) -> str | None:
 
     Source of the form: RFC 4180, Common Format and MIME Type for CSV Files, 2005.
     """
-    magnetic = mapping(saved.summary, "results", "magnetic")
-    curves, table = saved.figure("magnetic_curves"), saved.figure("magnetic_table")
-    if not magnetic or curves is None or table is None:
+    magnetic = results.answer(MagneticResult)
+    curves, table = results.figure_with_rows("magnetic_curves"), results.figure_with_rows("magnetic_table")
+    if magnetic is None or curves is None or table is None:
         return None
     wanted = (
         (READING, table, "magnetic_heading_deg"),
@@ -159,14 +160,13 @@ def deviation_csv(saved: SavedFlight) -> str | None:
         return None
     columns = {name: figure[column] for name, figure, column in wanted}
     columns[COVERAGE] = np.where(columns[COVERAGE], "interpolated", "covered")
-    flight = mapping(saved.summary, "flight")
     owner = {
-        METHOD: magnetic.get("recommended_method"),
-        VERDICT: magnetic.get("verdict"),
-        FLIGHT: flight.get("id"),
-        AIRCRAFT: flight.get("aircraft"),
+        METHOD: magnetic.recommended_method,
+        VERDICT: magnetic.verdict,
+        FLIGHT: results.flight_id,
+        AIRCRAFT: results.metadata.get("aircraft", ""),
     }
-    columns |= {name: np.full(len(table), str(value or "")) for name, value in owner.items()}
+    columns |= {name: np.full(len(table), value) for name, value in owner.items()}
     return csv_text(FigureData("deviation", columns, {}), "\r\n")
 
 

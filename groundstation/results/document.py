@@ -10,16 +10,17 @@ from groundstation.base.ledger import Ledger
 from groundstation.results.flight import NotAssessable, Source, Status
 
 SCHEMA_VERSION = 1
+UTC = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z$"
 
 
 @dataclass(frozen=True)
 class FlightDocument:
     """Which flight it is; ``start_utc`` is null without absolute time."""
 
-    id: str
+    id: str = field(metadata={"pattern": "^[A-Za-z0-9_-]+$"})
     aircraft: str
     flight: str
-    start_utc: str | None
+    start_utc: str | None = field(metadata={"pattern": UTC})
     duration_s: float
     source: Source
     metadata: Mapping[str, str]

@@ -7,17 +7,21 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import SEEK_END
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from groundstation.base.errors import UnreadableLogError
+from groundstation.base.serial import MismatchError, from_json, to_json_exactly
 from groundstation.results.answer import Answer
+from groundstation.results.document import SummaryDocument
 from groundstation.results.figures import FigureData, FigureSet
 from groundstation.results.flight import FlightResults
+from groundstation.results.manifest import Manifest
 from groundstation.results.restore import ANSWER_TYPES, restored
 from groundstation.results.summary import digits_of, summary_of
 
+Document = TypeVar("Document")
 SUMMARY, MANIFEST, ARRAYS, TABLES = "summary.json", "manifest.json", "results.parquet", "tables"
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 PARQUET_MAGIC = b"PAR1"  # at both ends of a whole file
@@ -29,12 +33,12 @@ class SavedFlight:
     """What a flight folder holds, as the report, ``compare`` and the fleet read it.
 
     ``results`` are the answers as the run had them; the arrays in ``figures`` are read when they are asked for.
-    ``summary`` and ``manifest`` are the JSON documents.
+    ``summary`` is the JSON document.
     """
 
     folder: Path
     summary: Mapping[str, Any]
-    manifest: Mapping[str, Any]
+    manifest: Manifest
     figures: Mapping[str, FigureData]
     answer_types: Mapping[str, type[Answer]] = field(default_factory=lambda: ANSWER_TYPES)
 
@@ -88,7 +92,7 @@ def json_text(document: Any) -> str:
     return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def save(folder: Path, results: FlightResults, manifest: Mapping[str, Any]) -> None:
+def save(folder: Path, results: FlightResults, manifest: Manifest) -> None:
     """Write a flight's answers and arrays into its folder; what an earlier run left of them is replaced.
 
     Parameters
@@ -96,7 +100,7 @@ def save(folder: Path, results: FlightResults, manifest: Mapping[str, Any]) -> N
     folder : Path
         Created when missing.
     results : FlightResults
-    manifest : mapping
+    manifest : Manifest
         Time of run, host, versions, settings: everything that may differ between two equal runs stands here alone.
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -109,7 +113,51 @@ def save(folder: Path, results: FlightResults, manifest: Mapping[str, Any]) -> N
         _write_parquet(folder / ARRAYS / f"{figure.name}.parquet", figure)
         write_text(folder / TABLES / f"{figure.name}.csv", csv_text(figure))
     write_text(folder / SUMMARY, json_text(summary_of(results)))
-    write_text(folder / MANIFEST, json_text(manifest))
+    save_manifest(folder, manifest)
+
+
+def save_manifest(folder: Path, manifest: Manifest) -> None:
+    """Write manifest.json of a flight folder."""
+    write_text(folder / MANIFEST, json_text(to_json_exactly(manifest)))
+
+
+def load_manifest(folder: Path) -> Manifest:
+    """Read manifest.json of a flight folder back.
+
+    Raises
+    ------
+    UnreadableLogError
+        When it is missing, or not as a run leaves it.
+    """
+    return _document(Manifest, folder / MANIFEST, _json_object(folder / MANIFEST))
+
+
+def load_document(folder: Path) -> SummaryDocument:
+    """Read summary.json of a flight folder back, its answers as JSON values.
+
+    Raises
+    ------
+    UnreadableLogError
+        When it is missing, or not as a run leaves it.
+    """
+    return _document(SummaryDocument, folder / SUMMARY, _json_object(folder / SUMMARY))
+
+
+def _json_object(path: Path) -> dict[str, Any]:
+    try:
+        return dict(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, TypeError, ValueError) as error:
+        raise UnreadableLogError(
+            str(path), type(error).__name__, "the JSON file a run leaves", "run the log again"
+        ) from error
+
+
+def _document(kind: type[Document], path: Path, document: Mapping[str, Any]) -> Document:
+    try:
+        return from_json(kind, document)
+    except MismatchError as error:
+        what = f"a file that cannot be used ({error})"
+        raise UnreadableLogError(str(path), what, "one that this version writes", "run the log again") from error
 
 
 class _Figures(Mapping[str, FigureData]):
@@ -149,19 +197,12 @@ def load(folder: Path, answer_types: Mapping[str, type[Answer]] = ANSWER_TYPES) 
         When the folder has no summary.json, or one that is not a JSON object; when a file of its figures is cut. A
         figure that is broken inside raises the same when it is asked for.
     """
-    documents: dict[str, dict[str, Any]] = {}
-    for name in (SUMMARY, MANIFEST):
-        try:
-            documents[name] = dict(json.loads((folder / name).read_text(encoding="utf-8")))
-        except (OSError, TypeError, ValueError) as error:
-            raise UnreadableLogError(
-                str(folder / name), type(error).__name__, "the JSON file a run leaves", "run the log again"
-            ) from error
+    summary, manifest = _json_object(folder / SUMMARY), load_manifest(folder)
     paths = sorted((folder / ARRAYS).glob("*.parquet"))
     for path in paths:
         _require_whole(path)
     figures = _Figures({path.stem: path for path in paths})
-    return SavedFlight(folder, documents[SUMMARY], documents[MANIFEST], figures, answer_types)
+    return SavedFlight(folder, summary, manifest, figures, answer_types)
 
 
 def _require_whole(path: Path) -> None:

@@ -30,7 +30,7 @@ class Source:
     """The log a flight came from: name without folders, SHA-256, size, reader that claimed it."""
 
     name: str
-    sha256: str
+    sha256: str = field(metadata={"pattern": "^[0-9a-f]{64}$"})
     size_bytes: int
     reader: str
 

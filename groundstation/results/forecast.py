@@ -30,7 +30,7 @@ class SkillRow:
     one; ``coverage95_model`` the same before the sigma is scaled to what the class and the flight's past show.
     """
 
-    method: str
+    method: str = field(metadata={"one_of": tuple(METHODS)})
     horizon_min: float
     starts: int
     rms_m: float
@@ -44,7 +44,7 @@ class SkillRow:
 class GapRow:
     """Replayed gaps with GNSS on both sides: root mean square over the gaps of the largest radial error in each."""
 
-    method: str
+    method: str = field(metadata={"one_of": ("forward", "rts")})
     length_min: float
     starts: int
     max_error_rms_m: float
@@ -70,7 +70,7 @@ class ClassicStart:
     """One of the paper's four starts (1.5, 2, 2.5, 3 h): radial and east error at the end and at equal horizons."""
 
     start_h: float
-    method: str
+    method: str = field(metadata={"one_of": tuple(METHODS)})
     horizon_min: float
     error_m: float
     east_error_m: float
@@ -85,7 +85,7 @@ class CalibrationRow:
     ``scale`` is what the model's sigma was multiplied by (mean over the starts).
     """
 
-    method: str
+    method: str = field(metadata={"one_of": tuple(METHODS)})
     horizon_min: float
     starts: int
     independent_starts: int
@@ -132,7 +132,7 @@ class ForecastResult(Answer):
 
     analysis: ClassVar[str] = "forecast"
 
-    default_method: str
+    default_method: str = field(metadata={"one_of": tuple(METHODS)})
     first_start_s: float
     start_step_s: float
     is_calibrated: bool
@@ -143,7 +143,7 @@ class ForecastResult(Answer):
     classic_starts: tuple[ClassicStart, ...] = ()
     calibration: tuple[CalibrationRow, ...] = ()
     coupled: tuple[CoupledRow, ...] = ()
-    best_method: dict[str, str] = field(default_factory=dict)
+    best_method: dict[str, str] = field(default_factory=dict, metadata={"one_of": tuple(METHODS)})
     figures: tuple[FigureData, ...] = ()
 
 

@@ -153,7 +153,7 @@ class HeadingResult(Answer):
     drift_deg_per_h: float | None
     drift_sigma_deg_per_h: float | None
     correction_deg: float | None
-    entry_step_deg: float
+    entry_step_deg: float = field(metadata={"above": 0})
     gates: tuple[Gate, ...]
     standstill: Standstill | None
     segments: tuple[TaxiSegment, ...]
@@ -165,7 +165,7 @@ class HeadingResult(Answer):
     time_offset_sigma_s: float | None = None
     latency_used_s: float | None = None
     latency_used_sigma_s: float | None = None
-    latency_origin: str = ""
+    latency_origin: str = field(default="", metadata={"one_of": ("", "aircraft file", "motion")})
     parking_ins_heading_deg: float | None = None
     parking_heading_deg: float | None = None
     parking_sigma_deg: float | None = None

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MISSING: dict[str, str] = {"gnss": "GNSS", "ins": "INS", "both": "both"}  # RealOutage.missing, for people
+CHANNELS = ("north", "east")
+STATES = ("position", "velocity", "tilt", "drift", "drift_rate", "random_drift")
 NOT_SEEN = 0.01  # observability below which the data said nothing of a state
 UNMOVED = 0.01  # share of its sigma at the start by which the sigma of such a state may differ
 SUMMARY_ROUNDING = 1e-6  # of a sigma in summary.json
@@ -26,7 +28,7 @@ class StateEstimate:
     nothing about it. ``observable_from_s`` is the flight time from which it stays above one half, None if never.
     """
 
-    name: str
+    name: str = field(metadata={"one_of": STATES})
     title: str
     unit: str
     value: float
@@ -44,7 +46,7 @@ class ChannelResult:
     ``share_inside95`` of the innovations inside their own 95 % band; ``rejected`` of ``innovations`` were gated.
     """
 
-    name: str
+    name: str = field(metadata={"one_of": CHANNELS})
     states: tuple[StateEstimate, ...]
     nis: float
     nis_low: float | None
@@ -70,7 +72,7 @@ class RealOutage:
     length_s: float
     jump_m: float | None
     sigma_m: float | None
-    missing: str = "gnss"
+    missing: str = field(default="gnss", metadata={"one_of": tuple(MISSING)})
 
 
 @dataclass(frozen=True)
@@ -126,9 +128,9 @@ class InertialResult(Answer):
     gnss_topic: str
     ins_class: str
     ins_class_origin: str
-    kind: str
+    kind: str = field(metadata={"one_of": ("unaided", "gnss_aided", "unknown")})
     kind_reason: str
-    transition: str
+    transition: str = field(metadata={"one_of": ("exact", "first_order")})
     epochs: int
     gnss_seconds: float
     north: ChannelResult

@@ -86,8 +86,8 @@ class Swing:
     right_bank_deg: float
     left_bank_deg: float
     covered_share: float
-    coefficients_deg: dict[str, float]
-    sigma_deg: dict[str, float]
+    coefficients_deg: dict[str, float] = field(metadata={"keys": LETTERS})
+    sigma_deg: dict[str, float] = field(metadata={"keys": LETTERS})
     difference_rms_deg: float | None = None
     difference_sigma_deg: float | None = None
 
@@ -170,8 +170,8 @@ class Method:
     held_out_after_deg: float | None = None
     held_out_mean_deg: float | None = None
     held_out_mean_sigma_deg: float | None = None
-    coefficients_deg: dict[str, float] = field(default_factory=dict)
-    coefficients_sigma_deg: dict[str, float] = field(default_factory=dict)
+    coefficients_deg: dict[str, float] = field(default_factory=dict, metadata={"keys": LETTERS})
+    coefficients_sigma_deg: dict[str, float] = field(default_factory=dict, metadata={"keys": LETTERS})
 
 
 @dataclass(frozen=True)
@@ -249,11 +249,11 @@ class MagneticResult(Answer):
     verdict_reason: str
     recommended_method: MethodName
     recommendation: str
-    coefficients_deg: dict[str, float]
-    coefficients_sigma_deg: dict[str, float]
+    coefficients_deg: dict[str, float] = field(metadata={"keys": LETTERS})
+    coefficients_sigma_deg: dict[str, float] = field(metadata={"keys": LETTERS})
     a_parts: tuple[SigmaPart, ...]
-    compass_error_deg: tuple[float, ...]
-    deviation_deg: tuple[float, ...]
+    compass_error_deg: tuple[float, ...] = field(metadata={"items": 360})
+    deviation_deg: tuple[float, ...] = field(metadata={"items": 360})
     coverage: Coverage
     residual_rms_deg: Residual | None
     alignment: Alignment

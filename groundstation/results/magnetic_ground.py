@@ -5,7 +5,7 @@ from typing import ClassVar, Literal
 
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
-from groundstation.results.magnetic import DeclinationUsed
+from groundstation.results.magnetic import LETTERS, DeclinationUsed
 
 RunState = Literal["used", "rejected"]
 CoefficientState = Literal["found", "not observable"]
@@ -59,7 +59,7 @@ class LeftOut:
 class GroundCoefficient:
     """One of A to E. ``value_deg`` is None where the runs do not show it; ``sigma_deg`` is what they leave of it."""
 
-    letter: str
+    letter: str = field(metadata={"one_of": LETTERS})
     value_deg: float | None
     sigma_deg: float
     state: CoefficientState

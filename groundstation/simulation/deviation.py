@@ -2,18 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, unwrap, wrap_180
 from groundstation.base.records import frozen
 from groundstation.simulation.magnetometer import sensed_nt, world_field_nt
-from groundstation.simulation.scenario import MagnetometerSettings
-from groundstation.simulation.trajectory import ANGLE_OF_ATTACK_DEG, rotation_n_from_b
-
-if TYPE_CHECKING:
-    from groundstation.simulation.flight import Simulated
+from groundstation.simulation.scenario import MagnetometerSettings, Scenario
+from groundstation.simulation.trajectory import ANGLE_OF_ATTACK_DEG, Trajectory, rotation_n_from_b
 
 HEADING_DEG = np.arange(0.0, 360.0, 0.25)
 BIN_MIDDLES_DEG = np.arange(360) + 0.5
@@ -112,13 +108,12 @@ def deviation_truth(
     )
 
 
-def scenario_deviation(simulated: "Simulated") -> DeviationTruth | None:
+def scenario_deviation(scenario: Scenario, motion: Trajectory) -> DeviationTruth | None:
     """Deviation in level flight (on the ground, if there is no other) under the base load; None without magnetometer.
 
     Constant errors of the INS's roll and pitch are in it: the heading shown is levelled with them on every flight.
     The field is that of the middle of the flight: over 50 km the declination changes by tenths of a degree.
     """
-    scenario, motion = simulated.scenario, simulated.trajectory
     if scenario.magnetometer is None:
         return None
     flown = np.flatnonzero(motion.airborne)

@@ -125,7 +125,7 @@ def scenario_truth(simulated: Simulated) -> dict[str, float]:
 
 
 def _magnetic_truth(simulated: Simulated) -> dict[str, float]:
-    deviation = scenario_deviation(simulated)
+    deviation = scenario_deviation(simulated.scenario, simulated.trajectory)
     if deviation is None:
         return {}
     letters = {f"deviation_{letter.lower()}_deg": value for letter, value in deviation.coefficients_deg.items()}

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
 from groundstation.base.units import NS_PER_S
+from groundstation.store.messages import ByteArray
 from groundstation.store.schema import GrowingType, WireField, columns_text
-from groundstation.store.wire import ByteArray, Slot, encode, slot_of, taken
+from groundstation.store.wire import Slot, encode, slot_of, taken
 
 CHUNK_BYTES = 1 << 20  # a chunk is closed when it has so many bytes: a flipped bit loses no more
 CHUNK_SPAN_NS = 300 * NS_PER_S  # or at each such boundary of time, which bounds the loss of slow topics

@@ -25,7 +25,7 @@ from groundstation.store.framing import (
     read_chunk_head,
     read_summary,
 )
-from groundstation.store.wire import HEAD, RECORD_PREFIX
+from groundstation.store.messages import HEAD, RECORD_PREFIX
 
 MAX_UTC_NS = 1 << 62  # year 2116: times past it are no times
 

@@ -31,7 +31,7 @@ from mcap.records import (
 )
 
 from groundstation.base.records import Int64Array
-from groundstation.store.wire import HEAD, MESSAGE_OPCODE, RECORD_PREFIX, ByteArray, Messages
+from groundstation.store.messages import HEAD, MESSAGE_OPCODE, RECORD_PREFIX, ByteArray, Messages
 
 MAGIC = b"\x89MCAP0\r\n"
 MAX_CHUNK_BYTES = 64 << 20  # of a decompressed chunk; the writer's have about one megabyte

@@ -10,7 +10,8 @@ from typing import Any
 from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
-from groundstation.base.serial import salvaged, to_json_exactly
+from groundstation.base.salvage import salvaged
+from groundstation.base.serial import to_json_exactly
 from groundstation.store.shape import sound_damages, sound_remarks
 
 METADATA_NAME = "groundstation"

@@ -18,6 +18,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.store.channel import COLUMNS_KEY, DERIVED_KEY
 from groundstation.store.framing import Summary, read_summary
 from groundstation.store.info import StoreInfo, definition_checksums, from_strings
+from groundstation.store.messages import Messages
 from groundstation.store.recognition import is_groundstation_mcap
 from groundstation.store.recovery import (
     Intact,
@@ -29,7 +30,7 @@ from groundstation.store.recovery import (
     search_definitions,
 )
 from groundstation.store.schema import WireField, message_type, own_columns
-from groundstation.store.wire import Decoded, Messages, decode
+from groundstation.store.wire import Decoded, decode
 
 READER = "groundstation-mcap"
 PLACES_BYTES = 64 << 20  # bound of the working arrays for one piece of a chunk

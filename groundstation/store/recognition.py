@@ -10,9 +10,9 @@ from mcap.records import Header, Schema
 
 from groundstation.store.framing import MAGIC, parse_record
 from groundstation.store.info import METADATA_NAME
+from groundstation.store.messages import RECORD_PREFIX
 from groundstation.store.recovery import SEARCH_BYTES, chunk_bytes, definitions_in, is_own_schema
 from groundstation.store.schema import PACKAGE
-from groundstation.store.wire import RECORD_PREFIX
 
 HEAD_BYTES = 4096  # of a sound file are enough to recognise it
 _LIBRARY = "groundstation "

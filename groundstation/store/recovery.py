@@ -34,8 +34,8 @@ from groundstation.store.framing import (
     split_messages,
 )
 from groundstation.store.info import COPY_NAME, METADATA_NAME, is_intact
+from groundstation.store.messages import RECORD_PREFIX, Messages
 from groundstation.store.schema import PACKAGE, message_type, own_columns
-from groundstation.store.wire import RECORD_PREFIX, Messages
 
 # A chunk record of the writer: this text stands 37 bytes from its start, zstd's magic number 8 bytes after it.
 SIGNATURE = struct.pack("<I4s", 4, b"zstd")

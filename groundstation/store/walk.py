@@ -13,8 +13,8 @@ import numpy as np
 
 from groundstation.base.compile import compiled
 from groundstation.base.records import BoolArray, Int64Array
+from groundstation.store.messages import HEAD, MESSAGE_OPCODE, RECORD_PREFIX, ByteArray, Messages
 from groundstation.store.schema import WireField
-from groundstation.store.wire import HEAD, MESSAGE_OPCODE, RECORD_PREFIX, ByteArray, Messages
 
 INTERPRETED_BYTES = 200_000  # in all, about 0.2 s of the interpreter
 HEAD_BYTES = HEAD.itemsize

@@ -27,10 +27,10 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from groundstation import __version__
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import RecordBatch
 from groundstation.base.signals import is_canonical, kind_of
+from groundstation.base.version import __version__
 from groundstation.store.channel import ChannelWriter, Chunk, LocationFixWriter, TopicWriter
 from groundstation.store.framing import MAGIC, chunk_head, message_index, to_bytes
 from groundstation.store.info import COPY_NAME, METADATA_NAME, StoreInfo

@@ -12,7 +12,8 @@ from groundstation.base.geodesy import north_east_m, on_earth
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.results.comparison import Comparison
 from groundstation.results.figures import FigureData
-from groundstation.results.files import SavedFlight, mapping
+from groundstation.results.files import SavedFlight
+from groundstation.results.forecast import ForecastResult
 from groundstation.viewer import colours
 from groundstation.viewer.chart import Axis, Chart, unbroken
 from groundstation.viewer.colours import Colour
@@ -248,7 +249,8 @@ def _forecast(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | Non
     """RMS of the forecast by horizon, the shipped method and the INS without one; both axes logarithmic."""
     curves: list[tuple[FloatArray, FloatArray, Line]] = []
     for half in halves:
-        default = str(mapping(half.saved.summary, "results", "forecast").get("default_method", ""))
+        forecast = half.saved.results.answer(ForecastResult)
+        default = forecast.default_method if forecast else ""
         for method, width in ((default, half.width), ("raw_ins", THIN)):
             figure = half.figure("forecast_growth", "horizon_min", f"{method}_rms_m")
             if figure is not None:

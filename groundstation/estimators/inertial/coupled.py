@@ -27,6 +27,9 @@ from groundstation.estimators.inertial.hindcast import Hindcast
 from groundstation.estimators.inertial.model import POSITION, VELOCITY, FloatArray, normal_gravity_mps2
 from groundstation.estimators.inertial.noise import InsNoise
 from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.estimators.kalman import filter as kalman
+from groundstation.estimators.kalman.arrays import NO_STEP, REJECTED, Lines
+from groundstation.estimators.kalman.rates import Rates
 from groundstation.results.forecast import HORIZONS_MIN, CoupledRow
 
 # The six states of each channel (model.STATES), then the azimuth error and its constant drift.
@@ -50,6 +53,10 @@ PATTERN = (
 )
 ROWS = np.array([row for row, _ in PATTERN], dtype=np.int64)
 COLUMNS = np.array([column for _, column in PATTERN], dtype=np.int64)
+RATES = Rates(SIZE, ROWS, COLUMNS)
+LONGEST_STEP_S = 10.0  # (Earth and Schuler rate x step)^5 / 120: below 1e-10 of the state
+AT_ONCE = 4096  # epochs whose transitions are held in memory, 3 MB
+KEPT = kalman.Kept(covariances=False, gains=False, variances=True, judged=True)
 
 
 @dataclass(frozen=True)
@@ -196,41 +203,52 @@ def run_coupled(differences: Differences, noise: InsNoise, settings: InertialSet
     Position and velocity error may be anything at the start (a log may begin in flight) and after a reset of the INS;
     a filter that has rejected GNSS for :data:`filter.PATIENCE_S` is opened in the same way, tilt and drift kept.
     """
-    from groundstation.estimators.inertial import coupled_kernels as kernels
-
     epochs = differences.epochs
     n = len(epochs)
     interval = np.diff(epochs.time_s, prepend=epochs.time_s[:1])
-    z = np.ascontiguousarray(np.stack([epochs.position_m, epochs.velocity_mps], axis=1))
     values = np.zeros((n, len(PATTERN)))
     values[1:] = coupled_values(CraftMotion.between(differences, epochs.time_s), noise.beta_per_s)
     covariance, densities = _noise_of(noise, differences)
-    weighted, believed = measurement_variances(epochs, noise)
+    opened = np.zeros(SIZE)
+    opened[CHANNELS[:, [POSITION, VELOCITY]]] = _opened_variances(noise, epochs)
     patience = [max(1, round(PATIENCE_S / interval_s)) for interval_s in gnss_intervals_s(epochs)]
-    opened = _opened_variances(noise, epochs)
-    x, variance = np.empty((n, SIZE)), np.empty((n, SIZE))
-    y, S, used = np.empty((n, 2, 2)), np.empty((n, 2, 2)), np.zeros((n, 2, 2), dtype=np.int8)
-    reopened = kernels.run_coupled_filter(
-        interval,
-        ROWS,
-        COLUMNS,
-        values,
-        densities,
-        z,
-        np.where(epochs.is_reset[:, None], opened, 0.0),
-        covariance,
-        weighted,
-        believed,
-        settings.gate_sigmas**2,
-        np.array(patience),
-        opened,
-        x,
-        variance,
-        y,
-        S,
-        used,
+    gate = kalman.Gate(settings.gate_sigmas, patience, opened)
+    lines, z = _lines(epochs, noise), np.stack([epochs.position_m, epochs.velocity_mps], axis=1).reshape(-1, 4)
+    parts, start = [], kalman.Start(np.zeros(SIZE), covariance)
+    for begin in range(0, n, AT_ONCE):
+        use = slice(begin, min(begin + AT_ONCE, n))
+        count = np.maximum(1, np.ceil(interval[use] / LONGEST_STEP_S - 1e-9)).astype(np.int64)
+        transition = RATES.transition(values[use], interval[use] / count, densities)
+        step, last = np.repeat(np.arange(len(count)), count), np.cumsum(count) - 1
+        if begin == 0:
+            step[0] = NO_STEP  # the start belongs to the first epoch
+        jump = np.full(len(step), NO_STEP, dtype=np.int64)
+        jump[last[epochs.is_reset[use]]] = 0
+        seen = kalman.Measurements(np.repeat(last, 4), z[use].ravel(), np.tile(np.arange(4), len(count)), lines)
+        run = kalman.run_filter(transition, step, seen, start, gate=gate, jump=jump, jumps=opened[None], kept=KEPT)
+        parts.append((run, last))
+        start = run.end
+    x, variance = (np.concatenate(part) for part in zip(*((_at_epochs(*part)) for part in parts), strict=True))
+    y, S, used = (
+        np.concatenate([np.asarray(getattr(run.record, name)) for run, _ in parts]).reshape(n, 2, 2)
+        for name in ("judged_innovation", "judged_variance", "mark")
     )
-    return CoupledRun(differences, noise, x, np.sqrt(np.maximum(variance, 0.0)), y, S, used, int(reopened))
+    reopened = sum(run.reopened for run, _ in parts)
+    return CoupledRun(differences, noise, x, np.sqrt(np.maximum(variance, 0.0)), y, S, used, reopened)
+
+
+def _at_epochs(run: kalman.FilterRun, last: Int64Array) -> tuple[FloatArray, FloatArray]:
+    """States and variances at the epochs: steps of a long interval that lie between are left out."""
+    return run.x[last, :, 0], run.record.variance[last]
+
+
+def _lines(epochs: Epochs, noise: InsNoise) -> Lines:
+    """Position north and east, velocity north and east; the two of a kind are judged together."""
+    weighted, believed = measurement_variances(epochs, noise)
+    states = CHANNELS[:, [POSITION, VELOCITY]].T.ravel()
+    return Lines(
+        np.arange(5), states, np.ones(4), np.repeat(weighted, 2), np.repeat(believed, 2), np.array([0, 0, 1, 1])
+    )
 
 
 def hindcast_coupled(run: CoupledRun, at: Int64Array, lead_s: FloatArray, settings: InertialSettings) -> FloatArray:
@@ -250,21 +268,21 @@ def hindcast_coupled(run: CoupledRun, at: Int64Array, lead_s: FloatArray, settin
     ndarray, shape (s, l, 2)
         Position error forecast to build up since the start, metres: as ``Hindcast.forecast_m``.
     """
-    from groundstation.estimators.inertial import coupled_kernels as kernels
-
     out = np.zeros((len(at), len(lead_s), 2))
     if not len(lead_s):
         return out
-    every = max(1, round(float(lead_s[0]) / min(settings.forecast_step_s, kernels.LONGEST_STEP_S)))
+    every = max(1, round(float(lead_s[0]) / min(settings.forecast_step_s, LONGEST_STEP_S)))
     step_s = float(lead_s[0]) / every
     elapsed = np.arange(every * len(lead_s) + 1) * step_s
     measured = run.epochs.position_m[at]
-    is_known = np.isfinite(measured) & (run.used[at, POSITION] != kernels.REJECTED)
+    is_known = np.isfinite(measured) & (run.used[at, POSITION] != REJECTED)
     known = np.where(is_known, measured, run.x[at][:, CHANNELS[:, POSITION]])
     for index, epoch in enumerate(at):
         motion = CraftMotion.between(run.differences, run.epochs.time_s[epoch] + elapsed)
         values = coupled_values(motion, run.noise.beta_per_s)
-        kernels.run_coupled_forecast(run.x[epoch], known[index], ROWS, COLUMNS, values, step_s, every, out[index])
+        start = run.x[epoch].copy()
+        start[CHANNELS[:, POSITION]] = known[index]
+        out[index] = RATES.carried(values, step_s, every, start)[:, CHANNELS[:, POSITION]] - known[index]
     return out
 
 

@@ -11,7 +11,9 @@ from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.estimators.inertial.model import POSITION, SIZE, VELOCITY, ChannelModel, FloatArray
 from groundstation.estimators.inertial.noise import InsNoise
 from groundstation.estimators.kalman import filter as kalman
+from groundstation.estimators.kalman import smoother
 from groundstation.estimators.kalman.arrays import NO_STEP, REJECTED, Drive, Lines
+from groundstation.estimators.kalman.transition import Transition, distinct_steps
 
 TIME_RESOLUTION_S = 1e-4  # intervals that agree to this share one transition
 MOST_TRANSITIONS = 4096  # distinct intervals kept exactly; jittered clocks are rounded more coarsely beyond
@@ -173,7 +175,7 @@ def initial_of(epochs: Epochs, noise: InsNoise) -> Initial:
 def steps_between(time_s: FloatArray, model: ChannelModel, noise: InsNoise) -> Steps:
     """Transition and noise of every interval; intervals equal to 0.1 ms share one."""
     interval = np.diff(time_s, prepend=time_s[:1])
-    seconds, index = kalman.distinct_steps(interval, TIME_RESOLUTION_S, MOST_TRANSITIONS)
+    seconds, index = distinct_steps(interval, TIME_RESOLUTION_S, MOST_TRANSITIONS)
     density = noise.densities()
     return Steps(
         index,
@@ -306,7 +308,7 @@ def _run_group(
     step = steps.index.copy()
     step[:1] = NO_STEP  # the start belongs to the first epoch
     return kalman.run_filter(
-        kalman.Transition.dense(steps.transitions, steps.noises),
+        Transition.dense(steps.transitions, steps.noises),
         step,
         kalman.Measurements(np.repeat(np.arange(n), 2), z.reshape(2 * n, channels), np.tile(both, n), lines),
         kalman.Start(first.of(group), first.covariance(group[0])),
@@ -330,7 +332,7 @@ def smooth(run: FilterRun, first: int = 0, last: int | None = None) -> Smoothed:
 
     Source: Rauch, Tung, Striebel, 1965, in the form of Bryson and Frazier (Bierman, 1973).
     """
-    parts = [kalman.smooth(part, first, last) for part in run.parts]
+    parts = [smoother.smooth(part, first, last) for part in run.parts]
     shapes = [(*part.variance.shape, len(group)) for part, group in zip(parts, run.groups, strict=True)]
     variances = [np.broadcast_to(part.variance[:, :, None], shape) for part, shape in zip(parts, shapes, strict=True)]
     return Smoothed(_joined([part.x for part in parts]), _joined(variances))

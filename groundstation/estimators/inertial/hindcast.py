@@ -10,8 +10,9 @@ from groundstation.estimators.inertial.filter import Epochs, FilterRun, gnss_int
 from groundstation.estimators.inertial.model import POSITION, SIZE, VELOCITY, FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.starts import start_states
-from groundstation.estimators.kalman import filter as kalman
 from groundstation.estimators.kalman.arrays import Drive
+from groundstation.estimators.kalman.filter import forecast
+from groundstation.estimators.kalman.transition import Transition
 
 NEAREST_S = 1.0
 
@@ -141,8 +142,8 @@ def _forecast(
     phi[POSITION, VELOCITY] = step_s  # the velocity is held and the model not used
     if method != "hold_velocity":
         phi = run.model.transition_over(step_s)
-    built = kalman.forecast(
-        kalman.Transition.blocks(phi[None], np.zeros((1, SIZE, SIZE)), 1),
+    built = forecast(
+        Transition.blocks(phi[None], np.zeros((1, SIZE, SIZE)), 1),
         np.zeros(every * leads, dtype=np.int64),
         np.ascontiguousarray(states.transpose(1, 2, 0)),
         known.T,

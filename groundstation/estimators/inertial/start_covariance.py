@@ -15,7 +15,7 @@ from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.model import POSITION, SIZE, FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.starts import windows_of
-from groundstation.estimators.kalman import filter as kalman
+from groundstation.estimators.kalman.smoother import lag_covariances
 
 WINDOW_METHODS = ("windows", "drift_windows", "consistent_windows")
 WITH_COVARIANCE = ("last_estimate", *WINDOW_METHODS, "smoothed_start")
@@ -58,7 +58,7 @@ def _smoothed(run: FilterRun, at: Int64Array, channel: int, lag_s: float) -> Flo
     """Q(L) - Phi P(s|t) Phi' + Phi P(s) Psi' + its transpose; P(t) itself for L = 0."""
     time_s, group = run.epochs.time_s, min(channel, len(run.P) - 1)
     first = np.maximum(np.searchsorted(time_s, time_s[at] - lag_s, side="left"), 0)
-    smoothed, closed = kalman.lag_covariances(run.parts[group], first, at)
+    smoothed, closed = lag_covariances(run.parts[group], first, at)
     density = run.noise.densities()
     out = np.empty_like(smoothed)
     for row, seconds in enumerate(time_s[at] - time_s[first]):

@@ -16,7 +16,7 @@ from groundstation.estimators.inertial.model import (
     FloatArray,
 )
 from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.estimators.kalman import filter as kalman
+from groundstation.estimators.kalman.smoother import smooth_lags
 
 LAG_STEP_S = 20.0  # of the sums over past estimates that are carried forward one by one
 
@@ -164,7 +164,7 @@ def _smoothed(run: FilterRun, at: Int64Array, lag_s: float) -> FloatArray:
     carried = {float(part): run.model.transition_over(float(part)) for part in np.unique(seconds)}
     forward = np.stack([carried[float(part)] for part in seconds]) if len(at) else np.zeros((0, SIZE, SIZE))
     for part, group in zip(run.parts, run.groups, strict=True):
-        states[:, :, group] = np.einsum("sij,sjc->sic", forward, kalman.smooth_lags(part, first, at))
+        states[:, :, group] = np.einsum("sij,sjc->sic", forward, smooth_lags(part, first, at))
     return states
 
 

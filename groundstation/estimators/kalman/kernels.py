@@ -25,12 +25,12 @@ R. S. Bucy, P. D. Joseph, Filtering for Stochastic Processes with Applications t
 G. J. Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, chapters II and V.
 """
 
-from groundstation.base.compile import compiled
+from groundstation.base.compile import inlined
 from groundstation.base.records import Int64Array
 from groundstation.estimators.kalman.arrays import FloatArray, Pattern, States
 
 
-@compiled
+@inlined
 def predict_covariance(
     states: States, pattern: Pattern, F: FloatArray, step: int, p: FloatArray, w: FloatArray
 ) -> None:
@@ -79,7 +79,7 @@ def predict_covariance(
                 p[j, i] = total
 
 
-@compiled
+@inlined
 def predict_states(states: States, pattern: Pattern, F: FloatArray, step: int, x: FloatArray, w: FloatArray) -> None:
     """x <- F x, every right-hand side."""
     n = len(states)
@@ -103,7 +103,7 @@ def predict_states(states: States, pattern: Pattern, F: FloatArray, step: int, x
                 x[c, rows[t]] = w[0, t]
 
 
-@compiled
+@inlined
 def add_noise(states: States, rows: Int64Array, columns: Int64Array, Q: FloatArray, step: int, p: FloatArray) -> None:
     """p <- p + Q; of a sparse Q every entry off the diagonal is added on both sides of it."""
     if Q.ndim == 3:
@@ -118,7 +118,7 @@ def add_noise(states: States, rows: Int64Array, columns: Int64Array, Q: FloatArr
                 p[j, i] = p[i, j]
 
 
-@compiled
+@inlined
 def predicted(columns: Int64Array, values: FloatArray, first: int, last: int, x: FloatArray, c: int) -> float:
     """Return h x of right-hand side c."""
     total = 0.0
@@ -127,7 +127,7 @@ def predicted(columns: Int64Array, values: FloatArray, first: int, last: int, x:
     return total
 
 
-@compiled
+@inlined
 def predicted_variance(columns: Int64Array, values: FloatArray, first: int, last: int, p: FloatArray) -> float:
     """Return h p h'."""
     total = 0.0
@@ -139,7 +139,7 @@ def predicted_variance(columns: Int64Array, values: FloatArray, first: int, last
     return total
 
 
-@compiled
+@inlined
 def update_covariance(
     states: States,
     columns: Int64Array,
@@ -204,7 +204,7 @@ def update_covariance(
     return s
 
 
-@compiled
+@inlined
 def correct_states(states: States, K: FloatArray, y: float, x: FloatArray, c: int) -> None:
     """x <- x + K y, right-hand side c."""
     for i in range(len(states)):

@@ -14,7 +14,7 @@ H. E. Rauch, F. Tung, C. T. Striebel, Maximum likelihood estimates of linear dyn
 
 import numpy as np
 
-from groundstation.base.compile import compiled
+from groundstation.base.compile import compiled, inlined
 from groundstation.base.records import Int64Array
 from groundstation.estimators.kalman.arrays import (
     USED,
@@ -28,7 +28,7 @@ from groundstation.estimators.kalman.arrays import (
 )
 
 
-@compiled
+@inlined
 def absorb_covariance(
     states: States,
     columns: Int64Array,
@@ -62,7 +62,7 @@ def absorb_covariance(
             A[columns[e], i] = A[i, columns[e]]
 
 
-@compiled
+@inlined
 def absorb_states(
     states: States,
     columns: Int64Array,
@@ -86,7 +86,7 @@ def absorb_states(
             a[c, columns[e]] -= values[e] * total
 
 
-@compiled
+@inlined
 def carry_covariance_back(
     states: States, pattern: Pattern, F: FloatArray, step: int, A: FloatArray, w: FloatArray
 ) -> None:
@@ -134,7 +134,7 @@ def carry_covariance_back(
                 A[i, j] = A[j, i]
 
 
-@compiled
+@inlined
 def carry_states_back(states: States, pattern: Pattern, F: FloatArray, step: int, a: FloatArray, w: FloatArray) -> None:
     """a <- F' a, every right-hand side. The first row of ``w`` is room."""
     n = len(states)

@@ -5,14 +5,32 @@ from dataclasses import replace
 
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.figures import latency
+from groundstation.reports.figures import heading, latency, magnetic, magnetic_ground, overview, quality, standstill
 from groundstation.results.flight import FlightResults
 
 Drawn = Drawing | Sequence[Drawing] | None
 
 # By the name that a chapter gives; a figure that is one of several alike gets which.
 DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, str], Drawn]] = {
+    "heading.difference": heading.difference,
+    "heading.density": heading.density,
+    "heading.convergence": heading.convergence,
+    "heading.taxi": heading.taxi,
+    "heading.forest": heading.forest,
+    "heading.spectrum": heading.spectrum,
+    "standstill.components": standstill.components,
+    "standstill.mean_speed": standstill.mean_speed,
     "latency.search": latency.search,
+    "magnetic.deviation": magnetic.deviation,
+    "magnetic.held_out": magnetic.held_out,
+    "magnetic.track": magnetic.track,
+    "magnetic.branches": magnetic.branches,
+    "magnetic.modulus": magnetic.modulus,
+    "magnetic.ground_runs": magnetic_ground.ground_runs,
+    "overview.track": overview.track_map,
+    "overview.profile": overview.profile,
+    "overview.states": overview.states,
+    "quality.gaps": quality.gaps,
 }
 
 

@@ -1,6 +1,5 @@
 """Figures of the taxi stage: difference over time, density, convergence, heading and track, estimates by segment."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -8,9 +7,9 @@ import numpy as np
 from groundstation.chapters.wording import clock, interval, is_number, number
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.sections.saved import heading_of, mapping, objects
 from groundstation.results.figures import FigureData, flags, numbers, texts
-from groundstation.results.files import SavedFlight
+from groundstation.results.flight import FlightResults
+from groundstation.results.heading import HeadingResult, TaxiSegment
 
 NORMAL_95 = 1.96  # half width of the 95 % interval of a normal distribution, in sigmas
 TAXI_SPEED_MARGIN = 1.6  # the take-off run leaves the figure, or the taxi would be a line at its foot
@@ -26,9 +25,9 @@ def taxi_window(samples: FigureData) -> tuple[float, float]:
     return d.padded(float(known.min()), float(known.max()), 0.05, 5.0)
 
 
-def difference(saved: SavedFlight) -> Drawing | None:
+def difference(results: FlightResults) -> Drawing | None:
     """Difference over time with the running mean, its honest interval and e."""
-    samples, running = saved.figure("heading_samples"), saved.figure("heading_running")
+    samples, running = results.figure_with_rows("heading_samples"), results.figure_with_rows("heading_running")
     if samples is None:
         return None
     time, value, used = numbers(samples, "time_s"), numbers(samples, "difference_deg"), flags(samples, "used")
@@ -92,9 +91,9 @@ def _sample_range(value: Any, used: Any) -> tuple[float, float]:
     return d.padded(low, high, 0.12, 0.05)
 
 
-def convergence(saved: SavedFlight) -> Drawing | None:
+def convergence(results: FlightResults) -> Drawing | None:
     """Precision e, quality and honest half width as the samples come in, with their limits."""
-    running = saved.figure("heading_running")
+    running = results.figure_with_rows("heading_running")
     if running is None:
         return None
     cycles = numbers(running, "cycles")
@@ -103,7 +102,8 @@ def convergence(saved: SavedFlight) -> Drawing | None:
         ("quality_deg", "quality", d.GNSS, "quality"),
         ("honest_half_width_deg", "honest 95 % half width", d.INK, ""),
     )
-    limits = {str(gate.get("name")): gate.get("limit") for gate in objects(heading_of(saved), "gates")}
+    answer = results.answer(HeadingResult)
+    limits = {} if answer is None else {gate.name: gate.limit for gate in answer.gates}
     keep = d.thin(len(running), 2000)
 
     def paint(figure: Any) -> None:
@@ -139,12 +139,12 @@ def _plain_log_labels(axis: Any, marks: tuple[float, ...] = (1.0, 2.0, 5.0)) -> 
     axis.set_minor_formatter(NullFormatter())
 
 
-def density(saved: SavedFlight) -> Drawing | None:
+def density(results: FlightResults) -> Drawing | None:
     """Density of the heading error with the fitted normal (figure 3 of the paper)."""
-    bars, normal = saved.figure("heading_distribution"), saved.figure("heading_normal")
+    bars, normal = results.figure_with_rows("heading_distribution"), results.figure_with_rows("heading_normal")
     if bars is None:
         return None
-    heading = heading_of(saved)
+    answer = results.answer(HeadingResult)
     low, high, height = (numbers(bars, name) for name in ("bin_low_deg", "bin_high_deg", "density_per_deg"))
 
     def paint(figure: Any) -> None:
@@ -164,7 +164,7 @@ def density(saved: SavedFlight) -> Drawing | None:
                 1.2,
                 label="fitted normal",
             )
-        error = heading.get("error_deg")
+        error = None if answer is None else answer.error_deg
         if is_number(error):
             estimate = f"estimate {number(error, 3, '°', signed=True)}"
             axes.axvline(error, color=d.USED, linewidth=1.0, label=estimate)
@@ -173,22 +173,24 @@ def density(saved: SavedFlight) -> Drawing | None:
         axes.set_ylabel("probability density, 1/°")
         d.legend_above(axes)
 
+    count = number(None if answer is None else answer.samples, 0)
+    deviation = number(None if answer is None else answer.estimate_sd_deg, 3, "°")
     caption = (
-        f"Distribution of the n = {number(heading.get('samples'), 0)} used differences, standard deviation "
-        f"{number(heading.get('estimate_sd_deg'), 3, '°')}, and the normal curve fitted to them. Near-normal is a "
-        "condition for taking the mean as the error."
+        f"Distribution of the n = {count} used differences, standard deviation {deviation}, and the normal curve "
+        "fitted to them. Near-normal is a condition for taking the mean as the error."
     )
     alt = "Histogram of the heading error with a fitted normal curve."
     names = ("heading_distribution",) if normal is None else ("heading_distribution", "heading_normal")
     return Drawing("Density of the heading error", caption, alt, d.draw("density", 70, paint), names)
 
 
-def taxi(saved: SavedFlight) -> Drawing | None:
+def taxi(results: FlightResults) -> Drawing | None:
     """Heading, track and speed during the taxi above the lanes that say which gate each epoch met."""
-    samples = saved.figure("heading_samples")
+    samples = results.figure_with_rows("heading_samples")
     if samples is None:
         return None
-    lanes = saved.figure("heading_lanes")
+    lanes, answer = results.figure_with_rows("heading_lanes"), results.answer(HeadingResult)
+    speed_limit_mps = None if answer is None else answer.settings.get("taxi_speed_min_mps")
     low, high = taxi_window(samples)
     states = _lane_states(lanes, low, high)
     lane_mm = 4.6 * len(states)
@@ -198,7 +200,7 @@ def taxi(saved: SavedFlight) -> Drawing | None:
         upper = d.place(figure, 27, base + 30, 174, base + 72)
         lower = d.place(figure, 27, base, 174, base + 26)
         _paint_angles(upper, samples, low, high)
-        _paint_speed(lower, samples, mapping(heading_of(saved), "settings").get("taxi_speed_min_mps"))
+        _paint_speed(lower, samples, speed_limit_mps)
         d.time_axis(upper, low, high, title=False)
         d.time_axis(lower, low, high, title=not states)
         d.legend_above(upper)
@@ -248,28 +250,27 @@ def _lane_states(lanes: FigureData | None, low: float, high: float) -> list[str]
     return seen[:12]
 
 
-def forest(saved: SavedFlight) -> Drawing | None:
+def forest(results: FlightResults) -> Drawing | None:
     """Estimates by segment and by direction with their intervals, beside the one of the whole run."""
-    heading = heading_of(saved)
-    segments, directions = objects(heading, "segments"), objects(heading, "directions")
-    if not segments:
+    answer = results.answer(HeadingResult)
+    if answer is None or not answer.segments:
         return None
-    shown = segments[:24]
+    segments, shown = answer.segments, answer.segments[:24]
     rows = [(_segment_name(index, item), item, d.USED) for index, item in enumerate(shown, 1)]
-    rows += [(_direction_name(item), item, d.INS) for item in directions[:8]]
+    rows += [(_direction_name(item), item, d.INS) for item in answer.directions[:8]]
     height = 20.0 + 5.2 * (len(rows) + 1)
 
     def paint(figure: Any) -> None:
         axes = d.place(figure, 72, 12, 174, height - 6)
         for place, (_, item, colour) in enumerate(rows):
-            error, sigma = item.get("error_deg"), item.get("sigma_deg")
+            error = item.error_deg
             if is_number(error):
-                width = NORMAL_95 * sigma if is_number(sigma) else 0.0
+                width = NORMAL_95 * item.sigma_deg if is_number(item.sigma_deg) else 0.0
                 axes.plot(
                     [error - width, error + width], [place, place], color=colour, linewidth=1.4, solid_capstyle="butt"
                 )
                 axes.plot([error], [place], "o", color=colour, markersize=4.0)
-        _overall(axes, heading, len(rows))
+        _overall(axes, answer, len(rows))
         axes.set_yticks(range(len(rows) + 1), [*(d.label(name, 60) for name, _, _ in rows), "whole run"])
         axes.set_ylim(len(rows) + 0.6, -0.6)
         axes.grid(axis="y", visible=False)
@@ -277,7 +278,7 @@ def forest(saved: SavedFlight) -> Drawing | None:
         axes.set_xlabel("heading error, °")
 
     more = f" The first {len(shown)} of {len(segments)} segments." if len(shown) < len(segments) else ""
-    whole = interval(heading.get("confidence95_deg"), 3, "°")
+    whole = interval(answer.confidence95_deg, 3, "°")
     caption = (
         "Dot: estimate; bar: ± 1.96 σ. Green: straight segments; blue: directions of travel; black: the whole run with "
         f"its 95 % interval {whole}. Opposite directions that disagree point to side-slip or mounting.{more} "
@@ -287,20 +288,20 @@ def forest(saved: SavedFlight) -> Drawing | None:
     return Drawing("Estimates by segment and direction", caption, alt, d.draw("forest", height, paint))
 
 
-def _overall(axes: Any, heading: Mapping[str, Any], place: int) -> None:
-    error, bounds = heading.get("error_deg"), heading.get("confidence95_deg")
+def _overall(axes: Any, answer: HeadingResult, place: int) -> None:
+    error, bounds = answer.error_deg, answer.confidence95_deg
     if not is_number(error):
         return
     axes.axvline(error, color=d.INK, linewidth=0.6)
-    if isinstance(bounds, list) and all(map(is_number, bounds)):
+    if all(map(is_number, bounds)):
         axes.axvspan(bounds[0], bounds[1], color=d.INK, alpha=0.08, linewidth=0)
         axes.plot(bounds, [place, place], color=d.INK, linewidth=1.8, solid_capstyle="butt")
     axes.plot([error], [place], "D", color=d.INK, markersize=4.5)
 
 
-def spectrum(saved: SavedFlight) -> Drawing | None:
+def spectrum(results: FlightResults) -> Drawing | None:
     """Spectral density of the residuals beside the noise model that the honest interval rests on."""
-    data = saved.figure("heading_spectrum")
+    data = results.figure_with_rows("heading_spectrum")
     if data is None:
         return None
     frequency = numbers(data, "frequency_hz")
@@ -328,11 +329,11 @@ def spectrum(saved: SavedFlight) -> Drawing | None:
     return Drawing("Spectrum of the residuals", caption, alt, drawn, ("heading_spectrum",))
 
 
-def _segment_name(index: int, item: Mapping[str, Any]) -> str:
-    span = f"{clock(item.get('start_s'))}–{clock(item.get('end_s'))}"
-    track, count = number(item.get("mean_track_deg"), 0, "°"), number(item.get("samples"), 0)
+def _segment_name(index: int, item: TaxiSegment) -> str:
+    span = f"{clock(item.start_s)}–{clock(item.end_s)}"
+    track, count = number(item.mean_track_deg, 0, "°"), number(item.samples, 0)
     return f"{index}  ·  {span}  ·  track {track}  ·  n {count}"
 
 
-def _direction_name(item: Mapping[str, Any]) -> str:
-    return f"direction {number(item.get('mean_track_deg'), 0, '°')}  ·  n {number(item.get('samples'), 0)}"
+def _direction_name(item: TaxiSegment) -> str:
+    return f"direction {number(item.mean_track_deg, 0, '°')}  ·  n {number(item.samples, 0)}"

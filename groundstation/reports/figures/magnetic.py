@@ -5,16 +5,14 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.geodesy import north_east_m
-from groundstation.chapters.wording import is_number, number
+from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.sections.saved import mapping, objects
 from groundstation.results.figures import flags, numbers, texts
-from groundstation.results.files import SavedFlight
-from groundstation.results.magnetic import METHOD_TITLES
+from groundstation.results.flight import FlightResults
+from groundstation.results.magnetic import METHOD_TITLES, MagneticResult
 
-METHODS = {str(name): title for name, title in METHOD_TITLES.items()}
-METHOD_COLOURS = dict(zip(METHODS, (d.INS, d.USED, "#cc79a7"), strict=True))
+METHOD_COLOURS = dict(zip(METHOD_TITLES, (d.INS, d.USED, "#cc79a7"), strict=True))
 RIGHT, LEFT = d.GNSS, d.INS
 BAND = 1.96  # half width of a 95 % band in sigmas
 MARGIN_S = 20.0  # flight shown before and after the figure
@@ -26,9 +24,9 @@ def _heading_axis(axes: Any) -> None:
     axes.set_xlabel("magnetic heading as read, °")
 
 
-def deviation(saved: SavedFlight) -> Drawing | None:
+def deviation(results: FlightResults) -> Drawing | None:
     """Deviation against heading by each method, with bands."""
-    curves, table = saved.figure("magnetic_curves"), saved.figure("magnetic_table")
+    curves, table = results.figure_with_rows("magnetic_curves"), results.figure_with_rows("magnetic_table")
     if curves is None:
         return None
     heading = numbers(curves, "magnetic_heading_deg")
@@ -38,7 +36,7 @@ def deviation(saved: SavedFlight) -> Drawing | None:
         if table is not None:
             bins, values = numbers(table, "magnetic_heading_deg"), numbers(table, "deviation_deg")
             d.dots(axes, bins, values, d.UNUSED, 3.0, label="table, bins of 1°")
-        for name, title in METHODS.items():
+        for name, title in METHOD_TITLES.items():
             value, half = numbers(curves, f"deviation_{name}_deg"), BAND * numbers(curves, f"sigma_{name}_deg")
             if not np.isfinite(value).any():
                 continue
@@ -58,15 +56,15 @@ def deviation(saved: SavedFlight) -> Drawing | None:
     return Drawing("Deviation by heading", caption, alt, d.draw("magnetic-deviation", 82, paint), ("magnetic_curves",))
 
 
-def held_out(saved: SavedFlight) -> Drawing | None:
+def held_out(results: FlightResults) -> Drawing | None:
     """Error of the magnetic heading where no fit has seen, before and after the recommended correction."""
-    data = saved.figure("magnetic_samples")
-    method = str(mapping(saved.summary, "results", "magnetic").get("recommended_method"))
-    if data is None or not (mine := texts(data, "part") == "held out").any():
+    answer, data = results.answer(MagneticResult), results.figure_with_rows("magnetic_samples")
+    if answer is None or data is None or not (mine := texts(data, "part") == "held out").any():
         return None
+    method = answer.recommended_method
     time, heading = numbers(data, "time_s")[mine], numbers(data, "magnetic_heading_deg")[mine]
     before, after = numbers(data, "error_before_deg")[mine], numbers(data, f"error_{method}_deg")[mine]
-    shown = ((before, d.UNUSED, "before"), (after, METHOD_COLOURS.get(method, d.USED), "after"))
+    shown = ((before, d.UNUSED, "before"), (after, METHOD_COLOURS[method], "after"))
 
     def paint(figure: Any) -> None:
         left, right = d.place(figure, 16, 12, 92, 62), d.place(figure, 106, 12, 174, 62)
@@ -83,7 +81,7 @@ def held_out(saved: SavedFlight) -> Drawing | None:
 
     caption = (
         f"Level flight that no fit has seen, n = {number(len(time), 0)} drawn, against flight time and heading; "
-        f"after: by the {METHODS.get(method, method)}. Judged by the same INS and declination: an error of theirs "
+        f"after: by the {METHOD_TITLES[method]}. Judged by the same INS and declination: an error of theirs "
         "common to the whole flight does not show."
     )
     alt = "Residual heading error before and after correction on the held-out part."
@@ -91,15 +89,15 @@ def held_out(saved: SavedFlight) -> Drawing | None:
     return Drawing("Error where no fit has seen", caption, alt, sketch, ("magnetic_samples",))
 
 
-def track(saved: SavedFlight) -> Drawing | None:
+def track(results: FlightResults) -> Drawing | None:
     """The figures as flown, coloured by branch."""
-    data = saved.figure("overview")
-    turns = [turn for turn in _turns(saved) if turn["state"] == "used"]
+    answer, data = results.answer(MagneticResult), results.figure_with_rows("overview")
+    turns = [turn for turn in answer.turns if turn.state == "used"] if answer else []
     if data is None or not turns:
         return None
     time = numbers(data, "time_s")
-    near = (time >= min(turn["start_s"] for turn in turns) - MARGIN_S) & (
-        time <= max(turn["end_s"] for turn in turns) + MARGIN_S
+    near = (time >= min(turn.start_s for turn in turns) - MARGIN_S) & (
+        time <= max(turn.end_s for turn in turns) + MARGIN_S
     )
     latitude, longitude = numbers(data, "latitude_deg")[near], numbers(data, "longitude_deg")[near]
     known = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
@@ -114,8 +112,8 @@ def track(saved: SavedFlight) -> Drawing | None:
         d.line(axes, east / 1e3, north / 1e3, d.UNUSED, 0.9)
         named: set[str] = set()
         for turn in turns:
-            mine = (time >= turn["start_s"]) & (time <= turn["end_s"])
-            colour, name = (RIGHT, "right turn") if turn["bank_deg"] > 0.0 else (LEFT, "left turn")
+            mine = (time >= turn.start_s) & (time <= turn.end_s)
+            colour, name = (RIGHT, "right turn") if turn.bank_deg > 0.0 else (LEFT, "left turn")
             shown = None if name in named else name
             x, y = (np.where(mine, values, np.nan) / 1e3 for values in (east, north))
             d.line(axes, x, y, colour, 2.0, label=shown)
@@ -129,16 +127,9 @@ def track(saved: SavedFlight) -> Drawing | None:
     return Drawing("Figures as flown", caption, alt, d.draw("magnetic-track", 90, paint), ("overview",))
 
 
-def _turns(saved: SavedFlight) -> list[dict[str, Any]]:
-    """Turns whose times and bank are known."""
-    listed = objects(mapping(saved.summary, "results", "magnetic"), "turns")
-    wanted = ("start_s", "end_s", "bank_deg")
-    return [{"state": None, **turn} for turn in listed if all(is_number(turn.get(name)) for name in wanted)]
-
-
-def branches(saved: SavedFlight) -> Drawing | None:
+def branches(results: FlightResults) -> Drawing | None:
     """Compass error on either branch and their average, declination in it."""
-    samples, table = saved.figure("magnetic_samples"), saved.figure("magnetic_table")
+    samples, table = results.figure_with_rows("magnetic_samples"), results.figure_with_rows("magnetic_table")
     if samples is None or table is None:
         return None
     part, heading = texts(samples, "part"), numbers(samples, "magnetic_heading_deg")
@@ -165,26 +156,25 @@ def branches(saved: SavedFlight) -> Drawing | None:
     return Drawing("Both branches", caption, alt, d.draw("magnetic-branches", 78, paint), names)
 
 
-def modulus(saved: SavedFlight) -> Drawing | None:
+def modulus(results: FlightResults) -> Drawing | None:
     """Modulus of the field on the figures before and after it is freed of the iron."""
-    data = saved.figure("magnetic_modulus")
-    if data is None:
+    answer, data = results.answer(MagneticResult), results.figure_with_rows("magnetic_modulus")
+    if answer is None or data is None:
         return None
     time = numbers(data, "time_s")
-    model = mapping(saved.summary, "results", "magnetic", "declination")
-    horizontal, down = model.get("horizontal_nt"), model.get("down_nt")
+    horizontal, down = answer.declination.horizontal_nt, answer.declination.down_nt
 
     def paint(figure: Any) -> None:
         axes = d.place(figure, 16, 12, 174, 62)
         for column, colour, name in (
             ("before_nt", d.UNUSED, "as read"),
-            *((f"{name}_nt", METHOD_COLOURS[name], METHODS[name]) for name in METHODS if f"{name}_nt" in data.columns),
+            *((f"{name}_nt", METHOD_COLOURS[name], METHOD_TITLES[name]) for name in METHOD_TITLES),
         ):
             values = numbers(data, column)
             if np.isfinite(values).any():
                 broken_time, broken = d.broken_at_gaps(time, values / 1e3)
                 d.line(axes, broken_time, broken, colour, 1.0, label=name)
-        if is_number(horizontal) and is_number(down):
+        if horizontal is not None and down is not None:
             d.limit_line(axes, float(np.hypot(horizontal, down)) / 1e3, "field of the model")
         axes.set_ylabel("modulus of the field, µT")
         d.time_axis(axes, *d.padded(float(time.min()), float(time.max())))

@@ -7,22 +7,27 @@ import numpy as np
 from groundstation.chapters.wording import is_number, number
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.sections.saved import heading_of, mapping
 from groundstation.results.figures import flags, numbers
-from groundstation.results.files import SavedFlight
+from groundstation.results.flight import FlightResults
+from groundstation.results.heading import HeadingResult, Standstill
 
 RAW_LIMIT_MPS = 0.2
 MEAN_LIMIT_MPS = 0.01
 
 
-def components(saved: SavedFlight) -> Drawing | None:
+def _assessed(results: FlightResults) -> Standstill | None:
+    answer = results.answer(HeadingResult)
+    return None if answer is None else answer.standstill
+
+
+def components(results: FlightResults) -> Drawing | None:
     """Velocity components at standstill over time and against each other (figure 2a of the paper)."""
-    data = saved.figure("standstill_velocity")
+    data = results.figure_with_rows("standstill_velocity")
     if data is None:
         return None
     time, inside = numbers(data, "time_s"), flags(data, "in_interval")
     north, east = numbers(data, "velocity_north_mps"), numbers(data, "velocity_east_mps")
-    still = mapping(heading_of(saved), "standstill")
+    still = _assessed(results)
     count = int(np.count_nonzero(inside & np.isfinite(north) & np.isfinite(east)))
     known = np.abs(d.finite(north[inside], east[inside]) if inside.any() else d.finite(north, east))
     reach = 1.1 * max(float(known.max()) if known.size else 0.0, RAW_LIMIT_MPS)
@@ -55,7 +60,7 @@ def components(saved: SavedFlight) -> Drawing | None:
     )
 
 
-def _plane(axes: Any, north: Any, east: Any, reach: float, still: Any) -> None:
+def _plane(axes: Any, north: Any, east: Any, reach: float, still: Standstill | None) -> None:
     from matplotlib.patches import Circle
 
     axes.set_aspect("equal")
@@ -63,23 +68,23 @@ def _plane(axes: Any, north: Any, east: Any, reach: float, still: Any) -> None:
         Circle((0.0, 0.0), RAW_LIMIT_MPS, fill=False, edgecolor=d.LIMIT, linewidth=0.9, linestyle=(0, (4, 2)))
     )
     d.dots(axes, east, north, d.USED, 1.6, 2000, alpha=0.6)
-    mean = still.get("mean_east_mps"), still.get("mean_north_mps")
-    if all(map(is_number, mean)):
-        axes.plot([mean[0]], [mean[1]], "+", color=d.INK, markersize=9, markeredgewidth=1.2)
+    if still is not None and is_number(still.mean_east_mps) and is_number(still.mean_north_mps):
+        axes.plot([still.mean_east_mps], [still.mean_north_mps], "+", color=d.INK, markersize=9, markeredgewidth=1.2)
     axes.set_xlim(-reach, reach)
     axes.set_ylim(-reach, reach)
     axes.set_xlabel("east, m/s")
     axes.set_ylabel("north, m/s")
 
 
-def mean_speed(saved: SavedFlight) -> Drawing | None:
+def mean_speed(results: FlightResults) -> Drawing | None:
     """Density of the mean speed over 10 s and 30 s with the limit (figure 2b of the paper)."""
-    data = saved.figure("standstill_mean_speed")
+    data = results.figure_with_rows("standstill_mean_speed")
     if data is None:
         return None
     window, speed, height = (numbers(data, name) for name in ("window_s", "speed_of_mean_mps", "density_per_mps"))
     windows = sorted(set(d.finite(window).tolist()))
-    measured = mapping(heading_of(saved), "standstill").get("speed_of_mean_mps")
+    still = _assessed(results)
+    measured = None if still is None else still.speed_of_mean_mps
 
     def paint(figure: Any) -> None:
         axes = d.place(figure, 16, 12, 174, 60)

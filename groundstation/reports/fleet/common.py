@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.chapters.verdict import VERDICTS
 from groundstation.chapters.wording import ABSENT, clean, is_number, named_quantity, number
 from groundstation.reports import drawing as d
-from groundstation.reports.sections.front import VERDICTS
 from groundstation.results.fleet import FleetResults
 
 NOT_NAMED = "not named"
@@ -65,7 +65,7 @@ def aircraft_name(name: str, most: int = 40) -> str:
 
 def verdict_words(verdict: str) -> str:
     """A verdict as a word for counts."""
-    return VERDICTS[verdict][1].lower() if verdict in VERDICTS else "not assessable"
+    return VERDICTS[verdict].text.lower() if verdict in VERDICTS else "not assessable"
 
 
 def day(time: np.datetime64) -> str:

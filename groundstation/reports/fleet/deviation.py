@@ -4,19 +4,19 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.chapters.magnetic import TONES
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Part, Section
 from groundstation.chapters.wording import ABSENT, number
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.figures.magnetic import METHODS
 from groundstation.reports.fleet.common import aircraft_name, bounded, colours_of
-from groundstation.reports.sections.magnetic import TONES
 from groundstation.results.fleet import DeviationRow, FleetResults
-from groundstation.results.magnetic import ADVISORY, LETTERS
+from groundstation.results.magnetic import ADVISORY, LETTERS, METHOD_TITLES
 
 TITLE = "Magnetic deviation by aircraft"
 LEAD = "What each flight found with its figure-eight: does the deviation of an aircraft stay the same?"
 MOST_CURVES = 60
+METHODS = {str(name): title for name, title in METHOD_TITLES.items()}
 CHANGED = 3.0  # times what the sigmas lead to expect
 
 

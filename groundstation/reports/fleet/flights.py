@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Section, Tone
+from groundstation.chapters.verdict import VERDICTS
 from groundstation.chapters.wording import ABSENT, clean, number, typeset
 from groundstation.reports.fleet.common import aircraft_name, bounded, plural, title_of
-from groundstation.reports.sections.front import VERDICTS
 from groundstation.results.fleet import FleetResults
 
 KEY = "flights"
@@ -64,8 +64,8 @@ def _minute(time: np.datetime64) -> str:
 
 def verdict_mark(verdict: str) -> Mark:
     """A verdict as it stands in a cell."""
-    tone, word = VERDICTS.get(verdict, ("unknown", clean(verdict) or "not assessable"))
-    return Mark(tone, word.lower())
+    mark = VERDICTS.get(verdict) or Mark("unknown", clean(verdict) or "not assessable")
+    return Mark(mark.tone, mark.text.lower())
 
 
 def remarks_of(fleet: FleetResults) -> dict[str, list[Mark]]:

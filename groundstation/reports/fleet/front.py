@@ -5,11 +5,11 @@ from collections import Counter
 import numpy as np
 
 from groundstation.chapters.parts import Cell, Front, Mark
+from groundstation.chapters.verdict import VERDICTS
 from groundstation.chapters.wording import ABSENT, number
 from groundstation.reports.fleet import skill
 from groundstation.reports.fleet.aircraft import median_rate
 from groundstation.reports.fleet.common import aircraft_name, bounded, day, figure_of, plural, title_of, verdict_words
-from groundstation.reports.sections.front import VERDICTS
 from groundstation.reports.sections.inertial import percent
 from groundstation.results.fleet import FleetResults
 
@@ -62,7 +62,7 @@ def _span(fleet: FleetResults) -> str:
 
 def _verdicts(fleet: FleetResults) -> str:
     counts = Counter(verdict_words(verdict) for verdict in fleet.flights["verdict"].tolist())
-    order = [*(word.lower() for _, word in VERDICTS.values()), "not assessable"]
+    order = [*(mark.text.lower() for mark in VERDICTS.values()), "not assessable"]
     return " · ".join(f"{number(counts[word], 0)} {word}" for word in order if counts[word]) or ABSENT
 
 

@@ -3,7 +3,9 @@
 import numpy as np
 import rerun.blueprint as rrb
 
-from groundstation.results.explain import explained
+from groundstation.chapters.assessed import reason_of
+from groundstation.chapters.heading import heading as heading_chapter
+from groundstation.chapters.markdown import markdown
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult
@@ -12,7 +14,6 @@ from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after, wraps_after
 from groundstation.viewer.tabs import distribution
 from groundstation.viewer.tabs.overview import log_lane
-from groundstation.viewer.tabs.verdict import verdict_text
 from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
 
 SPEED_LIMIT_MPS = 6.0  # the paper's; the result's own settings stand above it
@@ -23,11 +24,9 @@ MARGIN, SMALLEST_MARGIN_DEG = 0.15, 0.05
 
 def heading(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the heading tab; None when the flight was not assessed and no reason is known."""
-    reasons = [explained("heading", entry.reason) for entry in results.not_assessable if entry.analysis == "heading"]
-    answer = results.answer(HeadingResult)
-    if answer is None and not reasons:
+    if results.answer(HeadingResult) is None and not reason_of(results, "heading"):
         return None
-    recorder.document("heading/verdict", verdict_text(answer, reasons))
+    recorder.document("heading/verdict", markdown(heading_chapter(results)))
     verdict = document("Verdict and the number to type", "heading/verdict")
     plots = [*_difference(recorder, results), *_taxi(recorder, results), *_lanes(recorder, results)]
     pictures = [

@@ -3,6 +3,8 @@
 import numpy as np
 import rerun.blueprint as rrb
 
+from groundstation.chapters.magnetic import magnetic as chapter
+from groundstation.chapters.markdown import markdown
 from groundstation.results.flight import FlightResults
 from groundstation.results.magnetic import METHOD_TITLES, MagneticResult
 from groundstation.results.magnetic_ground import GroundDeviation
@@ -11,7 +13,6 @@ from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after
 from groundstation.viewer.tabs.magnetic_field import eight, sphere
-from groundstation.viewer.tabs.magnetic_text import magnetic_text
 from groundstation.viewer.views import document, figure_of, numbers, plot
 
 BAND = 1.96  # half width of a 95 % band in sigmas
@@ -23,11 +24,10 @@ RUN, FITTED = Line("ground runs", colours.INS, BOLD), Line("A to E", colours.ANS
 
 def magnetic(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the tab of the magnetic deviation; None when the flight was not assessed and no reason is known."""
-    reasons = [entry.reason for entry in results.not_assessable if entry.analysis == "magnetic"]
-    in_flight, on_ground = results.answer(MagneticResult), results.answer(GroundDeviation)
-    if in_flight is None and on_ground is None and not reasons:
+    section = chapter(results)
+    if section is None:
         return None
-    recorder.document("magnetic/answer", magnetic_text(in_flight, reasons, on_ground))
+    recorder.document("magnetic/answer", markdown(section))
     text = document("Verdict and card", "magnetic/answer")
     left = [*_deviation(recorder, results), *_branches(recorder, results), *_ground_runs(recorder, results)]
     middle = [*_errors(recorder, results), *_modulus(recorder, results), *_applied(recorder, results)]

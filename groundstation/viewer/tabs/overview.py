@@ -1,23 +1,19 @@
 """Overview: where the aircraft went, how high, how fast, where it pointed, and in what state it was."""
 
-from collections import Counter
-
 import numpy as np
 import rerun.blueprint as rrb
 
-from groundstation.base.timescales import duration_text, utc_ns_to_iso
-from groundstation.results.explain import explained
+from groundstation.chapters.findings import not_assessable
+from groundstation.chapters.front import front
+from groundstation.chapters.markdown import front_markdown, part_markdown
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
-from groundstation.results.heading import HeadingResult
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour
-from groundstation.viewer.markdown import markdown_text, table
 from groundstation.viewer.names import path_parts
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import gap_after, wraps_after
 from groundstation.viewer.tabs.track import track
-from groundstation.viewer.tabs.verdict import to_type
 from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
 
 LANE_SHARE = 0.35  # height of a lane, of that of a plot
@@ -106,24 +102,7 @@ def _direction(recorder: Recorder, figure: FigureData, column: str, path: str, l
 
 
 def _summary(results: FlightResults) -> str:
-    start = "unknown" if results.start_utc_ns is None else utc_ns_to_iso(results.start_utc_ns, 0)
-    severities = Counter(finding.severity for finding in results.findings)
-    found = ", ".join(f"{severities[name]} {name}" for name in ("fail", "warn", "info") if severities[name]) or "none"
-    rows = [
-        ["aircraft, flight", markdown_text(" ".join(results.metadata.get(key, "") for key in ("aircraft", "flight")))],
-        ["start, UTC", markdown_text(start)],
-        ["duration", markdown_text(duration_text(results.duration_s))],
-        ["source", markdown_text(f"{results.source.name}, read by {results.source.reader}")],
-        ["status", results.status],
-        ["findings", found],
-    ]
-    heading = results.answer(HeadingResult)
-    if heading is not None:
-        rows.append(["heading", f"**{heading.verdict}**: {to_type(heading)}"])
-    facts = table(["flight", markdown_text(results.flight_id)], [row for row in rows if row[1]])
-    # Cells do not wrap: reasons stand below.
-    reasons = [
-        f"**{markdown_text(entry.analysis)}: not assessable.** {markdown_text(explained(entry.analysis, entry.reason))}"
-        for entry in results.not_assessable
-    ]
-    return "\n\n".join([facts, *reasons])
+    """The front of the report, and what could not be assessed."""
+    missing = not_assessable(results)
+    parts = [front_markdown(front(results)), *([] if missing is None else [part_markdown(missing)])]
+    return "\n\n".join(parts)

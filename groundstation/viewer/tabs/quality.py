@@ -1,43 +1,22 @@
 """Data quality: what each topic delivered, where data is missing, and how good GNSS said it was."""
 
-from dataclasses import replace
-
 import numpy as np
 import rerun.blueprint as rrb
 
-from groundstation.base.serial import to_json_exactly
 from groundstation.base.signals import topics_of_kind
 from groundstation.chapters.latency import latency
 from groundstation.chapters.markdown import markdown
+from groundstation.chapters.quality import quality as quality_chapter
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.results.latency import Latencies
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer import colours
-from groundstation.viewer.markdown import markdown_text, table
-from groundstation.viewer.names import label, path_parts, topic_label, words
+from groundstation.viewer.names import label, path_parts, topic_label
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after
 from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
 
-LEDGER_HEADINGS = {
-    "topic": "topic",
-    "rows": "rows",
-    "first_s": "first, s",
-    "last_s": "last, s",
-    "nominal_rate_hz": "nominal, Hz",
-    "actual_rate_hz": "actual, Hz",
-    "coverage": "coverage",
-    "gaps": "gaps",
-    "longest_gap_s": "longest gap, s",
-    "duplicates": "duplicates",
-    "backward_steps": "backward steps",
-    "stray_rows": "stray rows",
-    "dropped_rows": "dropped rows",
-    "lost_by_counter": "lost by counter",
-    "out_of_range": "values out of range",
-    "stuck": "stuck stretches",
-}
 PLOTS = {
     "GNSS dilution of precision": ("gdop", "pdop", "hdop"),
     "GNSS satellites used": ("satellites_used",),
@@ -111,42 +90,6 @@ def _plot(recorder: Recorder, table_of_topic: Table, names: tuple[str, ...]) -> 
 
 
 def _ledger_text(results: FlightResults) -> str:
-    parts = [f"# {markdown_text(results.flight_id)}: {results.status}"]
-    source = results.source
-    parts.append(
-        f"{markdown_text(source.name)}, read by {markdown_text(source.reader)}, {source.size_bytes} bytes, "
-        f"SHA-256 {markdown_text(source.sha256[:16])}"
-    )
-    ledger = figure_of(results, "ledger", "topic")
-    if ledger is not None:
-        shown = [name for name in LEDGER_HEADINGS if name in ledger.columns]
-        rows = [[_cell(name, ledger[name][row]) for name in shown] for row in range(len(ledger))]
-        parts.append(table([LEDGER_HEADINGS[name] for name in shown], rows))
-    else:
-        rows = [
-            [markdown_text(topic), f"{100.0 * share:.2f} %"] for topic, share in sorted(results.completeness.items())
-        ]
-        parts.append(table(["topic", "share of expected samples"], rows) if rows else "No ledger.")
-    if results.clock.first_device_time:
-        plain = to_json_exactly(replace(results.clock, relations=()))
-        del plain["relations"]
-        for relation in results.clock.relations:
-            told = [f"{one.offset}, {one.drift}" for one in relation.segments] or [relation.reason]
-            plain[f"{relation.clock}: {relation.source}"] = "; ".join(told)
-        clock = [[markdown_text(words(str(name))), markdown_text(str(value))] for name, value in plain.items()]
-        parts += ["## Clock", table(["clock", "value"], clock)]
-    section = latency(results) if results.answer(Latencies) else None
-    if section is not None:
-        parts.append(markdown(section, level=2))
+    motion = latency(results) if results.answer(Latencies) else None
+    parts = [markdown(quality_chapter(results)), *([] if motion is None else [markdown(motion, level=2)])]
     return "\n\n".join(parts)
-
-
-def _cell(name: str, value: object) -> str:
-    if name == "topic":
-        return markdown_text(str(value))
-    number = float(value)  # type: ignore[arg-type]
-    if not np.isfinite(number):
-        return "–"
-    if name == "coverage":
-        return f"{100.0 * number:.2f} %"
-    return f"{number:.3f}" if name.endswith(("_s", "_hz")) else f"{number:.0f}"

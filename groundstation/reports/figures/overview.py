@@ -1,18 +1,17 @@
-"""Chapter: the flight at a glance: track map, altitude, speed, phases and the state of GNSS."""
+"""Figures of the flight at a glance: track map, altitude, speed, phases and the state of GNSS."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from groundstation.base.geodesy import north_east_m
-from groundstation.chapters.parts import Section
-from groundstation.chapters.wording import is_number, number, words
+from groundstation.chapters.wording import number, words
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.sections.saved import heading_of, objects
 from groundstation.results.figures import FigureData, numbers, texts
-from groundstation.results.files import SavedFlight
+from groundstation.results.flight import FlightResults
+from groundstation.results.heading import HeadingResult, TaxiSegment
 
 SMALLEST_TAXI_M = 10.0  # less is no taxi worth enlarging: a receiver at rest, or a start by hand
 SMALLEST_MAP_M = 2.0  # side of the map of an aircraft that did not move
@@ -21,16 +20,9 @@ STATE_COLOURS = {"armed": "#b3261e", "on the ground": "#3a86c8"}
 GNSS_COLOURS = {"good": d.USED, "integrity lost": "#b3261e", "no GNSS": "#b3261e"}
 
 
-def build(saved: SavedFlight) -> Section | None:
-    """Build the chapter, None when the flight has no overview."""
-    parts = tuple(drawing for drawing in (track_map(saved), profile(saved), states(saved)) if drawing is not None)
-    lead = "Where the aircraft was and what it did, from the logged navigation data."
-    return Section("overview", "Overview of the flight", lead, parts) if parts else None
-
-
-def track_map(saved: SavedFlight) -> Drawing | None:
+def track_map(results: FlightResults) -> Drawing | None:
     """The track in local coordinates, with the taxi enlarged and the used stretches marked."""
-    data = saved.figure("overview")
+    data = results.figure_with_rows("overview")
     if data is None:
         return None
     latitude, longitude = numbers(data, "latitude_deg"), numbers(data, "longitude_deg")
@@ -39,8 +31,10 @@ def track_map(saved: SavedFlight) -> Drawing | None:
         return None
     origin = float(latitude[known[0]]), float(longitude[known[0]])
     north, east = north_east_m(latitude, longitude, *origin)
-    used = _used_rows(numbers(data, "time_s"), objects(heading_of(saved), "segments"))
-    taxi = _taxi_rows(numbers(data, "time_s"), objects(heading_of(saved), "segments"), saved.figure("phases"))
+    answer = results.answer(HeadingResult)
+    segments = () if answer is None else answer.segments
+    used = _used_rows(numbers(data, "time_s"), segments)
+    taxi = _taxi_rows(numbers(data, "time_s"), segments, results.figure_with_rows("phases"))
     on_ground = _extent(north[taxi], east[taxi])
     zoom = on_ground > SMALLEST_TAXI_M and _extent(north, east) > 2.0 * on_ground
 
@@ -59,21 +53,19 @@ def track_map(saved: SavedFlight) -> Drawing | None:
     return Drawing("Track", caption, alt, d.draw("map", 92, paint), ("overview",))
 
 
-def _used_rows(time: Any, segments: list[Mapping[str, Any]]) -> Any:
+def _used_rows(time: Any, segments: Sequence[TaxiSegment]) -> Any:
     used = np.zeros(len(time), dtype=bool)
     for segment in segments:
-        start, end = segment.get("start_s"), segment.get("end_s")
-        if is_number(start) and is_number(end):
-            used |= (time >= start) & (time <= end)
+        used |= (time >= segment.start_s) & (time <= segment.end_s)
     return used
 
 
-def _taxi_rows(time: Any, segments: list[Mapping[str, Any]], phases: FigureData | None) -> Any:
+def _taxi_rows(time: Any, segments: Sequence[TaxiSegment], phases: FigureData | None) -> Any:
     if phases is not None:
         airborne = np.flatnonzero(np.isin(texts(phases, "phase"), ("take-off run", "airborne")))
         if airborne.size:
             return time < float(numbers(phases, "start_s")[airborne[0]])
-    ends = [segment["end_s"] for segment in segments if is_number(segment.get("end_s"))]
+    ends = [segment.end_s for segment in segments]
     return time <= max(ends) if ends else np.zeros(len(time), dtype=bool)
 
 
@@ -102,12 +94,12 @@ def _map(axes: Any, north: Any, east: Any, used: Any, title: str) -> None:
     axes.set_title(title)
 
 
-def profile(saved: SavedFlight) -> Drawing | None:
+def profile(results: FlightResults) -> Drawing | None:
     """Altitude and ground speed over time, shaded by phase, above the state of GNSS."""
-    data = saved.figure("overview")
+    data = results.figure_with_rows("overview")
     if data is None:
         return None
-    phases, gnss = saved.figure("phases"), saved.figure("gnss_lanes")
+    phases, gnss = results.figure_with_rows("phases"), results.figure_with_rows("gnss_lanes")
     time = numbers(data, "time_s")
     altitude = "altitude_m" if np.isfinite(numbers(data, "altitude_m")).any() else "pressure_altitude_m"
     altitude = altitude if altitude in data.columns else "altitude_m"
@@ -142,7 +134,7 @@ def profile(saved: SavedFlight) -> Drawing | None:
             d.lanes(strip, numbers(gnss, "start_s"), numbers(gnss, "end_s"), texts(gnss, "state"), states, GNSS_COLOURS)
             d.time_axis(strip, low, high)
 
-    names = tuple(name for name in ("overview", "phases", "gnss_lanes") if saved.figure(name) is not None)
+    names = tuple(name for name in ("overview", "phases", "gnss_lanes") if results.figure_with_rows(name) is not None)
     caption = (
         "Altitude and ground speed; the background is the phase of flight. Lanes: usability of GNSS."
         if states
@@ -152,9 +144,9 @@ def profile(saved: SavedFlight) -> Drawing | None:
     return Drawing("Altitude, speed and phases", caption, alt, d.draw("profile", 12 + lane_mm + 74, paint), names)
 
 
-def states(saved: SavedFlight) -> Drawing | None:
+def states(results: FlightResults) -> Drawing | None:
     """Flight modes, arming and ground contact as the log tells them, a row for each state; None when it tells none."""
-    data = saved.figure("state_lanes")
+    data = results.figure_with_rows("state_lanes")
     if data is None:
         return None
     lane, state = texts(data, "lane"), texts(data, "state")
@@ -163,7 +155,7 @@ def states(saved: SavedFlight) -> Drawing | None:
     shown = ~np.isin(state, ("disarmed", "in the air", ""))  # what is not drawn is the opposite
     modes = list(dict.fromkeys(named[shown & (lane == "mode")].tolist()))
     rows = [*dict.fromkeys(named[shown & (lane != "mode")].tolist()), *modes[:MOST_MODES]]
-    times = d.finite(numbers(saved.figure("overview") or data, "time_s"), start, end)
+    times = d.finite(numbers(results.figure_with_rows("overview") or data, "time_s"), start, end)
     if not rows or not times.size:
         return None
     height = 14.0 + 4.6 * len(rows)

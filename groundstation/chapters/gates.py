@@ -1,0 +1,85 @@
+"""The gates of an answer and the settings it was found with, as every chapter tells them."""
+
+from collections.abc import Mapping, Sequence
+
+from groundstation.chapters.parts import Cell, Facts, Grid, Head, Mark
+from groundstation.chapters.wording import (
+    any_value,
+    named_quantity,
+    number_with_unit,
+    significant,
+    typeset,
+    unit_sign,
+)
+from groundstation.results.heading import Gate
+
+SENSE_SIGNS = {"at_most": "≤ ", "at_least": "≥ "}
+STATES = {
+    "passed": Mark("good", "passed"),
+    "failed": Mark("bad", "failed"),
+    "not_measured": Mark("unknown", "not measured"),
+}
+HEADS = (
+    *(Head("State"), Head("Gate"), Head("Figure", True), Head("Limit", True)),
+    *(Head("Role"), Head("Reason")),
+)
+CAPTION = "Accept asks for every gate that decides; one that could not be measured is neither passed nor failed."
+
+
+def gate_grid(gates: Sequence[Gate]) -> Grid | None:
+    """The gates of an answer, each with figure, limit and reason; None where there are none."""
+    return Grid("Gates", HEADS, [_row(gate) for gate in gates], CAPTION) if gates else None
+
+
+def _row(gate: Gate) -> tuple[Cell, ...]:
+    value = number_with_unit(significant(gate.value, 3), unit_sign(gate.unit))
+    title = gate.title or gate.name
+    title = title[:1].upper() + title[1:]
+    return (
+        state_of(gate),
+        title,
+        value,
+        limit_text(gate),
+        "decides" if gate.required else "informs",
+        typeset(gate.reason),
+    )
+
+
+def state_of(gate: Gate) -> Mark:
+    """The state of a gate; one that only informs does not stand against an accepted answer.
+
+    Examples
+    --------
+    >>> failed = Gate("kurtosis", "Excess kurtosis", 2.4, (-1.2, 2.0), "", "failed", required=False)
+    >>> state_of(failed)
+    Mark(tone='warn', text='failed')
+    """
+    state = STATES[gate.state]
+    return Mark("warn", state.text) if state.tone == "bad" and not gate.required else state
+
+
+def limit_text(gate: Gate) -> str:
+    """A gate's limit with its sense.
+
+    Examples
+    --------
+    >>> limit_text(Gate("e", "Precision e", None, 0.05, "deg", "not_measured"))
+    '≤ 0.05°'
+    >>> limit_text(Gate("taxi", "Straight taxi", 148.3, 20.0, "s", "passed", sense="at_least"))
+    '≥ 20\u202fs'
+    >>> limit_text(Gate("kurtosis", "Excess kurtosis", 0.1, (-1.2, 2.0), "", "passed", sense="between"))
+    '−1.2 … 2'
+    """
+    unit = unit_sign(gate.unit)
+    if isinstance(gate.limit, tuple):
+        return number_with_unit(f"{significant(gate.limit[0], 4)} … {significant(gate.limit[1], 4)}", unit)
+    return SENSE_SIGNS.get(gate.sense, "") + number_with_unit(significant(gate.limit, 4), unit)
+
+
+def setting_facts(settings: Mapping[str, float | str | bool]) -> Facts | None:
+    """The settings an answer was found with; None where there are none."""
+    pairs = []
+    for name, value in sorted(settings.items()):
+        title, unit = named_quantity(name)
+        pairs.append((title, any_value(value, unit), ""))
+    return Facts("Settings of the method", pairs, compact=True) if pairs else None

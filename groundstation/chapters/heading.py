@@ -1,0 +1,225 @@
+"""Chapter: heading correction (system 1): gates, estimates and the figures of the published method."""
+
+from collections.abc import Sequence
+
+from groundstation.chapters.assessed import reason_of
+from groundstation.chapters.front import UNKNOWN_REASON
+from groundstation.chapters.gates import gate_grid, setting_facts
+from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Part, Section
+from groundstation.chapters.verdict import NOT_ASSESSABLE, figures, reasons, verdict_line
+from groundstation.chapters.wording import ABSENT, clock, interval, is_number, number, step_places
+from groundstation.results.chosen import ChosenInterval
+from groundstation.results.flight import FlightResults
+from groundstation.results.heading import HeadingResult, OnboardComparison, Standstill, TaxiSegment
+
+TITLE = "Heading correction"
+LEAD = (
+    "On straight taxi the nose points where the aircraft moves: the mean of INS heading minus GNSS track is the "
+    "heading error. Error = INS heading − true heading; the correction is its negative."
+)
+FIGURES = ("difference", "density", "convergence", "taxi", "forest", "spectrum")
+STANDSTILL_FIGURES = (Figure("standstill.components"), Figure("standstill.mean_speed"))
+USES = {"exclude": "Left out by hand", "force": "Used by hand against the gates"}
+ESTIMATE_HEADS = (Head("Estimate"), Head("Value", True), Head("95 %", True), Head("Meaning"))
+SEGMENT_HEADS = (
+    *(Head("Straight taxi"), Head("Samples", True), Head("Track", True), Head("Speed", True)),
+    *(Head("Error", True), Head("σ", True)),
+)
+ONBOARD_HEADS = (Head("Figure"), Head("Ground", True), Head("On board", True), Head("On board − ground", True))
+RUNWAY_HEADS = (
+    Head("Runway"),
+    *(Head(title, True) for title in ("True bearing", "INS heading", "Error", "σ", "Minus taxi")),
+)
+
+
+def heading(results: FlightResults, chosen: Sequence[ChosenInterval] = ()) -> Section:
+    """The chapter; without a result it says why there is none.
+
+    Parameters
+    ----------
+    results : FlightResults
+    chosen : sequence of ChosenInterval
+        What the user left out or forced.
+    """
+    answer = results.answer(HeadingResult)
+    if answer is None:
+        note = Note(f"Not assessable: {reason_of(results, 'heading') or UNKNOWN_REASON}", "unknown")
+        headline = f"{NOT_ASSESSABLE.symbol} Heading not assessable"
+        return Section("heading", TITLE, LEAD, (note, *_figures(()), *STANDSTILL_FIGURES), headline)
+    parts = (
+        *(gate_grid(answer.gates), _estimates(answer)),
+        *_figures(answer.segments),
+        *(_onboard(answer), _runway(answer), _geometry(answer), _standstill(answer.standstill)),
+        *STANDSTILL_FIGURES,
+        *(_by_hand(chosen), setting_facts(answer.settings)),
+    )
+    shown = tuple(part for part in parts if part is not None)
+    above: tuple[Part, ...] = (*(Note(reason) for reason in reasons(answer)), Facts("", figures(answer)))
+    return Section("heading", TITLE, LEAD, shown, verdict_line(answer), above)
+
+
+def _figures(segments: Sequence[TaxiSegment]) -> tuple[Figure, ...]:
+    table = _segments(segments)
+    return tuple(Figure(f"heading.{name}", instead=table if name == "forest" else None) for name in FIGURES)
+
+
+def _segments(segments: Sequence[TaxiSegment]) -> Grid | None:
+    rows = [
+        (
+            f"{clock(one.start_s)} – {clock(one.end_s)}",
+            number(one.samples, 0),
+            number(one.mean_track_deg, 1, "°"),
+            number(one.mean_speed_mps, 1, "m/s"),
+            number(one.error_deg, 3, "°", signed=True),
+            number(one.sigma_deg, 3, "°"),
+        )
+        for one in segments
+    ]
+    return Grid("Estimates by segment", SEGMENT_HEADS, rows) if rows else None
+
+
+def _estimates(answer: HeadingResult) -> Grid:
+    rows = (
+        (
+            "Heading error, robust and weighted by speed",
+            number(answer.error_deg, 4, "°", signed=True),
+            interval(answer.confidence95_deg, 3, "°"),
+            "the estimate corrected by; its interval allows for errors correlated over seconds",
+        ),
+        (
+            "Heading error, running mean of the paper",
+            number(answer.paper_error_deg, 4, "°", signed=True),
+            f"± {number(answer.precision_deg, 4, '°')} (e)",
+            "e is right for white errors only: it is not the accuracy",
+        ),
+        (
+            "Heading error, antenna velocity as logged",
+            number(answer.uncorrected_error_deg, 4, "°", signed=True),
+            ABSENT,
+            "what a computer on board would find without correcting for the lever arm",
+        ),
+        (
+            "Standard deviation of the differences",
+            number(answer.estimate_sd_deg, 3, "°"),
+            ABSENT,
+            "sway, GNSS noise and what the airframe adds",
+        ),
+        (
+            "Quality: scatter of the running mean",
+            number(answer.quality_deg, 3, "°"),
+            ABSENT,
+            "convergence, and gross drift in azimuth",
+        ),
+    )
+    pair = f"INS topic {answer.ins_topic} ({answer.heading_source}) against GNSS topic {answer.gnss_topic}."
+    return Grid("Estimates", ESTIMATE_HEADS, rows, pair)
+
+
+def _onboard(answer: HeadingResult) -> Grid | None:
+    onboard = answer.onboard
+    if onboard is None:
+        return None
+    rows = [
+        (
+            "Heading error",
+            number(answer.error_deg, 3, "°", signed=True),
+            number(onboard.heading_error_deg, 3, "°", signed=True),
+            number(onboard.difference_error_deg, 3, "°", signed=True),
+        ),
+        *((*figure, "") for figure in _onboard_figures(answer, onboard)),
+    ]
+    status = onboard.status
+    caption = f"Status reported by the aircraft: {status}." if status else "The aircraft reported no status."
+    return Grid("Ground result beside the aircraft's own", ONBOARD_HEADS, rows, caption)
+
+
+def _onboard_figures(answer: HeadingResult, onboard: OnboardComparison) -> tuple[tuple[str, str, str], ...]:
+    step = step_places(answer.entry_step_deg)
+    correction, entered = answer.correction_deg, onboard.correction_entered_deg
+    return (
+        ("Precision e", number(answer.precision_deg, 4, "°"), number(onboard.precision_deg, 4, "°")),
+        ("Quality", number(answer.quality_deg, 4, "°"), number(onboard.quality_deg, 4, "°")),
+        ("Cycles (distinct epochs on the ground)", number(answer.samples, 0), number(onboard.cycles, 0)),
+        ("Correction", number(correction, step, "°", signed=True), number(entered, step, "°", signed=True)),
+    )
+
+
+def _runway(answer: HeadingResult) -> Grid | None:
+    rows = [
+        (
+            check.name,
+            number(check.true_bearing_deg, 2, "°"),
+            number(check.ins_heading_deg, 2, "°"),
+            number(check.error_deg, 3, "°", signed=True),
+            number(check.sigma_deg, 3, "°"),
+            number(check.difference_deg, 3, "°", signed=True),
+        )
+        for check in answer.runway
+    ]
+    caption = "A second reference: the nose on the centre line."
+    return Grid("Runway check", RUNWAY_HEADS, rows, caption) if rows else None
+
+
+def _standstill(still: Standstill | None) -> Facts | None:
+    if still is None:
+        return None
+    mean = f"{_velocity(still.mean_north_mps)} / {_velocity(still.mean_east_mps)}"
+    sigma = f"{number(still.sigma_north_mps, 4, 'm/s')} / {number(still.sigma_east_mps, 4, 'm/s')}"
+    length, bound = number(still.speed_of_mean_mps, 4, "m/s"), number(still.speed_bound97_mps, 4, "m/s")
+    share = number(still.share_above_limit * 100.0, 1, "%")
+    span, samples = f"{clock(still.start_s)} – {clock(still.end_s)}", f"{number(still.samples, 0)} samples"
+    pairs = (
+        ("Interval", span, samples),
+        ("Proof of standstill", still.ground_proof or ABSENT, ""),
+        ("Mean velocity, north / east", mean, ""),
+        ("Standard deviation, north / east", sigma, ""),
+        ("Length of the mean vector", length, f"gated; 0.97 bound {bound}"),
+        ("Mean of the speeds", number(still.mean_of_speed_mps, 4, "m/s"), "the paper's other reading; not gated"),
+        ("Raw samples above 0.2 m/s", share, ""),
+        ("Make-up of the velocity error", _make_up(still), ""),
+    )
+    return Facts("GNSS at standstill", pairs)
+
+
+def _velocity(value_mps: float) -> str:
+    return number(value_mps, 4, "m/s", signed=True)
+
+
+def _make_up(still: Standstill) -> str:
+    if not is_number(still.white_sigma_mps):
+        return ABSENT
+    white, correlated = number(still.white_sigma_mps, 3, "m/s"), number(still.correlated_sigma_mps, 3, "m/s")
+    return f"white {white}, correlated {correlated} over {number(still.correlation_time_s, 1, 's')}"
+
+
+def _geometry(answer: HeadingResult) -> Facts:
+    arm = _with_sigma(answer.lever_arm_m, answer.lever_arm_sigma_m, 2, "m")
+    offset = _with_sigma(answer.time_offset_s, answer.time_offset_sigma_s, 3, "s")
+    drift = _with_sigma(answer.drift_deg_per_h, answer.drift_sigma_deg_per_h, 2, "°/h")
+    seen = "seen in the turns" if is_number(answer.time_offset_s) else "not observable"
+    slope = "slope of the difference over the taxi" if is_number(answer.drift_deg_per_h) else "not measured"
+    pairs = (
+        ("Lever arm, antenna ahead of the main gear", arm, answer.lever_arm_origin),
+        *_latency(answer),
+        ("GNSS time offset", offset, seen),
+        ("Azimuth drift", drift, slope),
+    )
+    return Facts("Lever arm, time offset, drift", pairs)
+
+
+def _with_sigma(value: float | None, sigma: float | None, places: int, unit: str) -> str:
+    text = number(value, places, unit, signed=True)
+    return f"{text} (σ {number(sigma, places, unit)})" if is_number(value) and is_number(sigma) else text
+
+
+def _latency(answer: HeadingResult) -> list[tuple[str, str, str]]:
+    """The latency by which GNSS was put back before all else; nothing where it was not."""
+    if not is_number(answer.latency_used_s):
+        return []
+    value = _with_sigma(answer.latency_used_s, answer.latency_used_sigma_s, 3, "s")
+    return [("GNSS latency taken out", value, f"from the {answer.latency_origin}")]
+
+
+def _by_hand(chosen: Sequence[ChosenInterval]) -> Facts | None:
+    pairs = [(USES[one.use], f"{one.start} – {one.end}", one.reason) for one in chosen]
+    return Facts("Intervals chosen by hand", pairs) if pairs else None

@@ -1,0 +1,265 @@
+"""Chapter: magnetic deviation (system 3): verdict, coefficients, steer card, and what each correction leaves."""
+
+from groundstation.chapters.assessed import reason_of
+from groundstation.chapters.gates import gate_grid, setting_facts
+from groundstation.chapters.magnetic_ground import ground_runs
+from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, Tone
+from groundstation.chapters.wording import ABSENT, clock, is_number, number, sentence, significant, typeset
+from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
+from groundstation.results.flight import FlightResults
+from groundstation.results.magnetic import (
+    ADVISORY,
+    LETTERS,
+    METHOD_TITLES,
+    Alignment,
+    MagneticResult,
+    Method,
+    PoissonParameters,
+    Vector,
+)
+
+TITLE = "Magnetic deviation"
+LEAD = (
+    "Opposite turns of equal bank show the deviation of the magnetic heading against the aligned INS. Error = magnetic "
+    "heading − true magnetic heading; the deviation is its negative, to be added to the reading, east positive."
+)
+HOW = (
+    "How computed: field levelled by roll and pitch of the INS; magnetic minus INS true heading averaged in bins of 1° "
+    "on each branch, then over both; A to E by least squares. Hard and soft iron are fitted with the attitude, and "
+    "from the constancy of the field's modulus. Level flight outside the figures, which no fit has seen, judges all "
+    "three. error(c) = A + B sin c + C cos c + D sin 2c + E cos 2c, c the uncorrected magnetic heading. Source: "
+    "Russian patent on the deviation of magnetometric sensors determined in flight; prior art RU 2550774."
+)
+TONES: dict[str, Tone] = {"accept": "good", "reject": "bad", "undecided": "unknown"}
+MEANING = {
+    "A": "constant: mounting, INS heading and declination besides",
+    "B": "semicircular, sin: iron fore and aft",
+    "C": "semicircular, cos: iron athwart",
+    "D": "quadrantal, sin: soft iron",
+    "E": "quadrantal, cos: soft iron askew",
+}
+MOST_TURNS = 24
+
+
+def magnetic(results: FlightResults) -> Section | None:
+    """The chapter; None when the flight was not assessed and no reason is known."""
+    answer = results.answer(MagneticResult)
+    if answer is None:
+        reason = reason_of(results, "magnetic")
+        notes = (Note(f"Not assessable: {typeset(reason)}", "unknown"),) if reason else ()
+        instead = (*notes, *ground_runs(results))
+        return Section("magnetic", TITLE, LEAD, instead, f"{TITLE} not assessed") if instead else None
+    parts: tuple[Part | None, ...] = (
+        *_conclusions(answer),
+        _coefficients(answer),
+        _card(answer),
+        Note("To print, and for programs, every degree:", files=(STEER_CARD, DEVIATION_CSV)),
+        Figure("magnetic.deviation"),
+        gate_grid(answer.gates),
+        _methods(answer),
+        *(Figure(f"magnetic.{name}") for name in ("held_out", "track", "branches", "modulus")),
+        _turns(answer),
+        _swings(answer),
+        _basis(answer),
+        _iron(answer.poisson),
+        *(Note(sentence(remark)) for remark in answer.remarks),
+        Note(HOW),
+        setting_facts(answer.settings),
+        *ground_runs(results),
+    )
+    headline = f"{TITLE}: {answer.verdict}"
+    return Section("magnetic", TITLE, LEAD, tuple(part for part in parts if part is not None), headline)
+
+
+def _conclusions(answer: MagneticResult) -> list[Note]:
+    residual = answer.residual_rms_deg
+    left = (
+        f" On level flight that no fit has seen the heading error was {number(residual.before, 2, '°')} RMS; "
+        f"{number(residual.after, 2, '°')} is left after correction."
+        if residual
+        else ""
+    )
+    text = f"{answer.verdict.capitalize()}: {sentence(answer.verdict_reason)}{left} {ADVISORY}"
+    advice = f"Correct by the {METHOD_TITLES[answer.recommended_method]}: {sentence(answer.recommendation)}"
+    return [Note(text, TONES[answer.verdict]), Note(advice)]
+
+
+def _coefficients(answer: MagneticResult) -> Grid:
+    methods = [row for row in answer.methods if row.coefficients_deg]
+    rows = []
+    for letter in LETTERS:
+        cells = [MEANING[letter]]
+        for row in methods:
+            value, sigma = row.coefficients_deg.get(letter), number(row.coefficients_sigma_deg.get(letter), 3)
+            cells.append(f"{number(value, 3, signed=True)} ± {sigma}" if is_number(value) else "not seen")
+        rows.append((letter, *cells))
+    heads = (Head(""), Head("Meaning"), *(Head(f"{METHOD_TITLES[row.name]}, °", True) for row in methods))
+    parts = "; ".join(f"{part.name} {number(part.sigma_deg, 3, '°')}" for part in answer.a_parts)
+    caption = (
+        "Of the error in level flight, declination removed, ± standard deviation. The deviation to add has the "
+        f"opposite signs. σ of A by the table is the quadrature of: {parts}."
+    )
+    return Grid("Coefficients", heads, rows, caption)
+
+
+def _card(answer: MagneticResult) -> Grid | None:
+    cells = [
+        (
+            number(row.magnetic_heading_deg, 0, "°"),
+            number(row.steer_deg, 1, "°"),
+            number(row.deviation_deg, 1, "°", signed=True),
+            f"± {number(row.sigma_deg, 1, '°')}" + (" *" if row.is_interpolated else ""),
+        )
+        for row in answer.card
+    ]
+    half = -(-len(cells) // 2)
+    empty = ("",) * 4
+    rows = [(*cells[row], *(cells[row + half] if row + half < len(cells) else empty)) for row in range(half)]
+    heads = tuple(Head(title, True) for title in ("For magnetic", "Steer", "Add", "σ")) * 2
+    starred = " * no reading there: interpolated." if any(row[3].endswith("*") for row in cells) else ""
+    caption = (
+        f"By the {METHOD_TITLES[answer.recommended_method]}. Steer: the uncorrected reading that gives the magnetic "
+        f"heading; add: the deviation, added to that reading.{starred} {ADVISORY}"
+    )
+    return Grid("Steer card", heads, rows, caption) if rows else None
+
+
+def _methods(answer: MagneticResult) -> Grid:
+    titles = ("Before, °", "After, °", "Mean after, °", "Condition", "Fit, nT")
+    heads = (Head("Method"), Head("State"), *(Head(title, True) for title in titles), Head("Why, or what it lacks"))
+    held = answer.held_out
+    flown = (
+        f"{number(held.seconds, 0, 's')} of level flight on {number(held.heading_sectors, 0)} of 12 sectors of heading"
+        if held
+        else "nothing was left to hold out"
+    )
+    caption = (
+        f"Before, after: RMS error of the magnetic heading on the part no fit has seen ({flown}). Condition: number of "
+        "the scaled normal problem; large means hardly observable. Fit: RMS of the field left, per axis."
+    )
+    rows = [_method(row, row.name == answer.recommended_method) for row in answer.methods]
+    return Grid("Methods side by side", heads, rows, caption)
+
+
+def _method(row: Method, is_recommended: bool) -> tuple[Cell, ...]:
+    mean, sigma = number(row.held_out_mean_deg, 2, signed=True), number(row.held_out_mean_sigma_deg, 2)
+    return (
+        f"{METHOD_TITLES[row.name]}{' (recommended)' if is_recommended else ''}",
+        Mark("good", "fitted") if row.state == "fitted" else Mark("unknown", "refused"),
+        number(row.held_out_before_deg, 2),
+        number(row.held_out_after_deg, 2),
+        ABSENT if ABSENT in (mean, sigma) else f"{mean} ± {sigma}",
+        significant(row.condition_number),
+        number(row.fit_rms_nt, 0),
+        sentence(row.reason) if row.reason else "",
+    )
+
+
+def _turns(answer: MagneticResult) -> Grid | None:
+    longest = sorted(answer.turns, key=lambda turn: (turn.state != "used", -abs(turn.turned_deg)))
+    rows: list[tuple[Cell, ...]] = [
+        (
+            Mark("good", "used") if turn.state == "used" else Mark("unknown", "not used"),
+            f"{clock(turn.start_s)} – {clock(turn.end_s)}",
+            f"{number(turn.bank_deg, 1, signed=True)} ± {number(turn.bank_sd_deg, 1)}",
+            number(turn.turned_deg, 0, signed=True),
+            number(turn.altitude_m, 0),
+            typeset(turn.reason),
+        )
+        for turn in sorted(longest[:MOST_TURNS], key=lambda turn: turn.start_s)
+    ]
+    titles = ("Bank, °", "Turned, °", "Altitude, m")
+    heads = (Head("State"), Head("Flight time"), *(Head(title, True) for title in titles), Head("Reason"))
+    more = len(answer.turns) - MOST_TURNS
+    left_out = f" {more} shorter turns are left out." if more > 0 else ""
+    return Grid("Turns of steady bank", heads, rows, f"Right positive.{left_out}") if rows else None
+
+
+def _swings(answer: MagneticResult) -> Grid | None:
+    """Repeated figures beside each other: equipment on and off, load, repeatability."""
+    if len(answer.swings) < 2:
+        return None
+    rows = [
+        (
+            f"{number(swing.number, 0)}: {clock(swing.start_s)} – {clock(swing.end_s)}",
+            *(number(swing.coefficients_deg.get(letter), 2, signed=True) for letter in LETTERS),
+            f"{number(swing.difference_rms_deg, 2)} ± {number(swing.difference_sigma_deg, 2)}",
+        )
+        for swing in answer.swings
+    ]
+    heads = (Head("Figure"), *(Head(f"{letter}, °", True) for letter in LETTERS), Head("From the others, °", True))
+    caption = "Each figure by its own table; from the others: RMS of the difference of the curves over the circle."
+    return Grid("Figures apart", heads, rows, caption)
+
+
+def _basis(answer: MagneticResult) -> Facts:
+    """What the deviation rests on."""
+    alignment, declination, coverage = answer.alignment, answer.declination, answer.coverage
+    bias = ", ".join(
+        f"{number(row.rms_deg, 2, '°')} at {number(row.bank_deg, 0, '°')}" + (" (flown)" if row.is_flown else "")
+        for row in answer.bank_bias
+    )
+    horizontal, down = (number(value, 0, "nT") for value in (declination.horizontal_nt, declination.down_nt))
+    pairs = (
+        (
+            "INS heading error taken off",
+            _with_sigma(alignment.error_deg, alignment.sigma_deg),
+            sentence(alignment.origin),
+        ),
+        *_gyros(alignment),
+        (
+            "Declination taken off",
+            _with_sigma(declination.value_deg, declination.sigma_deg),
+            f"{declination.model}; field {horizontal} horizontal, {down} down",
+        ),
+        (
+            "Circle covered by both branches",
+            number(100.0 * coverage.share, 1, "%"),
+            f"{number(coverage.interpolated_bins, 0)} of 360 bins interpolated, widest gap "
+            f"{number(coverage.widest_gap_deg, 0, '°')}",
+        ),
+        ("Forecast bank bias of the table", bias or ABSENT, "average of opposite banks minus level flight, RMS"),
+        ("Sensors", f"{answer.magnetometer_topic} against {answer.ins_topic}", ""),
+    )
+    return Facts("What it rests on", pairs)
+
+
+def _gyros(alignment: Alignment) -> tuple[tuple[str, str, str], ...]:
+    """Drift of the three gyros before flight, where it was logged."""
+    values, sigmas = alignment.gyro_drift_deg_per_h, alignment.gyro_drift_sigma_deg_per_h
+    if values is None or sigmas is None:
+        return ()
+    told = ", ".join(
+        f"{number(value, 2, signed=True)} ± {number(sigma, 2)}" for value, sigma in zip(values, sigmas, strict=True)
+    )
+    return (("Gyro drift at standstill", f"{told} °/h", "forward, right, down; beyond the rotation of the earth"),)
+
+
+def _with_sigma(value: float, sigma: float) -> str:
+    return f"{number(value, 2, '°', signed=True)} ± {number(sigma, 2, '°')}"
+
+
+def _iron(iron: PoissonParameters | None) -> Grid | None:
+    if iron is None:
+        return None
+    hard = _with_sigmas(iron.hard_iron_nt, iron.hard_iron_sigma_nt, 0)
+    current = _with_sigmas(iron.current_effect_nt_per_a, iron.current_effect_sigma_nt_per_a, 2)
+    rows = [
+        (axis, hard[place], *(number(value, 4) for value in iron.soft_iron[place]), current[place])
+        for place, axis in enumerate(("Forward", "Right", "Down"))
+    ]
+    titles = ("Hard iron, nT", "Soft iron: forward", "right", "down", "Current, nT/A")
+    reference = iron.current_reference_a
+    at = f"; current counted from {number(reference, 1, 'A')}, the mean of the figures" if is_number(reference) else ""
+    caption = f"Reading = soft iron × field + hard iron + current effect, ± standard deviation{at}."
+    return Grid("Iron of the aircraft", (Head("Axis"), *(Head(title, True) for title in titles)), rows, caption)
+
+
+def _with_sigmas(values: Vector | None, sigmas: Vector | None, places: int) -> tuple[str, ...]:
+    """The three axes of a vector, each with its sigma; em dashes where it is not known."""
+    if values is None or sigmas is None:
+        return (ABSENT,) * 3
+    return tuple(
+        f"{number(value, places, signed=True)} ± {number(sigma, places)}"
+        for value, sigma in zip(values, sigmas, strict=True)
+    )

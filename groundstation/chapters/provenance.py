@@ -1,0 +1,42 @@
+"""Chapter: where the numbers come from. Time of run, host and versions stand in manifest.json alone."""
+
+from groundstation.chapters.parts import Facts, Note, Part, Section
+from groundstation.chapters.wording import ABSENT, clean, number
+from groundstation.results.flight import FlightResults, Source
+
+LONG_LISTS = ("parameter.", "units.")  # of autopilot logs, hundreds of them
+MOST_METADATA = 40
+REST = "The rest of the metadata, parameters and units among it, stands in summary.json."
+CHECKS = (
+    "Every number on these pages stands in summary.json or in tables/*.csv beside this file. Time of run, "
+    "host, versions and configuration stand in manifest.json: equal input gives this report byte for byte."
+)
+
+
+def provenance(results: FlightResults) -> Section:
+    """The chapter."""
+    flight_id = clean(results.flight_id)
+    pairs = (
+        *source_pairs(results.source),
+        ("Flight id", flight_id, ""),
+        ("Recording", f"{flight_id}.rrd", "open with: groundstation view"),
+        ("Lossless store", f"{flight_id}.mcap", "every topic of the log"),
+    )
+    parts: list[Part] = [Facts("Source and files", pairs)]
+    if results.metadata:
+        listed = sorted(results.metadata.items())
+        rows = [(key, value, "") for key, value in listed if not key.startswith(LONG_LISTS)][:MOST_METADATA]
+        parts.append(Facts("Metadata of the log", rows))
+        if len(rows) < len(listed):
+            parts.append(Note(REST))
+    parts.append(Note(CHECKS))
+    return Section("provenance", "Provenance", "Where the numbers come from and how to check them.", parts)
+
+
+def source_pairs(source: Source) -> tuple[tuple[str, str, str], ...]:
+    """The log a flight came from."""
+    return (
+        ("Log", source.name or ABSENT, f"{number(source.size_bytes, 0)} bytes"),
+        ("SHA-256 of the log", source.sha256 or ABSENT, ""),
+        ("Read by", source.reader or ABSENT, ""),
+    )

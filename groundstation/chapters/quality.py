@@ -1,0 +1,159 @@
+"""Chapter: how good the data are: rates, gaps, order, clock."""
+
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from groundstation.base.clock import Clock, RelationEntry
+from groundstation.base.ledger import DamageEntry, Ledger
+from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Section
+from groundstation.chapters.provenance import source_pairs
+from groundstation.chapters.wording import (
+    any_value,
+    named_quantity,
+    number,
+    number_with_unit,
+    significant,
+    typeset,
+    words,
+)
+from groundstation.results.figures import numbers, texts
+from groundstation.results.flight import FlightResults
+
+LEAD = "What the recorder delivered: rates, gaps and order of every topic, and how its clock was read."
+MOST_TOPICS = 60
+MOST_ENTRIES = 20
+MOST_DAMAGES = 60
+TITLES = {
+    "topic": "Topic",
+    "rows": "Rows",
+    "rate": "Rate / nominal, Hz",
+    "coverage": "Coverage",
+    "longest_gap": "Longest gap, s",
+    "gaps": "Gaps",
+    "duplicates": "Duplicates",
+    "backward_steps": "Steps back",
+    "stray_rows": "Stray",
+    "dropped_rows": "Dropped",
+    "lost_by_counter": "Lost by counter",
+    "out_of_range": "Out of range",
+    "stuck": "Stuck",
+}
+COUNTED_IF_KNOWN = ("lost_by_counter", "out_of_range", "stuck")
+IN_TABLES = ("topics", "damages", "remarks", "spans", "spans_more", "steps", "relations")  # remarks are findings
+STEP_HEADS = (
+    *(Head(title, True) for title in ("Record", "Step, s", "Clock set by, s", "Records before it, moved")),
+    Head("What"),
+)
+CLOCK_HEADS = (
+    *(Head("Other clock"), Head("From"), Head("Length, s", True)),
+    *(Head("Other less recorder"), Head("Drift of the recorder"), Head("Scatter, s", True)),
+)
+CLOCK_CAPTION = (
+    "± is one standard error; positive drift: the recorder is fast. Corrected time is the recorder's, moved where "
+    "its clock was set, and not changed by its drift. UTC of autopilots' logs comes from GNSS time itself."
+)
+DAMAGE_HEADS = (Head("Kind"), Head("What"), Head("Where"), Head("Count", True), Head("Data lost"))
+WHOLE = "No damage was found in the log: nothing lost, nothing unreadable."
+
+
+def quality(results: FlightResults) -> Section:
+    """The chapter: every flight has a ledger."""
+    parts = (
+        *(_topics(results), Figure("quality.gaps")),
+        *(_nested(results.clock, "Clock model"), _clock_steps(results.clock), _other_clocks(results.clock)),
+        *(_damages(results.ledger), _nested(results.ledger, "Ledger of the log")),
+    )
+    shown = tuple(part for part in parts if part is not None)
+    headline = f"{results.flight_id}: {results.status}"
+    return Section("quality", "Data quality", LEAD, shown, headline, (Facts("", source_pairs(results.source)),))
+
+
+def _topics(results: FlightResults) -> Grid | None:
+    data = results.figure_with_rows("ledger")
+    if data is None:
+        return None
+    counts = [name for name in list(TITLES)[5:] if name not in COUNTED_IF_KNOWN or name in data.columns]
+    measured = ("rows", "nominal_rate_hz", "actual_rate_hz", "longest_gap_s", "coverage", *counts)
+    columns = {name: numbers(data, name) for name in measured}
+    rows = []
+    for place, topic in enumerate(texts(data, "topic").tolist()[:MOST_TOPICS]):
+        row = {name: float(values[place]) for name, values in columns.items()}
+        rates = f"{significant(row['actual_rate_hz'])} / {significant(row['nominal_rate_hz'])}"
+        whole, gap = number(row["coverage"] * 100, 1, "%"), number(row["longest_gap_s"], 2)
+        rows.append((topic, number(row["rows"], 0), rates, whole, gap, *(number(row[name], 0) for name in counts)))
+    heads = [Head(TITLES[name], name != "topic") for name in (*list(TITLES)[:5], *counts)]
+    more = len(data) - len(rows)
+    return Grid("Topics", heads, rows, f"{more} more topics in the table file." if more else "", ("ledger",))
+
+
+def _clock_steps(clock: Clock) -> Grid | None:
+    rows = [
+        (
+            number(step.record_index, 0),
+            number(step.size_s, 3, signed=True),
+            number(step.set_s, 3, signed=True),
+            number(step.records_before, 0),
+            words(step.mistake),
+        )
+        for step in clock.steps[:MOST_ENTRIES]
+    ]
+    return Grid("Steps of the recorder's clock", STEP_HEADS, rows) if rows else None
+
+
+def _other_clocks(clock: Clock) -> Grid | None:
+    """The recorder's clock by the others of the log: segments, the breaks between them, errors that have a name."""
+    rows = [row for relation in clock.relations for row in _relation_rows(relation)]
+    title = "The recorder's clock by others"
+    return Grid(title, CLOCK_HEADS, rows[:MOST_TOPICS], CLOCK_CAPTION) if rows else None
+
+
+def _relation_rows(relation: RelationEntry) -> list[tuple[str, ...]]:
+    name = f"{relation.clock.upper()} · {relation.source}"
+    rows: list[tuple[str, ...]] = [(name, "", "", relation.reason, "", "")] if relation.reason else []
+    for one in relation.segments:
+        told = (typeset(one.offset), typeset(one.drift), number(relation.residual_s, 4))
+        rows.append((name, one.start, number(one.length_s, 1), *told))
+    for two in relation.breaks:
+        step = number(two.step_s, 3, "s", signed=True) if two.kind == "step" else ""
+        change = number(two.drift_change_ppm, 1, "ppm", signed=True)
+        rows.append((f"{name}: {two.kind} changes", two.time, "", step, change, ""))
+    rows += [(f"{name}: error", error.time or "", "", typeset(error.text), "", "") for error in relation.mistakes]
+    return rows
+
+
+def _damages(ledger: Ledger) -> Grid | Note:
+    if not ledger.damages:
+        return Note(WHOLE, "good")
+    rows = [_damage_row(damage) for damage in ledger.damages[:MOST_DAMAGES]]
+    more = len(ledger.damages) - len(rows)
+    return Grid("Damage to the log", DAMAGE_HEADS, rows, f"{more} more in summary.json." if more else "")
+
+
+def _damage_row(damage: DamageEntry) -> tuple[str, ...]:
+    where = " · ".join(filter(None, (damage.topic, damage.place)))
+    lost = "yes" if damage.loses_data else "no"
+    return (words(damage.kind), damage.what, where, number(damage.count, 0), lost)
+
+
+def _nested(document: Clock | Ledger, title: str) -> Facts | None:
+    """Everything of a document that has no table of its own, by the names of its fields."""
+    pairs = [(name, value, "") for name, value in _flat(document)]
+    return Facts(title, pairs) if pairs else None
+
+
+def _flat(document: Any, above: str = "") -> list[tuple[str, str]]:
+    """A dataclass as pairs of a title and a value, with what is nested in it."""
+    out: list[tuple[str, str]] = []
+    for one in fields(document):
+        value = getattr(document, one.name)
+        name, unit = named_quantity(one.name)
+        title = f"{above} · {name}" if above else name
+        if one.name in IN_TABLES:
+            continue
+        if is_dataclass(value):
+            out += _flat(value, title)
+        elif isinstance(value, tuple) and len(value) > MOST_ENTRIES:
+            out.append((title, f"{len(value)} entries in summary.json"))
+        else:
+            out.append((title, number_with_unit(any_value(value), unit)))
+    return out

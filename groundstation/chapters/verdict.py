@@ -1,0 +1,90 @@
+"""The verdict on the heading: in a word, what to enter, why, and the figures it rests on."""
+
+from collections.abc import Mapping
+
+from groundstation.chapters.parts import Mark
+from groundstation.chapters.wording import ABSENT, interval, is_number, number, step_places, typeset
+from groundstation.results.heading import HeadingResult
+
+PUBLISHED_LIMIT_ARCMIN = 20.0
+VERDICTS: Mapping[str, Mark] = {
+    "accept": Mark("good", "Accept"),
+    "reject": Mark("bad", "Reject"),
+    "extend": Mark("warn", "Extend"),
+    "undecided": Mark("unknown", "Undecided"),
+}
+ADVICE: Mapping[str, str] = {
+    "reject": "Enter no correction",
+    "extend": "No correction yet: measure longer",
+    "undecided": "No correction: a required gate was not measured",
+}
+NOT_ASSESSABLE = Mark("unknown", "Not assessable")
+
+
+def what_to_enter(heading: HeadingResult) -> str:
+    """The number to type with its sign and the digits of the entry step; never one where there is nothing to type."""
+    if heading.verdict != "accept":
+        return ADVICE[heading.verdict]
+    step, correction = heading.entry_step_deg, heading.correction_deg
+    if is_number(correction) and correction:
+        return f"Enter {number(correction, step_places(step), '°', signed=True)}"
+    return f"Nothing to enter: the error is below half the entry step of {number(step, step_places(step), '°')}"
+
+
+def verdict_line(heading: HeadingResult) -> str:
+    """Verdict and number to type in one line: the first of a text panel."""
+    mark = VERDICTS[heading.verdict]
+    return f"{mark.symbol} {mark.text} · {what_to_enter(heading)}"
+
+
+def reasons(heading: HeadingResult) -> tuple[str, ...]:
+    """Why the verdict is what it is, and the error in words."""
+    return tuple(filter(None, (sentence(typeset(heading.verdict_reason)), _in_words(heading))))
+
+
+def sentence(text: str) -> str:
+    """Text with a capital and a full stop.
+
+    Examples
+    --------
+    >>> sentence("every required gate passed"), sentence("Why?")
+    ('Every required gate passed.', 'Why?')
+    """
+    text = text.strip()
+    return text[:1].upper() + text[1:] + ("" if not text or text[-1] in ".!?" else ".")
+
+
+def _in_words(heading: HeadingResult) -> str:
+    error = heading.error_deg
+    if not is_number(error):
+        return "The heading error could not be estimated."
+    if round(error, 2) == 0:
+        return "INS heading agrees with the GNSS track within 0.01°."
+    sense = "high" if error > 0 else "low"
+    text = f"INS heading reads too {sense} by {number(abs(error), 2, '°')}"
+    if heading.verdict == "accept":
+        step = heading.entry_step_deg
+        return f"{text}; entry step {number(step, step_places(step), '°')}."
+    return f"{text}: an estimate, not to be entered."
+
+
+def figures(heading: HeadingResult) -> tuple[tuple[str, str, str], ...]:
+    """The figures that decide, each with what it rests on."""
+    samples, taxi = number(heading.samples, 0), number(heading.taxi_seconds, 0, "s")
+    shown, sigma = number(heading.parking_ins_heading_deg, 2, "°"), number(heading.parking_sigma_deg, 2, "°")
+    interval95 = interval(heading.confidence95_deg, 3, "°")
+    return (
+        ("Heading error", number(heading.error_deg, 3, "°", signed=True), f"95 % interval {interval95}"),
+        ("Precision e", number(heading.precision_deg, 3, "°"), f"{samples} samples, {taxi} of straight taxi"),
+        ("Parking heading, corrected", number(heading.parking_heading_deg, 2, "°"), f"INS showed {shown}; σ {sigma}"),
+        _against_reference(heading),
+    )
+
+
+def _against_reference(heading: HeadingResult) -> tuple[str, str, str]:
+    label, residual = "Against the reference", heading.reference_residual_arcmin
+    if not is_number(residual):
+        return (label, ABSENT, "no reference heading in log or site file")
+    reference = number(heading.reference_parking_heading_deg, 2, "°")
+    remark = f"reference {reference}; published runs stayed within {PUBLISHED_LIMIT_ARCMIN:.0f}′"
+    return (label, number(residual, 1, "′", signed=True), remark)

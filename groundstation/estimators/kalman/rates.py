@@ -1,0 +1,79 @@
+"""Systems given by a sparse matrix of rates, x' = A x + white noise: their transitions, and states carried forward."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.base.records import Int64Array, frozen
+from groundstation.estimators.kalman.arrays import FloatArray
+from groundstation.estimators.kalman.transition import Transition
+
+ORDER = 4
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Where A of x' = A x has entries: n states, ``rows`` and ``columns`` (m,)."""
+
+    size: int
+    rows: Int64Array
+    columns: Int64Array
+
+    def __post_init__(self) -> None:
+        for name in ("rows", "columns"):
+            object.__setattr__(self, name, frozen(np.ascontiguousarray(getattr(self, name), dtype=np.int64)))
+
+    def reach(self) -> tuple[Int64Array, Int64Array]:
+        """Rows and columns where I + A + ... + A^4 may have entries; rows that stay the identity's are left out."""
+        own, power = np.zeros((self.size, self.size), dtype=bool), np.eye(self.size, dtype=bool)
+        own[self.rows, self.columns] = True
+        total = power.copy()
+        for _ in range(ORDER):
+            power = power @ own
+            total |= power
+        total[~own.any(axis=1)] = False
+        rows, columns = np.nonzero(total)
+        return frozen(rows), frozen(columns)
+
+    def transition(self, values: FloatArray, seconds: FloatArray, density: FloatArray) -> Transition:
+        """Transition over each of k steps; a white noise enters half before and half after it (trapezoidal rule).
+
+        Parameters
+        ----------
+        values : ndarray, shape (k, m)
+            Entries of A over each step.
+        seconds : ndarray, shape (k,)
+            Short beside the rates: the exponential is of the fourth order.
+        density : ndarray, shape (n,)
+            Power spectral densities of the white noises.
+
+        Examples
+        --------
+        >>> falling = Rates(2, np.array([0]), np.array([1])).transition(np.ones((1, 1)), np.array([2.0]), np.ones(2))
+        >>> falling.dynamics.F.tolist(), falling.dynamics.after.tolist()
+        ([[1.0, 2.0]], [[1.0, 1.0]])
+        """
+        from groundstation.estimators.kalman import series
+
+        rows, columns = self.reach()
+        entries = np.empty((len(seconds), len(rows)))
+        given, over = (frozen(np.ascontiguousarray(part, dtype=np.float64)) for part in (values, seconds))
+        series.exponentials(self.size, self.rows, self.columns, given, over, rows, columns, entries)
+        noise, diagonal = 0.5 * np.outer(seconds, density), np.arange(self.size)
+        return Transition.sparse(self.size, rows, columns, entries, diagonal, diagonal, noise, noise)
+
+    def carried(self, values: FloatArray, step_s: float, every: int, start: FloatArray) -> FloatArray:
+        """A state carried forward in equal steps, as after every ``every`` of them, shape (steps // every, n).
+
+        Parameters
+        ----------
+        values : ndarray, shape (steps, m)
+            Entries of A over each step.
+        start : ndarray, shape (n,)
+        """
+        from groundstation.estimators.kalman import series
+
+        out, x = np.empty((len(values) // every, self.size)), np.array(start, dtype=np.float64)
+        entries = frozen(np.ascontiguousarray(values))
+        series.carry_by_rates(self.rows, self.columns, entries, float(step_s), every, x, out)
+        return out

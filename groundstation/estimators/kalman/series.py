@@ -1,0 +1,94 @@
+"""Compiled exponentials of a sparse matrix of rates, x' = A x: as transitions of the filter, and applied to a state.
+
+Both to the fourth order of the step: the caller keeps |A| x seconds small ((|A| t)^5 / 120 of the state is left out).
+
+Source: C. Moler, C. Van Loan, Nineteen dubious ways to compute the exponential of a matrix, SIAM Review 45, 2003,
+method 1: good for small steps and nothing else.
+"""
+
+import numpy as np
+
+from groundstation.base.compile import compiled
+from groundstation.base.records import Int64Array
+from groundstation.estimators.kalman.arrays import FloatArray
+
+ORDER = 4
+
+
+@compiled
+def exponentials(
+    size: int,
+    rows: Int64Array,
+    columns: Int64Array,
+    rates: FloatArray,
+    seconds: FloatArray,
+    at_rows: Int64Array,
+    at_columns: Int64Array,
+    out: FloatArray,
+) -> None:
+    """Fill ``out`` (k, e) with the entries of exp(A t) at ``at_rows``, ``at_columns`` (e,), for each of k matrices A.
+
+    Parameters
+    ----------
+    rows, columns : ndarrays of int, shape (m,)
+        Where A has entries.
+    rates : ndarray, shape (k, m)
+    seconds : ndarray, shape (k,)
+    """
+    E, B = np.zeros((size, size)), np.zeros((size, size))
+    for k in range(len(seconds)):
+        for i in range(size):
+            for j in range(size):
+                E[i, j] = 0.0
+            E[i, i] = 1.0
+        for order in range(ORDER, 0, -1):  # Horner: E = I + A t / order E
+            for i in range(size):
+                for j in range(size):
+                    B[i, j] = 0.0
+            factor = seconds[k] / order
+            for e in range(len(rows)):
+                i, r, a = rows[e], columns[e], rates[k, e] * factor
+                for j in range(size):
+                    B[i, j] += a * E[r, j]
+            for i in range(size):
+                for j in range(size):
+                    E[i, j] = B[i, j]
+                E[i, i] += 1.0
+        for e in range(len(at_rows)):
+            out[k, e] = E[at_rows[e], at_columns[e]]
+
+
+@compiled
+def carry_by_rates(
+    rows: Int64Array, columns: Int64Array, rates: FloatArray, step_s: float, every: int, x: FloatArray, out: FloatArray
+) -> None:
+    """Carry a state forward in equal steps, each with rates of its own, without forming a matrix.
+
+    Parameters
+    ----------
+    rows, columns, rates
+        Pattern (m,) and entries (steps, m) of A over each step.
+    every : int
+        Steps between two leads.
+    x : ndarray, shape (n,)
+        Changed in place.
+    out : ndarray, shape (leads, n)
+        Filled: the state after every ``every`` steps.
+    """
+    n = len(x)
+    term, new = np.zeros(n), np.zeros(n)
+    for lead in range(out.shape[0]):
+        for part in range(every):
+            k = lead * every + part
+            for i in range(n):
+                term[i] = x[i]
+            for order in range(1, ORDER + 1):
+                for i in range(n):
+                    new[i] = 0.0
+                for e in range(len(rows)):
+                    new[rows[e]] += rates[k, e] * term[columns[e]]
+                for i in range(n):
+                    term[i] = new[i] * step_s / order
+                    x[i] += term[i]
+        for i in range(n):
+            out[lead, i] = x[i]

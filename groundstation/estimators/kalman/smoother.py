@@ -1,0 +1,84 @@
+"""Smoothers over a filter's run: fixed interval, fixed lag, and the covariance between two epochs of a lag."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from groundstation.base.records import Int64Array, frozen
+from groundstation.estimators.kalman.arrays import Dynamics, FloatArray, Lines, Record, Schedule, States
+from groundstation.estimators.kalman.filter import FilterRun
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """Smoothed states (n, states, c) and their variances (n, states), NaN outside the interval asked for."""
+
+    x: FloatArray
+    variance: FloatArray
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            object.__setattr__(self, item.name, frozen(getattr(self, item.name)))
+
+
+def smooth(run: FilterRun, begin: int = 0, end: int | None = None) -> Smoothed:
+    """Smooth epochs ``begin`` to ``end`` (both included) with the data up to ``end``.
+
+    Raises
+    ------
+    ValueError
+        Where the run kept too little, or held states: a smoother goes back over optimal gains alone.
+
+    Source: Rauch, Tung, Striebel, 1965, in the form of Bryson and Frazier (Bierman, 1973).
+    """
+    from groundstation.estimators.kalman import smoother_runs
+
+    last = len(run.schedule.step) - 1 if end is None else end
+    x, variance = np.full(run.x.shape, np.nan), np.full(run.x.shape[:2], np.nan)
+    smoother_runs.run_smoother(*_history(run), begin, last, x, variance)
+    return Smoothed(x, variance)
+
+
+def smooth_lags(run: FilterRun, begin: Int64Array, end: Int64Array) -> FloatArray:
+    """Smooth epoch ``begin[i]`` with the data up to ``end[i]``, for each i: states alone, shape (s, states, c)."""
+    from groundstation.estimators.kalman import smoother_runs
+
+    past = np.empty((len(begin), *run.x.shape[1:]))
+    smoother_runs.run_fixed_lag(*_history(run), _index(begin), _index(end), past)
+    return past
+
+
+def lag_covariances(run: FilterRun, begin: Int64Array, end: Int64Array) -> tuple[FloatArray, FloatArray]:
+    """Covariance of epoch ``begin[i]`` given the data up to ``end[i]``, and how errors travel between, for each i.
+
+    Returns
+    -------
+    smoothed : ndarray, shape (s, states, states)
+    closed : ndarray, shape (s, states, states)
+        Product of (I - K h) F from begin to end: error at end that an error at begin leaves.
+    """
+    from groundstation.estimators.kalman import smoother_runs
+
+    smoothed, closed = (np.empty((len(begin), *run.P.shape[1:])) for _ in range(2))
+    smoother_runs.run_lag_covariance(*_history(run), _index(begin), _index(end), smoothed, closed)
+    return smoothed, closed
+
+
+def _history(run: FilterRun) -> tuple[States, Dynamics, Schedule, Lines, Record]:
+    """What the smoothers go back over.
+
+    Raises
+    ------
+    ValueError
+        Where the run kept too little, or held states: a smoother goes back over optimal gains alone.
+    """
+    n = len(run.schedule.step)
+    if not run.is_optimal:
+        raise ValueError("a run with held states cannot be smoothed: estimate them")
+    if not len(run.x) == len(run.P) == n or len(run.record.K) != len(run.measurements):
+        raise ValueError("smoothing needs states, covariances and gains: run the filter with them kept")
+    return run.transition.states, run.transition.dynamics, run.schedule, run.measurements.lines, run.record
+
+
+def _index(values: Int64Array) -> Int64Array:
+    return frozen(np.ascontiguousarray(values, dtype=np.int64))

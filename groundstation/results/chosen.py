@@ -1,0 +1,35 @@
+"""Intervals that the user left out of the estimates, or forced into them, as the manifest of a run tells."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Use = Literal["exclude", "force"]
+USES: tuple[Use, ...] = ("exclude", "force")
+
+
+@dataclass(frozen=True)
+class ChosenInterval:
+    """Part of a flight chosen by hand; its ends as the user wrote them."""
+
+    use: Use
+    start: str
+    end: str
+    reason: str = ""
+
+
+def chosen_intervals(configuration: Mapping[str, Any]) -> tuple[ChosenInterval, ...]:
+    """The intervals in the configuration that a manifest keeps, those left out first.
+
+    Examples
+    --------
+    >>> chosen_intervals({"exclude": [{"from": "+03:10", "to": "+03:15", "reason": "towed"}]})
+    (ChosenInterval(use='exclude', start='+03:10', end='+03:15', reason='towed'),)
+    >>> chosen_intervals({})
+    ()
+    """
+    return tuple(
+        ChosenInterval(use, str(one["from"]), str(one["to"]), str(one.get("reason") or ""))
+        for use in USES
+        for one in configuration.get(use, ())
+    )

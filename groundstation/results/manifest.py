@@ -1,0 +1,74 @@
+"""manifest.json: when, where and with what a run was made, and what a later run need not do again."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from groundstation.base.serial import LEFT_OUT_WHEN_DEFAULT
+
+
+@dataclass(frozen=True)
+class SourceOfRun:
+    """The log as the run found it; ``path`` is a URL for a log that was fetched."""
+
+    path: str = ""
+    name: str = ""
+    sha256: str = ""
+    size_bytes: int = 0
+    reader: str = ""
+
+
+@dataclass(frozen=True)
+class Host:
+    """The machine of the run."""
+
+    platform: str = ""
+    machine: str = ""
+    python: str = ""
+
+
+@dataclass(frozen=True)
+class Keys:
+    """Keys of the stages of one log's run, hexadecimal; each one covers those before it."""
+
+    conversion: str
+    analysis: str
+    reports: str
+
+
+@dataclass(frozen=True)
+class Resume:
+    """What a later run need not do again: keys of the stages, what was found in one line, whether data was lost."""
+
+    keys: Keys
+    text: str
+    has_lost_data: bool
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """Everything that may differ between two equal runs.
+
+    Parameters
+    ----------
+    groundstation : str
+        Version that made the run.
+    made_utc : str
+    configuration : mapping
+        What the user set, table by table, as TOML has it.
+    heading_settings : mapping
+        Settings of the heading correction in force.
+    versions : mapping of package to version
+    resume : Resume, optional
+        Absent where no run made the folder.
+    """
+
+    groundstation: str = ""
+    flight_id: str = ""
+    made_utc: str = ""
+    source: SourceOfRun = field(default_factory=SourceOfRun)
+    configuration: Mapping[str, Any] = field(default_factory=dict)
+    heading_settings: Mapping[str, float | int | str | bool] = field(default_factory=dict)
+    host: Host = field(default_factory=Host)
+    versions: Mapping[str, str] = field(default_factory=dict)
+    resume: Resume | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)

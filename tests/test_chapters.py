@@ -1,0 +1,326 @@
+"""What the chapters of a flight say: front, heading, overview, quality, findings, provenance."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pytest
+
+from groundstation.base.findings import Finding
+from groundstation.base.ledger import DamageEntry, Ledger, RemarkEntry
+from groundstation.chapters.findings import findings
+from groundstation.chapters.front import front
+from groundstation.chapters.gates import gate_grid, limit_text
+from groundstation.chapters.heading import heading
+from groundstation.chapters.overview import overview
+from groundstation.chapters.parts import Facts, Figure, Grid, Mark, Note, Part, Section
+from groundstation.chapters.provenance import provenance
+from groundstation.chapters.quality import quality
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.figures import DRAWERS, with_drawings
+from groundstation.results.chosen import ChosenInterval
+from groundstation.results.flight import FlightResults, NotAssessable, Source
+from groundstation.results.heading import Gate, HeadingResult
+from tests.report_example import example, figure, heading_result
+
+BARE = FlightResults("NOTIME_00000000", Source("a.csv", "00" * 32, 0, "flat-csv"), {}, None, 0.0, "failed")
+
+
+def grid(section: Section, title: str) -> Grid:
+    return next(part for part in section.parts if isinstance(part, Grid) and part.title == title)
+
+
+def facts(parts: Sequence[Part], title: str) -> dict[str, tuple[str, str]]:
+    found = next(part for part in parts if isinstance(part, Facts) and part.title == title)
+    return {
+        label: (value.replace("\u202f", " "), remark.replace("\u202f", " ")) for label, value, remark in found.pairs
+    }
+
+
+def notes(parts: Sequence[Part]) -> list[str]:
+    return [part.text for part in parts if isinstance(part, Note)]
+
+
+# ----------------------------------------------------------------------------------------------------- front
+
+
+def test_front_tells_flight_verdict_and_number_to_type() -> None:
+    told = front(example(heading_result()))
+    assert told.title == "A12 · flight 17"
+    assert told.verdict == Mark("good", "Accept")
+    assert told.headline == "Enter −1.05°" and told.to_sign
+    assert told.sentences[0] == "Every required gate passed."
+    assert told.sentences[1].startswith("INS heading reads too high by 1.04°")
+    pairs = dict(told.pairs)
+    assert pairs["Start"] == "2026-05-04 06:00:00 UTC"
+    assert pairs["Status"] == Mark("good", "ok") and pairs["Findings"] == "1 warn · 2 info"
+    values = {label: (value, remark) for label, value, remark in told.figures}
+    assert values["Heading error"] == ("+1.038°", "95 % interval +0.977° … +1.099°")
+    assert values["Parking heading, corrected"][0] == "301.98°"
+    assert values["Against the reference"][0] == "−3.6′"
+
+
+@pytest.mark.parametrize(
+    ("verdict", "mark", "headline"),
+    [
+        ("reject", Mark("bad", "Reject"), "Enter no correction"),
+        ("extend", Mark("warn", "Extend"), "No correction yet: measure longer"),
+        ("undecided", Mark("unknown", "Undecided"), "No correction: a required gate was not measured"),
+    ],
+)
+def test_other_verdicts_give_no_number_to_type(verdict: str, mark: Mark, headline: str) -> None:
+    results = example(heading_result(verdict=verdict, verdict_reason="a gate says so", correction_deg=None))
+    told = front(results)
+    assert (told.verdict, told.headline, told.to_sign) == (mark, headline, False)
+    assert told.sentences[0] == "A gate says so." and told.sentences[1].endswith("an estimate, not to be entered.")
+    assert heading(results).headline == f"{mark.symbol} {mark.text} · {headline}"
+
+
+def test_accepted_error_below_half_a_step_needs_nothing_typed() -> None:
+    assert "Nothing to enter" in front(example(heading_result(error_deg=-0.011, correction_deg=None))).headline
+
+
+@pytest.mark.parametrize(
+    ("error_deg", "word"),
+    [(1.5, "too high by 1.50°"), (-0.4, "too low by 0.40°"), (0.001, "agrees"), (float("nan"), "not be estimated")],
+)
+def test_words_say_the_sense_of_the_error(error_deg: float, word: str) -> None:
+    assert word in front(example(heading_result(error_deg=error_deg))).sentences[1]
+
+
+def test_flight_without_heading_says_why_on_the_front() -> None:
+    told = front(example(None, not_assessable=(NotAssessable("heading", "no GNSS velocity in the log"),)))
+    assert told.verdict == Mark("unknown", "Not assessable") and not told.to_sign
+    assert told.headline == "Heading correction: not assessable"
+    assert told.sentences == ("No GNSS velocity in the log.",)
+
+
+def test_a_log_without_taxi_says_what_the_method_needs() -> None:
+    reason = "no straight taxi: of 986 epochs above 6 m/s before lift-off: not proven ground 986"
+    (told,) = front(example(None, not_assessable=(NotAssessable("heading", reason),))).sentences
+    assert "ground contact not proven for 986. The method needs a straight run on the ground" in told
+
+
+def test_log_without_absolute_time_names_no_date() -> None:
+    told = front(example(None, start_utc_ns=None, metadata={}, flight_id="NOTIME_9f9f9f9f"))
+    pairs = dict(told.pairs)
+    assert told.title == "NOTIME_9f9f9f9f"
+    assert pairs["Start"] == "no absolute time"
+    assert pairs["Aircraft"] == pairs["Flight"] == "not named in the log"
+
+
+def test_bare_results_have_a_front_and_chapters() -> None:
+    assert dict(front(BARE).pairs)["Status"] == Mark("bad", "failed: nothing could be computed")
+    assert findings(BARE).parts == [Note("No findings.", "good")]
+    assert overview(BARE) is None
+    assert notes(heading(BARE).parts) == ["Not assessable: the log does not hold what the method needs"]
+    assert notes(quality(BARE).parts) == ["No damage was found in the log: nothing lost, nothing unreadable."]
+
+
+# --------------------------------------------------------------------------------------------------- heading
+
+
+def test_heading_begins_with_verdict_and_number_to_type_where_there_is_no_front() -> None:
+    section = heading(example(heading_result()))
+    told = front(example(heading_result()))
+    assert section.headline == "✓ Accept · Enter −1.05°"
+    assert notes(section.above) == list(told.sentences)
+    assert [part.pairs for part in section.above if isinstance(part, Facts)] == [told.figures]
+
+
+def test_gates_say_state_limit_and_role() -> None:
+    rows = {str(row[1]): row for row in grid(heading(example(heading_result())), "Gates").rows}
+    assert rows["Mean GNSS velocity at standstill"][:1] == (Mark("good", "passed"),)
+    assert rows["Mean GNSS velocity at standstill"][3:5] == ("≤ 0.01\u202fm/s", "decides")
+    assert rows["Straight taxi"][3] == "≥ 20\u202fs" and rows["Skewness"][3] == "−0.5 … 0.5"
+    unmeasured = rows["GNSS integrity flag"]
+    assert (unmeasured[0], unmeasured[2]) == (Mark("unknown", "not measured"), "—")
+    assert unmeasured[4:] == ("informs", "no integrity flag in the log")
+
+
+@pytest.mark.parametrize(("required", "tone"), [(True, "bad"), (False, "warn")])
+def test_a_gate_that_fails_counts_against_an_answer_only_if_it_decides(required: bool, tone: str) -> None:
+    gate = Gate("kurtosis", "Excess kurtosis", 2.4, (-1.2, 2.0), "", "failed", required, "heavy tails")
+    table = gate_grid((gate,))
+    assert table is not None
+    ((mark, *_),) = table.rows
+    assert isinstance(mark, Mark) and (mark.tone, mark.text) == (tone, "failed")
+
+
+def test_least_values_are_told_from_largest_ones_even_on_the_limit() -> None:
+    ground = Gate("ground", "", 1.0, 1.0, "", "passed", sense="at_least")
+    assert limit_text(ground) == "≥ 1"
+    assert limit_text(replace(ground, name="ins_mode", value=0.0, limit=0.0, sense="at_most")) == "≤ 0"
+
+
+def test_estimates_stand_side_by_side() -> None:
+    answer = heading_result()
+    table = grid(heading(example(answer)), "Estimates")
+    assert [row[1] for row in table.rows[:3]] == ["+1.0379°", f"+{answer.paper_error_deg:.4f}°", "—"]
+    assert table.rows[0][2] == "+0.977° … +1.099°"
+    assert table.caption == "INS topic ins (true heading) against GNSS topic gnss."
+
+
+def test_the_aircrafts_own_figures_stand_beside_ours() -> None:
+    table = grid(heading(example(heading_result())), "Ground result beside the aircraft's own")
+    rows = {row[0]: row[1:] for row in table.rows}
+    assert rows["Heading error"] == ("+1.038°", "+1.020°", "−0.018°")
+    assert rows["Correction"] == ("−1.05°", "−1.00°", "")
+    assert table.caption == "Status reported by the aircraft: ready."
+
+
+def test_runway_lever_arm_and_standstill_are_told() -> None:
+    section = heading(example(heading_result(latency_used_s=0.1, latency_used_sigma_s=0.01, latency_origin="motion")))
+    (runway,) = grid(section, "Runway check").rows
+    assert runway == ("12", "119.72°", "120.71°", "+0.990°", "0.050°", "−0.048°")
+    arm = facts(section.parts, "Lever arm, time offset, drift")
+    assert arm["Lever arm, antenna ahead of the main gear"] == ("+4.12 m (σ 0.35 m)", "estimated")
+    assert arm["GNSS latency taken out"] == ("+0.100 s (σ 0.010 s)", "from the motion")
+    assert arm["Azimuth drift"][0] == "+0.80 °/h (σ 0.70 °/h)"
+    still = facts(section.parts, "GNSS at standstill")
+    assert still["Interval"] == ("0:25 – 0:55", "300 samples")
+    assert still["Mean velocity, north / east"][0] == "+0.0031 m/s / −0.0035 m/s"
+    assert still["Length of the mean vector"] == ("0.0047 m/s", "gated; 0.97 bound 0.0094 m/s")
+    assert still["Make-up of the velocity error"][0] == "white 0.040 m/s, correlated 0.020 m/s over 4.1 s"
+
+
+def test_what_is_unknown_is_an_em_dash() -> None:
+    answer = heading_result(lever_arm_m=None, time_offset_s=None, drift_deg_per_h=None, error_deg=float("nan"))
+    section = heading(example(answer))
+    told = facts(section.parts, "Lever arm, time offset, drift")
+    assert [told[label][0] for label in ("GNSS time offset", "Azimuth drift")] == ["—", "—"]
+    assert [told[label][1] for label in ("GNSS time offset", "Azimuth drift")] == ["not observable", "not measured"]
+    assert grid(section, "Estimates").rows[0][1] == "—"
+
+
+def test_segments_stand_in_a_table_where_no_figure_is_drawn() -> None:
+    section = heading(example(heading_result()))
+    (forest,) = [part for part in section.parts if isinstance(part, Figure) and part.name == "heading.forest"]
+    assert isinstance(forest.instead, Grid)
+    assert len(forest.instead.rows) == 4
+    first = tuple(str(cell).replace("\u202f", " ") for cell in forest.instead.rows[0])
+    assert first == ("1:10 – 2:10", "600", "302.0°", "8.9 m/s", "+1.070°", "0.060°")
+
+
+def test_intervals_chosen_by_hand_are_told_where_they_are_known() -> None:
+    chosen = (ChosenInterval("exclude", "+03:10", "+03:15", "towed"), ChosenInterval("force", "1", "2"))
+    part = next(
+        part
+        for part in heading(example(heading_result()), chosen).parts
+        if isinstance(part, Facts) and part.title == "Intervals chosen by hand"
+    )
+    assert part.pairs == [
+        ("Left out by hand", "+03:10 – +03:15", "towed"),
+        ("Used by hand against the gates", "1 – 2", ""),
+    ]
+    assert not [one for one in heading(example(heading_result())).parts if getattr(one, "title", "") == part.title]
+
+
+def test_settings_are_for_the_printed_page() -> None:
+    (settings,) = [
+        part for part in heading(example(heading_result())).parts if isinstance(part, Facts) and part.compact
+    ]
+    assert ("taxi speed min", "6\u202fm/s", "") in settings.pairs
+
+
+def test_every_figure_of_a_chapter_has_a_drawer() -> None:
+    results = example(heading_result())
+    chapters = [heading(results), overview(results), quality(results)]
+    named = [part.name for one in chapters if one for part in one.parts if isinstance(part, Figure)]
+    assert set(named) <= set(DRAWERS) and len(named) == len(set(named)) == 12
+    drawn = [part for one in chapters if one for part in with_drawings(one, results).parts if isinstance(part, Drawing)]
+    assert len(drawn) == 11, "the example has no spectrum"
+
+
+# ---------------------------------------------------------------------- quality, findings, provenance, overview
+
+
+def test_ledger_has_a_row_for_each_topic() -> None:
+    table = grid(quality(example(None)), "Topics")
+    titles = [head.title for head in table.heads]
+    gnss = dict(zip(titles, next(row for row in table.rows if row[0] == "gnss"), strict=True))
+    assert gnss["Rows"] == "29\u202f690" and gnss["Rate / nominal, Hz"] == "9.97 / 10"
+    assert (gnss["Coverage"], gnss["Longest gap, s"]) == ("99.0%", "28.10")
+    assert (gnss["Gaps"], gnss["Duplicates"], gnss["Steps back"]) == ("2", "14", "1")
+    assert "Stuck" not in titles, "a ledger without that column counts nothing of it"
+
+
+def test_a_long_ledger_is_cut_and_says_so() -> None:
+    count = 70
+    ledger = figure("ledger", topic=[f"raw.t{number}" for number in range(count)], rows=[1] * count, stuck=[2] * count)
+    table = grid(quality(example(None, figures=(ledger,))), "Topics")
+    assert len(table.rows) == 60 and table.caption == "10 more topics in the table file."
+    assert table.heads[-1].title == "Stuck" and table.rows[0][-1] == "2"
+
+
+def test_quality_begins_with_flight_status_and_log_where_there_is_no_front() -> None:
+    section = quality(example(None))
+    assert section.headline == "20260504T060000Z_A12_17: ok"
+    log = facts(section.above, "")
+    assert log["Log"] == ("2026-05-04 A12 flight 17.csv", "48 211 902 bytes")
+    assert log["SHA-256 of the log"][0] == "9f" * 32
+
+
+def test_clock_and_ledger_are_told_by_their_fields() -> None:
+    parts = quality(example(None)).parts
+    clock = facts(parts, "Clock model")
+    assert clock["nominal period"][0] == "0.02 s" and clock["is absolute"][0] == "yes"
+    ledger = facts(parts, "Ledger of the log")
+    assert ledger["dropouts · count"][0] == "0" and ledger["truncated"][0] == "—"
+    assert not {"topics", "damages", "remarks", "spans"} & set(ledger)
+
+
+def test_losses_are_a_table_and_remarks_are_not() -> None:
+    what = "bytes of a record"
+    damage = DamageEntry(kind="truncated", what=what, topic="", place="byte 9", count=7, loses_data=True)
+    remark = RemarkEntry(code="derived", text="told as a finding", topic="ins")
+    section = quality(example(None, ledger=Ledger(damages=(damage,), remarks=(remark,))))
+    assert grid(section, "Damage to the log").rows == [("truncated", what, "byte 9", "7", "yes")]
+    assert "told as a finding" not in str(section)
+    assert Note("No damage was found in the log: nothing lost, nothing unreadable.", "good") in quality(BARE).parts
+
+
+def test_findings_stand_gravest_first() -> None:
+    found = tuple(Finding(severity, f"a.{severity}", f"text of {severity}") for severity in ("info", "fail", "warn"))
+    results = example(None, findings=found)
+    rows = grid(findings(results), "Findings").rows
+    assert [row[0] for row in rows] == [Mark("bad", "fail"), Mark("warn", "warn"), Mark("plain", "info")]
+    assert [row[1] for row in rows] == ["text of fail", "text of warn", "text of info"]
+    assert dict(front(results).pairs)["Findings"] == "1 fail · 1 warn · 1 info"
+
+
+def test_remarks_on_raw_topics_are_one_line() -> None:
+    remarks = [Finding("info", "values.nan", f"raw.t.f{n}: NaN", "raw.t", "", 2) for n in range(50)]
+    results = example(None, findings=(*remarks, Finding("warn", "data.truncated", "cut", "", "byte 9", 1)))
+    table = grid(findings(results), "Findings")
+    assert table.rows[0] == (Mark("warn", "warn"), "cut", "byte 9", "1", "data.truncated")
+    joined = "50 fields of raw topics hold NaN as the device wrote it: t"
+    assert table.rows[1] == (Mark("plain", "info"), joined, "", "100", "values.nan")
+    assert len(table.rows) == 2 and "summary.json lists all 51" in table.caption
+
+
+def test_what_was_not_assessable_stands_with_its_reason() -> None:
+    assert grid(findings(example(None)), "Not assessable").rows == [("magnetic", "no magnetometer in the log")]
+
+
+def test_provenance_names_log_and_files() -> None:
+    section = provenance(example(None))
+    files = facts(section.parts, "Source and files")
+    assert files["SHA-256 of the log"][0] == "9f" * 32
+    assert files["Recording"] == ("20260504T060000Z_A12_17.rrd", "open with: groundstation view")
+    assert list(facts(section.parts, "Metadata of the log")) == ["aircraft", "crew", "flight", "start_utc"]
+
+
+def test_long_lists_of_metadata_are_left_to_the_summary() -> None:
+    section = provenance(example(None, metadata={"aircraft": "A12", "parameter.X": "1", "units.y": "m"}))
+    assert list(facts(section.parts, "Metadata of the log")) == ["aircraft"]
+    assert "stands in summary.json" in notes(section.parts)[0]
+
+
+def test_overview_stands_where_there_is_something_to_draw() -> None:
+    section = overview(example(None))
+    assert section is not None
+    assert [part.name for part in section.parts if isinstance(part, Figure)] == [
+        *("overview.track", "overview.profile", "overview.states")
+    ]
+    answer = example(heading_result()).answer(HeadingResult)
+    assert answer is not None and overview(example(answer, figures=answer.figures)) is None
