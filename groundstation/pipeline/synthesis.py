@@ -16,6 +16,7 @@ STUDIES = {
     "heading": "heading correction before take-off: errors, coverage of the interval, the figures of the paper again",
     "forecast": "forecast of INS errors: every method under true and false models, and how honest its sigma is",
     "magnetic": "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
+    "cooperative": "navigation between aircraft: published figures with ours beside them, divergence, consistency",
 }
 
 
@@ -102,4 +103,8 @@ def _study(name: str) -> "Callable[..., StudyResult]":
         from groundstation.studies.magnetic import study_magnetic
 
         return study_magnetic
+    if name == "cooperative":
+        from groundstation.studies.cooperative import study_cooperative
+
+        return study_cooperative
     raise UsageError("study", repr(name), f"one of {', '.join(STUDIES)}")

@@ -115,7 +115,7 @@ def sidereal_angle_rad(start_utc_ns: int, time_s: FloatArray) -> FloatArray:
 def elevation_deg(satellite_m: FloatArray, place_m: FloatArray, down: FloatArray) -> FloatArray:
     """Elevation above the horizon, degrees, of positions (..., 3) seen from a place whose down axis is ``down``."""
     line = satellite_m - place_m
-    return np.rad2deg(np.arcsin(-(line * down).sum(axis=-1) / np.linalg.norm(line, axis=-1)))
+    return np.asarray(np.rad2deg(np.arcsin(-(line * down).sum(axis=-1) / np.linalg.norm(line, axis=-1))))
 
 
 def emission_ecef_m(

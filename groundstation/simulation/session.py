@@ -86,7 +86,7 @@ def simulate_session(scenario: SessionScenario, seed: int, run: int = 0, *, scal
         points=points,
         ranges=draw_ranges(scenario, flown, generators[-2], scale),
         satellites=draw_satellite_ranges(scenario, flown, generators[-1], scale),
-        ranks={one.name: one.rank for one in (*scenario.aircraft, *scenario.points)},
+        ranks={one.name: one.rank for one in scenario.aircraft} | {one.name: one.rank for one in scenario.points},
     )
     errors_m = {name: (float(error[0]), float(error[1]), 0.0) for name, error in wrong.items()}
     return SimulatedSession(session, tuple(truths), errors_m)

@@ -65,9 +65,8 @@ def _pseudorange(
     """True distance with both clocks in it, at places of the grid."""
     place, clock = receiver.motion.position_m[at], receiver.errors.clock_m[at]
     if isinstance(transmitter, Flown):
-        return (
-            np.linalg.norm(place - transmitter.motion.position_m[at], axis=1) + clock - transmitter.errors.clock_m[at]
-        )
+        distance = np.linalg.norm(place - transmitter.motion.position_m[at], axis=1)
+        return np.asarray(distance + clock - transmitter.errors.clock_m[at])
     return np.asarray(np.linalg.norm(place - place_m(scenario, transmitter), axis=1) + clock)
 
 

@@ -44,7 +44,8 @@ class Motion:
 
 def grid_s(scenario: SessionScenario) -> FloatArray:
     """Times of the fine grid: one for each slot of the link."""
-    return scenario.link.slot_s * np.arange(round(scenario.duration_s / scenario.link.slot_s) + 1)
+    count = round(scenario.duration_s / scenario.link.slot_s) + 1
+    return np.asarray(scenario.link.slot_s * np.arange(count), dtype=np.float64)
 
 
 @lru_cache(maxsize=64)  # motion has no randomness: the runs of a study share it

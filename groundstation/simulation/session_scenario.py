@@ -136,7 +136,7 @@ class SessionScenario:
 
     def __post_init__(self) -> None:
         check_ranges(self)
-        names = [one.name for one in (*self.aircraft, *self.points)]
+        names = [one.name for one in self.aircraft] + [point.name for point in self.points]
         if not 1 <= len(self.aircraft) <= MOST_AIRCRAFT:
             raise SettingsError("aircraft", f"{len(self.aircraft)} aircraft", f"1 to {MOST_AIRCRAFT}")
         if len(set(names)) < len(names):

@@ -153,12 +153,17 @@ class Ranges:
 
     def take(self, rows: Any) -> "Ranges":
         """The rows that a mask or positions select."""
-        parts = {
-            item.name: value if value is None or isinstance(value, bool) else value[rows]
-            for item in fields(self)
-            for value in (getattr(self, item.name),)
-        }
-        return Ranges(**parts)
+        return Ranges(
+            self.time_s[rows],
+            self.receiver[rows],
+            self.source[rows],
+            self.pseudorange_m[rows],
+            self.sigma_m[rows],
+            self.slot[rows],
+            None if self.bearing_deg is None else self.bearing_deg[rows],
+            None if self.bearing_sigma_deg is None else self.bearing_sigma_deg[rows],
+            self.is_two_way,
+        )
 
 
 @dataclass(frozen=True)

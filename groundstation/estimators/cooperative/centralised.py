@@ -27,8 +27,8 @@ LEAP_M = 1e5
 class _Joint:
     """State x and covariance P of all vehicles and uncertain points."""
 
-    def __init__(self, prepared: Prepared) -> None:
-        self.prepared = prepared
+    def __init__(self, prepared: Prepared, settings: CooperativeSettings) -> None:
+        self.prepared, self.about_reckoning = prepared, settings.derivatives == "reckoning"
         starts = [vehicle.start() for vehicle in prepared.vehicles]
         sizes = [len(x) for x, _ in starts]
         edges = np.concatenate([[0], np.cumsum(sizes)])
@@ -71,7 +71,8 @@ class _Joint:
         elif event.kind == POINT and event.source in self.points:
             assert event.place_m is not None
             source_m = event.place_m - self.prepared.point_axes[event.source] @ self.x[self.points[event.source]]
-        for row in rows_of(event, vehicles[event.receiver], here[0], source_m, clock_m):
+        about = self._line_of_reckoning(event) if self.about_reckoning else None
+        for row in rows_of(event, vehicles[event.receiver], here[0], source_m, clock_m, about):
             h = np.zeros(len(self.x))
             h[self.slices[event.receiver]] = row.receiver @ here[1]
             if there is not None:
@@ -80,6 +81,16 @@ class _Joint:
                 h[self.points[event.source]] = -row.place @ self.prepared.point_axes[event.source]
             found.append((row, h))
         return found
+
+    def _line_of_reckoning(self, event: Event) -> FloatArray | None:
+        """Line between two aircraft as their dead reckoning has it: it never jumps with the estimate."""
+        vehicles = self.prepared.vehicles
+        if event.kind != PEER or vehicles[event.receiver].clock < 0 or vehicles[event.source].clock < 0:
+            return None
+        ends = [
+            vehicles[who].place(np.zeros(vehicles[who].size), event.time_s)[0] for who in (event.receiver, event.source)
+        ]
+        return np.asarray(ends[0] - ends[1])
 
     def _at(self, who: int, at_s: float) -> tuple[FloatArray, FloatArray]:
         """State of a vehicle at a time not later than its own, and its derivative by the state it has."""
@@ -120,7 +131,7 @@ def run_centralised(
     innovates : bool
         False: measurements shrink the covariance and leave the state where it is, as if each were predicted exactly.
     """
-    joint, recorder = _Joint(prepared), Recorder(prepared.vehicles)
+    joint, recorder = _Joint(prepared, settings), Recorder(prepared.vehicles)
     rejected = [0] * len(prepared.vehicles)
     together = settings.update == "simultaneous"
     for at_s, what in timeline(prepared, settings, together=together):

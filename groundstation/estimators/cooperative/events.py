@@ -138,8 +138,7 @@ def _clean(track: DeadReckoning | Odometry, findings: list[Finding]) -> DeadReck
         return None
     if good.all():
         return track
-    rest = {name: value for name, value in vars(track).items() if name not in parts}
-    return type(track)(**{name: value[good] for name, value in parts.items()}, **rest)
+    return replace(track, **{name: value[good] for name, value in parts.items()})  # type: ignore[arg-type]
 
 
 def _count(findings: list[Finding], code: str, text: str, bad: BoolArray, topic: str = "") -> None:

@@ -46,7 +46,12 @@ class Row:
 
 
 def rows_of(
-    event: Event, vehicle: Vehicle, x: FloatArray, source_m: FloatArray | None, source_clock_m: float
+    event: Event,
+    vehicle: Vehicle,
+    x: FloatArray,
+    source_m: FloatArray | None,
+    source_clock_m: float,
+    about_m: FloatArray | None = None,
 ) -> list[Row]:
     """Linearise one event about the receiver's state and what is known of the source.
 
@@ -61,6 +66,8 @@ def rows_of(
         Position of a peer; points and satellites carry their own.
     source_clock_m : float
         Clock offset of a peer; 0 else.
+    about_m : ndarray, shape (3,), optional
+        Line from the source to the receiver whose direction is the derivative of the range; None: that of the estimate.
 
     Returns
     -------
@@ -81,7 +88,8 @@ def rows_of(
         return []
     rows = []
     if np.isfinite(event.value_m):
-        rows.append(_range_row(event, vehicle, x, place, derivative, source, source_clock_m, line / distance, distance))
+        direction = line / distance if about_m is None else about_m / float(np.sqrt(about_m @ about_m))
+        rows.append(_range_row(event, vehicle, x, place, derivative, source, source_clock_m, direction, distance))
     if np.isfinite(event.bearing_rad):
         rows.append(_bearing_row(event, vehicle, x, derivative, -line))
     return rows
@@ -107,7 +115,7 @@ def _range_row(
         predicted += float(x[clock]) - source_clock_m
         h[clock] += 1.0
         by_clock = 0.0 if event.kind in (POINT, SATELLITE) else -1.0
-    if vehicle.bias >= 0 and event.kind not in (POINT, SATELLITE):
+    if vehicle.bias >= 0 and event.kind != SATELLITE:
         predicted += float(x[vehicle.bias])
         h[vehicle.bias] += 1.0
     return Row(event.value_m - predicted, h, -direction, by_clock, event.variance_m2)

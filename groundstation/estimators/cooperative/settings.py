@@ -72,6 +72,10 @@ class CooperativeSettings:
     ----------
     update : {'sequential', 'simultaneous'}
         Every measurement at its own time with its own linearisation, or all of one frame together.
+    derivatives : {'estimate', 'reckoning'}
+        Where the centralised filter takes the direction of a range between two aircraft: at its estimate, or at their
+        dead reckoning. Directions that jump with the estimate tell of a turn of the whole group, which ranges between
+        its members cannot see (first-estimates Jacobian: Huang, Mourikis and Roumeliotis, 2010).
     frame_s : float
         Length of a frame, for simultaneous updates and for the modified algorithm.
     gate_sigma : float
@@ -90,6 +94,7 @@ class CooperativeSettings:
     """
 
     update: Update = "sequential"
+    derivatives: Literal["estimate", "reckoning"] = "reckoning"
     frame_s: float = number(1.0, 0.01)
     gate_sigma: float = number(6.0, 0.0)
     latency_slots: int = number(1, 0, 10)

@@ -7,10 +7,11 @@ Source: Van Loan, Computing integrals involving the matrix exponential, IEEE Tra
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.compile import compiled
 from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
 
-TERMS = 30
-RELATIVE = 1e-17
+TERMS, FEWEST_TERMS = 40, 4
+SMALLEST = 1e-16  # of a term of the transition: its largest entry is 1 or more
 
 
 def discretise(F: FloatArray, q: FloatArray, step_s: float) -> tuple[FloatArray, FloatArray]:
@@ -29,22 +30,52 @@ def discretise(F: FloatArray, q: FloatArray, step_s: float) -> tuple[FloatArray,
     -----
     Phi = sum (F h)^k / k!; Q = sum L_k h^(k+1) / (k+1)! with L_0 = diag(q), L_(k+1) = F L_k + L_k F'.
     """
-    transition, term = np.eye(len(F)), np.eye(len(F))
-    level = np.diag(q)
-    factor = step_s
-    noise = level * factor
-    for k in range(1, TERMS):
-        term = F @ term * (step_s / k)
-        transition = transition + term
-        level = F @ level
-        level = level + level.T
-        factor *= step_s / (k + 1)
-        added = level * factor
-        noise = noise + added
-        small = np.abs(added).max() <= RELATIVE * np.abs(noise).max() and k > 5
-        if small and np.abs(term).max() < RELATIVE * np.abs(transition).max():
-            break
+    n = len(F)
+    transition, noise = np.empty((n, n)), np.empty((n, n))
+    _series(np.ascontiguousarray(F), q, step_s, transition, noise)
     return transition, noise
+
+
+@compiled
+def _series(F, q, step_s, transition, noise):  # type: ignore[no-untyped-def]
+    """Both sums at once; rows and columns of F without an entry cost nothing but their zeros."""
+    n = F.shape[0]
+    term, level, moved = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
+    for i in range(n):
+        for j in range(n):
+            transition[i, j] = noise[i, j] = 0.0
+        term[i, i] = transition[i, i] = 1.0
+        level[i, i] = q[i]
+        noise[i, i] = q[i] * step_s
+    factor = step_s
+    for k in range(1, TERMS):
+        largest = 0.0
+        for i in range(n):
+            for j in range(n):
+                total = 0.0
+                for m in range(n):
+                    if F[i, m] != 0.0:
+                        total += F[i, m] * term[m, j]
+                moved[i, j] = total * step_s / k
+        for i in range(n):
+            for j in range(n):
+                term[i, j] = moved[i, j]
+                transition[i, j] += moved[i, j]
+                largest = max(largest, abs(moved[i, j]))
+        for i in range(n):
+            for j in range(n):
+                total = 0.0
+                for m in range(n):
+                    if F[i, m] != 0.0:
+                        total += F[i, m] * level[m, j]
+                moved[i, j] = total
+        factor *= step_s / (k + 1)
+        for i in range(n):
+            for j in range(n):
+                level[i, j] = moved[i, j] + moved[j, i]
+                noise[i, j] += level[i, j] * factor
+        if k >= FEWEST_TERMS and largest < SMALLEST:
+            break
 
 
 def local_dynamics(velocity_s: float, baro_s: float, clock_s: float) -> FloatArray:

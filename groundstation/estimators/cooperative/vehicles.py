@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.geodesy import EARTH_RATE_RADPS
+from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
 from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.estimators.cooperative.transition import discretise, global_dynamics, local_dynamics
 from groundstation.tables.session import DeadReckoning, Frame, Odometry
@@ -59,16 +59,15 @@ class Vehicle(Protocol):
 class InertialVehicle:
     """An aircraft with INS, barometric altimeter and clock: 7 states in a local frame, 13 or 15 in the global one."""
 
-    heading = -1
+    heading: int = -1
 
     def __init__(self, track: DeadReckoning, frame: Frame, settings: CooperativeSettings) -> None:
         self.name, self._track, self._frame, self._settings = track.name, track, frame, settings
         self.first_s, self.last_s = float(track.time_s[0]), float(track.time_s[-1])
         belief = settings.ins
-        if frame == "local":
-            self.states = ("north_m", "east_m", "velocity_north_mps", "velocity_east_mps")
-        else:
-            self.states = ("north_m", "east_m", "velocity_north_mps", "velocity_east_mps", *_PLATFORM)
+        self.states: tuple[str, ...] = ("north_m", "east_m", "velocity_north_mps", "velocity_east_mps")
+        if frame == "ecef":
+            self.states += _PLATFORM
         self.height = len(self.states)
         self.clock = self.receiver_clock = self.height + 1
         self.states += ("height_m", "clock_m", "clock_mps")
@@ -84,6 +83,7 @@ class InertialVehicle:
             self.states += ("lever_forward_m", "lever_right_m")
         self._steps: dict[tuple[float, float], tuple[FloatArray, FloatArray]] = {}
         self._places: dict[float, tuple[FloatArray, FloatArray]] = {}
+        self._dynamics_at: dict[int, FloatArray] = {}
         self._density = self._noise_density()
 
     @property
@@ -107,7 +107,7 @@ class InertialVehicle:
 
     def step(self, x: FloatArray, from_s: float, to_s: float) -> Step:
         """Linear: the matrices of a pair of times are kept, all algorithms ask for the same."""
-        key = (from_s, to_s)
+        key = (0.0, round(to_s - from_s, 9)) if self._frame == "local" else (from_s, to_s)
         if key not in self._steps:
             self._steps[key] = self._matrices(from_s, to_s)
         transition, noise = self._steps[key]
@@ -127,7 +127,7 @@ class InertialVehicle:
     def _reading(self, at_s: float) -> tuple[FloatArray, FloatArray]:
         """Position between two epochs (cubic through both positions and velocities) and derivative by the state."""
         track = self._track
-        after = int(np.clip(np.searchsorted(track.time_s, at_s), 1, len(track) - 1)) if len(track) > 1 else 0
+        after = min(max(int(np.searchsorted(track.time_s, at_s)), 1), len(track) - 1)
         nearest = after
         if len(track) == 1:
             position = track.position_m[0]
@@ -162,7 +162,9 @@ class InertialVehicle:
             at = int(
                 np.clip(np.searchsorted(self._track.time_s, 0.5 * (one + two)) - 1, 0, max(len(self._track) - 2, 0))
             )
-            phi, q = discretise(self._dynamics(at), self._density, two - one)
+            if at not in self._dynamics_at:
+                self._dynamics_at[at] = self._dynamics(at)
+            phi, q = discretise(self._dynamics_at[at], self._density, two - one)
             transition, noise = phi @ transition, phi @ noise @ phi.T + q
         return transition, noise
 
@@ -217,29 +219,26 @@ _PLATFORM = tuple(
 
 def _specific_force(latitude_deg: float, height_m: float, velocity: FloatArray, change: FloatArray) -> FloatArray:
     """Specific force north, east, down: change of velocity, Coriolis and transport terms, less gravity."""
-    from groundstation.base.geodesy import curvature_radii_m
-
     latitude_rad = np.deg2rad(latitude_deg)
     sine, cosine = float(np.sin(latitude_rad)), float(np.cos(latitude_rad))
     meridian, normal = (float(radius) + height_m for radius in curvature_radii_m(latitude_deg))
-    north, east, _ = velocity
+    north, east, down = (float(value) for value in velocity)
     equator, k, e2 = GRAVITY_MPS2
-    gravity = equator * (1.0 + k * sine**2) / np.sqrt(1.0 - e2 * sine**2) * (1.0 - 2.0 * height_m / 6_371_000.0)
-    turn = np.array(
-        [
-            2.0 * EARTH_RATE_RADPS * cosine + east / normal,
-            -north / meridian,
-            -2.0 * EARTH_RATE_RADPS * sine - east * sine / cosine / normal,
-        ]
-    )
-    return np.asarray(change + np.cross(turn, velocity) - np.array([0.0, 0.0, gravity]))
+    gravity = equator * (1.0 + k * sine**2) / (1.0 - e2 * sine**2) ** 0.5 * (1.0 - 2.0 * height_m / 6_371_000.0)
+    w_n = 2.0 * EARTH_RATE_RADPS * cosine + east / normal
+    w_e = -north / meridian
+    w_d = -2.0 * EARTH_RATE_RADPS * sine - east * sine / cosine / normal
+    coriolis = [w_e * down - w_d * east, w_d * north - w_n * down, w_n * east - w_e * north - gravity]
+    return np.asarray(change + np.array(coriolis))
 
 
 class WheeledVehicle:
     """A ground vehicle with odometry: north, east, heading, and scale errors of speed and turn where believed."""
 
-    clock = receiver_clock = height = -1
-    heading = 2
+    clock: int = -1
+    receiver_clock: int = -1
+    height: int = -1
+    heading: int = 2
 
     def __init__(self, track: Odometry, settings: CooperativeSettings) -> None:
         self.name, self._track, self._settings = track.name, track, settings
@@ -278,12 +277,16 @@ class WheeledVehicle:
     def step(self, x: FloatArray, from_s: float, to_s: float) -> Step:
         """Integrate odometry, each reading held until the next; derivative by the state with it."""
         track, n = self._track, self.size
-        first = max(int(np.searchsorted(track.time_s, from_s + SAME_TIME_S)) - 1, 0)
-        last = max(int(np.searchsorted(track.time_s, to_s - SAME_TIME_S)) - 1, first)
-        edges = [from_s, *track.time_s[first + 1 : last + 1].tolist(), to_s]
+        early, late = min(from_s, to_s), max(from_s, to_s)
+        first = max(int(np.searchsorted(track.time_s, early + SAME_TIME_S)) - 1, 0)
+        last = max(int(np.searchsorted(track.time_s, late - SAME_TIME_S)) - 1, first)
+        edges = [early, *track.time_s[first + 1 : last + 1].tolist(), late]
+        epochs = list(range(first, first + len(edges) - 1))
+        if to_s < from_s:  # back in time, for measurements that are used together
+            edges, epochs = edges[::-1], epochs[::-1]
         x, transition, noise = x.copy(), np.eye(n), np.zeros((n, n))
-        for k, (one, two) in enumerate(pairwise(edges)):
-            x, phi, q = self._short_step(x, first + k, two - one)
+        for epoch, (one, two) in zip(epochs, pairwise(edges), strict=True):
+            x, phi, q = self._short_step(x, epoch, two - one)
             transition, noise = phi @ transition, phi @ noise @ phi.T + q
         return x, transition, noise
 

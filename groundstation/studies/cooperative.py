@@ -1,0 +1,35 @@
+"""Monte Carlo behind navigation between aircraft: every published figure with ours beside it, and how honest it is."""
+
+from collections.abc import Sequence
+
+from groundstation.studies.cooperative_cases import CASES, FIRST_SEED, Case
+from groundstation.studies.cooperative_page import page, study_table
+from groundstation.studies.cooperative_runs import WORKERS, Progress, run_cases
+from groundstation.studies.page import StudyResult
+
+
+def study_cooperative(
+    runs: int = 100,
+    seed: int = 0,
+    progress: Progress | None = None,
+    *,
+    cases: Sequence[Case] = CASES,
+    workers: int = WORKERS,
+) -> StudyResult:
+    """Fly every published case and compare.
+
+    Parameters
+    ----------
+    runs : int
+        Sessions of each case; 100 give NEES to 10 %.
+    seed : int
+        The runs' seed is ``FIRST_SEED + seed``.
+    progress : callable, optional
+        Called with one line for each case.
+    cases : sequence of Case
+    workers : int
+        Processes; the answer does not depend on them.
+    """
+    outcomes = run_cases(cases, runs, FIRST_SEED + seed, progress, workers)
+    table = study_table(cases, outcomes)
+    return StudyResult("cooperative", (table,), page(cases, table, runs, FIRST_SEED + seed))
