@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from groundstation.base.angles import FloatArray, wrap_360
-from groundstation.base.ecef import ecef_from_n, ecef_m
+from groundstation.base.ecef import ecef_from_n, ecef_m, geodetic_deg_m
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number, required_number
 
@@ -72,3 +72,17 @@ def level_direction(heading_deg: ArrayLike) -> FloatArray:
     """Unit vectors north, east, down of headings, shape (n, 3)."""
     heading_rad = np.deg2rad(heading_deg)
     return np.stack([np.cos(heading_rad), np.sin(heading_rad), np.zeros_like(heading_rad)], axis=-1)
+
+
+def plane_through(position_m: FloatArray) -> LocalFrame:
+    """The frame whose origin lies on the ellipsoid below the middle of ECEF positions (n, 3), NaN rows left out.
+
+    Examples
+    --------
+    >>> found = plane_through(ecef_m([55.0, 57.0], [38.0, 38.0], [0.0, 9000.0]))
+    >>> round(found.latitude_deg), round(found.longitude_deg), found.altitude_ellipsoid_m
+    (56, 38, 0.0)
+    """
+    middle = position_m[np.isfinite(position_m).all(axis=1)].mean(axis=0)
+    latitude, longitude, _ = geodetic_deg_m(middle)
+    return LocalFrame(float(latitude), float(longitude))

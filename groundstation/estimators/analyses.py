@@ -1,9 +1,11 @@
-"""The analyses of a flight, in the order they are shown. A new one is a folder of its own and a line here."""
+"""The analyses of a flight and of a session, in the order they are shown. A new one is a folder and a line here."""
 
 from groundstation.estimators.analysis import Analysis
+from groundstation.estimators.cooperative.analysis import COOPERATIVE
 from groundstation.estimators.heading.analysis import HEADING
 from groundstation.estimators.inertial.analysis import FORECAST, INERTIAL
 from groundstation.estimators.latency.analysis import LATENCY
 from groundstation.estimators.magnetic.analysis import MAGNETIC, MAGNETIC_GROUND
 
 FLIGHT_ANALYSES: tuple[Analysis, ...] = (HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND)
+SESSION_ANALYSES: tuple[Analysis, ...] = (COOPERATIVE,)

@@ -4,16 +4,18 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.front import front
 from groundstation.chapters.parts import Document
 from groundstation.reports.page import TEMPLATES, render
 from groundstation.reports.pdf import PdfError, write_pdf
-from groundstation.reports.sections import CHAPTERS
+from groundstation.reports.sections import CHAPTERS, SESSION_CHAPTERS
 from groundstation.reports.steer_card import write_exports
 from groundstation.results.files import SavedFlight, load, write_text
 
 REPORT = "report.html"
 PDF = "report.pdf"
+SESSION = "Session report"
 _NOT_IN_AN_ID = re.compile(r"[^A-Za-z0-9_-]+")
 
 
@@ -64,9 +66,10 @@ def write_pages(page: Path, html: str, document: Document, *, with_pdf: bool) ->
 
 
 def flight_document(saved: SavedFlight) -> Document:
-    """Put the report of one saved flight together."""
-    sections = tuple(section for section in (build(saved) for build in CHAPTERS) if section is not None)
-    return Document("Flight report", saved.results.flight_id, front(saved.results), sections)
+    """Put the report of one saved flight, or of a session of several, together."""
+    chapters, kind = (SESSION_CHAPTERS, SESSION) if is_session(saved.results) else (CHAPTERS, "Flight report")
+    sections = tuple(section for section in (build(saved) for build in chapters) if section is not None)
+    return Document(kind, saved.results.flight_id, front(saved.results), sections)
 
 
 def flight_report_html(document: Document) -> str:
@@ -77,6 +80,7 @@ def flight_report_html(document: Document) -> str:
         label=document.label,
         front=document.front,
         sections=document.sections,
+        verdict_of="the session" if document.kind == SESSION else "the heading correction",
         page_label=_NOT_IN_AN_ID.sub("-", document.label),  # stands inside a CSS string
         style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
     )

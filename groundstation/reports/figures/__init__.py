@@ -5,7 +5,16 @@ from dataclasses import replace
 
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.figures import heading, latency, magnetic, magnetic_ground, overview, quality, standstill
+from groundstation.reports.figures import (
+    cooperative,
+    heading,
+    latency,
+    magnetic,
+    magnetic_ground,
+    overview,
+    quality,
+    standstill,
+)
 from groundstation.results.flight import FlightResults
 
 Drawn = Drawing | Sequence[Drawing] | None
@@ -31,6 +40,10 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "overview.profile": overview.profile,
     "overview.states": overview.states,
     "quality.gaps": quality.gaps,
+    "cooperative.map": cooperative.session_map,
+    "cooperative.errors": cooperative.errors,
+    "cooperative.geometry": cooperative.geometry,
+    "cooperative.links": cooperative.links,
 }
 
 

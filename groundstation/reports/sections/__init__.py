@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from groundstation.chapters.cooperative import cooperative
 from groundstation.chapters.findings import findings
 from groundstation.chapters.heading import heading as heading_chapter
 from groundstation.chapters.latency import latency
@@ -61,6 +62,12 @@ CHAPTERS: tuple[Callable[[SavedFlight], Section | None], ...] = (
     _drawn(magnetic),
     _drawn(overview),
     _drawn(quality),
+    _drawn(findings),
+    _drawn(provenance),
+)
+# Of a session of several aircraft.
+SESSION_CHAPTERS: tuple[Callable[[SavedFlight], Section | None], ...] = (
+    _drawn(cooperative),
     _drawn(findings),
     _drawn(provenance),
 )
