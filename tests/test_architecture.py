@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.architecture_picture import PICTURE, picture
+
 PACKAGE = Path(__file__).parents[1] / "groundstation"
 
 MAY_IMPORT: dict[str, set[str]] = {
@@ -109,3 +111,7 @@ def _imported(path: Path, files: Mapping[str, Path]) -> set[str]:
                 name if (name := f"{node.module}.{alias.name}") in files else node.module or "" for alias in node.names
             )
     return found & files.keys()
+
+
+def test_picture_of_the_rooms_is_fresh() -> None:
+    assert PICTURE.read_text(encoding="utf-8") == picture(), "python -m tests.architecture_picture draws it again"

@@ -205,7 +205,7 @@ def test_intervals_chosen_by_hand_are_told_where_they_are_known() -> None:
     chosen = (ChosenInterval("exclude", "+03:10", "+03:15", "towed"), ChosenInterval("force", "1", "2"))
     part = next(
         part
-        for part in heading(example(heading_result()), chosen).parts
+        for part in heading(example(heading_result(), chosen=chosen)).parts
         if isinstance(part, Facts) and part.title == "Intervals chosen by hand"
     )
     assert part.pairs == [
@@ -263,7 +263,7 @@ def test_quality_begins_with_flight_status_and_log_where_there_is_no_front() -> 
 def test_clock_and_ledger_are_told_by_their_fields() -> None:
     parts = quality(example(None)).parts
     clock = facts(parts, "Clock model")
-    assert clock["nominal period"][0] == "0.02 s" and clock["is absolute"][0] == "yes"
+    assert clock["nominal period"][0] == "0.02 s" and clock["is absolute"][0] == "no"
     ledger = facts(parts, "Ledger of the log")
     assert ledger["dropouts · count"][0] == "0" and ledger["truncated"][0] == "—"
     assert not {"topics", "damages", "remarks", "spans"} & set(ledger)

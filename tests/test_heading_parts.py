@@ -30,17 +30,10 @@ from groundstation.estimators.heading.samples import (
     window_slope,
     without_arm,
 )
-from groundstation.estimators.heading.settings import (
-    AircraftData,
-    HeadingRequest,
-    HeadingSettings,
-    Interval,
-    Runway,
-    SiteData,
-    Stand,
-)
+from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.heading.standstill import effective_samples, find_standstill, speed_bound_mps
 from groundstation.estimators.heading.verdict import decide, explain
+from groundstation.estimators.known import AircraftData, Interval, Runway, SiteData, Stand
 from groundstation.results.heading import Gate
 from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.taxi import TaxiCase, noiseless, simulate_taxi, table_of, taxi_flight

@@ -46,7 +46,7 @@ def test_utc_of_zero_makes_it_absolute() -> None:
 def test_a_clock_that_was_never_set_tells_no_date(zero: str) -> None:
     clock, times = model([5, 6, 7], iso_to_utc_ns(zero)[0])
     assert (clock.is_absolute, clock.start, times) == (False, "unset", [5, 6, 7])
-    assert clock.to_dict()["first_device_time"] == zero.replace(":00Z", ":05.000Z")
+    assert clock.document().first_device_time == zero.replace(":00Z", ":05.000Z")
     clock, times = model([5, 6, 7], iso_to_utc_ns("1980-02-01T00:00:00Z")[0])
     assert clock.is_absolute and clock.start == "utc"
 

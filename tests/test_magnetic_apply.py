@@ -29,10 +29,10 @@ from groundstation.pipeline.batch import plan_many, run_many
 from groundstation.pipeline.check import check_many
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.deviation_to_apply import Apply, asked_for
-from groundstation.pipeline.elsewhere import FarFolder
 from groundstation.pipeline.inputs import file_in
 from groundstation.pipeline.outcome import Outcome
 from groundstation.pipeline.publishing import report_again
+from groundstation.pipeline.remote import RemoteFolder
 from groundstation.reports.drawing import sketching
 from groundstation.reports.pdf import write_pdf
 from groundstation.reports.steer_card import MOST_ROWS, TEMPLATE, steer_card, write_exports
@@ -661,7 +661,7 @@ def test_a_run_elsewhere_has_the_files_and_loses_those_it_did_not_make(first: Pa
     store = fsspec.filesystem("memory")
     store.store.clear()
     store.pseudo_dirs[:] = [""]
-    far, out = FarFolder("memory://out"), "memory://out"
+    far, out = RemoteFolder("memory://out"), "memory://out"
 
     def run(configuration: Configuration, *, with_pdf: bool = True) -> set[str]:
         run_many([logs[0]], out, configuration, jobs=1, with_pdf=with_pdf)

@@ -6,9 +6,9 @@ import pytest
 from groundstation.base.findings import Finding
 from groundstation.base.records import Column
 from groundstation.pipeline.overview import overview, state_lanes
-from groundstation.results.explain import WHAT_HEADING_NEEDS, explained
 from groundstation.results.figures import FigureData
-from groundstation.results.noticed import grouped
+from groundstation.results.grouped_findings import grouped
+from groundstation.results.reasons import WHAT_HEADING_NEEDS, explained
 from groundstation.tables.table import Flight, Table
 from tests.viewer_example import START_NS, table
 

@@ -28,6 +28,7 @@ from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import MANIFEST, example, figure, heading_result
 
 LARGEST_REPORT_BYTES = 1_500_000  # mailed and opened on old machines
+LARGEST_LONG_REPORT_BYTES = 2_500_000  # with the figures of INS errors and forecast
 VOID = {"meta", "col", "link", "br", "hr", "img", "input", "path", "use"}
 HOSTILE = "<script>alert(1)</script>\"'><img src=x onerror=alert(1)>=cmd|' /C calc'!A0&amp;{{7*7}}$\\frac$-->]]>"
 
@@ -330,3 +331,24 @@ def test_gaps_break_lines_even_when_thinned() -> None:
     axes = Axes()
     drawing.line(axes, np.arange(20_000.0), y, "black", most=100)
     assert len(axes.x) <= 102 and np.isnan(axes.y).sum() == 1
+
+
+def test_a_report_with_ins_errors_and_forecast_is_whole_and_small_enough(tmp_path: Path) -> None:
+    html = report(tmp_path, example(inertial_result(), forecast_result()))
+    page = Page(html)
+    assert len(html.encode()) < LARGEST_LONG_REPORT_BYTES
+    for title in ("Position error of the INS", "Hindcast map", "States", "Skill by method and horizon"):
+        assert title in page.text, title
+    assert "nan" not in page.text.lower().split() and "None" not in page.text
+    links = {value for tag, name, value in page.attributes if tag == "a" and name == "href"}
+    assert {f"tables/{name}.csv" for name in ("inertial_states", "forecast_map", "forecast_classic")} <= links
+
+
+def test_texts_of_ins_errors_and_forecast_are_escaped(tmp_path: Path) -> None:
+    inertial = inertial_result(
+        ins_topic=HOSTILE, kind_reason=HOSTILE, ins_class=HOSTILE, settings={HOSTILE: HOSTILE}, figures=()
+    )
+    forecast = forecast_result(calibration_reason=HOSTILE, is_calibrated=False, figures=())
+    page = Page(report(tmp_path, example(inertial, forecast)))
+    assert "script" not in page.tags and "img" not in page.tags
+    assert page.text.count("<script>alert(1)</script>") >= 5

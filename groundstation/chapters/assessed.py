@@ -1,8 +1,8 @@
 """A chapter without an answer: the reason why there is none."""
 
 from groundstation.chapters.parts import Note, Section
-from groundstation.results.explain import explained
 from groundstation.results.flight import FlightResults
+from groundstation.results.reasons import explained
 
 
 def reason_of(results: FlightResults, analysis: str) -> str:

@@ -29,13 +29,18 @@ MOST_LINKS = 40
 ALGORITHM_HEADS = (
     *(Head("Algorithm"), Head("Update"), Head("2σ_r, worst at the end, m", True), Head("RMS error, m", True)),
     *(Head("RMS over the bound", True), Head("NEES (95 % limits)", True), Head("Consistent"), Head("Diverges")),
-    *(Head("Spectral radius", True), Head("Used / gated / lost", True)),
+)
+COST_HEADS = (
+    *(Head("Algorithm"), Head("Spectral radius", True), Head("Used", True), Head("Gated", True), Head("Lost", True)),
     *(Head("Messages", True), Head("Bytes a slot", True)),
+)
+COST_CAPTION = (
+    "Spectral radius of the joint error map, worst window: above 1 errors feed themselves. Messages and bytes are what "
+    "a data link would carry for the algorithm."
 )
 ALGORITHM_CAPTION = (
     "NEES: squared error over its computed variance, 2 is honest; the limits count aircraft, not epochs. Diverges: "
-    "error above three computed σ_r at the end. Spectral radius of the joint error map, worst window: above 1 errors "
-    "feed themselves. The bound is that of Cramér and Rao for this geometry."
+    "error above three computed σ_r at the end. The bound is that of Cramér and Rao for this geometry."
 )
 VEHICLE_HEADS = (
     *(Head("Aircraft"), Head("σ north, m", True), Head("σ east, m", True), Head("2σ_r, m", True)),
@@ -65,6 +70,7 @@ def cooperative(results: FlightResults) -> Section | None:
     parts: list[Part | None] = [
         _advice(answer, best),
         _algorithms(answer, best),
+        _costs(answer),
         Figure("cooperative.map"),
         _vehicles(answer, best),
         Figure("cooperative.errors"),
@@ -182,13 +188,26 @@ def _algorithms(answer: CooperativeResult, best: AlgorithmRow) -> Grid:
                 number(row.nees, 2) + limits,
                 _yes_no(row.is_consistent, is_good=True),
                 _yes_no(row.diverges, is_good=False),
-                number(row.spectral_radius, 3),
-                f"{row.accepted} / {row.gated} / {row.lost}",
-                number(row.messages, 0),
-                number(row.bytes_per_slot, 0),
             )
         )
-    return Grid("Algorithms", ALGORITHM_HEADS, rows, ALGORITHM_CAPTION, ("cooperative_map", "cooperative_traffic"))
+    return Grid("Algorithms", ALGORITHM_HEADS, rows, ALGORITHM_CAPTION, ("cooperative_tracks",))
+
+
+def _costs(answer: CooperativeResult) -> Grid:
+    rows = [
+        (
+            title_of(row.algorithm),
+            number(row.spectral_radius, 3),
+            number(row.accepted, 0),
+            number(row.gated, 0),
+            number(row.lost, 0),
+            number(row.messages, 0),
+            number(row.bytes_per_slot, 0),
+        )
+        for row in answer.algorithms
+    ]
+    numbers_of = ("cooperative_map", "cooperative_traffic")
+    return Grid("Stability, measurements and data link", COST_HEADS, rows, COST_CAPTION, numbers_of)
 
 
 def _yes_no(value: bool | None, is_good: bool) -> Mark:

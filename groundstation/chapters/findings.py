@@ -2,9 +2,9 @@
 
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Part, Section
 from groundstation.chapters.wording import number
-from groundstation.results.explain import explained
 from groundstation.results.flight import FlightResults
-from groundstation.results.noticed import grouped
+from groundstation.results.grouped_findings import grouped
+from groundstation.results.reasons import explained
 
 MOST_FINDINGS = 200
 MARKS = {"fail": Mark("bad", "fail"), "warn": Mark("warn", "warn"), "info": Mark("plain", "info")}

@@ -32,15 +32,8 @@ RUNWAY_HEADS = (
 )
 
 
-def heading(results: FlightResults, chosen: Sequence[ChosenInterval] = ()) -> Section:
-    """The chapter; without a result it says why there is none.
-
-    Parameters
-    ----------
-    results : FlightResults
-    chosen : sequence of ChosenInterval
-        What the user left out or forced.
-    """
+def heading(results: FlightResults) -> Section:
+    """The chapter; without a result it says why there is none."""
     answer = results.answer(HeadingResult)
     if answer is None:
         note = Note(f"Not assessable: {reason_of(results, 'heading') or UNKNOWN_REASON}", "unknown")
@@ -51,7 +44,7 @@ def heading(results: FlightResults, chosen: Sequence[ChosenInterval] = ()) -> Se
         *_figures(answer.segments),
         *(_onboard(answer), _runway(answer), _geometry(answer), _standstill(answer.standstill)),
         *STANDSTILL_FIGURES,
-        *(_by_hand(chosen), setting_facts(answer.settings)),
+        *(_by_hand(results.chosen), setting_facts(answer.settings)),
     )
     shown = tuple(part for part in parts if part is not None)
     above: tuple[Part, ...] = (*(Note(reason) for reason in reasons(answer)), Facts("", figures(answer)))

@@ -47,6 +47,17 @@ def number(value: Any, places: int, unit: str = "", signed: bool = False) -> str
     return text + (unit if unit in "°′%" else NARROW_SPACE + unit)
 
 
+def percent(share: Any, places: int = 0) -> str:
+    """A share as per cent.
+
+    Examples
+    --------
+    >>> percent(0.953), percent(None)
+    ('95%', '—')
+    """
+    return number(100.0 * share, places, "%") if is_number(share) else ABSENT
+
+
 def significant(value: Any, digits: int = 3) -> str:
     """A number of unknown kind with so many significant digits, plain notation where that is readable.
 

@@ -228,7 +228,7 @@ def view(
     verbose: Verbose = False,
 ) -> int | None:
     """Look at a flight in the Rerun viewer, native or in the browser."""
-    from groundstation.pipeline.look import look_at
+    from groundstation.pipeline.view import look_at
 
     look_at(flight, web=web, host=host, port=port, profile=profile, say=say)
     return DONE

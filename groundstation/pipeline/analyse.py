@@ -19,9 +19,10 @@ from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline import configuration as configured
 from groundstation.pipeline import overview
 from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.damage import damage_finding
 from groundstation.pipeline.intervals import seconds_of
-from groundstation.pipeline.leaning import damage_finding
 from groundstation.results.answer import Answers
+from groundstation.results.chosen import chosen_intervals
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
 from groundstation.results.heading import HeadingResult
@@ -87,6 +88,7 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
         not_assessable=found.not_assessable,
         answers=found.answers,
         figures=tuple(figures),
+        chosen=chosen_intervals(configuration.to_dict()),
     )
 
 

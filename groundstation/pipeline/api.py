@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from groundstation.base.clock import Clock
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
 from groundstation.base.ledger import Ledger
+from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.analyse import analyse
 from groundstation.pipeline.configuration import SECTIONS, Configuration, load_configuration
@@ -201,7 +202,7 @@ class SavedRun(OpenFlight):
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.saved = load(folder)
+        self.saved = load(folder, ANSWER_TYPES)
 
     @cached_property
     def results(self) -> FlightResults:

@@ -10,16 +10,16 @@ from pathlib import Path, PurePath
 
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.depot import FarDepot, FolderDepot
-from groundstation.pipeline.elsewhere import far_logs, is_far
-from groundstation.pipeline.far import FarJob, run_far
 from groundstation.pipeline.flight import PARTIAL_PREFIX, Job, run_flight
 from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, collect, flight_folders, is_ours
 from groundstation.pipeline.outcome import Outcome
+from groundstation.pipeline.output import LocalOutput, RemoteOutput
+from groundstation.pipeline.placement import Placement
 from groundstation.pipeline.progress import Event, Listener, silent
 from groundstation.pipeline.publishing import FLEET_FILES, write_beside, write_index_of
+from groundstation.pipeline.remote import far_logs, is_remote
+from groundstation.pipeline.remote_runs import RemoteJob, run_remote
 from groundstation.pipeline.resume import Finished, finished_flights
-from groundstation.pipeline.shelf import Shelf
 from groundstation.pipeline.workers import TASKS_PER_PROCESS, AnyJob, Crew, cores, in_turn, side_by_side
 
 LOCK = ".lock"
@@ -73,9 +73,9 @@ def run_many(
     crew = _crew(scheduler, jobs or cores(), len(inputs), listen)
     make = partial(Job, configuration=configuration, fail_on=fail_on, with_pdf=with_pdf)
     listen(Event("begin", total=len(inputs)))
-    if any(is_far(str(place)) for place in (out, *paths)):
-        far = [FarJob(make(Path(), Path(), is_named=named), log, str(out), redo) for log, named in inputs]
-        return _run_elsewhere(far, str(out), crew, force, listen)
+    if any(is_remote(str(place)) for place in (out, *paths)):
+        remote = [RemoteJob(make(Path(), Path(), is_named=named), log, str(out), redo) for log, named in inputs]
+        return _run_remote(remote, str(out), crew, force, listen)
     near = [make(Path(log), Path(out), is_named=named) for log, named in inputs]
     return _run_here(near, Path(out), crew, force, redo, listen)
 
@@ -87,45 +87,45 @@ def _run_here(
     with alone_in(out):
         prepare(out)
         known = {} if redo else finished_flights(flight_folders(out))
-        shelf = Shelf(FolderDepot(out), [job.log for job in work])
+        placement = Placement(LocalOutput(out), [job.log for job in work])
 
         def left() -> Iterator[tuple[int, Job]]:
             for number, job, twin in _with_steps(work, known):
                 if twin is None:
                     yield number, job
                 else:
-                    shelf.put_twin(number, Outcome(job.log, "skipped", ""), twin)
+                    placement.put_twin(number, Outcome(job.log, "skipped", ""), twin)
                     listen(Event("end", job.name, "same content as another log"))
 
         def suffixed(number: int) -> Job:
             return replace(work[number], add_suffix=True)
 
-        _run_into(shelf, out, left(), run_flight, suffixed, crew, listen)
-        return (*shelf.outcomes(), *write_beside(out, shelf.outcomes(), with_pdf=work[0].with_pdf))
+        _run_into(placement, out, left(), run_flight, suffixed, crew, listen)
+        return (*placement.outcomes(), *write_beside(out, placement.outcomes(), with_pdf=work[0].with_pdf))
 
 
-def _run_elsewhere(work: Sequence[FarJob], out: str, crew: Crew, force: bool, listen: Listener) -> tuple[Outcome, ...]:
-    def suffixed(number: int) -> FarJob:
+def _run_remote(work: Sequence[RemoteJob], out: str, crew: Crew, force: bool, listen: Listener) -> tuple[Outcome, ...]:
+    def suffixed(number: int) -> RemoteJob:
         return replace(work[number], job=replace(work[number].job, add_suffix=True), redo=True)
 
     with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
         copy = Path(folder)
-        depot = FarDepot(out, copy)
-        depot.refuse_foreign(force=force)
-        depot.copy_all()
-        shelf = Shelf(depot, [far.log for far in work])
+        output = RemoteOutput(out, copy)
+        output.refuse_foreign(force=force)
+        output.copy_all()
+        placement = Placement(output, [one.log for one in work])
         is_whole = False
         try:
-            _run_into(shelf, copy, enumerate(work), run_far, suffixed, crew, listen)
-            problems = write_beside(copy, shelf.outcomes(), with_pdf=work[0].job.with_pdf)
+            _run_into(placement, copy, enumerate(work), run_remote, suffixed, crew, listen)
+            problems = write_beside(copy, placement.outcomes(), with_pdf=work[0].job.with_pdf)
             is_whole = True
         finally:
-            depot.publish(FLEET_FILES, is_whole=is_whole)
-        return (*shelf.outcomes(), *problems)
+            output.publish(FLEET_FILES, is_whole=is_whole)
+        return (*placement.outcomes(), *problems)
 
 
 def _run_into(
-    shelf: Shelf,
+    placement: Placement,
     out: Path,
     tasks: Iterable[tuple[int, AnyJob]],
     run: Callable[[AnyJob, Listener], Outcome],
@@ -133,20 +133,20 @@ def _run_into(
     crew: Crew,
     listen: Listener,
 ) -> None:
-    """Carry out jobs and put their flights on the shelf; interrupted, the index at least is written."""
+    """Carry out jobs and put their flights into place; interrupted, the index at least is written."""
     try:
         with closing(crew(tasks, run)) as ended:  # closed at once when something is wrong here: its processes end
             for number, outcome in ended:
                 listen(Event("end", PurePath(outcome.source).name, outcome.text))
-                shelf.put(number, outcome)
-        clashing = shelf.clashing()
+                placement.put(number, outcome)
+        clashing = placement.clashing()
         if clashing:
             with closing(crew(((number, suffixed(number)) for number in clashing), run)) as ended:
                 for number, outcome in ended:
-                    shelf.put_again(number, outcome)
-        shelf.sweep()
+                    placement.put_again(number, outcome)
+        placement.sweep()
     except BaseException:
-        write_index_of(out, shelf.outcomes())
+        write_index_of(out, placement.outcomes())
         raise
 
 
@@ -176,7 +176,7 @@ def plan_many(
     UsageError
         As :func:`run_many`, and for logs or results elsewhere, which would have to be fetched first.
     """
-    if any(is_far(str(place)) for place in (out, *paths)):
+    if any(is_remote(str(place)) for place in (out, *paths)):
         raise UsageError("--dry-run", "logs or results elsewhere", "local ones")
     inputs, out = _inputs(paths, out, configuration), Path(out)
     refuse_foreign(out, force=True)
@@ -192,9 +192,9 @@ def plan_many(
 
 def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configuration) -> tuple[tuple[str, bool], ...]:
     """Logs by path or URL, in a stable order, each with whether the user named it."""
-    near = [Path(path) for path in paths if not is_far(str(path))]
-    found = {log: named for path in paths if is_far(str(path)) for log, named in far_logs(str(path))}
-    found |= {str(one.path): one.is_named for one in collect(near, None if is_far(str(out)) else Path(out))}
+    near = [Path(path) for path in paths if not is_remote(str(path))]
+    found = {log: named for path in paths if is_remote(str(path)) for log, named in far_logs(str(path))}
+    found |= {str(one.path): one.is_named for one in collect(near, None if is_remote(str(out)) else Path(out))}
     if not found:
         hint = "what groundstation made is no input" if any(path.is_dir() and is_ours(path) for path in near) else ""
         raise UsageError(", ".join(map(str, paths)), "no log in it", "", hint)

@@ -14,6 +14,7 @@ from groundstation.base.findings import SEVERITIES, Finding
 from groundstation.base.signals import is_canonical
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.wording import is_number
+from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.alignment import align
 from groundstation.pipeline.clip import CUT_SHA256
 from groundstation.pipeline.inputs import COMPARISON_MARKS, COMPARISON_RECORDING, is_ours
@@ -21,7 +22,7 @@ from groundstation.reports.sections.saved import mapping
 from groundstation.results.comparison import Comparison, Delta, Event, SettingPair, Side, Value
 from groundstation.results.files import MANIFEST, SavedFlight, csv_text, load, write_text
 from groundstation.results.flight import NotAssessable
-from groundstation.results.noticed import grouped
+from groundstation.results.grouped_findings import grouped
 
 (PAGE, TABLE), RECORDING = COMPARISON_MARKS, COMPARISON_RECORDING
 IDENTITY = (  # what tells the rows of a table in the results apart
@@ -113,7 +114,7 @@ def _load(folder: Path) -> SavedFlight:
     if not folder.is_dir() or not (folder / MANIFEST).is_file():
         found = "no such folder" if not folder.exists() else "no results"
         raise UsageError(str(folder), found, "a flight folder that `run` made")
-    return load(folder)
+    return load(folder, ANSWER_TYPES)
 
 
 def _side(saved: SavedFlight) -> Side:

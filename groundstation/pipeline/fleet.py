@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.errors import GroundstationError
+from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.fleet import answer
 from groundstation.estimators.fleet.changes import ChangeSettings
 from groundstation.estimators.fleet.density import SampleHistogram, densities_of
@@ -125,7 +126,7 @@ def _collect(out: Path, store: SampleStore | None) -> _Collected:
 
 
 def _add(collected: _Collected, folder: Path, store: SampleStore | None) -> None:
-    saved = load(folder)
+    saved = load(folder, ANSWER_TYPES)
     samples = heading_samples(saved)
     row = flight_row(saved, samples)
     for name, values in collected.columns.items():

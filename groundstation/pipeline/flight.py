@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 from groundstation.base.errors import UnclaimedLogError, UnreadableLogError
 from groundstation.base.findings import SEVERITIES, Severity, worst
 from groundstation.base.records import RecordBatch
-from groundstation.estimators.analyses import FLIGHT_ANALYSES
+from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES
 from groundstation.pipeline.analyse import Given, analyse
 from groundstation.pipeline.apply_deviation import apply_deviation, corrected_name, write_corrected
 from groundstation.pipeline.configuration import Configuration
@@ -167,7 +167,7 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
     with watch.stage("recording"):
         write_recording(partial / f"{identity}.rrd", flight, results)
     with watch.stage("reporting"):
-        written = write_flight_report(partial, with_pdf=job.with_pdf)
+        written = write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf)
     return Outcome(
         job.log,
         state_of(worst(results.findings), converted.has_lost_data, job.fail_on),
@@ -184,7 +184,7 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
     problem = ""
     if job.step == "reports":
         with watch.stage("reporting"):
-            problem = write_flight_report(finished.folder, with_pdf=job.with_pdf).problem
+            problem = write_flight_report(finished.folder, ANSWER_TYPES, with_pdf=job.with_pdf).problem
             remember_reports(finished, with_pdf=job.with_pdf)
     return Outcome(
         job.log,

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
+from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.fleet import FLEET_PARQUET, write_fleet
 from groundstation.pipeline.fleet_samples import SAMPLES
 from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, flight_folders, is_ours, session_folders
@@ -48,7 +49,7 @@ def write_index_of(out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[I
     rows = list(kept_rows)
     for folder in flight_folders(out):
         try:
-            rows.append(index_row(load(folder)))
+            rows.append(index_row(load(folder, ANSWER_TYPES)))
         except GroundstationError as error:
             problems.append(Outcome(str(folder), "failed", str(error)))
     without_flight = [outcome for outcome in outcomes if not outcome.flight_id]
@@ -83,7 +84,7 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
     for folder in [out] if is_flight else [*flight_folders(out), *session_folders(out)]:
         try:
             with told_in_a_line(str(folder)):
-                written = write_flight_report(folder, with_pdf=with_pdf)
+                written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf)
         except GroundstationError as error:
             if is_flight:
                 raise

@@ -19,7 +19,7 @@ from groundstation.base.records import RecordBatch
 from groundstation.base.signals import kind_of
 from groundstation.base.toml_settings import settings_from
 from groundstation.base.version import __version__
-from groundstation.estimators.analyses import SESSION_ANALYSES
+from groundstation.estimators.analyses import ANSWER_TYPES, SESSION_ANALYSES
 from groundstation.estimators.cooperative.analysis import SessionKnown
 from groundstation.pipeline.analyse import run_analyses
 from groundstation.pipeline.batch import alone_in, prepare, refuse_foreign
@@ -181,7 +181,7 @@ def _continued(job: SessionJob, listen: Listener) -> Outcome | None:
         wanted = (REPORT, PDF) if job.with_pdf else (REPORT,)
         if resume.keys != keys or not all((folder / name).is_file() for name in wanted):
             with watch.stage("reporting"):
-                problem = write_flight_report(folder, with_pdf=job.with_pdf).problem
+                problem = write_flight_report(folder, ANSWER_TYPES, with_pdf=job.with_pdf).problem
             save_manifest(folder, _with_keys(manifest, resume, keys))
         state = state_of(worst(findings), resume.has_lost_data, job.fail_on)
         text = "; ".join(filter(None, (resume.text, problem)))
@@ -227,7 +227,7 @@ def _run_into(partial: Path, job: SessionJob, names: str, watch: Stopwatch) -> O
     with watch.stage("recording"):
         write_session_recording(partial / f"{results.flight_id}.rrd", assembled, results)
     with watch.stage("reporting"):
-        problem = write_flight_report(partial, with_pdf=job.with_pdf).problem
+        problem = write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf).problem
     target = job.out / results.flight_id
     shutil.rmtree(target / MCAPS, ignore_errors=True)
     place(partial, target)

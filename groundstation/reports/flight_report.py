@@ -1,6 +1,7 @@
 """The report of one flight: one self-contained HTML file and its PDF, made from the saved results alone."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,9 +10,11 @@ from groundstation.chapters.front import front
 from groundstation.chapters.parts import Document
 from groundstation.reports.page import TEMPLATES, render
 from groundstation.reports.pdf import PdfError, write_pdf
-from groundstation.reports.sections import CHAPTERS, SESSION_CHAPTERS
+from groundstation.reports.sections import flight_sections
 from groundstation.reports.steer_card import write_exports
+from groundstation.results.answer import Answer
 from groundstation.results.files import SavedFlight, load, write_text
+from groundstation.results.restore import ANSWER_TYPES
 
 REPORT = "report.html"
 PDF = "report.pdf"
@@ -27,7 +30,9 @@ class Written:
     problem: str = ""
 
 
-def write_flight_report(folder: Path, *, with_pdf: bool = True) -> Written:
+def write_flight_report(
+    folder: Path, answer_types: Mapping[str, type[Answer]] = ANSWER_TYPES, *, with_pdf: bool = True
+) -> Written:
     """Write report.html and report.pdf into a flight folder; with a magnetic deviation its table and steer card too.
 
     Parameters
@@ -35,6 +40,8 @@ def write_flight_report(folder: Path, *, with_pdf: bool = True) -> Written:
     folder : Path
         Holds summary.json, manifest.json and results.parquet/: nothing else is read, and equal files give equal bytes
         whatever the time, the host or the number of workers.
+    answer_types : mapping of analysis name to dataclass
+        What its answers become.
     with_pdf : bool
         Without it there is neither report.pdf nor steer_card.pdf afterwards: those of an earlier run would tell of
         other results.
@@ -44,7 +51,7 @@ def write_flight_report(folder: Path, *, with_pdf: bool = True) -> Written:
     UnreadableLogError
         When the folder has no saved results.
     """
-    saved = load(folder)
+    saved = load(folder, answer_types)
     exports, problem = write_exports(saved, with_pdf=with_pdf)  # first: the report links to those that are there
     document = flight_document(saved)
     written = write_pages(folder / REPORT, flight_report_html(document), document, with_pdf=with_pdf)
@@ -67,9 +74,8 @@ def write_pages(page: Path, html: str, document: Document, *, with_pdf: bool) ->
 
 def flight_document(saved: SavedFlight) -> Document:
     """Put the report of one saved flight, or of a session of several, together."""
-    chapters, kind = (SESSION_CHAPTERS, SESSION) if is_session(saved.results) else (CHAPTERS, "Flight report")
-    sections = tuple(section for section in (build(saved) for build in chapters) if section is not None)
-    return Document(kind, saved.results.flight_id, front(saved.results), sections)
+    kind = SESSION if is_session(saved.results) else "Flight report"
+    return Document(kind, saved.results.flight_id, front(saved.results), flight_sections(saved))
 
 
 def flight_report_html(document: Document) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.serial import MismatchError, from_json, to_json_exactly
 from groundstation.results.answer import Answer
+from groundstation.results.chosen import chosen_intervals
 from groundstation.results.document import SummaryDocument
 from groundstation.results.figures import FigureData, FigureSet
 from groundstation.results.flight import FlightResults
@@ -52,7 +53,8 @@ class SavedFlight:
             When the summary lacks what a result needs.
         """
         results = restored(self.summary, str(self.folder / SUMMARY), self.answer_types)
-        return replace(results, figures=FigureSet(self.figures, self.figures.__getitem__))
+        figures = FigureSet(self.figures, self.figures.__getitem__)
+        return replace(results, figures=figures, chosen=chosen_intervals(self.manifest.configuration))
 
     def figure(self, name: str) -> FigureData | None:
         """The figure data of that name, None when the flight has none or it is empty."""

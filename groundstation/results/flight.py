@@ -8,6 +8,7 @@ from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.results.answer import A, Answers, answer_of
+from groundstation.results.chosen import ChosenInterval
 from groundstation.results.figures import FigureData, FigureSet
 from groundstation.results.frames import Tabular, no_such_table
 
@@ -58,6 +59,8 @@ class FlightResults(Tabular):
         By the name of the analysis, in the order they are shown.
     figures : sequence of FigureData
         Arrays behind every figure, those of the analyses among them.
+    chosen : tuple of ChosenInterval
+        What the user left out or forced.
     """
 
     flight_id: str
@@ -73,6 +76,7 @@ class FlightResults(Tabular):
     not_assessable: tuple[NotAssessable, ...] = ()
     answers: Answers = field(default_factory=dict)
     figures: Sequence[FigureData] = ()
+    chosen: tuple[ChosenInterval, ...] = ()
 
     def answer(self, kind: type[A]) -> A | None:
         """The answer of that type, None where its analysis has none."""
@@ -93,9 +97,16 @@ class FlightResults(Tabular):
         found = self.figure(name)
         return found if found is not None and len(found) else None
 
+    @property
+    def figure_names(self) -> tuple[str, ...]:
+        """Names of the figure data, none of which is read for it."""
+        if isinstance(self.figures, FigureSet):
+            return self.figures.names
+        return tuple(figure.name for figure in self.figures)
+
     def table_names(self) -> tuple[str, ...]:
         """Names that :meth:`to_frame` takes: findings, what was not assessable, the arrays behind the figures."""
-        return (*super().table_names(), *(figure.name for figure in self.figures))
+        return (*super().table_names(), *self.figure_names)
 
     def to_frame(self, table: str = "findings") -> "pd.DataFrame":
         """A table of the flight as a frame: a list of rows, or the arrays behind a figure.

@@ -13,11 +13,13 @@ import rerun.blueprint as rrb
 import rerun_bindings
 
 from groundstation.base.errors import GroundstationError
+from groundstation.chapters import without_chapter
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.recorder import FLIGHT_TIME, Recorder
 from groundstation.viewer.tabs.forecast import forecast
+from groundstation.viewer.tabs.generic import generic_tab
 from groundstation.viewer.tabs.heading import heading
 from groundstation.viewer.tabs.inertial import inertial
 from groundstation.viewer.tabs.log import log
@@ -119,6 +121,7 @@ def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResul
         inertial(recorder, results),
         forecast(recorder, results),
         magnetic(recorder, results),
+        *(generic_tab(recorder, results, answer) for answer in without_chapter(results)),
         raw(recorder, flight, results),
         log(recorder, flight, results),
     )

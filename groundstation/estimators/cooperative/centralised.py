@@ -13,12 +13,15 @@ from itertools import pairwise
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.records import Int64Array
 from groundstation.estimators.cooperative.events import HEIGHT, PEER, POINT, Event, Prepared
 from groundstation.estimators.cooperative.messages import report_bytes
 from groundstation.estimators.cooperative.observation import Row, rows_of
 from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.estimators.cooperative.timeline import timeline
 from groundstation.estimators.cooperative.tracks import GATED, USED, AlgorithmRun, Recorder
+from groundstation.estimators.kalman.arrays import Pattern
+from groundstation.estimators.kalman.kernels import add_noise, predict_covariance, update_covariance
 
 PATIENCE = 30  # rejections of a vehicle in a row: then its clock has leapt
 LEAP_M = 1e5
@@ -43,6 +46,9 @@ class _Joint:
         for i, place in self.points.items():
             self.P[place, place] = prepared.session.points[i].position_sigma_m ** 2 * np.eye(2)
         self.times = [vehicle.first_s for vehicle in prepared.vehicles]
+        self._states, self._held = np.arange(total), np.zeros(0, dtype=np.int64)
+        self._room, self._g, self._gain = np.zeros((total, total)), np.zeros(total), np.zeros(total)
+        self._patterns = [_whole_block(place.start, size) for place, size in zip(self.slices, sizes, strict=True)]
 
     def advance(self, who: int, to_s: float) -> None:
         """Move one vehicle's block on."""
@@ -51,9 +57,10 @@ class _Joint:
         place = self.slices[who]
         x, phi, noise = self.prepared.vehicles[who].step(self.x[place], self.times[who], to_s)
         self.x[place] = x
-        self.P[place] = phi @ self.P[place]
-        self.P[:, place] = self.P[:, place] @ phi.T
-        self.P[place, place] += noise
+        pattern, rows, columns = self._patterns[who]
+        predict_covariance(self._states, pattern, phi.reshape(1, -1), 0, self.P, self._room)
+        block = noise[rows - place.start, columns - place.start]
+        add_noise(self._states, rows, columns, block.reshape(1, -1), 0, self.P)
         self.times[who] = to_s
 
     def rows(self, event: Event) -> list[tuple[Row, FloatArray]]:
@@ -101,11 +108,12 @@ class _Joint:
         return moved, phi
 
     def update(self, h: FloatArray, innovation: float, variance: float) -> None:
-        """One scalar measurement with the optimal gain; P stays symmetric to the last bit."""
-        shared = self.P @ h
-        total = float(h @ shared) + variance
-        self.x += shared * (innovation / total)
-        self.P -= np.outer(shared, shared / total)
+        """One scalar measurement with the optimal gain, in the symmetric form of the Kalman core."""
+        columns = np.flatnonzero(h)
+        update_covariance(
+            self._states, columns, h[columns], 0, len(columns), variance, self._held, self.P, self._g, self._gain
+        )
+        self.x += self._gain * innovation
 
     def update_together(self, H: FloatArray, innovation: FloatArray, variance: FloatArray) -> None:
         """Several measurements in one step."""
@@ -115,6 +123,13 @@ class _Joint:
         self.x += gain @ innovation
         self.P -= gain @ shared.T
         self.P = 0.5 * (self.P + self.P.T)
+
+
+def _whole_block(first: int, size: int) -> tuple[Pattern, Int64Array, Int64Array]:
+    """Where the transition of one vehicle has entries, and where its noise has (one side of the diagonal)."""
+    rows = np.arange(first, first + size)
+    one, two = np.triu_indices(size)
+    return Pattern(rows, size * np.arange(size + 1), np.tile(rows, size)), one + first, two + first
 
 
 def run_centralised(

@@ -20,7 +20,6 @@ from groundstation.estimators.inertial.filter import (
     RESET_POSITION_M,
     RESET_VELOCITY_MPS,
     Epochs,
-    gnss_intervals_s,
     measurement_variances,
 )
 from groundstation.estimators.inertial.hindcast import Hindcast
@@ -211,7 +210,7 @@ def run_coupled(differences: Differences, noise: InsNoise, settings: InertialSet
     covariance, densities = _noise_of(noise, differences)
     opened = np.zeros(SIZE)
     opened[CHANNELS[:, [POSITION, VELOCITY]]] = _opened_variances(noise, epochs)
-    patience = [max(1, round(PATIENCE_S / interval_s)) for interval_s in gnss_intervals_s(epochs)]
+    patience = [max(1, round(PATIENCE_S / interval_s)) for interval_s in epochs.gnss_intervals_s]
     gate = kalman.Gate(settings.gate_sigmas, patience, opened)
     lines, z = _lines(epochs, noise), np.stack([epochs.position_m, epochs.velocity_mps], axis=1).reshape(-1, 4)
     parts, start = [], kalman.Start(np.zeros(SIZE), covariance)

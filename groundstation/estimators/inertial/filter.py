@@ -65,6 +65,15 @@ class Epochs:
         """Median interval of the epochs, with GNSS or without, seconds; 1 for fewer than two."""
         return float(np.median(np.diff(self.time_s))) if len(self) > 1 else 1.0
 
+    @cached_property
+    def gnss_intervals_s(self) -> tuple[float, float]:
+        """Median interval of the epochs with a position and of those with a velocity; 1 s for fewer than two."""
+        found = []
+        for measured in (self.position_m, self.velocity_mps):
+            times = self.time_s[np.isfinite(measured).any(axis=1)]
+            found.append(float(np.median(np.diff(times))) if len(times) > 1 else 1.0)
+        return found[0], found[1]
+
     @property
     def has_gnss(self) -> BoolArray:
         """Where position or velocity was compared in at least one channel, shape (n,)."""
@@ -255,29 +264,20 @@ def _stacked(parts: list[FloatArray]) -> FloatArray:
     return parts[0][None] if len(parts) == 1 else np.stack(parts)
 
 
-def gnss_intervals_s(epochs: Epochs) -> tuple[float, float]:
-    """Median interval of the epochs with a position and of those with a velocity; 1 s for fewer than two."""
-    found = []
-    for measured in (epochs.position_m, epochs.velocity_mps):
-        times = epochs.time_s[np.isfinite(measured).any(axis=1)]
-        found.append(float(np.median(np.diff(times))) if len(times) > 1 else 1.0)
-    return found[0], found[1]
-
-
 def measurement_variances(epochs: Epochs, noise: InsNoise) -> tuple[FloatArray, FloatArray]:
     """Variances of position and velocity, shape (2,) each: as they are weighted, and as a single one errs.
 
     The first are inflated for slow errors; the second are not, or the gate would be as wide as the inflation, but leave
     room for a receiver worse than the class thinks and for the lag of a filter that weighs it little.
     """
-    weighted = [noise.gnss.variances(interval)[kind] for kind, interval in enumerate(gnss_intervals_s(epochs))]
+    weighted = [noise.gnss.variances(interval)[kind] for kind, interval in enumerate(epochs.gnss_intervals_s)]
     believed = replace(noise.gnss, is_inflated=False).variances(1.0)
     return np.array(weighted), ROOM_OF_THE_GATE**2 * np.array(believed)
 
 
 def patience_of(epochs: Epochs) -> Int64Array:
     """Rejections in a row of each kind, shape (2,), after which the filter takes GNSS to be right."""
-    return np.array([max(1, round(PATIENCE_S / interval)) for interval in gnss_intervals_s(epochs)], dtype=np.int64)
+    return np.array([max(1, round(PATIENCE_S / interval)) for interval in epochs.gnss_intervals_s], dtype=np.int64)
 
 
 def _pushed(drag: FloatArray, group: list[int], earlier: list[FloatArray]) -> FloatArray:

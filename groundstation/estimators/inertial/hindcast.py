@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.records import Int64Array
-from groundstation.estimators.inertial.filter import Epochs, FilterRun, gnss_intervals_s
+from groundstation.estimators.inertial.filter import Epochs, FilterRun
 from groundstation.estimators.inertial.model import POSITION, SIZE, VELOCITY, FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.starts import start_states
@@ -121,7 +121,7 @@ def built_up(epochs: Epochs, at: Int64Array, lead_s: FloatArray) -> FloatArray:
 
 def nearest_s(epochs: Epochs) -> float:
     """How far from a start or a lead an epoch may be that is compared: one interval of GNSS, a second at least."""
-    return max(NEAREST_S, gnss_intervals_s(epochs)[0])
+    return max(NEAREST_S, epochs.gnss_intervals_s[0])
 
 
 def _forecast(

@@ -3,11 +3,15 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures import (
     cooperative,
+    forecast,
+    generic,
     heading,
+    inertial,
     latency,
     magnetic,
     magnetic_ground,
@@ -21,6 +25,7 @@ Drawn = Drawing | Sequence[Drawing] | None
 
 # By the name that a chapter gives; a figure that is one of several alike gets which.
 DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, str], Drawn]] = {
+    GENERIC_SERIES: generic.series,
     "heading.difference": heading.difference,
     "heading.density": heading.density,
     "heading.convergence": heading.convergence,
@@ -29,6 +34,15 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "heading.spectrum": heading.spectrum,
     "standstill.components": standstill.components,
     "standstill.mean_speed": standstill.mean_speed,
+    "forecast.growth": forecast.growth,
+    "forecast.calibration": forecast.calibration,
+    "forecast.hindcast_map": forecast.hindcast_map,
+    "forecast.classic": forecast.classic,
+    "inertial.state": inertial.state,
+    "inertial.tilt_and_drift": inertial.tilt_and_drift,
+    "inertial.radial": inertial.radial,
+    "inertial.innovations": inertial.innovations,
+    "inertial.observability": inertial.observability,
     "latency.search": latency.search,
     "magnetic.deviation": magnetic.deviation,
     "magnetic.held_out": magnetic.held_out,

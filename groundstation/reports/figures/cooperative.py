@@ -14,6 +14,7 @@ from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.flight import FlightResults
 
 ELLIPSES = 8  # of each track
+SEEN_SHARE, MAGNIFIED = 0.03, (1, 2, 5, 10, 20, 50, 100)
 MOST_PANELS = 8
 PANEL_MM = 38.0
 M_PER_KM = 1000.0
@@ -43,6 +44,7 @@ def session_map(results: FlightResults) -> Drawing | None:
     origin = plane_through(place) if answer.frame == "ecef" else None
     plane = place if origin is None else origin.from_ecef_m(place)
     stations = results.figure_with_rows("session_points")
+    larger = _magnified(plane, north_m, east_m)
 
     def paint(figure: Any) -> None:
         axes = d.place(figure, 18, 12, 174, 104)
@@ -53,8 +55,8 @@ def session_map(results: FlightResults) -> Drawing | None:
             d.line(axes, plane[mine, 1] / M_PER_KM, plane[mine, 0] / M_PER_KM, colour, 1.2, label=d.label(name, 12))
             d.dots(axes, plane[mine[:1], 1] / M_PER_KM, plane[mine[:1], 0] / M_PER_KM, colour, 4.0)
             for row in mine[d.thin(len(mine), ELLIPSES)]:
-                east = (plane[row, 1] + east_m[row] * np.cos(ROUND)) / M_PER_KM
-                north = (plane[row, 0] + north_m[row] * np.sin(ROUND)) / M_PER_KM
+                east = (plane[row, 1] + larger * east_m[row] * np.cos(ROUND)) / M_PER_KM
+                north = (plane[row, 0] + larger * north_m[row] * np.sin(ROUND)) / M_PER_KM
                 d.line(axes, east, north, colour, 0.6)
         if stations is not None:
             points = _places(stations) if origin is None else origin.from_ecef_m(_places(stations))
@@ -67,11 +69,20 @@ def session_map(results: FlightResults) -> Drawing | None:
         axes.set_ylabel("north, km")
         d.legend_above(axes, 10)
 
+    size = f", drawn {larger} times their size" if larger > 1 else ""
     caption = (
         f"Tracks from above, {title_of(algorithm)}; the dot is where each begins. Ellipses: 2σ north and east, at "
-        f"{ELLIPSES} times of each track. Triangles: ground stations."
+        f"{ELLIPSES} times of each track{size}. Triangles: ground stations."
     )
     return Drawing("Map", caption, "Tracks of the aircraft.", d.draw("cooperative-map", 112, paint), _numbers(results))
+
+
+def _magnified(plane: FloatArray, north_m: FloatArray, east_m: FloatArray) -> int:
+    """How many times larger ellipses are drawn so that they can be seen: 1, or 2, 5, 10 ... times."""
+    half = float(np.nanmedian(np.hypot(north_m, east_m)))
+    side = float(np.nanmax(np.nanmax(plane[:, :2], axis=0) - np.nanmin(plane[:, :2], axis=0)))
+    wanted = SEEN_SHARE * side / half if half > 0.0 else 1.0
+    return max((step for step in MAGNIFIED if step <= wanted), default=1)
 
 
 def _numbers(results: FlightResults) -> tuple[str, ...]:
@@ -101,12 +112,11 @@ def errors(results: FlightResults) -> Drawing | None:
             axes = d.place(figure, left, top - PANEL_MM + 10, left + 72, top)
             mine, reckoned = ((vehicle == name) & (of == which) for which in (algorithm, REFERENCE))
             axes.fill_between(time_s[mine], 0.0, bound[mine], color=d.FILL, linewidth=0, label="2σ_r")
-            d.line(axes, time_s[reckoned], bound[reckoned], d.FAINT, 0.8, label="2σ_r of dead reckoning")
+            d.line(axes, time_s[reckoned], bound[reckoned], d.FAINT, 0.8, label="2σ_r without ranges")
             if np.isfinite(error[mine]).any():
                 d.line(axes, time_s[mine], error[mine], d.INS, 1.0, label="error")
             axes.set_ylim(0.0, _ceiling(bound[mine], error[mine]))
-            axes.set_title(d.label(name, 20))
-            axes.set_ylabel("m")
+            axes.set_ylabel(f"{d.label(name, 12)}, m")
             d.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number >= len(shown) - 2, most=6)
             if not number:
                 d.legend_above(axes, 3)
@@ -132,11 +142,14 @@ def geometry(results: FlightResults) -> Drawing | None:
     if answer is None or data is None:
         return None
     vehicle, time_s = texts(data, "vehicle"), numbers(data, "time_s")
-    columns = (("hdop", "HDOP"), ("determinant", "det(H'H)"), ("eigenvalue", "least eigenvalue"))
+    measures = (("hdop", "HDOP"), ("determinant", "det(H'H)"), ("eigenvalue", "least eigenvalue"))
+    columns = [one for one in measures if np.isfinite(numbers(data, one[0])).any()]
+    height = 42.0 * len(columns) + 12.0
 
     def paint(figure: Any) -> None:
         for number, (column, title) in enumerate(columns):
-            axes = d.place(figure, 18, 96 - 42 * number, 174, 130 - 42 * number)
+            top = height - 8 - 42 * number
+            axes = d.place(figure, 18, top - 34, 174, top)
             for name, colour in zip(answer.vehicle_names, _colours(answer), strict=True):
                 mine = vehicle == name
                 when, values = d.broken_at_gaps(time_s[mine], numbers(data, column)[mine])
@@ -153,7 +166,7 @@ def geometry(results: FlightResults) -> Drawing | None:
         "Geometry of the sources that each aircraft hears in a frame: dilution, and determinant and least eigenvalue "
         "of H'H, horizontal directions alone; a line ends where an aircraft hears nothing."
     )
-    svg = d.draw("cooperative-geometry", 138, paint)
+    svg = d.draw("cooperative-geometry", height, paint)
     return Drawing("Geometry", caption, "Geometry measures with time.", svg, ("cooperative_geometry",))
 
 

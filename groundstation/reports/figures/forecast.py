@@ -1,30 +1,33 @@
 """Figures of the forecast: growth by horizon, calibration, the hindcast map, the paper's four starts."""
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.chapters.wording import is_number, number
+from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import has_values, plain_log
-from groundstation.reports.sections.saved import mapping, objects
 from groundstation.results.figures import FigureData, numbers
-from groundstation.results.files import SavedFlight
-from groundstation.results.forecast import FEWEST_STARTS, METHODS
+from groundstation.results.flight import FlightResults
+from groundstation.results.forecast import FEWEST_STARTS, METHODS, CalibrationRow, ForecastResult
 
 OTHERS = ("#e69f00", "#56b4e9", "#8a2be2", "#7a6a00", "#cc79a7", "#a9b1ba", "#d55e00")
 MAP_CELLS = 90  # along each side: finer is not seen on paper and makes the page heavy
 LEVELS = 12
 MAP_QUANTILE = 0.98  # the scale of colour ends there: a few bad starts would darken the rest
-CHANNELS_INSIDE = (("inside50", 0.50), ("inside68", 0.68), ("inside95", 0.95))
+NOMINAL = (0.50, 0.68, 0.95)  # shares that the bands should hold
 
 
-def growth(saved: SavedFlight, default: str) -> Drawing | None:
+def _shipped(results: FlightResults) -> str:
+    answer = results.answer(ForecastResult)
+    return "" if answer is None else answer.default_method
+
+
+def growth(results: FlightResults) -> Drawing | None:
     """RMS error by horizon, a line for each method, the shipped one thick; logarithmic axes."""
-    data = saved.figure("forecast_growth")
+    data, default = results.figure_with_rows("forecast_growth"), _shipped(results)
     known = [] if data is None else [name for name in METHODS if has_values(data, f"{name}_rms_m")]
     if data is None or not known or not has_values(data, "horizon_min"):
         return None
@@ -65,34 +68,18 @@ def _last(values: NDArray[np.float64]) -> float:
     return float(known[-1]) if known.size else 0.0
 
 
-def calibration(rows: Sequence[Mapping[str, Any]], default: str) -> Drawing | None:
+def calibration(results: FlightResults) -> Drawing | None:
     """Shares inside the 50, 68 and 95 % bands by horizon, and NEES with its limits, of the shipped method."""
-    mine = [row for row in rows if row.get("method") == default and is_number(row.get("horizon_min"))]
+    answer = results.answer(ForecastResult)
+    mine = [] if answer is None else [row for row in answer.calibration if row.method == answer.default_method]
+    mine = sorted((row for row in mine if np.isfinite(row.horizon_min)), key=lambda row: row.horizon_min)
     if not mine:
         return None
-    mine.sort(key=lambda row: float(row["horizon_min"]))
-    columns = {name: np.array([_number(row.get(name)) for row in mine]) for name in mine[0] if name != "method"}
-    horizon = columns["horizon_min"]
 
     def paint(figure: Any) -> None:
         left, right = d.place(figure, 18, 12, 86, 56), d.place(figure, 106, 12, 174, 56)
-        for (name, nominal), colour in zip(CHANNELS_INSIDE, (d.INS, d.GNSS, d.USED), strict=True):
-            if name in columns:
-                left.plot(horizon, 100.0 * columns[name], "o-", color=colour, markersize=3.0, linewidth=1.0)
-                d.limit_line(left, 100.0 * nominal, f"{100.0 * nominal:.0f} % wanted", colour=colour)
-        left.set_ylim(0.0, 105.0)
-        left.set_ylabel("errors inside the band, %")
-        left.set_title("Bands of 50, 68 and 95 %")
-        if {"nees", "nees_low", "nees_high"} <= set(columns):
-            low, high = columns["nees_low"], columns["nees_high"]
-            right.fill_between(horizon, low, high, color=d.USED, alpha=0.18, linewidth=0, label="95 % limits")
-            right.plot(horizon, columns["nees"], "o-", color=d.INK, markersize=3.0, linewidth=1.0, label="NEES")
-            few = columns.get("independent_starts", np.full(len(mine), np.inf)) < FEWEST_STARTS
-            right.plot(horizon[few], columns["nees"][few], "o", color=d.INK, markerfacecolor="white", markersize=3.0)
-            right.axhline(1.0, color=d.FAINT, linewidth=0.6)
-            right.set_ylim(bottom=0.0)
-            d.legend_above(right)
-        right.set_ylabel("NEES, 1 is honest")
+        _paint_bands(left, mine)
+        _paint_nees(right, mine)
         for axes in (left, right):
             axes.set_xlabel("horizon, min without GNSS")
 
@@ -105,16 +92,36 @@ def calibration(rows: Sequence[Mapping[str, Any]], default: str) -> Drawing | No
     return Drawing("Calibration of the shipped method", caption, alt, d.draw("calibration", 64, paint))
 
 
-def _number(value: Any) -> float:
-    return float(value) if is_number(value) else float("nan")
+def _paint_bands(axes: Any, rows: list[CalibrationRow]) -> None:
+    horizon = np.array([row.horizon_min for row in rows])
+    inside = np.array([[row.inside50, row.inside68, row.inside95] for row in rows])
+    for shares, nominal, colour in zip(inside.T, NOMINAL, (d.INS, d.GNSS, d.USED), strict=True):
+        axes.plot(horizon, 100.0 * shares, "o-", color=colour, markersize=3.0, linewidth=1.0)
+        d.limit_line(axes, 100.0 * nominal, f"{100.0 * nominal:.0f} % wanted", colour=colour)
+    axes.set_ylim(0.0, 105.0)
+    axes.set_ylabel("errors inside the band, %")
+    axes.set_title("Bands of 50, 68 and 95 %")
 
 
-def hindcast_map(saved: SavedFlight, default: str) -> Drawing | None:
+def _paint_nees(axes: Any, rows: list[CalibrationRow]) -> None:
+    horizon, nees = np.array([row.horizon_min for row in rows]), np.array([row.nees for row in rows])
+    low, high = [row.nees_low for row in rows], [row.nees_high for row in rows]
+    axes.fill_between(horizon, low, high, color=d.USED, alpha=0.18, linewidth=0, label="95 % limits")
+    axes.plot(horizon, nees, "o-", color=d.INK, markersize=3.0, linewidth=1.0, label="NEES")
+    few = np.array([row.independent_starts < FEWEST_STARTS for row in rows])
+    axes.plot(horizon[few], nees[few], "o", color=d.INK, markerfacecolor="white", markersize=3.0)
+    axes.axhline(1.0, color=d.FAINT, linewidth=0.6)
+    axes.set_ylim(bottom=0.0)
+    d.legend_above(axes)
+    axes.set_ylabel("NEES, 1 is honest")
+
+
+def hindcast_map(results: FlightResults) -> Drawing | None:
     """Radial error by start and horizon, the shipped method beside the raw INS, on one scale of colour."""
-    data = saved.figure("forecast_map")
+    data = results.figure_with_rows("forecast_map")
     if data is None:
         return None
-    names = [name for name in dict.fromkeys((default, "raw_ins")) if has_values(data, f"{name}_m")]
+    names = [name for name in dict.fromkeys((_shipped(results), "raw_ins")) if has_values(data, f"{name}_m")]
     starts, horizons = (np.unique(d.finite(numbers(data, name))) for name in ("start_s", "horizon_min"))
     if not names or min(len(starts), len(horizons)) < 2 or len(starts) * len(horizons) != len(data):
         return None
@@ -146,14 +153,13 @@ def hindcast_map(saved: SavedFlight, default: str) -> Drawing | None:
     return Drawing("Hindcast map", caption, alt, d.draw("map-hindcast", 74, paint), ("forecast_map",))
 
 
-def classic(saved: SavedFlight) -> Drawing | None:
+def classic(results: FlightResults) -> Drawing | None:
     """The paper's figure 2: east error after each of four starts, measured, forecast without and with windows."""
-    data = saved.figure("forecast_classic")
-    if data is None or not has_values(data, "start_s", "time_s", "measured_east_m"):
+    answer, data = results.answer(ForecastResult), results.figure_with_rows("forecast_classic")
+    if answer is None or data is None or not has_values(data, "start_s", "time_s", "measured_east_m"):
         return None
     starts = np.unique(d.finite(numbers(data, "start_s")))[:4]
-    rows = objects(mapping(mapping(saved.summary, "results"), "forecast"), "classic_starts")
-    hours = sorted({row["start_h"] for row in rows if is_number(row.get("start_h"))})
+    hours = sorted({row.start_h for row in answer.classic_starts})
     titles = [f"{part:g} h after take-off" for part in hours] if len(hours) == len(starts) else [""] * len(starts)
 
     def paint(figure: Any) -> None:

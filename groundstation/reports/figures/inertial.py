@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
 from groundstation.results.figures import FigureData, flags, numbers
-from groundstation.results.files import SavedFlight
+from groundstation.results.flight import FlightResults
 
 CHANNELS = ("north", "east")
 BAND = 1.96  # half width of a 95 % band in sigmas
@@ -27,9 +27,9 @@ OUTAGE = "#fbe9c6"
 MOST, MOST_DOTS = 500, 800  # points of a line and dots: more cannot be told apart on paper
 
 
-def state(saved: SavedFlight, name: str) -> Drawing | None:
+def state(results: FlightResults, name: str) -> Drawing | None:
     """Position or velocity error of both channels: measured, estimated, smoothed, with the 95 % band."""
-    data = saved.figure("inertial_states")
+    data = results.figure_with_rows("inertial_states")
     if data is None or not has_values(data, *(f"{channel}_{name}_{SUFFIXES[name]}" for channel in CHANNELS)):
         return None
     low, high = span(data)
@@ -52,9 +52,9 @@ def state(saved: SavedFlight, name: str) -> Drawing | None:
     return Drawing(f"{name.capitalize()} error of the INS", caption, alt, svg, ("inertial_states",))
 
 
-def tilt_and_drift(saved: SavedFlight) -> Drawing | None:
+def tilt_and_drift(results: FlightResults) -> Drawing | None:
     """Platform tilt and constant gyro drift of both channels with their bands."""
-    data = saved.figure("inertial_states")
+    data = results.figure_with_rows("inertial_states")
     names = ("tilt", "drift")
     if data is None or not has_values(data, *(f"{c}_{name}_{SUFFIXES[name]}" for c in CHANNELS for name in names)):
         return None
@@ -121,13 +121,13 @@ def _outages(axes: Any, data: FigureData) -> None:
         axes.axvspan(time[start], time[min(end, len(time) - 1)], color=OUTAGE, linewidth=0, zorder=0)
 
 
-def radial(saved: SavedFlight) -> Drawing | None:
+def radial(results: FlightResults) -> Drawing | None:
     """Radial error of the track as flown by the INS and as corrected, on a logarithmic axis."""
-    data = saved.figure("inertial_track")
+    data = results.figure_with_rows("inertial_track")
     if data is None or not has_values(data, "ins_error_m", "corrected_error_m"):
         return None
     low, high = span(data)
-    states = saved.figure("inertial_states")
+    states = results.figure_with_rows("inertial_states")
 
     def paint(figure: Any) -> None:
         axes = d.place(figure, 18, 12, 174, 58)
@@ -164,9 +164,9 @@ def plain_log(axis: Any, marks: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def innovations(saved: SavedFlight) -> Drawing | None:
+def innovations(results: FlightResults) -> Drawing | None:
     """Innovations over their sigma, with the limits that 95 % should keep."""
-    data = saved.figure("inertial_states")
+    data = results.figure_with_rows("inertial_states")
     if data is None or not has_values(data, *(f"{channel}_normalised_innovation" for channel in CHANNELS)):
         return None
     low, high = span(data)
@@ -197,9 +197,9 @@ def _symmetric(values: NDArray[np.float64]) -> tuple[float, float]:
     return -1.1 * min(largest, 8.0), 1.1 * min(largest, 8.0)
 
 
-def observability(saved: SavedFlight) -> Drawing | None:
+def observability(results: FlightResults) -> Drawing | None:
     """How well each state is seen as the flight goes on."""
-    data = saved.figure("inertial_observability")
+    data = results.figure_with_rows("inertial_observability")
     if data is None or not any(has_values(data, f"north_{name}") for name in STATES):
         return None
     low, high = span(data)

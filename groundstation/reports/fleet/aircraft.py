@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.chapters.parts import Grid, Head, Note, Section
-from groundstation.chapters.wording import number
+from groundstation.chapters.wording import number, percent
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
@@ -20,7 +20,6 @@ from groundstation.reports.fleet.common import (
     rows_shown,
     span_of,
 )
-from groundstation.reports.sections.inertial import percent
 from groundstation.results.fleet import AircraftRow, FleetResults
 
 MOST_DOTS = 2000

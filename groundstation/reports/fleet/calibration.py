@@ -5,11 +5,10 @@ from typing import Any
 import numpy as np
 
 from groundstation.chapters.parts import Grid, Head, Mark, Note, Section
-from groundstation.chapters.wording import number, typeset
+from groundstation.chapters.wording import number, percent, typeset
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.fleet.common import name_axis, plural
-from groundstation.reports.sections.inertial import percent
 from groundstation.results.fleet import FleetCalibration, FleetResults
 
 LEAD = "Are the stated intervals honest? Of something known independently, 95 % should lie inside."

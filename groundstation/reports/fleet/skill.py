@@ -5,13 +5,12 @@ from typing import Any
 import numpy as np
 
 from groundstation.chapters.parts import Cell, Grid, Head, Note, Part, Section
-from groundstation.chapters.wording import clean, is_number, number
+from groundstation.chapters.wording import clean, is_number, number, percent
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.forecast import OTHERS
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.reports.fleet.common import bounded, colours_of, date_axis, date_numbers, dot_size, plural
-from groundstation.reports.sections.inertial import percent
 from groundstation.results.fleet import FleetResults, FleetSkill
 from groundstation.results.forecast import HORIZONS_MIN, METHODS
 

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
-from groundstation.results.explain import explained
 from groundstation.results.files import SavedFlight
 from groundstation.results.files import mapping as mapping
+from groundstation.results.reasons import explained
 
 
 def objects(document: Any, key: str) -> list[Mapping[str, Any]]:

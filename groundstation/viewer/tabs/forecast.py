@@ -5,16 +5,16 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.base.timescales import duration_text
+from groundstation.chapters.forecast import forecast as chapter
+from groundstation.chapters.markdown import markdown
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import METHODS, ForecastResult
-from groundstation.results.inertial import InertialResult
 from groundstation.viewer import colours
 from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.names import words
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray
-from groundstation.viewer.tabs.forecast_text import forecast_text
 from groundstation.viewer.views import document, figure_of, numbers, plot
 
 BAND = 1.96  # half width of a 95 % band in sigmas
@@ -28,12 +28,10 @@ CLAIMED = Line("± 1.96 σ", colours.HONEST, THIN)
 
 def forecast(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the forecast tab; None when the flight was not assessed and no reason is known."""
-    reasons = [entry.reason for entry in results.not_assessable if entry.analysis == "forecast"]
-    answer, inertial = results.answer(ForecastResult), results.answer(InertialResult)
-    if answer is None and not reasons:
+    section, answer = chapter(results), results.answer(ForecastResult)
+    if section is None:
         return None
-    kind = inertial.kind if inertial is not None else "unaided"
-    recorder.document("forecast/answer", forecast_text(answer, reasons, kind=kind))
+    recorder.document("forecast/answer", markdown(section))
     text = document("How far a forecast can be trusted", "forecast/answer")
     rows: list[rrb.Container] = []
     fan = _fan(recorder, results)

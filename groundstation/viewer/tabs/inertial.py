@@ -3,13 +3,14 @@
 import numpy as np
 import rerun.blueprint as rrb
 
+from groundstation.chapters.inertial import inertial as chapter
+from groundstation.chapters.markdown import markdown
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.results.inertial import InertialResult
 from groundstation.viewer import colours
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after, runs
-from groundstation.viewer.tabs.inertial_text import inertial_text
 from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
 
 CHANNELS = ("north", "east")
@@ -36,11 +37,10 @@ TITLES = {
 
 def inertial(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the tab of the INS errors; None when the flight was not assessed and no reason is known."""
-    reasons = [entry.reason for entry in results.not_assessable if entry.analysis == "inertial"]
-    answer = results.answer(InertialResult)
-    if answer is None and not reasons:
+    section = chapter(results)
+    if section is None:
         return None
-    recorder.document("inertial/answer", inertial_text(answer, reasons))
+    recorder.document("inertial/answer", markdown(section))
     right: list[rrb.View] = [document("How good this INS is", "inertial/answer")]
     states = figure_of(results, "inertial_states", "time_s", "north_position_m", "east_position_m")
     pages: list[rrb.Container] = []

@@ -10,7 +10,7 @@ from groundstation.base.signals import RAW_PREFIX, topics_of_kind
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.results.flight import FlightResults
-from groundstation.results.noticed import grouped
+from groundstation.results.grouped_findings import grouped
 from groundstation.tables.table import Flight
 from groundstation.viewer.names import topic_label
 from groundstation.viewer.recorder import Recorder

@@ -7,17 +7,17 @@ from pathlib import Path
 from typing import Protocol
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.elsewhere import FarFolder
-from groundstation.pipeline.far import BY_LOG, STAGING, array_files
 from groundstation.pipeline.flight import is_made, place, remove
 from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK
 from groundstation.pipeline.outcome import Outcome
+from groundstation.pipeline.remote import RemoteFolder
+from groundstation.pipeline.remote_runs import BY_LOG, STAGING, array_files
 from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY
 
 FLEET_ARRAYS = ("heading_samples",)  # of a flight's arrays, what the fleet is made from
 
 
-class Depot(Protocol):
+class Output(Protocol):
     """Takes finished flights in.
 
     Attributes
@@ -38,7 +38,7 @@ class Depot(Protocol):
         """Throw a flight folder away; what somebody else put into one that is in place stays."""
 
 
-class FolderDepot:
+class LocalOutput:
     """A folder on this machine."""
 
     def __init__(self, root: Path) -> None:
@@ -62,7 +62,7 @@ class FolderDepot:
             remove(self.root / Path(folder).name)
 
 
-class FarDepot:
+class RemoteOutput:
     """An OUT elsewhere; its copy here holds documents and what the fleet is made from, and other files by name alone.
 
     Parameters
@@ -74,7 +74,7 @@ class FarDepot:
 
     def __init__(self, url: str, root: Path) -> None:
         self.root = root
-        self._out = FarFolder(url)
+        self._out = RemoteFolder(url)
 
     def refuse_foreign(self, *, force: bool) -> None:
         """Raise UsageError when something else is in the folder."""

@@ -19,10 +19,10 @@ from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.pipeline.batch import plan_many, run_many
 from groundstation.pipeline.cluster import on_cluster
 from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.elsewhere import FarFolder, far_logs
 from groundstation.pipeline.flight import Job
 from groundstation.pipeline.outcome import Outcome
 from groundstation.pipeline.progress import Event
+from groundstation.pipeline.remote import RemoteFolder, far_logs
 from groundstation.reports.drawing import sketching
 from tests.test_resume import SETTINGS, SHORT, assert_equal_runs, tell_and_sleep
 
@@ -57,12 +57,12 @@ def whole(logs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def sent(folder: Path, url: str) -> str:
-    FarFolder(url).send(folder)
+    RemoteFolder(url).send(folder)
     return url
 
 
 def fetched(url: str, target: Path) -> Path:
-    far = FarFolder(url)
+    far = RemoteFolder(url)
     for name in far.files():
         if not name.startswith("."):
             far.fetch(name, target / name)
@@ -81,14 +81,14 @@ def test_a_run_elsewhere_gives_what_a_run_here_gives(memory: str, logs: Path, wh
     (copy / "index.csv").write_text((copy / "index.csv").read_text().replace(f"{source}/", f"{logs}/"))
     (copy / ".lock").touch()
     assert_equal_runs(copy, whole)
-    assert [name for name in FarFolder(out).names() if name == ".staging"] == []
+    assert [name for name in RemoteFolder(out).names() if name == ".staging"] == []
 
 
 def test_what_is_finished_elsewhere_is_not_done_again(
     memory: str, finished_run: Callable[..., Outcome], tmp_path: Path
 ) -> None:
     out, source = f"{memory}out", f"{memory}logs"
-    FarFolder(source).write(SHORT.name, SHORT.read_bytes())
+    RemoteFolder(source).write(SHORT.name, SHORT.read_bytes())
     run_many([source], out, Configuration(), jobs=1)
     told: list[str] = []
 
@@ -106,8 +106,8 @@ def test_what_is_finished_elsewhere_is_not_done_again(
 
 def test_a_flight_elsewhere_loses_its_pdf_and_keeps_what_somebody_put_there(memory: str) -> None:
     out, source = f"{memory}out", f"{memory}logs"
-    far = FarFolder(out)
-    FarFolder(source).write(SHORT.name, SHORT.read_bytes())
+    far = RemoteFolder(out)
+    RemoteFolder(source).write(SHORT.name, SHORT.read_bytes())
     (done,) = run_many([source], out, Configuration(), jobs=1)
     far.write(f"{done.flight_id}/notes.txt", b"mine")
     assert json.loads(far.read(f"{done.flight_id}/manifest.json") or b"")["source"]["path"] == f"{source}/{SHORT.name}"
@@ -123,18 +123,18 @@ def test_places_that_cannot_be_reached_are_told_in_one_line(memory: str, tmp_pat
     with pytest.raises(UsageError, match="no such file"):
         far_logs(f"{memory}nothing")
     with pytest.raises(UsageError, match="fsspec reaches"):
-        FarFolder("nosuchprotocol://x")
-    FarFolder(f"{memory}mine").write("photo.jpg", b"x")
+        RemoteFolder("nosuchprotocol://x")
+    RemoteFolder(f"{memory}mine").write("photo.jpg", b"x")
     with pytest.raises(UsageError, match="did not make"):
         run_many([SHORT], f"{memory}mine", Configuration())
     with pytest.raises(UsageError, match="local ones"):
         plan_many([SHORT], f"{memory}out", Configuration())
     with pytest.raises(GroundstationError):
-        FarFolder(f"{memory}out").fetch("nothing", tmp_path / "x")
+        RemoteFolder(f"{memory}out").fetch("nothing", tmp_path / "x")
 
 
 def test_what_groundstation_made_is_no_log(memory: str) -> None:
-    far = FarFolder(f"{memory}flights")
+    far = RemoteFolder(f"{memory}flights")
     for name in (
         "a.ulg",
         "sub/b.csv",

@@ -8,18 +8,18 @@ from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK
 
 
-def is_far(place: str) -> bool:
+def is_remote(place: str) -> bool:
     """Whether a place is named by URL.
 
     Examples
     --------
-    >>> is_far("s3://flights/2026"), is_far("flights/2026")
+    >>> is_remote("s3://flights/2026"), is_remote("flights/2026")
     (True, False)
     """
     return "://" in place
 
 
-class FarFolder:
+class RemoteFolder:
     """A folder named by URL.
 
     Parameters
@@ -155,7 +155,7 @@ def far_logs(url: str) -> list[tuple[str, bool]]:
     UsageError
         When nothing is there.
     """
-    folder = FarFolder(url)
+    folder = RemoteFolder(url)
     if folder.is_file():
         return [(url, True)]
     paths = [PurePosixPath(name) for name in folder.files()]

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from groundstation.base.errors import GroundstationError
-from groundstation.pipeline.elsewhere import FarFolder, is_far
 from groundstation.pipeline.flight import Job, run_flight
 from groundstation.pipeline.outcome import Outcome
 from groundstation.pipeline.progress import Listener, silent
+from groundstation.pipeline.remote import RemoteFolder, is_remote
 from groundstation.pipeline.resume import Finished, finished
 from groundstation.reports.flight_report import PDF
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
@@ -23,7 +23,7 @@ STAGING, BY_LOG = ".staging", ".logs"  # in an OUT elsewhere: what is on its way
 
 
 @dataclass(frozen=True)
-class FarJob:
+class RemoteJob:
     """A job whose log or results lie elsewhere.
 
     ``log`` and ``out`` are URLs or paths; with ``redo`` nothing counts as finished.
@@ -40,7 +40,7 @@ class FarJob:
         return PurePosixPath(self.log).name
 
 
-def run_far(far: FarJob, listen: Listener = silent) -> Outcome:
+def run_remote(remote: RemoteJob, listen: Listener = silent) -> Outcome:
     """Fetch a log, run it and send its flight folder to staging.
 
     Returns
@@ -50,23 +50,23 @@ def run_far(far: FarJob, listen: Listener = silent) -> Outcome:
     """
     try:
         with tempfile.TemporaryDirectory(prefix="groundstation-") as scratch:
-            outcome = _run_in(Path(scratch), far, listen)
+            outcome = _run_in(Path(scratch), remote, listen)
     except GroundstationError as error:
-        outcome = Outcome(far.log, "failed", str(error))
+        outcome = Outcome(remote.log, "failed", str(error))
     except OSError as error:
-        outcome = Outcome(far.log, "failed", f"{far.name}: {error.strerror or error}")
+        outcome = Outcome(remote.log, "failed", f"{remote.name}: {error.strerror or error}")
     return outcome
 
 
-def _run_in(scratch: Path, far: FarJob, listen: Listener) -> Outcome:
-    out = FarFolder(far.out)
-    path = Path(far.log)
-    if is_far(far.log):
-        parent, _, _name = far.log.rpartition("/")
-        path = scratch / "log" / far.name
-        FarFolder(parent).fetch(far.name, path)
-    job = replace(far.job, path=path, out=scratch / "out", url=far.log if is_far(far.log) else "")
-    if not far.redo:
+def _run_in(scratch: Path, remote: RemoteJob, listen: Listener) -> Outcome:
+    out = RemoteFolder(remote.out)
+    path = Path(remote.log)
+    if is_remote(remote.log):
+        parent, _, _name = remote.log.rpartition("/")
+        path = scratch / "log" / remote.name
+        RemoteFolder(parent).fetch(remote.name, path)
+    job = replace(remote.job, path=path, out=scratch / "out", url=remote.log if is_remote(remote.log) else "")
+    if not remote.redo:
         job = _planned(job, out, scratch / "finished")
     outcome = run_flight(job, listen)
     if not outcome.flight_id:
@@ -84,7 +84,7 @@ def _run_in(scratch: Path, far: FarJob, listen: Listener) -> Outcome:
     return replace(outcome, folder=staged)
 
 
-def _planned(job: Job, out: FarFolder, scratch: Path) -> Job:
+def _planned(job: Job, out: RemoteFolder, scratch: Path) -> Job:
     """The job with what has to be done of it; what it needs of a finished flight is fetched."""
     asked = job.asked()
     if asked is None:
@@ -103,12 +103,12 @@ def _planned(job: Job, out: FarFolder, scratch: Path) -> Job:
     return planned
 
 
-def array_files(out: FarFolder, flight_id: str) -> list[str]:
+def array_files(out: RemoteFolder, flight_id: str) -> list[str]:
     """Files of a flight that hold the arrays behind its figures."""
     return [f"{ARRAYS}/{name}" for name in out.names(f"{flight_id}/{ARRAYS}")]
 
 
-def _fetched(out: FarFolder, flight_id: str, scratch: Path) -> Finished | None:
+def _fetched(out: RemoteFolder, flight_id: str, scratch: Path) -> Finished | None:
     """What a flight elsewhere remembers, its two documents fetched; None when it is not whole."""
     folder, files = scratch / flight_id, out.names(flight_id)
     if not {MANIFEST, SUMMARY} <= set(files):

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.pipeline.depot import FolderDepot
 from groundstation.pipeline.flight import PARTIAL_PREFIX, remove
 from groundstation.pipeline.outcome import Outcome
-from groundstation.pipeline.shelf import Shelf
+from groundstation.pipeline.output import LocalOutput
+from groundstation.pipeline.placement import Placement
 
 ONE, OTHER = "1" * 64, "2" * 64
 FLIGHT = "20260504T060000Z_A12"
@@ -29,16 +29,16 @@ def finished(out: Path, log: str, sha256: str, flight_id: str = FLIGHT, folder: 
 
 def run(out: Path, *outcomes: Outcome, again: bool = True) -> list[Outcome]:
     """Put outcomes in their order; those that clash are run again, with success or without."""
-    shelf = Shelf(FolderDepot(out), [one.source for one in outcomes])
+    placement = Placement(LocalOutput(out), [one.source for one in outcomes])
     for number, outcome in enumerate(outcomes):
-        shelf.put(number, outcome)
-    for number in shelf.clashing():
+        placement.put(number, outcome)
+    for number in placement.clashing():
         one = outcomes[number]
         flight_id = f"{FLIGHT}_{one.sha256[:8]}"
         anew = finished(out, one.source, one.sha256, flight_id) if again else Outcome(one.source, "failed", "no memory")
-        shelf.put_again(number, anew)
-    shelf.sweep()
-    return list(shelf.outcomes())
+        placement.put_again(number, anew)
+    placement.sweep()
+    return list(placement.outcomes())
 
 
 def names(out: Path) -> list[str]:
@@ -59,11 +59,11 @@ def test_a_flight_that_fails_when_it_is_run_again_keeps_what_stood_there(tmp_pat
 
 def test_a_twin_of_a_clashing_flight_leaves_nothing_behind(tmp_path: Path) -> None:
     kept, twin, other = (finished(tmp_path, log, sha) for log, sha in (("a", ONE), ("b", ONE), ("c", OTHER)))
-    shelf = Shelf(FolderDepot(tmp_path), ["a", "b", "c"])
+    placement = Placement(LocalOutput(tmp_path), ["a", "b", "c"])
     for number, outcome in ((2, other), (1, twin), (0, kept)):  # the later twin is finished first
-        shelf.put(number, outcome)
-    assert [one.state for one in shelf.outcomes()] == ["done", "skipped", "done"]
-    assert shelf.clashing() == (0, 2)
+        placement.put(number, outcome)
+    assert [one.state for one in placement.outcomes()] == ["done", "skipped", "done"]
+    assert placement.clashing() == (0, 2)
     assert names(tmp_path) == [Path(kept.folder).name, FLIGHT]
 
 
@@ -109,11 +109,11 @@ def test_a_flight_that_clashed_before_is_put_where_it_was(tmp_path: Path) -> Non
     anew = [
         finished(tmp_path, log, sha, name) for log, sha, name in (("a", ONE, SUFFIXED[0]), ("b", OTHER, SUFFIXED[1]))
     ]
-    shelf = Shelf(FolderDepot(tmp_path), ["a", "b"])
+    placement = Placement(LocalOutput(tmp_path), ["a", "b"])
     for number, outcome in enumerate(anew):
-        shelf.put(number, outcome)
-    shelf.sweep()
-    assert shelf.clashing() == () and names(tmp_path) == list(SUFFIXED)
+        placement.put(number, outcome)
+    placement.sweep()
+    assert placement.clashing() == () and names(tmp_path) == list(SUFFIXED)
 
 
 def test_another_log_does_not_take_the_place_of_one_that_is_not_in_this_run(tmp_path: Path) -> None:

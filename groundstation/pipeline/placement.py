@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError
-from groundstation.pipeline.depot import Depot
-from groundstation.pipeline.elsewhere import is_far
 from groundstation.pipeline.identity import plain_id
 from groundstation.pipeline.inputs import flight_folders
 from groundstation.pipeline.outcome import Outcome
+from groundstation.pipeline.output import Output
+from groundstation.pipeline.remote import is_remote
 from groundstation.results.files import MANIFEST
 
 
@@ -23,7 +23,7 @@ class _Origin:
     sha256: str
 
 
-class Shelf:
+class Placement:
     """Puts finished flights into place at once.
 
     Two flights of one id get the digests of their logs into their names; as that is known only when the second one
@@ -33,13 +33,13 @@ class Shelf:
 
     Parameters
     ----------
-    depot : Depot
+    output : Output
     names : sequence of str
         The logs as the user would type them.
     """
 
-    def __init__(self, depot: Depot, names: Sequence[str]) -> None:
-        self._depot, self._names = depot, names
+    def __init__(self, output: Output, names: Sequence[str]) -> None:
+        self._output, self._names = output, names
         self._outcomes: dict[int, Outcome] = {}
         self._kept: dict[str, int] = {}  # content -> number of the log that is kept
         self._owner: dict[str, str] = {}  # flight id -> content
@@ -61,8 +61,8 @@ class Shelf:
 
     def put_twin(self, number: int, outcome: Outcome, kept: int) -> None:
         """Take over a log whose content is that of the log with the number ``kept``."""
-        if outcome.folder and not self._depot.has_in_place(outcome):
-            self._depot.discard(outcome.folder)
+        if outcome.folder and not self._output.has_in_place(outcome):
+            self._output.discard(outcome.folder)
         text = f"{Path(outcome.source).name}: same content as {self._names[kept]}, listed once"
         self._outcomes[number] = Outcome(outcome.source, "skipped", text, sha256=outcome.sha256)
 
@@ -71,21 +71,21 @@ class Shelf:
         owner = self._owner.setdefault(plain, outcome.sha256)
         is_taken = owner != outcome.sha256 or self._is_of_another_log(identity, outcome)
         was_taken = plain != identity  # in an earlier run
-        if is_taken or (not was_taken and (self._depot.root / f"{plain}_{outcome.sha256[:8]}").exists()):
+        if is_taken or (not was_taken and (self._output.root / f"{plain}_{outcome.sha256[:8]}").exists()):
             self._clashes.add(plain)
             if not was_taken:
                 return outcome
-        return outcome if self._depot.has_in_place(outcome) else self._put_in_place(outcome)
+        return outcome if self._output.has_in_place(outcome) else self._put_in_place(outcome)
 
     def _put_in_place(self, outcome: Outcome) -> Outcome:
         try:
-            return replace(outcome, folder=self._depot.place(outcome))
+            return replace(outcome, folder=self._output.place(outcome))
         except GroundstationError as error:
             reason = str(error)
         except OSError as error:
             reason = f"{outcome.flight_id}: cannot be put into place ({error.strerror or error})"
         with suppress(OSError, GroundstationError):
-            self._depot.discard(outcome.folder)
+            self._output.discard(outcome.folder)
         return Outcome(outcome.source, "failed", reason, sha256=outcome.sha256, times_s=outcome.times_s)
 
     def clashing(self) -> tuple[int, ...]:
@@ -95,8 +95,8 @@ class Shelf:
     def put_again(self, number: int, outcome: Outcome) -> None:
         """Take over what was run again; if that failed, what stood in place stays."""
         former = self._outcomes[number]
-        if not self._depot.has_in_place(former):
-            self._depot.discard(former.folder)
+        if not self._output.has_in_place(former):
+            self._output.discard(former.folder)
         self._outcomes[number] = self._put_in_place(outcome) if outcome.flight_id else outcome
 
     def sweep(self) -> None:
@@ -104,13 +104,13 @@ class Shelf:
         flights = [outcome for outcome in self._outcomes.values() if outcome.flight_id]
         now = {outcome.sha256: outcome.flight_id for outcome in flights}
         versions = {(_place_of(outcome), plain_id(outcome.flight_id, outcome.sha256)) for outcome in flights}
-        for folder in flight_folders(self._depot.root):
+        for folder in flight_folders(self._output.root):
             origin = _origin_of(folder)
             if origin is None or now.get(origin.sha256) == folder.name:
                 continue
             if origin.sha256 in now or (origin.path, plain_id(folder.name, origin.sha256)) in versions:
                 with suppress(OSError, GroundstationError):  # the next run tries again
-                    self._depot.discard(folder.name)
+                    self._output.discard(folder.name)
 
     def outcomes(self) -> tuple[Outcome, ...]:
         """What became of the logs put so far, in the order of the inputs."""
@@ -118,7 +118,7 @@ class Shelf:
 
     def _is_of_another_log(self, flight_id: str, outcome: Outcome) -> bool:
         """Whether a flight folder came from another log than an earlier version of this one."""
-        origin = _origin_of(self._depot.root / flight_id)
+        origin = _origin_of(self._output.root / flight_id)
         if origin is None or origin.sha256 == outcome.sha256:
             return False
         return origin.path != _place_of(outcome)
@@ -126,7 +126,7 @@ class Shelf:
 
 def _place_of(outcome: Outcome) -> str:
     """Where the log is, as manifests tell it."""
-    return outcome.source if is_far(outcome.source) else str(Path(outcome.source).absolute())
+    return outcome.source if is_remote(outcome.source) else str(Path(outcome.source).absolute())
 
 
 def _origin_of(folder: Path) -> _Origin | None:

@@ -1,0 +1,276 @@
+"""Chapter: INS errors (system 2): what the INS is like, its states with sigma, and how consistent the filter is."""
+
+from collections.abc import Mapping
+
+from groundstation.chapters.assessed import without_answer
+from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, Tone
+from groundstation.chapters.wording import (
+    ABSENT,
+    any_value,
+    clock,
+    is_number,
+    named_quantity,
+    number,
+    percent,
+    typeset,
+    unit_sign,
+)
+from groundstation.results.flight import FlightResults
+from groundstation.results.inertial import (
+    MISSING,
+    AzimuthEstimate,
+    ChannelResult,
+    InertialResult,
+    RealOutage,
+    StateEstimate,
+    is_left_alone,
+)
+
+PLACES = {"m": 1, "mps": 3, "arcsec": 1, "dph": 4, "dphph": 4}
+CONSISTENT = (0.93, 0.97)  # shares of innovations inside their 95 % band that pass for it
+TITLE = "INS errors"
+LEAD = (
+    "While GNSS is there a Kalman filter finds the errors of the INS, north and east apart: position, velocity, "
+    "platform tilt, gyro drift. Error = INS − truth."
+)
+AIDED = "This INS is aided by GNSS: a forecast from it means nothing"
+
+
+def inertial(results: FlightResults) -> Section | None:
+    """The chapter; None when the flight was not assessed and no reason is known."""
+    answer = results.answer(InertialResult)
+    if answer is None:
+        return without_answer(results, "inertial", TITLE, LEAD)
+    parts: tuple[Part | None, ...] = (
+        *_conclusions(answer),
+        _figures_of_merit(answer),
+        _states(answer),
+        Figure("inertial.state", of="position"),
+        Figure("inertial.state", of="velocity"),
+        Figure("inertial.tilt_and_drift"),
+        Figure("inertial.radial"),
+        _outages(answer.outages),
+        _consistency(answer.channels),
+        Figure("inertial.innovations"),
+        Figure("inertial.observability"),
+        _azimuth(answer.azimuth),
+        _settings(answer.settings),
+    )
+    return Section("inertial", TITLE, LEAD, tuple(part for part in parts if part is not None), _headline(answer))
+
+
+def _headline(answer: InertialResult) -> str:
+    if answer.kind == "gnss_aided":
+        return AIDED
+    if answer.kind == "unknown":
+        return "Whether GNSS corrects this INS cannot be told"
+    rate = number(answer.radial_error_rate_50_nmiph, 2, "nmi/h")
+    return "Unaided INS" if rate == ABSENT else f"Unaided INS, {rate} (median)"
+
+
+def _conclusions(answer: InertialResult) -> list[Note]:
+    """The chapter in a few sentences: what the INS is like, and whether the filter can be trusted."""
+    reason = typeset(answer.kind_reason).strip().rstrip(".")
+    if answer.kind == "gnss_aided":
+        return [Note(f"This INS is aided by GNSS, and a forecast from it means nothing: {reason}.", "warn")]
+    notes = []
+    if answer.kind == "unknown":
+        text = f"Whether GNSS corrects this INS already cannot be told: {reason or 'the log does not show it'}."
+        notes.append(Note(f"{text} If it does, its errors and any forecast mean nothing.", "unknown"))
+    notes.append(_quality(answer))
+    if answer.reopened > 0:
+        times = "once" if answer.reopened == 1 else f"{number(answer.reopened, 0)} times"
+        text = (
+            f"GNSS was rejected for so long that the filter was opened to it again, {times}: the noise of INS class "
+            f"{answer.ins_class or ABSENT} does not fit this INS or this receiver."
+        )
+        notes.append(Note(text, "warn"))
+    return notes
+
+
+def _rates(answer: InertialResult) -> tuple[str, str]:
+    """Radial error rate, median and 95 %."""
+    median, p95 = answer.radial_error_rate_50_nmiph, answer.radial_error_rate_95_nmiph
+    return number(median, 2, "nmi/h"), number(p95, 2, "nmi/h")
+
+
+def _quality(answer: InertialResult) -> Note:
+    rates = _rates(answer)
+    rate = "" if ABSENT in rates else f" of {rates[0]} (median; 95 % of the time below {rates[1]})"
+    velocity = number(answer.velocity_error_rms_mps, 2, "m/s")
+    largest = number(answer.largest_radial_error_m, 0, "m")
+    name = f"An INS{rate}, taken as unaided" if answer.kind == "unknown" else f"An unaided INS{rate}"
+    in_words = _in_words(answer.channels)
+    text = f"{name}: velocity error {velocity} RMS, position error up to {largest}. {in_words}"
+    tone: Tone = "plain" if _is_inflated(answer.channels) else "good"  # raised noise proves nothing
+    return Note(text.strip(), tone if _is_consistent(answer.channels) else "warn")
+
+
+Channels = tuple[ChannelResult, ...]
+
+
+def _shares(channels: Channels) -> dict[str, float]:
+    return {channel.name: channel.share_inside95 for channel in channels if is_number(channel.share_inside95)}
+
+
+def _is_inflated(channels: Channels) -> bool:
+    return any(not is_number(channel.nis_low) for channel in channels)
+
+
+def _is_consistent(channels: Channels) -> bool:
+    shares = _shares(channels)
+    highest = 1.0 if _is_inflated(channels) else CONSISTENT[1]
+    return bool(shares) and all(CONSISTENT[0] <= share <= highest for share in shares.values())
+
+
+def _in_words(channels: Channels) -> str:
+    shares = _shares(channels)
+    if not shares:
+        return ""
+    told = " and ".join(f"{number(100.0 * share, 1, '%')} ({name})" for name, share in shares.items())
+    text = f"{told} of the innovations lie inside their 95 % band"
+    if min(shares.values()) < CONSISTENT[0]:
+        return f"{text}: the filter is surer than it should be."
+    if _is_inflated(channels):
+        return (
+            "The GNSS noise was raised to cover slow errors, so innovations cannot show whether the filter is "
+            "consistent."
+        )
+    is_close = max(shares.values()) <= CONSISTENT[1]
+    return f"{text}: " + ("the filter is consistent." if is_close else "the filter claims less than it knows.")
+
+
+def _figures_of_merit(answer: InertialResult) -> Facts:
+    origin, others = answer.ins_class_origin, answer.other_ins
+    pairs = (
+        (
+            "Radial error rate, median / 95 %",
+            " / ".join(_rates(answer)),
+            "position error over time since the first epoch, epochs later than ten minutes",
+        ),
+        ("Velocity error, RMS", number(answer.velocity_error_rms_mps, 3, "m/s"), "both channels together"),
+        ("Largest radial error", number(answer.largest_radial_error_m, 0, "m"), "against GNSS"),
+        ("Kind", (answer.kind or ABSENT).replace("_", "-"), typeset(answer.kind_reason)),
+        ("INS class", answer.ins_class or ABSENT, f"noise parameters: {origin}" if origin else ""),
+        (
+            "Pair used",
+            f"{answer.ins_topic} against {answer.gnss_topic}",
+            f"not used: {any_value(others)}" if others else "",
+        ),
+        ("Epochs compared", number(answer.epochs, 0), f"{clock(answer.gnss_seconds)} of the flight with GNSS"),
+        ("Transition matrix", "exact exponential" if answer.transition == "exact" else "first order, I + A T", ""),
+        ("Filter opened again", number(answer.reopened, 0, "times"), "after GNSS had been rejected for long"),
+    )
+    return Facts("The INS in figures", pairs)
+
+
+def _states(answer: InertialResult) -> Grid | None:
+    by_name = [{state.name: state for state in channel.states} for channel in answer.channels]
+    names = dict.fromkeys(name for states in by_name for name in states)
+    if not names:
+        return None
+    rows = [_state_row(answer, [states.get(name) for states in by_name]) for name in names]
+    heads = [Head("State")]
+    for channel in answer.channels:
+        heads += [Head(channel.name.capitalize(), True), *(Head(title, True) for title in ("± σ", "Seen", "From"))]
+    caption = (
+        "At the last time GNSS was there. Seen: observability, 1 − σ/σ without GNSS; near 0 the data say nothing of "
+        "the state. From: flight time since when it stays above one half. Not estimated: the class holds the state at "
+        "zero, and its σ never moved."
+    )
+    return Grid("States", heads, rows, caption, ("inertial_states",))
+
+
+def _state_row(answer: InertialResult, states: list[StateEstimate | None]) -> tuple[str, ...]:
+    """One state of both channels, None in a channel that lacks it."""
+    known = next(state for state in states if state is not None)
+    title = known.title or known.name
+    title = f"{title[:1].upper()}{title[1:]}, {unit_sign(known.unit)}"
+    is_alone = [
+        state is not None and is_left_alone(state.name, state.sigma, state.observability, answer.settings)
+        for state in states
+    ]
+    if any(is_alone):
+        where = "" if all(is_alone) else f"{answer.channels[is_alone.index(True)].name} "
+        title += f" ({where}not estimated in this class)"
+    cells = [
+        cell
+        for state, alone in zip(states, is_alone, strict=True)
+        for cell in _state_cells(None if alone else state, PLACES.get(known.unit, 3))
+    ]
+    return (title, *cells)
+
+
+def _state_cells(state: StateEstimate | None, places: int) -> tuple[str, ...]:
+    if state is None:
+        return (ABSENT,) * 4
+    since = state.observable_from_s
+    return (
+        number(state.value, places, signed=True),
+        number(state.sigma, places),
+        number(state.observability, 2),
+        clock(since) if is_number(since) else "never",
+    )
+
+
+def _consistency(channels: Channels) -> Grid:
+    titles = ("NIS", "95 % limits", "Inside 95 %", "Innovations", "Rejected", "Velocity RMS", "Position RMS")
+    caption = (
+        "NIS: mean normalised innovation squared, 1 where the noise model is right. Noise raised: slow GNSS errors are "
+        "covered by a larger white noise; then NIS stays below 1, has no limits, and neither it nor the share inside "
+        "says anything of consistency."
+    )
+    heads = (Head("Channel"), *(Head(title, True) for title in titles))
+    return Grid("Consistency of the filter", heads, [_consistency_row(channel) for channel in channels], caption)
+
+
+def _consistency_row(channel: ChannelResult) -> tuple[str, ...]:
+    low, high = channel.nis_low, channel.nis_high
+    return (
+        channel.name.capitalize(),
+        number(channel.nis, 3),
+        f"{number(low, 2)} … {number(high, 2)}" if is_number(low) and is_number(high) else "noise raised",
+        percent(channel.share_inside95, 1),
+        number(channel.innovations, 0),
+        number(channel.rejected, 0),
+        number(channel.velocity_error_rms_mps, 3, "m/s"),
+        number(channel.position_error_rms_m, 0, "m"),
+    )
+
+
+def _outages(outages: tuple[RealOutage, ...]) -> Grid | None:
+    numeric = (Head(title, True) for title in ("Length", "Off on return", "σ claimed"))
+    heads = (Head("Flight time"), Head("Without"), *numeric, Head(""))
+    caption = (
+        "The filter went over to the forecast by itself; off on return: forecast against the first position difference "
+        "seen again."
+    )
+    return Grid("Outages in the log", heads, [_outage_row(one) for one in outages], caption) if outages else None
+
+
+def _outage_row(outage: RealOutage) -> tuple[Cell, ...]:
+    jump, sigma = outage.jump_m, outage.sigma_m
+    missing = MISSING.get(outage.missing, ABSENT)
+    state = Mark("unknown", "neither returned" if missing == "both" else f"{missing} did not return")
+    if is_number(jump) and is_number(sigma):
+        state = Mark("good", "within 2 σ") if jump <= 2.0 * sigma else Mark("warn", "beyond 2 σ")
+    span = f"{clock(outage.start_s)} – {clock(outage.end_s)}"
+    return (span, missing, clock(outage.length_s), number(jump, 0, "m"), number(sigma, 0, "m"), state)
+
+
+def _azimuth(azimuth: AzimuthEstimate | None) -> Note | None:
+    if azimuth is None:
+        return None
+    reason = typeset(azimuth.reason)
+    if not azimuth.observable:
+        return Note(f"Azimuth error: not observable on this flight: {reason}.", "unknown")
+    error, sigma = number(azimuth.error_deg, 3, "°", signed=True), number(azimuth.sigma_deg, 3, "°")
+    return Note(f"Azimuth error from the turns: {error} (σ {sigma}): {reason}.")
+
+
+def _settings(settings: Mapping[str, float | str | bool]) -> Facts | None:
+    pairs = []
+    for name, value in sorted(settings.items()):
+        title, unit = named_quantity(name)
+        pairs.append((title, any_value(value, unit), ""))
+    return Facts("Model, noise and gates as used", pairs, compact=True) if pairs else None

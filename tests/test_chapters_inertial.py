@@ -1,0 +1,231 @@
+"""Chapter of the INS errors: conclusions that follow from the numbers, and a text for whatever is not known."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from groundstation.chapters.inertial import inertial
+from groundstation.chapters.parts import Section
+from groundstation.results.flight import NotAssessable
+from groundstation.results.inertial import AzimuthEstimate, ChannelResult, RealOutage
+from tests.inertial_example import inertial_result
+from tests.report_example import example
+from tests.section_contents import every_text, facts, grid, notes, row, rows, titles, tones
+
+FIGURES = "The INS in figures"
+
+
+def chapter(**changes: Any) -> Section:
+    """The chapter of the example, with some fields of its answer changed."""
+    section = inertial(example(inertial_result(**changes)))
+    assert section is not None
+    return section
+
+
+def test_everything_has_its_place() -> None:
+    assert titles(chapter()) == [
+        *(FIGURES, "States", "inertial.state position", "inertial.state velocity", "inertial.tilt_and_drift"),
+        *("inertial.radial", "Outages in the log", "Consistency of the filter"),
+        *("inertial.innovations", "inertial.observability", "Model, noise and gates as used"),
+    ]
+    assert grid(chapter(), "States").numbers == ("inertial_states",)
+
+
+def test_figures_asked_first_stand_first() -> None:
+    section = chapter()
+    assert section.headline.replace("\u202f", " ") == "Unaided INS, 0.41 nmi/h (median)"
+    assert notes(section)[0] == (
+        "An unaided INS of 0.41 nmi/h (median; 95 % of the time below 1.32 nmi/h): velocity error 0.87 m/s RMS, "
+        "position error up to 2140 m. 95.3% (north) and 95.3% (east) of the innovations lie inside their 95 % band: "
+        "the filter is consistent."
+    )
+    told = facts(section, FIGURES)
+    assert told["Radial error rate, median / 95 %"][0] == "0.41 nmi/h / 1.32 nmi/h"
+    assert told["Velocity error, RMS"][0] == "0.870 m/s"
+    assert told["Pair used"] == ("ins against gnss", "")
+    assert told["Kind"] == ("unaided", "the position error grows to 2.1 km and swings with the Schuler period")
+    assert told["INS class"] == ("navigation", "noise parameters: chosen by the spread of the velocity error")
+
+
+def test_states_stand_with_sigma_and_observability() -> None:
+    section = chapter()
+    assert row(section, "States", "Platform tilt, arcsec") == ("+11.2", "1.5", "0.81", "10:00") * 2
+    assert row(section, "States", "Random gyro drift, °/h") == ("+0.0021", "0.0040", "0.08", "never") * 2
+    assert row(section, "Outages in the log", "2:40:00 – 3:01:20") == (
+        *("GNSS", "21:20", "212 m", "260 m", "✓ within 2 σ"),
+    )
+    assert rows(section, "Outages in the log")[1][-1] == "○ GNSS did not return"
+
+
+def test_a_return_far_from_the_forecast_is_marked() -> None:
+    section = chapter(outages=(RealOutage(60.0, 120.0, 60.0, 19.0, 9.0),))
+    assert row(section, "Outages in the log", "1:00 – 2:00")[-1] == "▲ beyond 2 σ"
+
+
+@pytest.mark.parametrize(
+    ("missing", "left", "returned"),
+    [
+        ("gnss", "GNSS", "GNSS did not return"),
+        ("ins", "INS", "INS did not return"),
+        ("both", "both", "neither returned"),
+    ],
+)
+def test_an_outage_says_what_was_missing(missing: str, left: str, returned: str) -> None:
+    outages = (RealOutage(60.0, 120.0, 60.0, 5.0, 9.0, missing), RealOutage(600.0, 660.0, 60.0, None, None, missing))
+    assert rows(chapter(outages=outages), "Outages in the log") == [
+        ("1:00 – 2:00", left, "1:00", "5 m", "9 m", "✓ within 2 σ"),
+        ("10:00 – 11:00", left, "1:00", "—", "—", f"○ {returned}"),
+    ]
+
+
+def changed_states(name: str, **changes: float) -> dict[str, Any]:
+    """Both channels with one state changed."""
+    north, east = (
+        replace(
+            channel,
+            states=tuple(replace(state, **changes) if state.name == name else state for state in channel.states),
+        )
+        for channel in inertial_result().channels
+    )
+    return {"north": north, "east": east, "settings": {"noise.drift_rate_dphph": 5e-6}}
+
+
+def test_a_state_the_class_leaves_out_has_no_number() -> None:
+    alone = changed_states("drift_rate", value=0.0, sigma=5e-6, observability=3e-6)
+    assert row(chapter(**alone), "States", "Drift rate, °/h² (not estimated in this class)") == ("—",) * 8
+    cells = row(
+        chapter(**alone | {"east": inertial_result().east}),
+        "States",
+        "Drift rate, °/h² (north not estimated in this class)",
+    )
+    assert cells[:5] == ("—",) * 4 + ("+0.0029",)
+
+
+@pytest.mark.parametrize(("sigma", "observability"), [(5e-6, 0.2), (4e-3, 3e-6)], ids=["seen", "grown"])
+def test_a_state_that_was_seen_or_has_grown_keeps_its_number(sigma: float, observability: float) -> None:
+    section = chapter(**changed_states("drift_rate", sigma=sigma, observability=observability))
+    assert row(section, "States", "Drift rate, °/h²")[0] == "+0.0029"
+
+
+def test_an_ins_of_unknown_kind_is_not_called_unaided() -> None:
+    section = chapter(kind="unknown", kind_reason="it stood still all the time.")
+    assert section.headline == "Whether GNSS corrects this INS cannot be told"
+    first, second = notes(section)[:2]
+    assert first == (
+        "Whether GNSS corrects this INS already cannot be told: it stood still all the time. If it does, its errors "
+        "and any forecast mean nothing."
+    )
+    assert tones(section)[0] == "unknown"
+    assert second.startswith(
+        "An INS of 0.41 nmi/h (median; 95 % of the time below 1.32 nmi/h), taken as unaided: velocity error"
+    )
+    assert not [text for text in every_text(section) if "naided INS" in text]
+
+
+def test_an_aided_ins_is_told_at_once() -> None:
+    section = chapter(kind="gnss_aided", kind_reason="its error stays below 2 m for an hour")
+    assert section.headline == "This INS is aided by GNSS: a forecast from it means nothing"
+    assert notes(section)[0] == (
+        "This INS is aided by GNSS, and a forecast from it means nothing: its error stays below 2 m for an hour."
+    )
+    assert tones(section)[0] == "warn"
+    assert facts(section, FIGURES)["Kind"][0] == "gnss-aided"
+
+
+def test_reopening_and_other_ins_are_told() -> None:
+    section = chapter(reopened=2, other_ins=("ins.1", "ins.2"))
+    assert notes(section)[1] == (
+        "GNSS was rejected for so long that the filter was opened to it again, 2 times: the noise of INS class "
+        "navigation does not fit this INS or this receiver."
+    )
+    assert facts(section, FIGURES)["Pair used"][1] == "not used: ins.1, ins.2"
+    assert facts(section, FIGURES)["Filter opened again"][0] == "2 times"
+    assert "to it again, once: " in notes(chapter(reopened=1))[1]
+    assert not [note for note in notes(chapter()) if "was opened to it again" in note]
+
+
+def test_units_of_the_settings_are_read_from_their_names() -> None:
+    settings: dict[str, float | str | bool] = {
+        "noise.velocity_walk_mps_per_sqrt_s": 0.004,
+        "noise.tilt_walk_deg_per_sqrt_h": 0.0044,
+        "noise.drift_walk_dph_per_sqrt_h": 0.5,
+        "noise.drift_rate_walk_dphph_per_sqrt_h": 0.25,
+        "noise.tilt_rad": 0.0002,
+    }
+    assert facts(chapter(settings=settings), "Model, noise and gates as used") == {
+        "noise.velocity walk": ("0.004 m/s/√s", ""),
+        "noise.tilt walk": ("0.0044 °/√h", ""),
+        "noise.drift walk": ("0.5 °/h/√h", ""),
+        "noise.drift rate walk": ("0.25 °/h²/√h", ""),
+        "noise.tilt": ("0.0002 rad", ""),
+    }
+
+
+def with_share(share: float, *, raised: bool) -> dict[str, Any]:
+    """A pair of channels with a share of innovations inside their band."""
+
+    def changed(channel: ChannelResult) -> ChannelResult:
+        limits = (None, None) if raised else (channel.nis_low, channel.nis_high)
+        return replace(channel, share_inside95=share, nis_low=limits[0], nis_high=limits[1])
+
+    return {channel.name: changed(channel) for channel in inertial_result().channels}
+
+
+@pytest.mark.parametrize(
+    ("share", "raised", "tone", "verdict"),
+    [
+        (0.95, False, "good", "the filter is consistent"),
+        (0.80, False, "warn", "the filter is surer than it should be"),
+        (0.80, True, "warn", "the filter is surer than it should be"),
+        (0.995, False, "warn", "the filter claims less than it knows"),
+        (0.995, True, "plain", "innovations cannot show whether the filter is consistent"),
+        (1.0, True, "plain", "innovations cannot show whether the filter is consistent"),
+    ],
+)
+def test_conclusion_on_the_filter_follows_its_innovations(share: float, raised: bool, tone: str, verdict: str) -> None:
+    section = chapter(**with_share(share, raised=raised))
+    assert verdict in notes(section)[0]
+    assert tones(section)[0] == tone
+    assert ("of the innovations lie inside" in notes(section)[0]) == (not raised or share < 0.93)
+
+
+def test_raised_noise_has_no_limits() -> None:
+    (north, east) = rows(chapter(**with_share(0.99, raised=True)), "Consistency of the filter")
+    assert north == ("North", "0.970", "noise raised", "99.0%", "15 210", "12", "0.610 m/s", "744 m")
+    assert east[2] == "noise raised"
+    assert rows(chapter(), "Consistency of the filter")[0][2] == "0.93 … 1.07"
+    assert "says anything of consistency" in grid(chapter(), "Consistency of the filter").caption
+
+
+def test_azimuth_is_told_with_its_reason() -> None:
+    assert notes(chapter())[-1] == (
+        "Azimuth error from the turns: +0.042° (σ 0.015°): seven turns, 410 m/s of velocity change."
+    )
+    section = chapter(azimuth=AzimuthEstimate(False, None, 0.4, 1, 20.0, "one turn is too little"))
+    assert notes(section)[-1] == "Azimuth error: not observable on this flight: one turn is too little."
+    assert tones(section)[-1] == "unknown"
+
+
+def test_a_reason_stands_in_place_of_the_answer() -> None:
+    section = inertial(example(None, not_assessable=(NotAssessable("inertial", "GNSS for a minute only"),)))
+    assert section is not None
+    assert notes(section) == ["Not assessable: GNSS for a minute only"]
+
+
+def test_without_answer_and_reason_there_is_no_chapter() -> None:
+    assert inertial(example(None)) is None
+
+
+def test_what_is_not_known_is_a_dash() -> None:
+    unknown = float("nan")
+    rates = {"radial_error_rate_50_nmiph": None, "radial_error_rate_95_nmiph": unknown, "velocity_error_rms_mps": None}
+    channels = {channel.name: replace(channel, states=()) for channel in inertial_result().channels}
+    bare = {"outages": (), "azimuth": None, "settings": {}, "figures": (), "largest_radial_error_m": None}
+    section = chapter(**channels, **rates, **bare)
+    assert section.headline == "Unaided INS"
+    assert facts(section, FIGURES)["Radial error rate, median / 95 %"][0] == "— / —"
+    assert facts(section, FIGURES)["Largest radial error"][0] == "—"
+    assert "States" not in titles(section) and "Outages in the log" not in titles(section)
+    shown = " ".join(every_text(section))
+    assert "nan" not in shown.lower().split() and "None" not in shown
