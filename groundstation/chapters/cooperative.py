@@ -88,14 +88,16 @@ def cooperative(results: FlightResults) -> Section | None:
 def trusted(answer: CooperativeResult) -> AlgorithmRow:
     """The algorithm to trust.
 
-    With truth, of those that neither diverge nor are inconsistent the one with the least error; where there is none,
-    or no truth, the default. Dead reckoning only where nothing else ran.
+    The default, unless the truth speaks against it: then, of those that neither diverge nor are inconsistent, the one
+    with the least error, where there is any. One session is too little to choose by its error alone. Dead reckoning
+    only where nothing else ran.
     """
     ran = [row for row in answer.algorithms if row.algorithm != REFERENCE] or list(answer.algorithms)
+    default = next((row for row in ran if row.algorithm == answer.default_algorithm), ran[0])
     sound = [row for row in ran if row.is_consistent and row.diverges is False and is_number(row.rms_m)]
-    if sound:
-        return min(sound, key=lambda row: (row.rms_m or 0.0, row.algorithm))
-    return next((row for row in ran if row.algorithm == answer.default_algorithm), ran[0])
+    if default in sound or not sound:
+        return default
+    return min(sound, key=lambda row: (row.rms_m or 0.0, row.algorithm))
 
 
 def title_of(algorithm: str) -> str:
@@ -161,13 +163,17 @@ def _reason(answer: CooperativeResult, best: AlgorithmRow) -> str:
             f"{name} is the algorithm to trust by its construction: no log holds a truth, so nothing judges the errors "
             "or whether the computed sigma is honest."
         )
-    if best.diverges:
+    if best.diverges or not best.is_consistent:
         return (
-            f"Every algorithm diverges or is inconsistent; {name} is the default, and its sigma is not to be trusted."
+            f"No algorithm is consistent with the truth without diverging; {name} is the default, and its sigma is not "
+            "to be trusted."
         )
-    if not best.is_consistent:
-        return f"No algorithm is consistent with the truth; {name} is the default, and its sigma is not to be trusted."
-    return f"{name} has the least error of the algorithms that are consistent with the truth and do not diverge."
+    if best.algorithm == answer.default_algorithm:
+        return f"{name}: its errors against the truth are consistent with its computed sigma, and it does not diverge."
+    return (
+        f"{name} has the least error of the algorithms that are consistent with the truth and do not diverge; the "
+        f"default, {title_of(answer.default_algorithm)}, is not among them."
+    )
 
 
 def _advice(answer: CooperativeResult, best: AlgorithmRow) -> Note:
