@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
+from groundstation.chapters.cooperative import cooperative, is_session
 from groundstation.chapters.forecast import forecast
 from groundstation.chapters.generic import generic
 from groundstation.chapters.heading import heading
@@ -11,6 +12,7 @@ from groundstation.chapters.latency import latency
 from groundstation.chapters.magnetic import magnetic
 from groundstation.chapters.parts import Section
 from groundstation.results.answer import Answer
+from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.heading import HeadingResult
@@ -35,11 +37,13 @@ FLIGHT_CHAPTERS: tuple[Chapter, ...] = (
     Chapter((Latencies,), latency),
     Chapter((MagneticResult, GroundDeviation), magnetic),
 )
+SESSION_CHAPTERS: tuple[Chapter, ...] = (Chapter((CooperativeResult,), cooperative),)
 
 
 def chapters_of(results: FlightResults) -> tuple[Section, ...]:
-    """The chapters on a flight's answers: those of their own, then a generic one for every other answer."""
-    own = [chapter.build(results) for chapter in FLIGHT_CHAPTERS]
+    """The chapters on the answers of a flight or session: those of their own, then a generic one for every other."""
+    listed = SESSION_CHAPTERS if is_session(results) else FLIGHT_CHAPTERS
+    own = [chapter.build(results) for chapter in listed]
     return (
         *(section for section in own if section is not None),
         *(generic(results, answer) for answer in without_chapter(results)),
@@ -48,5 +52,5 @@ def chapters_of(results: FlightResults) -> tuple[Section, ...]:
 
 def without_chapter(results: FlightResults) -> tuple[Answer, ...]:
     """The answers that no chapter of its own tells."""
-    told = tuple(kind for chapter in FLIGHT_CHAPTERS for kind in chapter.answers)
+    told = tuple(kind for chapter in (*FLIGHT_CHAPTERS, *SESSION_CHAPTERS) for kind in chapter.answers)
     return tuple(answer for answer in results.answers.values() if not isinstance(answer, told))

@@ -2,6 +2,7 @@
 
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.assessed import reason_of
+from groundstation.chapters.cooperative import is_session, session_front
 from groundstation.chapters.parts import Cell, Front, Mark
 from groundstation.chapters.verdict import NOT_ASSESSABLE, VERDICTS, figures, reasons, sentence, what_to_enter
 from groundstation.chapters.wording import ABSENT, clock, is_number, number
@@ -25,6 +26,8 @@ def front(results: FlightResults) -> Front:
     """The top of the report."""
     names = [results.metadata.get(key, "") for key in ("aircraft", "flight")]
     title = " · ".join(filter(None, (names[0], names[1] and f"flight {names[1]}"))) or results.flight_id
+    if is_session(results):
+        return session_front(results, _pairs(results, names))
     pairs, of_the_rest = _pairs(results, names), (*_of_the_ins(results), *_of_the_compass(results))
     heading = results.answer(HeadingResult)
     if heading is None:

@@ -1,5 +1,6 @@
 """Chapter: where the numbers come from. Time of run, host and versions stand in manifest.json alone."""
 
+from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.parts import Facts, Note, Part, Section
 from groundstation.chapters.wording import ABSENT, clean, number
 from groundstation.results.flight import FlightResults, Source
@@ -16,11 +17,15 @@ CHECKS = (
 def provenance(results: FlightResults) -> Section:
     """The chapter."""
     flight_id = clean(results.flight_id)
+    if is_session(results):
+        store = ("Lossless stores", "manifest.json", "names the MCAP of every log")
+    else:
+        store = ("Lossless store", f"{flight_id}.mcap", "every topic of the log")
     pairs = (
         *source_pairs(results.source),
         ("Flight id", flight_id, ""),
         ("Recording", f"{flight_id}.rrd", "open with: groundstation view"),
-        ("Lossless store", f"{flight_id}.mcap", "every topic of the log"),
+        store,
     )
     parts: list[Part] = [Facts("Source and files", pairs)]
     if results.metadata:

@@ -297,8 +297,54 @@ def list_(
     return DONE
 
 
+@app.command()
+@answers_with_exit_code
+def cooperative(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(help="Logs, MCAPs or flight folders, one of each aircraft.", metavar="LOG", readable=False),
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.", metavar="OUT")],
+    stations: Annotated[
+        Path | None,
+        typer.Option("--stations", help="Ground stations (TOML).", metavar="FILE", readable=False),
+    ] = None,
+    config: ConfigFile = None,
+    profile: Profile = None,
+    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is this grave.")] = "none",
+    no_pdf: NoPdf = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+    progress: Progress = "auto",
+) -> int | None:
+    """Analyse the logs of several aircraft together: positions from ranges over their data link.
+
+    An OUT of an earlier run is continued: a session with the same logs, stations and settings is not run again.
+    """
+    from groundstation.cli import printing
+    from groundstation.cli.progress import listener
+    from groundstation.pipeline.configuration import load_configuration
+    from groundstation.pipeline.session import run_session
+
+    configuration = load_configuration(config, profile=profile)
+    with listener("none" if quiet else progress) as listen:
+        outcomes = run_session(
+            logs,
+            output,
+            configuration,
+            stations=stations,
+            force=force,
+            fail_on=fail_on,
+            with_pdf=not no_pdf,
+            listen=listen,
+        )
+    printing.outcomes(outcomes, as_json_text=json, quiet=quiet, with_times=verbose)
+    return printing.worst_code(outcomes)
+
+
 LATER_VERBS = {
-    "cooperative": "Navigation between aircraft.",
     "plan": "Plan a session or a landing.",
 }
 

@@ -93,7 +93,13 @@ def _plain(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-KINDS = {"analysis": "analyses", "format": "formats", "scenario": "scenarios", "study": "studies"}
+KINDS = {
+    "analysis": "analyses",
+    "format": "formats",
+    "scenario": "scenarios",
+    "session": "sessions",
+    "study": "studies",
+}
 
 
 def catalogue(entries: Sequence[Mapping[str, Any]], is_about_a_log: bool) -> str:

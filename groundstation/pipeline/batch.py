@@ -83,9 +83,9 @@ def run_many(
 def _run_here(
     work: Sequence[Job], out: Path, crew: Crew, force: bool, redo: bool, listen: Listener
 ) -> tuple[Outcome, ...]:
-    _refuse_foreign(out, force)
-    with _alone_in(out):
-        _prepare(out)
+    refuse_foreign(out, force)
+    with alone_in(out):
+        prepare(out)
         known = {} if redo else finished_flights(flight_folders(out))
         placement = Placement(LocalOutput(out), [job.log for job in work])
 
@@ -179,7 +179,7 @@ def plan_many(
     if any(is_remote(str(place)) for place in (out, *paths)):
         raise UsageError("--dry-run", "logs or results elsewhere", "local ones")
     inputs, out = _inputs(paths, out, configuration), Path(out)
-    _refuse_foreign(out, force=True)
+    refuse_foreign(out, force=True)
     known = {} if redo or not out.is_dir() else finished_flights(flight_folders(out))
     work = [Job(Path(log), out, configuration, is_named=named, with_pdf=with_pdf) for log, named in inputs]
     outcomes = []
@@ -201,7 +201,8 @@ def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configu
     return tuple(sorted(found.items()))
 
 
-def _refuse_foreign(out: Path, force: bool) -> None:
+def refuse_foreign(out: Path, force: bool) -> None:
+    """Refuse to write results into what another made, or into a flight folder."""
     if out.exists() and not out.is_dir():
         raise UsageError(str(out), "a file", "a folder for the results")
     if out.is_dir() and any(one.name != LOCK for one in out.iterdir()) and not is_ours(out) and not force:
@@ -211,7 +212,7 @@ def _refuse_foreign(out: Path, force: bool) -> None:
 
 
 @contextmanager
-def _alone_in(out: Path) -> Iterator[None]:
+def alone_in(out: Path) -> Iterator[None]:
     """Keep other runs out of a folder; the system takes the lock off a run that is killed."""
     from filelock import FileLock, Timeout
 
@@ -227,7 +228,8 @@ def _alone_in(out: Path) -> Iterator[None]:
         lock.release()
 
 
-def _prepare(out: Path) -> None:
+def prepare(out: Path) -> None:
+    """Clear away what a killed run left, and mark the folder as ours."""
     for left_over in out.iterdir():
         if left_over.name.startswith(PARTIAL_PREFIX):  # of a run that is no more: this one is alone in here
             shutil.rmtree(left_over, ignore_errors=True)

@@ -4,7 +4,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from groundstation.estimators.analyses import FLIGHT_ANALYSES
+from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
 
 
 def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict[str, Any]]:
@@ -16,7 +16,7 @@ def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict
         When the log is missing or cannot be read.
     """
     if log is None:
-        return [*_analyses(), *_formats(), *_scenarios(), *_studies()]
+        return [*_analyses(), *_session_analyses(), *_formats(), *_scenarios(), *_sessions(), *_studies()]
     return _with_answers(log, profile)
 
 
@@ -24,6 +24,13 @@ def _analyses() -> list[dict[str, Any]]:
     return [
         {"kind": "analysis", "name": analysis.name, "title": analysis.title, "needs": analysis.needs}
         for analysis in FLIGHT_ANALYSES
+    ]
+
+
+def _session_analyses() -> list[dict[str, Any]]:
+    return [
+        {"kind": "analysis", "name": analysis.name, "title": analysis.title, "needs": analysis.needs}
+        for analysis in SESSION_ANALYSES
     ]
 
 
@@ -63,6 +70,15 @@ def _scenarios() -> list[dict[str, Any]]:
     return [
         {"kind": "scenario", "name": name, "title": load_scenario(name).title, "needs": "nothing"}
         for name in scenario_names()
+    ]
+
+
+def _sessions() -> list[dict[str, Any]]:
+    from groundstation.simulation.session_scenario import load_session, session_names
+
+    return [
+        {"kind": "session", "name": name, "title": load_session(name).title, "needs": "nothing"}
+        for name in session_names()
     ]
 
 

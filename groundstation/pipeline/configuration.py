@@ -9,14 +9,16 @@ from typing import Any, TypeVar
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import settings_from
-from groundstation.estimators.analyses import FLIGHT_ANALYSES
+from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
 from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.integrity.limits import Thresholds, thresholds_from
 from groundstation.pipeline.deviation_to_apply import Apply, asked_for
+from groundstation.tables.session_settings import SessionSettings
 
 S = TypeVar("S")
 FLIGHT_TABLES = tuple(dict.fromkeys(analysis.settings_table for analysis in FLIGHT_ANALYSES))
-TABLES = (*FLIGHT_TABLES, "aircraft", "site", "thresholds")
+SESSION_TABLES = (*(analysis.settings_table for analysis in SESSION_ANALYSES), "session")
+TABLES = (*FLIGHT_TABLES, *SESSION_TABLES, "aircraft", "site", "thresholds")
 SECTIONS = (*TABLES, "exclude", "force")
 Settings = Path | Mapping[str, Any]  # a TOML file, or its content
 
@@ -41,6 +43,7 @@ class UserSettings:
     aircraft: AircraftData
     site: SiteData
     thresholds: Thresholds
+    session: SessionSettings
 
     def of(self, kind: type[S]) -> S:
         """The settings of that type."""
@@ -81,12 +84,13 @@ class Configuration:
         object.__setattr__(self, "settings", self._parsed())
 
     def _parsed(self) -> UserSettings:
-        types = {analysis.settings_table: analysis.settings for analysis in FLIGHT_ANALYSES}
+        types = {analysis.settings_table: analysis.settings for analysis in (*FLIGHT_ANALYSES, *SESSION_ANALYSES)}
         settings = UserSettings(
             {name: self._table(name, kind) for name, kind in types.items()},
             self._table("aircraft", AircraftData),
             self._table("site", SiteData),
             thresholds_from(self.tables.get("thresholds", {}), self._file_of("thresholds"), "thresholds"),
+            self._table("session", SessionSettings),
         )
         for analysis in FLIGHT_ANALYSES:
             analysis.check(settings.analyses[analysis.settings_table], settings.aircraft)

@@ -170,7 +170,7 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         written = write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf)
     return Outcome(
         job.log,
-        _state(worst(results.findings), converted.has_lost_data, job.fail_on),
+        state_of(worst(results.findings), converted.has_lost_data, job.fail_on),
         "; ".join(filter(None, (text, written.problem))),
         flight_id=identity,
         folder=str(partial),
@@ -188,7 +188,7 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
             remember_reports(finished, with_pdf=job.with_pdf)
     return Outcome(
         job.log,
-        _state(finished.gravest, finished.has_lost_data, job.fail_on),
+        state_of(finished.gravest, finished.has_lost_data, job.fail_on),
         "; ".join(filter(None, (finished.text, problem))),
         flight_id=finished.flight_id,
         folder=str(finished.folder),
@@ -225,7 +225,8 @@ def read_flight(mcap: Path, converted: Converted) -> Flight:
     return flight_from_batches(batches, metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name)
 
 
-def _state(gravest: Severity | None, has_lost_data: bool, fail_on: str) -> State:
+def state_of(gravest: Severity | None, has_lost_data: bool, fail_on: str) -> State:
+    """State of a run from its gravest finding and whether data was lost."""
     if fail_on in SEVERITIES and gravest and SEVERITIES.index(gravest) >= SEVERITIES.index(fail_on):
         return "limit_reached"
     return "data_lost" if has_lost_data else "done"

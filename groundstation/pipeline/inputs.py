@@ -6,9 +6,10 @@ from pathlib import Path
 
 from groundstation.base.errors import UsageError
 from groundstation.reports.index import INDEX_CSV, INDEX_JSON
-from groundstation.results.files import MANIFEST, SUMMARY
+from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY
 
 FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, STUDY_MARK = MANIFEST, INDEX_JSON, ".groundstation-study"
+SESSION_MARK = f"{ARRAYS}/session_clocks.parquet"  # of a session of several aircraft, which is no flight
 COMPARISON_MARKS = "compare.html", "compare.csv"
 COMPARISON_RECORDING = "compare.rrd"
 CORRECTED = ".corrected.mcap"  # end of the name of what stands beside a flight's MCAP, and is none
@@ -74,6 +75,15 @@ def file_in(folder: Path, ending: str, *others: str) -> Path:
 
 def flight_folders(out: Path) -> list[Path]:
     """Flight folders in an OUT, in the order of their names."""
+    return [folder for folder in _finished_folders(out) if not (folder / SESSION_MARK).is_file()]
+
+
+def session_folders(out: Path) -> list[Path]:
+    """Session folders in an OUT, in the order of their names."""
+    return [folder for folder in _finished_folders(out) if (folder / SESSION_MARK).is_file()]
+
+
+def _finished_folders(out: Path) -> list[Path]:
     return sorted(folder for folder in out.iterdir() if folder.name[0] != "." and (folder / SUMMARY).is_file())
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from groundstation.base.errors import UsageError
+from groundstation.pipeline.configuration import read_toml
 from groundstation.pipeline.inputs import STUDY_MARK
 from groundstation.pipeline.progress import Event, Listener
 
@@ -22,6 +23,9 @@ STUDIES = {
 def simulate_to(scenario: str, folder: Path, *, seed: int | None = None, force: bool = False) -> list[Path]:
     """Simulate a scenario (a shipped name or a TOML file) into ``<folder>/<scenario>.csv``.
 
+    A session of several aircraft gives one log for each, ``<folder>/<session>-<aircraft>.csv``, with stations.toml and
+    settings.toml beside them.
+
     Raises
     ------
     UsageError
@@ -30,10 +34,33 @@ def simulate_to(scenario: str, folder: Path, *, seed: int | None = None, force: 
     from groundstation.simulation.samples import write_scenario
     from groundstation.simulation.scenario import load_scenario
 
+    if is_session(scenario):
+        return _session_to(scenario, folder, seed, force=force)
     target = folder / f"{load_scenario(scenario).name}.csv"
     if target.exists() and not force:
         raise UsageError(str(target), "a file that exists", "a new folder", "-f overwrites it")
     return [write_scenario(scenario, folder, seed)]
+
+
+def is_session(scenario: str) -> bool:
+    """Whether a scenario is one of several aircraft: a shipped name of such, or a TOML file with ``[[aircraft]]``."""
+    from groundstation.simulation.session_scenario import session_names
+
+    if not scenario.endswith(".toml"):
+        return scenario.lower() in session_names()
+    path = Path(scenario)
+    return path.is_file() and isinstance(read_toml(path).get("aircraft"), list)
+
+
+def _session_to(name: str, folder: Path, seed: int | None, *, force: bool) -> list[Path]:
+    from groundstation.simulation.session_log import session_paths, write_session
+    from groundstation.simulation.session_scenario import load_session
+
+    scenario, stem = load_session(name), Path(name).stem.lower()
+    there = [path for path in session_paths(scenario, folder, stem) if path.exists()]
+    if there and not force:
+        raise UsageError(str(there[0]), "a file that exists", "a new folder", "-f overwrites it")
+    return write_session(scenario, folder, stem, seed)
 
 
 def study_to(name: str, folder: Path, *, runs: int, seed: int, force: bool, listen: Listener) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.front import front
 from groundstation.chapters.parts import Document
 from groundstation.reports.page import TEMPLATES, render
@@ -17,6 +18,7 @@ from groundstation.results.restore import ANSWER_TYPES
 
 REPORT = "report.html"
 PDF = "report.pdf"
+SESSION = "Session report"
 _NOT_IN_AN_ID = re.compile(r"[^A-Za-z0-9_-]+")
 
 
@@ -71,8 +73,9 @@ def write_pages(page: Path, html: str, document: Document, *, with_pdf: bool) ->
 
 
 def flight_document(saved: SavedFlight) -> Document:
-    """Put the report of one saved flight together."""
-    return Document("Flight report", saved.results.flight_id, front(saved.results), flight_sections(saved))
+    """Put the report of one saved flight, or of a session of several, together."""
+    kind = SESSION if is_session(saved.results) else "Flight report"
+    return Document(kind, saved.results.flight_id, front(saved.results), flight_sections(saved))
 
 
 def flight_report_html(document: Document) -> str:
@@ -83,6 +86,7 @@ def flight_report_html(document: Document) -> str:
         label=document.label,
         front=document.front,
         sections=document.sections,
+        verdict_of="the session" if document.kind == SESSION else "the heading correction",
         page_label=_NOT_IN_AN_ID.sub("-", document.label),  # stands inside a CSS string
         style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
     )

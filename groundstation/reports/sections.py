@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from groundstation.chapters import chapters_of
+from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.findings import findings
 from groundstation.chapters.overview import overview
 from groundstation.chapters.parts import Note, Section
@@ -13,15 +14,19 @@ from groundstation.reports.figures import with_drawings
 from groundstation.results.files import SavedFlight
 
 ON_THE_FLIGHT = (overview, quality, findings, provenance)  # behind the chapters on its answers
+ON_THE_SESSION = (findings, provenance)
 
 
 def flight_sections(saved: SavedFlight) -> tuple[Section, ...]:
     """The chapters of a flight: those on its answers, then the flight itself, its data and findings, its source.
 
+    Of a session of several aircraft: those on its answers, its findings, its source.
+
     A chapter that has nothing to say is left out, and one of nothing but figures without arrays.
     """
     results = saved.results
-    told = (*chapters_of(results), *(build(results) for build in ON_THE_FLIGHT))
+    on_the_rest = ON_THE_SESSION if is_session(results) else ON_THE_FLIGHT
+    told = (*chapters_of(results), *(build(results) for build in on_the_rest))
     drawn = (on_a_page(section, saved) for section in told if section is not None)
     return tuple(section for section in drawn if section.parts)
 

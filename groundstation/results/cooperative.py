@@ -1,9 +1,10 @@
 """Answer of the cooperative analysis (system 4): positions from ranges between vehicles, by every algorithm."""
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
+from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
-from groundstation.results.frames import Tabular
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ class LinkRow:
 
 
 @dataclass(frozen=True)
-class CooperativeResult(Tabular):
+class CooperativeResult(Answer):
     """Navigation between the vehicles of one session.
 
     Parameters
@@ -131,6 +132,7 @@ class CooperativeResult(Tabular):
         vehicle, messages, bytes).
     """
 
+    analysis: ClassVar[str] = "cooperative"
     frame: str
     default_algorithm: str
     algorithms: tuple[AlgorithmRow, ...]

@@ -19,6 +19,13 @@ class SourceOfRun:
 
 
 @dataclass(frozen=True)
+class LogOfSession(SourceOfRun):
+    """One log of a session; ``mcap`` is its store, beside the manifest where the session converted it."""
+
+    mcap: str = ""
+
+
+@dataclass(frozen=True)
 class Host:
     """The machine of the run."""
 
@@ -59,6 +66,8 @@ class Manifest:
     heading_settings : mapping
         Settings of the heading correction in force.
     versions : mapping of package to version
+    logs : tuple of LogOfSession
+        Of a session; absent for a flight.
     resume : Resume, optional
         Absent where no run made the folder.
     """
@@ -71,4 +80,5 @@ class Manifest:
     heading_settings: Mapping[str, float | int | str | bool] = field(default_factory=dict)
     host: Host = field(default_factory=Host)
     versions: Mapping[str, str] = field(default_factory=dict)
+    logs: tuple[LogOfSession, ...] = field(default=(), metadata=LEFT_OUT_WHEN_DEFAULT)
     resume: Resume | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)

@@ -8,6 +8,7 @@ from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.serial import MismatchError, from_json, join
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.results.answer import A, Answer
+from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.document import SummaryDocument
 from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import ForecastResult
@@ -17,11 +18,14 @@ from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
 from groundstation.results.magnetic_ground import GroundDeviation
 
-# The answers that a flight may have, by the name of their analysis.
+# The answers that a flight or a session may have, by the name of their analysis.
 ANSWER_TYPES: Mapping[str, type[Answer]] = MappingProxyType(
     {
         kind.analysis: kind
-        for kind in (HeadingResult, InertialResult, ForecastResult, Latencies, MagneticResult, GroundDeviation)
+        for kind in (
+            *(HeadingResult, InertialResult, ForecastResult, Latencies, MagneticResult, GroundDeviation),
+            CooperativeResult,
+        )
     }
 )
 

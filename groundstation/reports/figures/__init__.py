@@ -7,6 +7,7 @@ from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures import (
+    cooperative,
     forecast,
     generic,
     heading,
@@ -53,6 +54,10 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "overview.profile": overview.profile,
     "overview.states": overview.states,
     "quality.gaps": quality.gaps,
+    "cooperative.map": cooperative.session_map,
+    "cooperative.errors": cooperative.errors,
+    "cooperative.geometry": cooperative.geometry,
+    "cooperative.links": cooperative.links,
 }
 
 

@@ -1,0 +1,66 @@
+"""Navigation between aircraft as an analysis of a session."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from groundstation.estimators.analysis import Analysis, Found
+from groundstation.estimators.cooperative.settings import CooperativeSettings
+from groundstation.results.answer import Answers, answer_of
+from groundstation.results.cooperative import CooperativeResult
+
+if TYPE_CHECKING:
+    from groundstation.tables.session import Session
+    from groundstation.tables.session_assemble import Truth
+
+
+@dataclass(frozen=True)
+class SessionKnown:
+    """What an analysis of a session may use besides the session.
+
+    Parameters
+    ----------
+    truth : mapping of vehicle to (time_s, position_m)
+        Only judges.
+    settings : mapping
+        Settings by the name of their table.
+    answers, workings : mappings
+        Of the analyses before this one.
+    """
+
+    truth: "Truth" = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    answers: Answers = field(default_factory=dict)
+    workings: Mapping[str, Any] = field(default_factory=dict)
+
+
+def _run(session: "Session", known: SessionKnown, settings: CooperativeSettings) -> Found[CooperativeResult]:
+    from groundstation.estimators.cooperative.estimate import estimate_session
+
+    answer, findings = estimate_session(session, settings=settings, truth=dict(known.truth))
+    return Found(answer, findings)
+
+
+def _sentence(answers: Answers) -> str:
+    answer = answer_of(answers, CooperativeResult)
+    if answer is None:
+        return ""
+    rows = [row for row in answer.algorithms if row.algorithm == answer.default_algorithm]
+    if not rows:
+        return ""
+    against = "" if rows[0].rms_m is None else f", {rows[0].rms_m:.1f} m RMS against the truth"
+    who = f"{len(answer.vehicle_names)} aircraft" if len(answer.vehicle_names) > 1 else answer.vehicle_names[0]
+    return f"{who}, {answer.default_algorithm}: 2 sigma_r {rows[0].two_sigma_r_m:.1f} m at the end{against}"
+
+
+COOPERATIVE = Analysis(
+    name="cooperative",
+    title="navigation between aircraft: positions from ranges over the data link, by every algorithm",
+    subject="navigation between aircraft",
+    needs="a session: for each aircraft ins latitude, longitude, height and velocities; link.<peer> pseudorange_m "
+    "with transmission_time_s, and where there are any satellite.<id>; ground stations in a file",
+    settings=CooperativeSettings,
+    answer=CooperativeResult,
+    run=_run,
+    sentence=_sentence,
+)

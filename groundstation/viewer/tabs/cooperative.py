@@ -1,0 +1,157 @@
+"""Cooperative: the aircraft of a session in space with their ellipsoids and links, errors, geometry, links in time."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from groundstation.chapters.cooperative import cooperative as chapter
+from groundstation.chapters.cooperative import trusted, worst_first
+from groundstation.chapters.front import front
+from groundstation.chapters.markdown import front_markdown, markdown
+from groundstation.results.cooperative import CooperativeResult
+from groundstation.results.flight import FlightResults
+from groundstation.tables.session import GroundPoint
+from groundstation.viewer import colours
+from groundstation.viewer.names import clean_text, path_parts
+from groundstation.viewer.recorder import Line, Recorder
+from groundstation.viewer.series import FloatArray, gap_after
+from groundstation.viewer.tabs.session_space import space
+from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
+
+MOST_PLOTS, MOST_LANES = 6, 24
+THIN, BOLD = 1.0, 2.0
+GEOMETRY = (
+    ("sources", "Sources heard"),
+    ("hdop", "HDOP"),
+    ("determinant", "det(H'H)"),
+    ("eigenvalue", "least eigenvalue"),
+)
+LINK_STATES = {"ranging": colours.ANSWER, "gated": colours.LIMIT, "silent": colours.DIM}
+SILENT_FRAMES = 3.0  # so many ordinary steps without a range are silence
+
+
+def cooperative(recorder: Recorder, points: Sequence[GroundPoint], results: FlightResults) -> rrb.Container:
+    """Log the tab of a session; without an answer it is the text that says why."""
+    answer, section = results.answer(CooperativeResult), chapter(results)
+    if answer is None or section is None:
+        recorder.document("cooperative/answer", front_markdown(front(results)))
+        return rrb.Vertical(contents=[document("Session", "cooperative/answer")], name="Cooperative")
+    recorder.document("cooperative/answer", markdown(section))
+    text = document("Algorithms, geometry and links", "cooperative/answer")
+    left = [*space(recorder, answer, points, results), text]
+    middle = _errors(recorder, answer, results)
+    right = [*_geometry(recorder, answer, results), *_links(recorder, answer, results)]
+    columns = [rrb.Vertical(contents=column) for column in (left, middle, right) if column]
+    return rrb.Horizontal(contents=columns, column_shares=[1.6, 1.0, 1.0][: len(columns)], name="Cooperative")
+
+
+def _errors(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:
+    """Error of each aircraft on the band of its computed 2 sigma_r, a view each."""
+    tracks = figure_of(results, "cooperative_tracks", "time_s", "vehicle", "algorithm")
+    if tracks is None:
+        return []
+    best, views = trusted(answer).algorithm, list[rrb.View]()
+    used = tracks["algorithm"].astype(np.str_) == best
+    vehicle = tracks["vehicle"].astype(np.str_)
+    for name, part in zip(answer.vehicle_names, path_parts(answer.vehicle_names), strict=True):
+        rows = used & (vehicle == name)
+        if not rows.any():
+            continue
+        path = f"cooperative/errors/{part}"
+        time_ns = recorder.time_ns(numbers(tracks, "time_s")[rows])
+        _band(recorder, f"{path}/a_band", time_ns, numbers(tracks, "two_sigma_r_m")[rows])
+        error = numbers(tracks, "error_m")[rows]
+        if np.isfinite(error).any():
+            line = Line("error against the truth, m", colours.ANSWER, BOLD)
+            recorder.lines(f"{path}/b_error", time_ns, error[:, None], [line], gap_after(time_ns))
+        views.append(plot(f"{clean_text(name)}: horizontal error and 2σ_r, m", path, legend=not views))
+    return views[:MOST_PLOTS]
+
+
+def _band(recorder: Recorder, path: str, time_ns: NDArray[np.int64], half_m: FloatArray) -> None:
+    """A filled band of plus and minus ``half_m`` around zero: Rerun fills one sigma of a measurement."""
+    known = np.isfinite(half_m)
+    variance = np.where(known, half_m, 0.0) ** 2
+    values = np.where(known, 0.0, np.nan)
+    style = rr.Measurements.from_fields(names=["2σ_r as computed, m"], colors=[colours.HONEST], widths=[THIN])
+    recorder.static(path, style)
+    columns = rr.Measurements.columns(values=values, variances=variance)
+    recorder.stream.send_columns(path, recorder.indexes(time_ns), columns)
+
+
+def _geometry(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:
+    """Measures of geometry with time, one line an aircraft."""
+    data = figure_of(results, "cooperative_geometry", "time_s", "vehicle")
+    if data is None:
+        return []
+    vehicle, views = data["vehicle"].astype(np.str_), list[rrb.View]()
+    shades = colours.for_series(len(answer.vehicle_names))
+    for column, title in GEOMETRY:
+        if column not in data.columns or not np.isfinite(numbers(data, column)).any():
+            continue
+        path = f"cooperative/geometry/{column}"
+        names = zip(answer.vehicle_names, path_parts(answer.vehicle_names), shades, strict=True)
+        for name, part, shade in names:
+            rows = vehicle == name
+            if not rows.any():
+                continue
+            time_ns = recorder.time_ns(numbers(data, "time_s")[rows])
+            values = numbers(data, column)[rows][:, None]
+            line = Line(clean_text(name), shade, THIN)
+            recorder.lines(f"{path}/{part}", time_ns, values, [line], gap_after(time_ns))
+        views.append(plot(title, path, legend=not views))
+    return views
+
+
+def _links(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:
+    """A lane each for the worst links: ranging, gated, silent."""
+    data = figure_of(results, "cooperative_links", "time_s", "receiver", "source", "mark")
+    if data is None:
+        return []
+    ordered = [row for row in worst_first(answer.links) if row.kind != "satellite"]
+    shown = ordered[:MOST_LANES]
+    parts = path_parts([f"{row.receiver} from {row.source}" for row in shown])
+    end_s = float(numbers(data, "time_s").max())
+    paths = []
+    for row, part in zip(shown, parts, strict=True):
+        mine = (data["receiver"] == row.receiver) & (data["source"] == row.source)
+        if not mine.any():
+            continue
+        path = f"cooperative/links/{part}"
+        start, end, state = link_spans(numbers(data, "time_s")[mine], numbers(data, "mark")[mine], end_s)
+        recorder.spans(path, start, end, state, LINK_STATES)
+        paths.append(path)
+    more = f", the worst {len(shown)} of {len(ordered)}" if len(shown) < len(ordered) else ""
+    return [lanes(f"Links{more}", paths)] if paths else []
+
+
+def link_spans(time_s: FloatArray, mark: FloatArray, end_s: float) -> tuple[FloatArray, FloatArray, NDArray[np.str_]]:
+    """Stretches in which a link ranges, is gated, or is silent, until the end of the session.
+
+    Examples
+    --------
+    >>> time_s = np.array([0.0, 1.0, 2.0, 3.0, 20.0, 21.0])
+    >>> start, end, state = link_spans(time_s, np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0]), 30.0)
+    >>> list(zip(start.tolist(), end.tolist(), state.tolist()))
+    ... # doctest: +NORMALIZE_WHITESPACE
+    [(0.0, 2.0, 'ranging'), (2.0, 3.0, 'gated'), (3.0, 4.0, 'ranging'), (4.0, 20.0, 'silent'),
+     (20.0, 22.0, 'ranging'), (22.0, 30.0, 'silent')]
+    """
+    order = np.argsort(time_s, kind="stable")
+    time_s, state = time_s[order], np.where(mark[order] > 0, "ranging", "gated")
+    step = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+    ends = np.append(time_s[1:], end_s)
+    is_long = ends - time_s > SILENT_FRAMES * max(step, 1e-9)
+    begins, names = [], []
+    for begin, name, silent in zip(time_s.tolist(), state.tolist(), is_long.tolist(), strict=True):
+        begins.append(begin)
+        names.append(name)
+        if silent:
+            begins.append(begin + step)
+            names.append("silent")
+    keep = [place for place in range(len(names)) if not place or names[place] != names[place - 1]]
+    start = np.array(begins)[keep]
+    return start, np.append(start[1:], max(end_s, float(start[-1]))), np.array(names)[keep]

@@ -1,0 +1,166 @@
+"""The aircraft of a session in space, with 2 sigma ellipsoids, and links in the colour of their residual."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from groundstation.base.local_frame import LocalFrame, plane_through
+from groundstation.base.records import Int64Array
+from groundstation.chapters.cooperative import trusted
+from groundstation.results.cooperative import CooperativeResult
+from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults
+from groundstation.tables.session import GroundPoint
+from groundstation.viewer import colours
+from groundstation.viewer.colours import Colour
+from groundstation.viewer.names import clean_text, path_parts
+from groundstation.viewer.recorder import Recorder
+from groundstation.viewer.series import FloatArray
+from groundstation.viewer.views import figure_of, numbers
+
+MARK, TRAIL, LINK = 5.0, 1.0, 1.2  # radii in points of the screen
+LEVEL_SHARE = 0.05  # height of an ellipsoid: the answer has horizontal sigmas alone
+FRAME_S = 1.0  # links of one such step are drawn together
+MOST_STRIPS = 60_000
+STEPS: tuple[tuple[float, Colour], ...] = ((1.0, colours.ANSWER), (2.0, colours.PAPER), (3.0, colours.OVER_LIMIT))
+VIEW_NAME = "East, north, up; ellipsoids 2σ; links: residual below 1σ green, 2σ yellow, 3σ orange, else red"
+
+
+def space(
+    recorder: Recorder, answer: CooperativeResult, points: Sequence[GroundPoint], results: FlightResults
+) -> list[rrb.View]:
+    """Log the aircraft, their tracks, the ground points and the links; the view, none without a position."""
+    tracks = figure_of(results, "cooperative_tracks", "time_s", "vehicle", "algorithm", "x_m", "y_m", "z_m")
+    if tracks is None:
+        return []
+    rows = tracks["algorithm"].astype(np.str_) == trusted(answer).algorithm
+    place = np.column_stack([numbers(tracks, f"{axis}_m") for axis in "xyz"])
+    origin = plane_through(place[rows]) if answer.frame == "ecef" else None
+    shown, stations = _seen(place, origin), _stations(recorder, points, origin)
+    ways: dict[str, tuple[FloatArray, FloatArray]] = {}
+    vehicle, shades = tracks["vehicle"].astype(np.str_), colours.for_series(len(answer.vehicle_names))
+    parts = path_parts(answer.vehicle_names)
+    for name, part, shade in zip(answer.vehicle_names, parts, shades, strict=True):
+        mine = np.flatnonzero(rows & (vehicle == name) & np.isfinite(shown).all(axis=1))
+        if len(mine):
+            _aircraft(recorder, f"space/{part}", name, tracks, mine, shown[mine], shade)
+            ways[name] = numbers(tracks, "time_s")[mine], shown[mine]
+    links = figure_of(results, "cooperative_links", "time_s", "receiver", "source", "innovation", "sigma", "mark")
+    if links is not None:
+        _links(recorder, links, ways, stations)
+    recorder.static("space", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    return [rrb.Spatial3DView(name=VIEW_NAME, origin="/space")]
+
+
+def _seen(position_m: FloatArray, origin: LocalFrame | None) -> FloatArray:
+    """East, north, up of positions in the frame of the session."""
+    plane = position_m if origin is None else origin.from_ecef_m(position_m)
+    return np.column_stack([plane[:, 1], plane[:, 0], -plane[:, 2]])
+
+
+def _stations(recorder: Recorder, points: Sequence[GroundPoint], origin: LocalFrame | None) -> dict[str, FloatArray]:
+    if not points:
+        return {}
+    places = _seen(np.array([point.position_m for point in points]), origin)
+    drawn = rr.Points3D(
+        places,
+        labels=[clean_text(point.name) for point in points],
+        colors=[colours.LIGHT] * len(points),
+        radii=rr.Radius.ui_points(MARK),
+    )
+    recorder.static("space/stations", drawn)
+    return {point.name: place for point, place in zip(points, places, strict=True)}
+
+
+def _aircraft(
+    recorder: Recorder, path: str, name: str, tracks: FigureData, rows: Int64Array, place: FloatArray, shade: Colour
+) -> None:
+    indexes = recorder.indexes(recorder.time_ns(numbers(tracks, "time_s")[rows]))
+    strip = rr.LineStrips3D([place], colors=[shade], radii=rr.Radius.ui_points(TRAIL))
+    recorder.static(f"{path}/track", strip)
+    mark = rr.Points3D.from_fields(colors=[shade], radii=rr.Radius.ui_points(MARK), labels=[clean_text(name)])
+    recorder.static(f"{path}/now", mark)
+    where = place.astype(np.float32)
+    recorder.stream.send_columns(f"{path}/now", indexes, rr.Points3D.columns(positions=where))
+    north, east = (2.0 * numbers(tracks, f"sigma_{axis}_m")[rows] for axis in ("north", "east"))
+    half = np.nan_to_num(np.column_stack([east, north, LEVEL_SHARE * 0.5 * (east + north)]))
+    recorder.static(f"{path}/ellipsoid", rr.Ellipsoids3D.from_fields(colors=[(*shade[:3], 90)], fill_mode="solid"))
+    columns = rr.Ellipsoids3D.columns(half_sizes=half.astype(np.float32), centers=where)
+    recorder.stream.send_columns(f"{path}/ellipsoid", indexes, columns)
+
+
+def _links(
+    recorder: Recorder,
+    links: FigureData,
+    ways: dict[str, tuple[FloatArray, FloatArray]],
+    stations: dict[str, FloatArray],
+) -> None:
+    """Log the links of every frame as strips from source to receiver; a frame without any clears them."""
+    receiver, source = links["receiver"].astype(np.str_), links["source"].astype(np.str_)
+    known = np.isin(receiver, list(ways)) & np.isin(source, [*ways, *stations])
+    rows = np.flatnonzero(known)
+    if not len(rows):
+        return
+    time_s = numbers(links, "time_s")[rows]
+    frame_s = FRAME_S * np.ceil(len(rows) / MOST_STRIPS)  # of many links fewer frames
+    frame = np.floor(time_s / frame_s).astype(np.int64)
+    rows, frame, time_s = _one_a_frame(rows, frame, time_s, receiver, source)
+    ends = np.stack([_places(name, rows, time_s, ways, stations) for name in (source, receiver)], axis=1)
+    shades = [shade_of(*one) for one in _residuals(links, rows)]
+    frames = np.arange(frame[0], frame[-1] + 2)
+    lengths = np.bincount(frame - frame[0], minlength=len(frames))
+    recorder.static("space/links", rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(LINK)))
+    columns = rr.LineStrips3D.columns(strips=list(ends.astype(np.float32)), colors=shades).partition(lengths.tolist())
+    recorder.stream.send_columns("space/links", recorder.indexes(recorder.time_ns(frames * frame_s)), columns)
+
+
+def _one_a_frame(
+    rows: Int64Array, frame: Int64Array, time_s: FloatArray, receiver: np.ndarray, source: np.ndarray
+) -> tuple[Int64Array, Int64Array, FloatArray]:
+    """The last range of each link in each frame, in order of frames."""
+    names = np.char.add(np.char.add(receiver[rows], "\n"), source[rows])
+    _, link = np.unique(names, return_inverse=True)
+    order = np.lexsort((time_s, link, frame))
+    same = (np.diff(frame[order]) == 0) & (np.diff(link[order]) == 0)
+    kept = order[np.append(~same, True)]
+    return rows[kept], frame[kept], time_s[kept]
+
+
+def _places(
+    names: np.ndarray,
+    rows: Int64Array,
+    time_s: FloatArray,
+    ways: dict[str, tuple[FloatArray, FloatArray]],
+    stations: dict[str, FloatArray],
+) -> FloatArray:
+    """Where one end of each link was at its time."""
+    found = np.zeros((len(rows), 3))
+    for name in np.unique(names[rows]).tolist():
+        mine = names[rows] == name
+        if name in ways:
+            when, where = ways[name]
+            found[mine] = np.column_stack([np.interp(time_s[mine], when, where[:, k]) for k in range(3)])
+        else:
+            found[mine] = stations[name]
+    return found
+
+
+def _residuals(links: FigureData, rows: Int64Array) -> list[tuple[float, bool]]:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        normal = np.abs(numbers(links, "innovation")[rows] / numbers(links, "sigma")[rows])
+    return list(zip(normal.tolist(), (numbers(links, "mark")[rows] > 0).tolist(), strict=True))
+
+
+def shade_of(normal: float, is_used: bool) -> Colour:
+    """Colour of a link whose residual is ``normal`` sigmas.
+
+    Examples
+    --------
+    >>> shade_of(0.4, True) == colours.ANSWER, shade_of(0.4, False) == colours.LIMIT == shade_of(9.0, True)
+    (True, True)
+    """
+    if not is_used:
+        return colours.LIMIT
+    return next((shade for most, shade in STEPS if normal < most), colours.LIMIT)
