@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import DamageEntry, Ledger, RemarkEntry
 from groundstation.chapters.findings import findings
@@ -261,9 +262,9 @@ def test_quality_begins_with_flight_status_and_log_where_there_is_no_front() -> 
 
 
 def test_clock_and_ledger_are_told_by_their_fields() -> None:
-    parts = quality(example(None)).parts
+    parts = quality(example(None, clock=Clock(nominal_period_s=0.02, is_absolute=True))).parts
     clock = facts(parts, "Clock model")
-    assert clock["nominal period"][0] == "0.02 s" and clock["is absolute"][0] == "no"
+    assert clock["nominal period"][0] == "0.02 s" and clock["is absolute"][0] == "yes"
     ledger = facts(parts, "Ledger of the log")
     assert ledger["dropouts · count"][0] == "0" and ledger["truncated"][0] == "—"
     assert not {"topics", "damages", "remarks", "spans"} & set(ledger)

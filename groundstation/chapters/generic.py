@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from groundstation.base.digits import digits_of
+from groundstation.base.digits import digits_of, rounded
 from groundstation.chapters.gates import gate_grid, setting_facts
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Note, Part, Section, Tone
 from groundstation.chapters.wording import any_value, clean, is_number, named_quantity, sentence, typeset, words
@@ -58,7 +58,7 @@ def figures_over_time(results: FlightResults, analysis: str) -> tuple[str, ...]:
         if _is_of(name, analysis) and not any(_is_of(name, other) for other in others)
     )
     found = ((name, results.figure_with_rows(name)) for name in own)
-    return tuple(name for name, figure in found if figure is not None and "time_s" in figure.columns)
+    return tuple(sorted(name for name, figure in found if figure is not None and "time_s" in figure.columns))
 
 
 def quantity(name: str) -> tuple[str, str]:
@@ -169,6 +169,6 @@ def _told(name: str, value: Any, unit: str) -> str:
         return f"{len(value)} values"
     if isinstance(value, list | tuple):
         return ", ".join(_told(name, one, unit) for one in value) or "none"
-    if isinstance(value, float) and is_number(value):
-        return any_value(round(value, digits_of(name)) + 0.0, unit)
+    if isinstance(value, float):
+        return any_value(rounded(value, digits_of(name)), unit)
     return typeset(clean(value)) if isinstance(value, str) and value else any_value(value, unit)

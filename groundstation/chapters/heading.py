@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from groundstation.chapters.assessed import reason_of
-from groundstation.chapters.front import UNKNOWN_REASON
+from groundstation.chapters.front import UNKNOWN_REASON, front
 from groundstation.chapters.gates import gate_grid, setting_facts
 from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Part, Section
-from groundstation.chapters.verdict import NOT_ASSESSABLE, figures, reasons, verdict_line
+from groundstation.chapters.verdict import NOT_ASSESSABLE, figures, reasons
 from groundstation.chapters.wording import ABSENT, clock, interval, is_number, number, step_places
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults
@@ -48,7 +48,7 @@ def heading(results: FlightResults) -> Section:
     )
     shown = tuple(part for part in parts if part is not None)
     above: tuple[Part, ...] = (*(Note(reason) for reason in reasons(answer)), Facts("", figures(answer)))
-    return Section("heading", TITLE, LEAD, shown, verdict_line(answer), above)
+    return Section("heading", TITLE, LEAD, shown, front(results).line, above)
 
 
 def _figures(segments: Sequence[TaxiSegment]) -> tuple[Figure, ...]:

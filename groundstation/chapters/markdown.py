@@ -59,22 +59,14 @@ def part_markdown(part: Part, *, level: int = 2) -> str:
 
 def front_markdown(front: Front) -> str:
     """The front of a report as a Markdown document: what flight it is, the verdict, and why."""
-    parts = [
-        f"# {escaped(front.title)}",
-        table(("", ""), [(escaped(label), _cell(cell)) for label, cell in front.pairs]),
-    ]
+    parts = [f"# {escaped(front.title)}"]
     if front.headline:
-        parts.append(f"## {escaped(answer_line(front))}")
+        parts.append(f"## {escaped(front.line)}")  # before the rest: a small panel shows it without scrolling
+    parts.append(table(("", ""), [(escaped(label), _cell(cell)) for label, cell in front.pairs]))
     parts += [escaped(sentence) for sentence in front.sentences]
     if front.figures:
         parts += _facts(Facts("", front.figures), 2)
     return "\n\n".join(parts)
-
-
-def answer_line(front: Front) -> str:
-    """Verdict and headline of a front in one line."""
-    verdict = "" if front.verdict is None else f"{front.verdict.symbol} {front.verdict.text}"
-    return " · ".join(filter(None, (verdict.strip(), front.headline)))
 
 
 def _part(part: Part | None, level: int) -> list[str]:
@@ -103,12 +95,20 @@ def _grid(grid: Grid, level: int) -> list[str]:
     rows = [[_cell(cell) for cell in row] for row in grid.rows]
     named = min((place for row in grid.rows for place, cell in enumerate(row) if isinstance(cell, str)), default=0)
     long = {place for row in grid.rows for place, cell in enumerate(row) if len(_text(cell)) > WIDEST_CELL}
-    shown = [place for place in range(len(grid.heads)) if place == named or place not in long]
-    shown.sort(key=lambda place: place == named and place in long)  # long names last: the figures stay in sight
+    shown = [place for place in _in_sight(grid, named in long, named) if place == named or place not in long]
     heads = [escaped(grid.heads[place].title) for place in shown]
     cells = [table(heads, [[row[place] for place in shown] for row in rows])] if shown != [named] else []
     below = [f"{row[named]}: {row[place]}" for row in rows for place in sorted(long - {named}) if row[place]]
     return [*_title(grid.title, level), *cells, *below, *_caption(grid.caption)]
+
+
+def _in_sight(grid: Grid, has_long_names: bool, named: int) -> list[int]:
+    """The order of the columns: long names stand behind the figures, or a narrow panel would show no figure."""
+    places = list(range(len(grid.heads)))
+    last_figure = max((place for place in places if grid.heads[place].numeric), default=named)
+    if not has_long_names or last_figure < named:
+        return places
+    return [*places[:named], *places[named + 1 : last_figure + 1], named, *places[last_figure + 1 :]]
 
 
 def _title(title: str, level: int) -> list[str]:

@@ -130,6 +130,12 @@ class Front:
     figures: Sequence[tuple[str, str, str]] = ()
     to_sign: bool = False
 
+    @property
+    def line(self) -> str:
+        """Verdict and headline in one line, with the symbol of the verdict."""
+        mark = self.verdict
+        return " · ".join(filter(None, ("" if mark is None else f"{mark.symbol} {mark.text}".strip(), self.headline)))
+
 
 @dataclass(frozen=True)
 class Document:

@@ -31,12 +31,6 @@ def what_to_enter(heading: HeadingResult) -> str:
     return f"Nothing to enter: the error is below half the entry step of {number(step, step_places(step), '°')}"
 
 
-def verdict_line(heading: HeadingResult) -> str:
-    """Verdict and number to type in one line: the first of a text panel."""
-    mark = VERDICTS[heading.verdict]
-    return f"{mark.symbol} {mark.text} · {what_to_enter(heading)}"
-
-
 def reasons(heading: HeadingResult) -> tuple[str, ...]:
     """Why the verdict is what it is, and the error in words."""
     return tuple(filter(None, (sentence(typeset(heading.verdict_reason)), _in_words(heading))))

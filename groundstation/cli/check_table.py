@@ -1,6 +1,6 @@
 """How ``check`` looks on stdout: tables for people, JSON for programs."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
 import typer
 
@@ -8,7 +8,9 @@ from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import FieldEntry, Ledger, TopicEntry
 from groundstation.base.signals import is_canonical
-from groundstation.cli.printing import columns, totals
+from groundstation.chapters.parts import Grid, Head
+from groundstation.chapters.terminal import columns, grid_text
+from groundstation.cli.printing import totals
 from groundstation.cli.text import as_json, printable
 from groundstation.pipeline.check import Checked
 
@@ -129,7 +131,7 @@ def _topics(topics: Mapping[str, TopicEntry]) -> str:
         "stuck": lambda topic: topic.stuck,
     }
     told = {head: count for head, count in counts.items() if any(count(topic) for topic in topics.values())}
-    rows = [[*heads, *told]]
+    rows = []
     for name, topic in topics.items():
         row = [
             printable(name),
@@ -142,7 +144,7 @@ def _topics(topics: Mapping[str, TopicEntry]) -> str:
             f"{topic.gaps.longest_s:.2f}" if topic.gaps.count else "",
         ]
         rows.append([*row, *(str(count(topic) or "") for count in told.values())])
-    return columns(rows, right=range(1, len(rows[0])))
+    return _titled("", [*heads, *told], rows, right=range(1, len(heads) + len(told)))
 
 
 def _number(value: float | None, digits: int) -> str:
@@ -216,5 +218,5 @@ def _fields(topics: Mapping[str, TopicEntry]) -> Iterator[tuple[str, FieldEntry]
             yield printable(f"{name}.{field}"), entry
 
 
-def _titled(title: str, heads: list[str], rows: list[list[str]], right: Sequence[int] = ()) -> str:
-    return f"{title}\n{columns([heads, *rows], right)}" if rows else ""
+def _titled(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
+    return grid_text(Grid(title, [Head(head, place in right) for place, head in enumerate(heads)], rows))

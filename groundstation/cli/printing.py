@@ -5,24 +5,12 @@ from typing import Any
 
 import typer
 
+from groundstation.chapters.terminal import columns
 from groundstation.cli.text import as_json, printable
 from groundstation.pipeline.describe import Description
 from groundstation.pipeline.outcome import Outcome, worst_code
 
 __all__ = ["as_json", "catalogue", "description", "outcomes", "worst_code"]
-
-
-def columns(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
-    """Lay rows out in aligned columns; those numbered in ``right`` are aligned to the right."""
-    widths = [max(len(row[place]) for row in rows) for place in range(len(rows[0]))]
-    lines = []
-    for row in rows:
-        cells = [
-            cell.rjust(width) if place in right else cell.ljust(width)
-            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ]
-        lines.append("  ".join(cells).rstrip())
-    return "\n".join(lines)
 
 
 def description(what: Description) -> str:

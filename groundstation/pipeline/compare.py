@@ -18,9 +18,8 @@ from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.alignment import align
 from groundstation.pipeline.clip import CUT_SHA256
 from groundstation.pipeline.inputs import COMPARISON_MARKS, COMPARISON_RECORDING, is_ours
-from groundstation.reports.sections.saved import mapping
 from groundstation.results.comparison import Comparison, Delta, Event, SettingPair, Side, Value
-from groundstation.results.files import MANIFEST, SavedFlight, csv_text, load, write_text
+from groundstation.results.files import MANIFEST, SavedFlight, csv_text, load, mapping, write_text
 from groundstation.results.flight import NotAssessable
 from groundstation.results.grouped_findings import grouped
 

@@ -1,4 +1,4 @@
-"""Intervals that the user left out of the estimates, or forced into them, as the manifest of a run tells."""
+"""Intervals that the user left out of the estimates, or forced into them, as the configuration of a run has them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

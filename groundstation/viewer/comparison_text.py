@@ -4,8 +4,9 @@ from collections.abc import Sequence
 
 from groundstation.base.findings import Finding
 from groundstation.base.timescales import duration_text
+from groundstation.chapters.markdown import table
 from groundstation.results.comparison import Comparison, Delta, Side, Value
-from groundstation.viewer.markdown import markdown_text, table
+from groundstation.viewer.markdown import markdown_text
 
 SIGNIFICANCE = {None: "", True: "**beyond**", False: "within"}
 MOST_FINDINGS = 12

@@ -7,9 +7,10 @@ import numpy as np
 
 from groundstation.base.records import Int64Array
 from groundstation.base.timescales import utc_ns_to_iso
+from groundstation.chapters.markdown import table
 from groundstation.results.fleet import AircraftRow, FleetResults
 from groundstation.viewer.fleet_recorder import FleetRecorder
-from groundstation.viewer.markdown import markdown_text, number, table
+from groundstation.viewer.markdown import markdown_text, number
 from groundstation.viewer.names import words
 from groundstation.viewer.views import numbers
 

@@ -1,12 +1,9 @@
 """Text panels: Markdown in which nothing from a log can act as markup."""
 
 import math
-import re
-from collections.abc import Sequence
 
+from groundstation.chapters.markdown import escaped
 from groundstation.viewer.names import clean_text
-
-_MARKUP = re.compile(r"([\\`*_{}\[\]()<>#+\-.!|~&:])")
 
 
 def markdown_text(text: str, limit: int = 400) -> str:
@@ -17,7 +14,7 @@ def markdown_text(text: str, limit: int = 400) -> str:
     >>> print(markdown_text("a|b ![x](http://y)"))
     a\\|b \\!\\[x\\]\\(http\\://y\\)
     """
-    return _MARKUP.sub(r"\\\1", clean_text(text, limit))
+    return escaped(clean_text(text, limit))
 
 
 def number(value: float | None, digits: int = 3, unit: str = "", *, sign: bool = False) -> str:
@@ -32,17 +29,3 @@ def number(value: float | None, digits: int = 3, unit: str = "", *, sign: bool =
         return "–"
     text = f"{value:+.{digits}f}" if sign else f"{value:.{digits}f}"
     return f"{text} {unit}".strip()
-
-
-def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Markdown table; cells are Markdown already.
-
-    Examples
-    --------
-    >>> print(table(["a", "b"], [["1", "2"]]))
-    | a | b |
-    |---|---|
-    | 1 | 2 |
-    """
-    lines = ["| " + " | ".join(line) + " |" for line in (header, *rows)]
-    return "\n".join([lines[0], "|" + "---|" * len(header), *lines[1:]])

@@ -11,10 +11,11 @@ import rerun.blueprint as rrb
 
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.signals import RAW_PREFIX, TOPICS, field_of, kind_of
+from groundstation.chapters.markdown import table
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer import colours
-from groundstation.viewer.markdown import markdown_text, table
+from groundstation.viewer.markdown import markdown_text
 from groundstation.viewer.names import (
     clean_text,
     label,

@@ -1,0 +1,81 @@
+"""Sections as plain text for a terminal: aligned columns, nothing that a terminal takes for a command."""
+
+from collections.abc import Collection, Sequence
+
+from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Mark, Note, Part, Section
+from groundstation.chapters.wording import clean
+
+GAP = "  "
+
+
+def columns(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
+    """Lay rows out in aligned columns; those numbered in ``right`` are aligned to the right.
+
+    Examples
+    --------
+    >>> print(columns([["topic", "rows"], ["ins", "3020"], ["baro", "302"]], right=(1,)))
+    topic  rows
+    ins    3020
+    baro    302
+    """
+    widths = [max(len(row[place]) for row in rows) for place in range(len(rows[0]))]
+    lines = []
+    for row in rows:
+        cells = [
+            cell.rjust(width) if place in right else cell.ljust(width)
+            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append(GAP.join(cells).rstrip())
+    return "\n".join(lines)
+
+
+def terminal(section: Section) -> str:
+    """A section as plain text, headed by its headline or its title.
+
+    The parts set small are left out, and figures, but for what stands in their place.
+
+    Examples
+    --------
+    >>> heads, rows = (Head("Gate"), Head("Figure", True)), [("Precision e", "0.022°"), ("Quality", "0.1°")]
+    >>> print(terminal(Section("heading", "Heading", "", (Note("Enter it.", "good"), Grid("Gates", heads, rows)))))
+    Heading
+    <BLANKLINE>
+    ✓ Enter it.
+    <BLANKLINE>
+    Gates
+    Gate         Figure
+    Precision e  0.022°
+    Quality        0.1°
+    """
+    told = (part_text(part) for part in (*section.above, *section.parts))
+    return "\n\n".join(filter(None, (clean(section.headline or section.title), *told)))
+
+
+def part_text(part: Part | None) -> str:
+    """A part of a section alone; empty for one that is left out."""
+    if isinstance(part, Figure):
+        return part_text(part.instead)
+    if isinstance(part, Note):
+        return " ".join(filter(None, (Mark(part.tone, "").symbol, clean(part.text))))
+    if isinstance(part, Facts):
+        return "" if part.compact else _facts(part)
+    return grid_text(part) if isinstance(part, Grid) else ""
+
+
+def grid_text(grid: Grid) -> str:
+    """A table under its title; without rows nothing, without heads that have a title no line of heads."""
+    if not grid.rows:
+        return ""
+    heads = [[head.title for head in grid.heads]] if any(head.title for head in grid.heads) else []
+    right = [place for place, head in enumerate(grid.heads) if head.numeric]
+    rows = columns([*heads, *([_cell(cell) for cell in row] for row in grid.rows)], right)
+    return "\n".join(filter(None, (clean(grid.title), rows, clean(grid.caption))))
+
+
+def _facts(facts: Facts) -> str:
+    rows = [[clean(text) for text in pair] for pair in facts.pairs]
+    return "\n".join(filter(None, (clean(facts.title), columns(rows) if rows else "", clean(facts.caption))))
+
+
+def _cell(cell: Cell) -> str:
+    return clean(cell) if isinstance(cell, str) else f"{cell.symbol} {clean(cell.text)}".strip()
