@@ -72,7 +72,7 @@ def session_map(results: FlightResults) -> Drawing | None:
     size = f", drawn {larger} times their size" if larger > 1 else ""
     caption = (
         f"Tracks from above, {title_of(algorithm)}; the dot is where each begins. Ellipses: 2σ north and east, at "
-        f"{ELLIPSES} times of each track{size}. Triangles: ground stations."
+        f"{ELLIPSES} times of each track{size}." + (" Triangles: ground stations." if stations is not None else "")
     )
     return Drawing("Map", caption, "Tracks of the aircraft.", d.draw("cooperative-map", 112, paint), _numbers(results))
 

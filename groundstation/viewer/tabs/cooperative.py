@@ -22,7 +22,7 @@ from groundstation.viewer.tabs.session_space import space
 from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
 
 MOST_PLOTS, MOST_LANES = 6, 24
-THIN, BOLD = 1.0, 2.0
+THIN, BOLD, ROOM = 1.0, 2.0, 1.1
 GEOMETRY = (
     ("sources", "Sources heard"),
     ("hdop", "HDOP"),
@@ -62,13 +62,20 @@ def _errors(recorder: Recorder, answer: CooperativeResult, results: FlightResult
             continue
         path = f"cooperative/errors/{part}"
         time_ns = recorder.time_ns(numbers(tracks, "time_s")[rows])
-        _band(recorder, f"{path}/a_band", time_ns, numbers(tracks, "two_sigma_r_m")[rows])
-        error = numbers(tracks, "error_m")[rows]
+        bound, error = (numbers(tracks, column)[rows] for column in ("two_sigma_r_m", "error_m"))
+        _band(recorder, f"{path}/a_band", time_ns, bound)
         if np.isfinite(error).any():
             line = Line("error against the truth, m", colours.ANSWER, BOLD)
             recorder.lines(f"{path}/b_error", time_ns, error[:, None], [line], gap_after(time_ns))
-        views.append(plot(f"{clean_text(name)}: horizontal error and 2σ_r, m", path, legend=not views))
+        title, high = f"{clean_text(name)}: horizontal error and 2σ_r, m", _ceiling(bound, error)
+        views.append(plot(title, path, axis_range=(0.0, high), legend=not views))
     return views[:MOST_PLOTS]
+
+
+def _ceiling(*series: FloatArray) -> float:
+    """Upper end of an axis from 0 on which bands and lines are seen: Rerun scales by the lines alone."""
+    known = np.concatenate([values[np.isfinite(values)] for values in series])
+    return ROOM * float(known.max()) if known.size and known.max() > 0.0 else 1.0
 
 
 def _band(recorder: Recorder, path: str, time_ns: NDArray[np.int64], half_m: FloatArray) -> None:
