@@ -24,6 +24,7 @@ from groundstation.pipeline.flight import Job, run_flight
 from groundstation.pipeline.inputs import collect
 from groundstation.reports.comparison import comparison_html
 from groundstation.reports.drawing import sketching
+from groundstation.results.answer import by_analysis
 from groundstation.results.comparison import Comparison, Delta
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, load, save
@@ -220,7 +221,7 @@ def lanes(**columns: Any) -> FigureData:
 
 
 def saved_with(figures: dict[str, FigureData], inertial: InertialResult | None = None) -> SavedFlight:
-    document = summary_of(replace(make_results(make_flight()), inertial=inertial, figures=()))
+    document = summary_of(replace(make_results(make_flight()), answers=by_analysis(inertial), figures=()))
     return SavedFlight(Path("x"), document, Manifest(), figures)
 
 

@@ -16,8 +16,10 @@ from groundstation.chapters.front import front
 from groundstation.chapters.parts import Facts, Figure, Grid, Mark, Note, Section
 from groundstation.cli.main import main
 from groundstation.estimators.analyses import ANSWER_TYPES
+from groundstation.estimators.cooperative.analysis import COOPERATIVE, NIS_MAX, SessionKnown, innovations_of
 from groundstation.estimators.cooperative.estimate import estimate_session
-from groundstation.estimators.cooperative.settings import ALGORITHMS
+from groundstation.estimators.cooperative.settings import ALGORITHMS, CooperativeSettings, InsBelief
+from groundstation.pipeline.analyse import run_analyses
 from groundstation.pipeline.configuration import Configuration, load_configuration
 from groundstation.pipeline.inputs import flight_folders, session_folders
 from groundstation.pipeline.publishing import report_again
@@ -29,7 +31,7 @@ from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_log import write_session
 from tests.cooperative_example import believed, truth_of
 from tests.recording_contents import Contents
-from tests.session_example import SEED, SHORT
+from tests.session_example import SEED, SHORT, simulated
 
 IDENTITY = "20180305T120000Z_session_A-B-C"
 SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
@@ -407,3 +409,18 @@ def test_view_takes_a_session_folder(out: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(launch, "open_viewer", open_viewer)
     assert called("view", out / IDENTITY) == 0
     assert opened == [out / IDENTITY / f"{IDENTITY}.rrd"]
+
+
+def test_ranges_that_contradict_the_stated_sigmas_are_a_warning(
+    results: FlightResults, answer: CooperativeResult
+) -> None:
+    """Without any truth: a filter that is too sure is told by its innovations."""
+    assert not [finding for finding in results.findings if finding.code == "cooperative.too_sure"]
+    assert max(innovations_of(answer).values()) < NIS_MAX
+    session = simulated(SHORT).session
+    belief = InsBelief(position_m=1.0, velocity_mps=0.001, baro_m=0.1, clock_m=0.1, clock_mps=0.001)
+    sure = CooperativeSettings(ins=belief, gate_sigma=0.0)
+    found = run_analyses((COOPERATIVE,), session, SessionKnown(settings={"cooperative": sure}))
+    (finding, *_) = (one for one in found.findings["cooperative"] if one.code == "cooperative.too_sure")
+    assert finding.severity == "warn" and "where 1 is right" in finding.text
+    assert "sigma too small" in COOPERATIVE.sentence(found.answers)

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from groundstation.base.findings import Finding
 from groundstation.estimators.analysis import Analysis, Found
 from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.results.answer import Answers, answer_of
@@ -12,6 +13,9 @@ from groundstation.results.cooperative import CooperativeResult
 if TYPE_CHECKING:
     from groundstation.tables.session import Session
     from groundstation.tables.session_assemble import Truth
+
+NIS_MAX = 1.5  # white innovations of LEAST_RANGES rows stay below it in all but one of 10 000 sessions
+LEAST_RANGES = 150
 
 
 @dataclass(frozen=True)
@@ -38,7 +42,34 @@ def _run(session: "Session", known: SessionKnown, settings: CooperativeSettings)
     from groundstation.estimators.cooperative.estimate import estimate_session
 
     answer, findings = estimate_session(session, settings=settings, truth=dict(known.truth))
-    return Found(answer, findings)
+    return Found(answer, (*findings, *_too_sure(answer)))
+
+
+def innovations_of(answer: CooperativeResult) -> dict[str, float]:
+    """Mean normalised innovation squared of the default algorithm by kind of range; 1 is right."""
+    kinds = dict.fromkeys(link.kind for link in answer.links)
+    found: dict[str, float] = {}
+    for kind in kinds:
+        rows = [(link.used, link.nis) for link in answer.links if link.kind == kind and link.nis is not None]
+        used = sum(count for count, _nis in rows)
+        if used >= LEAST_RANGES:
+            found[kind] = sum(count * nis for count, nis in rows) / used
+    return found
+
+
+def _too_sure(answer: CooperativeResult) -> tuple[Finding, ...]:
+    """A warning where ranges contradict the sigmas that the filter was given: it needs no truth."""
+    return tuple(
+        Finding(
+            "warn",
+            "cooperative.too_sure",
+            f"ranges of kind {kind} miss their prediction by more than the stated sigmas allow: NIS {nis:.1f} where 1 "
+            "is right; the computed sigma is too small: state the errors of these INS and ranges in [cooperative.ins] "
+            "and [session]",
+        )
+        for kind, nis in innovations_of(answer).items()
+        if nis > NIS_MAX
+    )
 
 
 def _sentence(answers: Answers) -> str:
@@ -50,7 +81,8 @@ def _sentence(answers: Answers) -> str:
         return ""
     against = "" if rows[0].rms_m is None else f", {rows[0].rms_m:.1f} m RMS against the truth"
     who = f"{len(answer.vehicle_names)} aircraft" if len(answer.vehicle_names) > 1 else answer.vehicle_names[0]
-    return f"{who}, {answer.default_algorithm}: 2 sigma_r {rows[0].two_sigma_r_m:.1f} m at the end{against}"
+    doubt = ", sigma too small: the ranges contradict it" if _too_sure(answer) else ""
+    return f"{who}, {answer.default_algorithm}: 2 sigma_r {rows[0].two_sigma_r_m:.1f} m at the end{against}{doubt}"
 
 
 COOPERATIVE = Analysis(
