@@ -407,3 +407,15 @@ def test_view_takes_a_session_folder(out: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(launch, "open_viewer", open_viewer)
     assert called("view", out / IDENTITY) == 0
     assert opened == [out / IDENTITY / f"{IDENTITY}.rrd"]
+
+
+def test_run_into_the_same_folder_leaves_the_session_be(out: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "out"
+    shutil.copytree(out, copy)
+    log = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv"
+    assert called("run", log, "-o", copy, "-q", "--no-pdf", "-j", "1") == 0
+    rows = json.loads((copy / "index.json").read_text(encoding="utf-8"))["rows"]
+    assert [row["source"] for row in rows] == ["taxi-short.csv"]
+    assert len(flight_folders(copy)) == 1
+    assert [folder.name for folder in session_folders(copy)] == [IDENTITY]
+    assert (copy / IDENTITY / "report.html").read_bytes() == (out / IDENTITY / "report.html").read_bytes()
