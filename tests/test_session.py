@@ -424,3 +424,15 @@ def test_ranges_that_contradict_the_stated_sigmas_are_a_warning(
     (finding, *_) = (one for one in found.findings["cooperative"] if one.code == "cooperative.too_sure")
     assert finding.severity == "warn" and "where 1 is right" in finding.text
     assert "sigma too small" in COOPERATIVE.sentence(found.answers)
+
+
+def test_run_into_the_same_folder_leaves_the_session_be(out: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "out"
+    shutil.copytree(out, copy)
+    log = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv"
+    assert called("run", log, "-o", copy, "-q", "--no-pdf", "-j", "1") == 0
+    rows = json.loads((copy / "index.json").read_text(encoding="utf-8"))["rows"]
+    assert [row["source"] for row in rows] == ["taxi-short.csv"]
+    assert len(flight_folders(copy)) == 1
+    assert [folder.name for folder in session_folders(copy)] == [IDENTITY]
+    assert (copy / IDENTITY / "report.html").read_bytes() == (out / IDENTITY / "report.html").read_bytes()

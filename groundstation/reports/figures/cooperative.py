@@ -9,6 +9,7 @@ from groundstation.base.local_frame import plane_through
 from groundstation.chapters.cooperative import REFERENCE, title_of, trusted
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
+from groundstation.reports.figures.inertial import plain_log
 from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.flight import FlightResults
@@ -158,6 +159,7 @@ def geometry(results: FlightResults) -> Drawing | None:
             known = d.finite(numbers(data, column))
             if column == "hdop" and known.size and known.max() > 20.0 * np.median(known):
                 axes.set_yscale("log")
+                plain_log(axes.yaxis, (1.0,))
             d.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number == len(columns) - 1)
             if not number:
                 d.legend_above(axes, 10)
