@@ -36,6 +36,7 @@ def terminal(section: Section) -> str:
 
     Examples
     --------
+    >>> from groundstation.chapters.parts import Head
     >>> heads, rows = (Head("Gate"), Head("Figure", True)), [("Precision e", "0.022°"), ("Quality", "0.1°")]
     >>> print(terminal(Section("heading", "Heading", "", (Note("Enter it.", "good"), Grid("Gates", heads, rows)))))
     Heading

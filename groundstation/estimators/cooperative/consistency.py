@@ -33,11 +33,13 @@ class Judgement:
         return float(np.sqrt(np.nanmean((self.error_m**2).sum(axis=1)))) if np.isfinite(self.error_m).any() else np.nan
 
     def diverges(self, track: Track) -> bool:
-        """Whether the error of the last tenth of the session is beyond three computed sigma_r."""
-        ratio = np.linalg.norm(self.error_m, axis=1) / (0.5 * track.two_sigma_r_m)
-        last = ratio[int((1.0 - LAST_PART) * len(ratio)) :]
-        last = last[np.isfinite(last)]
-        return bool(len(last) and np.sqrt(np.mean(last**2)) > DIVERGED)
+        """Whether the error of the last tenth of the session is beyond three computed sigma_r, or has no sigma."""
+        error = np.linalg.norm(self.error_m, axis=1)
+        sigma = 0.5 * track.two_sigma_r_m
+        last = slice(int((1.0 - LAST_PART) * len(error)), None)
+        known = np.isfinite(error[last])
+        ratio = (error[last] / sigma[last])[known]
+        return bool(len(ratio) and not np.sqrt(np.mean(ratio**2)) <= DIVERGED)  # no sigma is no number
 
 
 def judge(track: Track, vehicle: DeadReckoning | Odometry, time_s: FloatArray, position_m: FloatArray) -> Judgement:
