@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from groundstation.cli.main import app
+from groundstation.pipeline.synthesis import STUDIES
 from groundstation.simulation.scenario import scenario_names
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
@@ -106,6 +107,13 @@ def test_list_of_a_log_says_whether_it_would_run_and_why_not(tmp_path: Path) -> 
     }
     assert not any(entry["would_run"] for entry in answers.values())
     assert "GNSS" in answers["heading"]["reason"] and "INS position" in answers["inertial"]["reason"]
+
+
+def test_every_study_that_is_listed_can_be_called(tmp_path: Path) -> None:
+    for name in STUDIES:
+        (tmp_path / f"{name}.md").touch()  # a page that is there stops the study before its first run
+        code, _, told = groundstation("study", name, "-o", str(tmp_path))
+        assert (code, "a file that exists" in told) == (2, True)
 
 
 def test_study_writes_page_and_tables(tmp_path: Path) -> None:
