@@ -37,6 +37,7 @@ class Judged:
         return [(index, one) for index, one in enumerate(self.judgements) if one is not None]
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a filter that diverges to infinity says so by its NaN
 def run_algorithm(prepared: Prepared, settings: CooperativeSettings, algorithm: str) -> AlgorithmRun:
     """Run one algorithm by its name.
 
@@ -115,6 +116,7 @@ def estimate_session(
     return answer, tuple(findings)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _judged(prepared: Prepared, run: AlgorithmRun, truth: Truth) -> Judged:
     judgements = []
     for track, vehicle in zip(run.tracks, prepared.session.vehicles, strict=True):
