@@ -125,4 +125,4 @@ def _ratio(errors: list[FloatArray], tracks: Sequence[object], first: float, las
 
 def diverges(outcomes: Sequence[Outcome]) -> bool:
     """Whether errors of the last tenth, over all runs, are beyond three computed sigma_r."""
-    return bool(np.sqrt(np.mean([one.late_ratio**2 for one in outcomes])) > DIVERGED)
+    return not np.sqrt(np.mean([one.late_ratio**2 for one in outcomes])) <= DIVERGED  # an error that is no number too
