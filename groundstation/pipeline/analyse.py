@@ -21,13 +21,16 @@ from groundstation.pipeline import overview
 from groundstation.pipeline.configuration import Configuration
 from groundstation.pipeline.damage import damage_finding
 from groundstation.pipeline.intervals import seconds_of
-from groundstation.results.answer import Answers
+from groundstation.results.answer import Answers, answer_of
 from groundstation.results.chosen import chosen_intervals
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
 from groundstation.results.heading import HeadingResult
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight
+
+INFO: Severity = "info"
+WARN: Severity = "warn"
 
 
 @dataclass(frozen=True)
@@ -151,10 +154,6 @@ def run_analyses(analyses: tuple[Analysis, ...], data: Any, known: Any) -> Answe
     )
 
 
-INFO: Severity = "info"
-WARN: Severity = "warn"
-
-
 def _on_damage(
     analysis: Analysis, flight: Flight, given: Given, answers: Answers, thresholds: Thresholds
 ) -> tuple[Finding, ...]:
@@ -196,7 +195,6 @@ def _general_figures(
 
 
 def _heading_for_overview(flight: Flight, answers: Answers) -> tuple[NDArray[np.float64] | None, str | None]:
-    from groundstation.results.answer import answer_of
     from groundstation.tables.headings import true_heading
 
     heading = answer_of(answers, HeadingResult)
