@@ -16,12 +16,12 @@ from typer.testing import CliRunner
 
 from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.cli.main import app
-from groundstation.pipeline.alignment import align, events_of
-from groundstation.pipeline.clip import Wanted, clip
-from groundstation.pipeline.compare import compare, compare_to, deltas_of
-from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.flight import Job, run_flight
-from groundstation.pipeline.inputs import collect
+from groundstation.pipeline.many_flights.inputs import collect
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.flight import Job, run_flight
+from groundstation.pipeline.verbs.alignment import align, events_of
+from groundstation.pipeline.verbs.clip import Wanted, clip
+from groundstation.pipeline.verbs.compare import compare, compare_to, deltas_of
 from groundstation.reports.comparison import comparison_html
 from groundstation.reports.drawing import sketching
 from groundstation.results.answer import by_analysis

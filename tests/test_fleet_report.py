@@ -25,8 +25,8 @@ from groundstation.estimators.fleet.density import densities_of, histogram_of
 from groundstation.estimators.fleet.deviation import deviations
 from groundstation.estimators.fleet.moments import moments_of
 from groundstation.estimators.fleet.skill import SkillMerger, SkillOfFlight
-from groundstation.pipeline.fleet import gather
-from groundstation.pipeline.fleet_rows import flights_table
+from groundstation.pipeline.many_flights.fleet import gather
+from groundstation.pipeline.many_flights.fleet_rows import flights_table
 from groundstation.reports.fleet import densities
 from groundstation.reports.fleet_report import MOST_ROWS_ON_PAPER, PAGE, write_fleet_report
 from groundstation.results.figures import FigureData

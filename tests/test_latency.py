@@ -20,8 +20,8 @@ from groundstation.estimators.latency.analysis import LATENCY
 from groundstation.estimators.latency.estimate import estimate_latencies
 from groundstation.estimators.latency.settings import LatencySettings
 from groundstation.estimators.latency.windows import Series
-from groundstation.pipeline.analyse import Answered, known_of, run_analyses
-from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.one_flight.analyse import Answered, known_of, run_analyses
+from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results import latency as answers
 from groundstation.results.files import load, save
 from groundstation.results.manifest import Manifest

@@ -24,15 +24,15 @@ from groundstation.base.records import Column
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.cli.main import app
 from groundstation.estimators.magnetic.corrected import CorrectedHeading, correct_heading
-from groundstation.pipeline.apply_deviation import APPLIED, NOT_APPLIED, Applied, apply_deviation
-from groundstation.pipeline.batch import plan_many, run_many
-from groundstation.pipeline.check import check_many
-from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.deviation_to_apply import Apply, asked_for
-from groundstation.pipeline.inputs import file_in
-from groundstation.pipeline.outcome import Outcome
-from groundstation.pipeline.publishing import report_again
-from groundstation.pipeline.remote import RemoteFolder
+from groundstation.pipeline.many_flights.batch import plan_many, run_many
+from groundstation.pipeline.many_flights.inputs import file_in
+from groundstation.pipeline.many_flights.publishing import report_again
+from groundstation.pipeline.many_flights.remote import RemoteFolder
+from groundstation.pipeline.one_flight.apply_deviation import APPLIED, NOT_APPLIED, Applied, apply_deviation
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.deviation_to_apply import Apply, asked_for
+from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.verbs.check import check_many
 from groundstation.reports.drawing import sketching
 from groundstation.reports.pdf import write_pdf
 from groundstation.reports.steer_card import MOST_ROWS, TEMPLATE, steer_card, write_exports

@@ -27,11 +27,11 @@ from groundstation.estimators.magnetic.analysis import MAGNETIC_GROUND
 from groundstation.estimators.magnetic.ground_fit import fit_curve
 from groundstation.estimators.magnetic.ground_runs import estimate_ground_deviation
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
-from groundstation.pipeline.analyse import Answered, Given, analyse, known_of, run_analyses
-from groundstation.pipeline.configuration import Configuration, load_configuration
-from groundstation.pipeline.convert import convert_log
-from groundstation.pipeline.flight import read_flight, sentence
-from groundstation.pipeline.log import open_log
+from groundstation.pipeline.one_flight.analyse import Answered, Given, analyse, known_of, run_analyses
+from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
+from groundstation.pipeline.one_flight.convert import convert_log
+from groundstation.pipeline.one_flight.flight import read_flight, sentence
+from groundstation.pipeline.one_flight.log import open_log
 from groundstation.reports.drawing import Drawing, sketching
 from groundstation.reports.figures import with_drawings
 from groundstation.results import magnetic_ground as answers

@@ -18,7 +18,7 @@ import pytest
 import groundstation
 from groundstation.base.errors import GroundstationError, NotAssessableError, UnreadableLogError, UsageError
 from groundstation.pipeline.api import OpenLog, SavedRun
-from groundstation.pipeline.clip import Wanted, clip
+from groundstation.pipeline.verbs.clip import Wanted, clip
 from groundstation.reports import drawing
 from groundstation.results.files import SavedFlight, load, save
 from groundstation.results.flight import FlightResults

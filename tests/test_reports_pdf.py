@@ -12,9 +12,9 @@ import pytest
 from pypdf import PdfReader
 
 from groundstation.chapters.parts import Cell, Document, Facts, Front, Grid, Head, Mark, Note, Section
-from groundstation.pipeline.batch import run_many
-from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.publishing import report_again
+from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.publishing import report_again
+from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.reports import pdf
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.flight_report import PDF, REPORT, flight_document, write_flight_report

@@ -9,8 +9,8 @@ import jsonschema
 import pytest
 
 from groundstation.base.findings import Finding
-from groundstation.pipeline.batch import run_many
-from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results import forecast as outlook
 from groundstation.results import heading as answers
 from groundstation.results import inertial as errors

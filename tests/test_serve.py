@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.cli.main import app
-from groundstation.pipeline.serve import recordings_in, serve
+from groundstation.pipeline.verbs.serve import recordings_in, serve
 from groundstation.results.files import SUMMARY
 from groundstation.viewer.fleet import FLIGHTS_TEXT
 from groundstation.viewer.fleet_catalog import FLEET, FLIGHTS, Catalog, catalog_server, reachable

@@ -19,11 +19,11 @@ from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.cooperative.analysis import COOPERATIVE, NIS_MAX, SessionKnown, innovations_of
 from groundstation.estimators.cooperative.estimate import estimate_session
 from groundstation.estimators.cooperative.settings import ALGORITHMS, CooperativeSettings, InsBelief
-from groundstation.pipeline.analyse import run_analyses
-from groundstation.pipeline.configuration import Configuration, load_configuration
-from groundstation.pipeline.inputs import flight_folders, session_folders
-from groundstation.pipeline.publishing import report_again
-from groundstation.pipeline.session import run_session
+from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
+from groundstation.pipeline.many_flights.publishing import report_again
+from groundstation.pipeline.many_flights.session import run_session
+from groundstation.pipeline.one_flight.analyse import run_analyses
+from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.files import load, load_manifest
 from groundstation.results.flight import FlightResults

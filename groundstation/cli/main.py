@@ -60,7 +60,7 @@ def info(
 ) -> int | None:
     """Tell what a log is: format, clock, span, topics with rows, rates and fields."""
     from groundstation.cli import printing
-    from groundstation.pipeline.describe import describe
+    from groundstation.pipeline.verbs.describe import describe
 
     description = describe(log, profile)
     typer.echo(printing.as_json(description.to_dict()) if json else printing.description(description))
@@ -83,8 +83,8 @@ def check(
     """Print the integrity ledger: rates, coverage, gaps, losses and odd values of every topic. Writes nothing."""
     from groundstation.cli import check_table, printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.check import check_many
-    from groundstation.pipeline.configuration import load_configuration
+    from groundstation.pipeline.one_flight.configuration import load_configuration
+    from groundstation.pipeline.verbs.check import check_many
 
     configuration = load_configuration(config, profile=profile, thresholds=thresholds)
     with listener("none" if quiet else progress) as listen:
@@ -112,8 +112,8 @@ def convert(
     """Convert recorded logs to MCAP (protobuf channels, zstd, indexed); the clock is repaired, both times are kept."""
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.configuration import load_configuration
-    from groundstation.pipeline.conversions import convert_many
+    from groundstation.pipeline.one_flight.configuration import load_configuration
+    from groundstation.pipeline.verbs.conversions import convert_many
 
     configuration = load_configuration(config, profile=profile, thresholds=thresholds)
     with listener("none" if quiet else progress) as listen:
@@ -162,8 +162,8 @@ def run(
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.batch import plan_many, run_many
-    from groundstation.pipeline.configuration import applying, load_configuration
+    from groundstation.pipeline.many_flights.batch import plan_many, run_many
+    from groundstation.pipeline.one_flight.configuration import applying, load_configuration
 
     configuration = applying(load_configuration(config, aircraft, site, intervals, profile, thresholds), apply)
     if dry_run:
@@ -198,7 +198,7 @@ def report(
 ) -> int | None:
     """Make the reports and the index again from the saved results, without the logs."""
     from groundstation.cli import printing
-    from groundstation.pipeline.publishing import report_again
+    from groundstation.pipeline.many_flights.publishing import report_again
 
     paths, problems = report_again(out, with_pdf=not no_pdf)
     tell_written(paths, as_json_text=json, quiet=quiet)
@@ -228,7 +228,7 @@ def view(
     verbose: Verbose = False,
 ) -> int | None:
     """Look at a flight in the Rerun viewer, native or in the browser."""
-    from groundstation.pipeline.view import look_at
+    from groundstation.pipeline.verbs.view import look_at
 
     look_at(flight, web=web, host=host, port=port, profile=profile, say=say)
     return DONE
@@ -246,7 +246,7 @@ def simulate(
     json: Json = False,
 ) -> int | None:
     """Simulate a flight as a flat CSV, with the truth beside it. `groundstation list` names the scenarios."""
-    from groundstation.pipeline.synthesis import simulate_to
+    from groundstation.pipeline.verbs.synthesis import simulate_to
 
     tell_written(simulate_to(scenario, output, seed=seed, force=force), as_json_text=json, quiet=quiet)
     return DONE
@@ -269,7 +269,7 @@ def study(
 ) -> int | None:
     """Monte Carlo behind the published figures, with ours beside them."""
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.synthesis import study_to
+    from groundstation.pipeline.verbs.synthesis import study_to
 
     with listener("none" if quiet else progress) as listen:
         text = study_to(name, output, runs=runs, seed=seed, force=force, listen=listen)
@@ -290,7 +290,7 @@ def list_(
 ) -> int | None:
     """List the analyses and what each needs; with a LOG, whether each would run and why not."""
     from groundstation.cli import printing
-    from groundstation.pipeline.catalogue import catalogue
+    from groundstation.pipeline.verbs.catalogue import catalogue
 
     entries = catalogue(log, profile)
     typer.echo(printing.as_json(entries) if json else printing.catalogue(entries, log is not None))
@@ -325,8 +325,8 @@ def cooperative(
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.configuration import load_configuration
-    from groundstation.pipeline.session import run_session
+    from groundstation.pipeline.many_flights.session import run_session
+    from groundstation.pipeline.one_flight.configuration import load_configuration
 
     configuration = load_configuration(config, profile=profile)
     with listener("none" if quiet else progress) as listen:

@@ -7,8 +7,8 @@ import typer
 
 from groundstation.chapters.terminal import columns
 from groundstation.cli.text import as_json, printable
-from groundstation.pipeline.describe import Description
-from groundstation.pipeline.outcome import Outcome, worst_code
+from groundstation.pipeline.one_flight.outcome import Outcome, worst_code
+from groundstation.pipeline.verbs.describe import Description
 
 __all__ = ["as_json", "catalogue", "description", "outcomes", "worst_code"]
 
