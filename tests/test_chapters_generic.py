@@ -20,6 +20,7 @@ from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import Gate
 from groundstation.results.manifest import Manifest
+from groundstation.viewer.recording import ANSWER_TABS, SHOWN_ELSEWHERE
 from tests.report_example import example, heading_result
 from tests.section_contents import facts, grid, notes, row, rows, titles, tones
 
@@ -206,3 +207,8 @@ def test_every_shipped_answer_has_a_chapter_of_its_own() -> None:
     own = {kind for chapter in (*FLIGHT_CHAPTERS, *SESSION_CHAPTERS) for kind in chapter.answers}
     assert own == {analysis.answer for analysis in (*FLIGHT_ANALYSES, *SESSION_ANALYSES)}
     assert by_analysis(wind())["wind"] == wind()
+
+
+def test_tabs_name_analyses_that_there_are() -> None:
+    named = [*SHOWN_ELSEWHERE, *(name for _, names in ANSWER_TABS for name in names)]
+    assert sorted(named) == sorted({analysis.name for analysis in FLIGHT_ANALYSES})
