@@ -11,9 +11,10 @@ from groundstation.estimators.cooperative.estimate import estimate_session, run_
 from groundstation.estimators.cooperative.events import HEIGHT, PEER, POINT, SATELLITE, Event, prepare
 from groundstation.estimators.cooperative.messages import Broadcast, decode, pairwise_bytes, report_bytes
 from groundstation.estimators.cooperative.observation import rows_of
-from groundstation.estimators.cooperative.settings import ALGORITHMS, CooperativeSettings, OdometryBelief
+from groundstation.estimators.cooperative.settings import ALGORITHMS, CameraBelief, CooperativeSettings, OdometryBelief
 from groundstation.estimators.cooperative.transition import discretise, local_dynamics
-from groundstation.estimators.cooperative.vehicles import InertialVehicle, Vehicle, WheeledVehicle
+from groundstation.estimators.cooperative.vehicles import InertialVehicle, Vehicle
+from groundstation.estimators.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.simulation.session import simulate_session
 from groundstation.tables.session import NO_SLOT, DeadReckoning, GroundPoint, Heights, Odometry, Ranges, Session
 from tests.cooperative_example import GLOBAL, LOCAL, believed, full_nees, truth_of
@@ -64,7 +65,8 @@ def wheeled() -> WheeledVehicle:
     time_s = np.arange(5.0)
     track = Odometry("R", time_s, np.full(5, 0.4), np.full(5, 20.0), (1.0, 2.0), 30.0)
     belief = OdometryBelief(speed_scale=0.1, turn_scale=0.1)
-    return WheeledVehicle(track, CooperativeSettings(odometry=belief, range_bias_m=0.1))
+    camera = CameraBelief(range_scale=0.1, marker_bias_m=0.1, mount_deg=3.0, lag_s=0.1)
+    return WheeledVehicle(track, CooperativeSettings(odometry=belief, camera=camera, range_bias_m=0.1))
 
 
 @pytest.mark.parametrize("kind", [PEER, POINT, SATELLITE, HEIGHT, "bearing"])
@@ -101,7 +103,7 @@ def test_derivatives_against_central_differences(kind: str) -> None:
 
 def test_motion_of_a_wheeled_vehicle_against_central_differences() -> None:
     vehicle = wheeled()
-    x = np.array([1.0, 2.0, 0.5, 0.05, -0.03, 0.1])
+    x = np.array([1.0, 2.0, 0.5, 0.05, -0.03, 0.1, 0.02, 0.03, -0.01, 0.04])
     _, phi, noise = vehicle.step(x, 0.3, 3.6)
     assert np.linalg.eigvalsh(noise).min() > -1e-15
     for at in range(vehicle.size):
