@@ -18,9 +18,9 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.verbs.clip import Wanted, clip
-from groundstation.results.files import load
 from groundstation.store.reader import Part, read, read_info
 from tests.recording_contents import Contents
+from tests.saved import load
 from tests.test_store import joined
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"

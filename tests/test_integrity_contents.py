@@ -15,7 +15,7 @@ from groundstation.integrity.stretches import Sampler
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.log import open_log
-from groundstation.results.files import load
+from tests.saved import load
 from tests.test_formats_agree import as_dataflash, as_ulog
 
 Fields = Mapping[str, NDArray[np.float64]]

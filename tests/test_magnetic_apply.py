@@ -44,7 +44,7 @@ from groundstation.results.deviation import (
     deviation_from_csv,
     deviation_of,
 )
-from groundstation.results.files import SUMMARY, load, save
+from groundstation.results.files import SUMMARY, save
 from groundstation.results.flight import FlightResults
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import ADVISORY, CardRow, MagneticResult
@@ -59,6 +59,7 @@ from groundstation.tables.table import Flight, Table
 from groundstation.viewer.recording import write_recording
 from tests import magnetic_example
 from tests.recording_contents import Contents
+from tests.saved import load
 from tests.test_magnetic_run import analysed, figure_eight, simulated
 from tests.test_reports import HOSTILE
 

@@ -35,7 +35,7 @@ from groundstation.pipeline.one_flight.log import open_log
 from groundstation.reports.drawing import Drawing, sketching
 from groundstation.reports.figures import with_drawings
 from groundstation.results import magnetic_ground as answers
-from groundstation.results.files import load, save
+from groundstation.results.files import save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.magnetic import LETTERS
 from groundstation.results.magnetic_ground import GroundDeviation
@@ -45,6 +45,7 @@ from groundstation.tables.table import Flight, Table
 from groundstation.viewer.recording import write_recording
 from tests.real_logs import real_log
 from tests.recording_contents import Contents
+from tests.saved import load
 from tests.schema_fields import SCHEMA, expect_fields
 
 START_NS = iso_to_utc_ns("2026-05-09T08:00:00Z")[0]

@@ -21,8 +21,8 @@ from groundstation.pipeline.one_flight.configuration import Configuration, Inter
 from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.one_flight.outcome import Outcome, worst_code
 from groundstation.pipeline.verbs.conversions import convert_many
-from groundstation.results.files import load
 from tests.real_logs import real_log
+from tests.saved import load
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 BYTE_IDENTICAL = ("summary.json", "report.html", "report.pdf", "tables")

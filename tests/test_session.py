@@ -15,7 +15,6 @@ from groundstation.chapters.cooperative import TITLES, cooperative, is_session, 
 from groundstation.chapters.front import front
 from groundstation.chapters.parts import Facts, Figure, Grid, Mark, Note, Section
 from groundstation.cli.main import main
-from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.cooperative.analysis import COOPERATIVE, NIS_MAX, SessionKnown, innovations_of
 from groundstation.estimators.cooperative.estimate import estimate_session
 from groundstation.estimators.cooperative.settings import ALGORITHMS, CooperativeSettings, InsBelief
@@ -25,12 +24,13 @@ from groundstation.pipeline.one_flight.analyse import run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.pipeline.verbs.cooperative import run_session
 from groundstation.results.cooperative import CooperativeResult
-from groundstation.results.files import load, load_manifest
+from groundstation.results.files import load_manifest
 from groundstation.results.flight import FlightResults
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_log import write_session
 from tests.cooperative_example import believed, truth_of
 from tests.recording_contents import Contents
+from tests.saved import load
 from tests.session_example import SEED, SHORT, simulated
 
 IDENTITY = "20180305T120000Z_session_A-B-C"
@@ -70,7 +70,7 @@ def out(logs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def results(out: Path) -> FlightResults:
-    return load(out / IDENTITY, ANSWER_TYPES).results
+    return load(out / IDENTITY).results
 
 
 @pytest.fixture
@@ -142,7 +142,7 @@ def test_another_setting_runs_it_again_in_its_place(out: Path, logs: Path, tmp_p
     config.write_text("[cooperative]\noutput_step_s = 10.0\n[session]\nrange_sigma_m = 20.0\n")
     assert called("cooperative", *csvs(logs), "--config", config, "-o", copy, "-q", "--no-pdf") == 0
     assert [folder.name for folder in session_folders(copy)] == [IDENTITY]
-    found = load(copy / IDENTITY, ANSWER_TYPES).results
+    found = load(copy / IDENTITY).results
     answer = found.answer(CooperativeResult)
     assert answer is not None
     assert answer.settings["output_step_s"] == 10.0
@@ -189,7 +189,7 @@ def test_a_log_that_cannot_be_read_stops_no_other(logs: Path, tmp_path: Path) ->
     first, second, _ = csvs(logs)
     outcomes = run_session([first, second, bad], tmp_path / "out", Configuration(), with_pdf=False)
     assert [outcome.state for outcome in outcomes] == ["failed", "done"]
-    found = load(Path(outcomes[1].folder), ANSWER_TYPES).results
+    found = load(Path(outcomes[1].folder)).results
     assert found.metadata["aircraft"] == "A, B"
     codes = {(finding.code, finding.topic) for finding in found.findings}
     assert ("session.unknown_source", "link.C") in codes
@@ -201,7 +201,7 @@ def test_a_cut_log_loses_data_and_says_so(logs: Path, tmp_path: Path) -> None:
     cut.write_bytes(third.read_bytes()[:-20])
     (outcome,) = run_session([first, second, cut], tmp_path / "out", Configuration(), with_pdf=False)
     assert (outcome.state, outcome.code) == ("data_lost", 3)
-    found = load(Path(outcome.folder), ANSWER_TYPES).results
+    found = load(Path(outcome.folder)).results
     assert found.status == "degraded"
     assert [finding.place for finding in found.findings if finding.code == "session.lost_data"] == [third.name]
 

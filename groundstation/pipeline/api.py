@@ -194,7 +194,7 @@ class OpenLog(OpenFlight):
 
         manifest = Manifest(configuration=self.configuration.to_dict())
         figures = {figure.name: figure for figure in self.results.figures}
-        return SavedFlight(Path(), summary_of(self.results), manifest, figures)
+        return SavedFlight(Path(), summary_of(self.results), manifest, figures, ANSWER_TYPES)
 
 
 class SavedRun(OpenFlight):

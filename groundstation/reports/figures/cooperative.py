@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.local_frame import plane_through
+from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.cooperative import REFERENCE, title_of, trusted
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
@@ -191,8 +192,8 @@ def links(results: FlightResults) -> Drawing | None:
         gated = mark <= 0
         if gated.any():
             d.dots(axes, time_s[gated], np.clip(normal[gated], -ceiling, ceiling), d.LIMIT, 3.0, label="gated")
-        d.limit_line(axes, 1.96, "95 %")
-        d.limit_line(axes, -1.96, "")
+        d.limit_line(axes, NORMAL_95, "95 %")
+        d.limit_line(axes, -NORMAL_95, "")
         axes.set_ylim(-1.05 * ceiling, 1.05 * ceiling)
         axes.set_ylabel("residual over its sigma")
         d.time_axis(axes, float(time_s.min()), float(time_s.max()))
