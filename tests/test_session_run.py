@@ -349,3 +349,49 @@ def test_a_warning_of_the_session_reaches_the_exit_code(logs: Path, tmp_path: Pa
     call = ("run", *sorted(logs.glob("*.csv"))[:2], "-o", tmp_path / "out", "-q", "--no-pdf", "-j", "1")
     assert called(*call, "--fail-on", "fail") == 0
     assert called(*call, "--fail-on", "warn") == 4, "ranges to C: no log"
+
+
+# ------------------------------------------------------------------------------------------------ the fleet
+
+
+def test_the_fleet_lists_the_session_with_its_report(out: Path) -> None:
+    from groundstation.pipeline.many_flights.fleet import gather
+    from groundstation.viewer.fleet_recorder import FleetRecorder
+    from groundstation.viewer.fleet_text import flights_text
+    from groundstation.viewer.recording import open_stream
+
+    fleet = gather(out)
+    answer = results_in(out / IDENTITY).answer(CooperativeResult)
+    assert answer is not None
+    (row,) = fleet.sessions
+    centralised, reckoned = (
+        next(one for one in answer.algorithms if one.algorithm == name) for name in ("centralised", "dead_reckoning")
+    )
+    assert (row.session_id, row.aircraft, row.algorithm) == (IDENTITY, "A, B, C", "centralised")
+    assert (row.two_sigma_r_m, row.rms_m) == (centralised.two_sigma_r_m, centralised.rms_m)
+    assert row.reckoned_two_sigma_r_m == reckoned.two_sigma_r_m
+    assert len(fleet) == 3
+    page = (out / "summary.html").read_text(encoding="utf-8")
+    assert '<section id="sessions"' in page
+    assert f'href="{IDENTITY}/report.html"' in page
+    with open_stream("fleet") as stream:
+        text = flights_text(FleetRecorder(stream, fleet), fleet)
+    assert f"({IDENTITY}/{IDENTITY}.rrd)" in text
+    assert fleet.to_frame("sessions")["session_id"].tolist() == [IDENTITY]
+
+
+def test_a_session_that_cannot_be_read_is_told(out: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "out"
+    shutil.copytree(out, copy)
+    (copy / IDENTITY / "summary.json").write_text("{")
+    assert called("report", copy, "--no-pdf") == 1
+    assert [row["source"] for row in rows_of(copy) if row["kind"] == "failed"] == [str(copy / IDENTITY)]
+    assert 'id="sessions"' not in (copy / "summary.html").read_text(encoding="utf-8")
+
+
+def test_serve_offers_the_session(out: Path) -> None:
+    from groundstation.pipeline.verbs.serve import recordings_in
+
+    flights, fleet = recordings_in(out, lambda _text: None)
+    assert [path.stem for path in flights] == [*(one.name for one in flight_folders(out)), IDENTITY]
+    assert fleet == out / "fleet.rrd"
