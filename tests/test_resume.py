@@ -16,7 +16,8 @@ import pytest
 from filelock import FileLock
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.many_flights.batch import LOCK, _crew, plan_many, run_many
+from groundstation.pipeline.many_flights.batch import _crew, plan_many, run_many
+from groundstation.pipeline.many_flights.out_folder import LOCK
 from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, _teller, in_turn, side_by_side
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job

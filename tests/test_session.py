@@ -20,9 +20,9 @@ from groundstation.estimators.cooperative.estimate import estimate_session
 from groundstation.estimators.cooperative.settings import ALGORITHMS, CooperativeSettings, InsBelief
 from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
 from groundstation.pipeline.many_flights.publishing import report_again
-from groundstation.pipeline.many_flights.session import run_session
 from groundstation.pipeline.one_flight.analyse import run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
+from groundstation.pipeline.verbs.cooperative import run_session
 from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.files import load_manifest
 from groundstation.results.flight import FlightResults
@@ -432,7 +432,10 @@ def test_run_into_the_same_folder_leaves_the_session_be(out: Path, tmp_path: Pat
     log = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv"
     assert called("run", log, "-o", copy, "-q", "--no-pdf", "-j", "1") == 0
     rows = json.loads((copy / "index.json").read_text(encoding="utf-8"))["rows"]
-    assert [row["source"] for row in rows] == ["taxi-short.csv"]
+    assert [(row["kind"], row["source"]) for row in rows] == [
+        ("flight", "taxi-short.csv"),
+        ("session", "session of A, B, C"),
+    ]
     assert len(flight_folders(copy)) == 1
     assert [folder.name for folder in session_folders(copy)] == [IDENTITY]
     assert (copy / IDENTITY / "report.html").read_bytes() == (out / IDENTITY / "report.html").read_bytes()

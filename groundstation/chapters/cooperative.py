@@ -8,6 +8,7 @@ from groundstation.chapters.verdict import NOT_ASSESSABLE, sentence
 from groundstation.chapters.wording import any_value, clock, is_number, named_quantity, number, significant, words
 from groundstation.results.cooperative import AlgorithmRow, CooperativeResult, LinkRow
 from groundstation.results.figures import FigureData, flags, numbers, texts
+from groundstation.results.fleet import SessionRow
 from groundstation.results.flight import FlightResults
 
 TITLE = "Navigation between aircraft"
@@ -105,7 +106,7 @@ def title_of(algorithm: str) -> str:
     return TITLES.get(algorithm, words(algorithm))
 
 
-def state_of(row: AlgorithmRow) -> Mark:
+def state_of(row: AlgorithmRow | SessionRow) -> Mark:
     """What truth says of an algorithm, in a word."""
     if row.diverges is None or row.is_consistent is None:
         return Mark("unknown", "Not judged")

@@ -147,6 +147,15 @@ def run(
             metavar="own|PATH",
         ),
     ] = "",
+    stations: Annotated[
+        Path | None,
+        typer.Option(
+            "--stations",
+            help="Ground stations of the sessions found (TOML); left out: stations.toml beside the logs.",
+            metavar="FILE",
+            readable=False,
+        ),
+    ] = None,
     no_pdf: NoPdf = False,
     redo: Annotated[bool, typer.Option("--redo", help="Do again what an earlier run finished.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done; write nothing.")] = False,
@@ -157,6 +166,8 @@ def run(
     progress: Progress = "auto",
 ) -> int | None:
     """Run everything the data allows: MCAP, heading correction, recording and report of each flight.
+
+    Flights of several aircraft that ranged to one another over a data link are then analysed as a session.
 
     An OUT of an earlier run is continued: what it finished with the same logs and settings is not done again.
     """
@@ -181,6 +192,7 @@ def run(
             fail_on=fail_on,
             with_pdf=not no_pdf,
             redo=redo,
+            stations=stations,
             listen=listen,
         )
     printing.outcomes(outcomes, as_json_text=json, quiet=quiet, with_times=verbose)
@@ -325,8 +337,8 @@ def cooperative(
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.many_flights.session import run_session
     from groundstation.pipeline.one_flight.configuration import load_configuration
+    from groundstation.pipeline.verbs.cooperative import run_session
 
     configuration = load_configuration(config, profile=profile)
     with listener("none" if quiet else progress) as listen:

@@ -1,34 +1,29 @@
 """Several logs: each in its turn, several at once or on a cluster, one bad log never stopping the others."""
 
-import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePath
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.many_flights.inputs import (
-    FLIGHT_FOLDER_MARK,
-    OUT_FOLDER_MARK,
-    collect,
-    flight_folders,
-    is_ours,
-)
+from groundstation.pipeline.many_flights.found_sessions import Asked, find_sessions, run_sessions
+from groundstation.pipeline.many_flights.inputs import collect, flight_folders, is_ours
+from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
 from groundstation.pipeline.many_flights.output import LocalOutput, RemoteOutput
 from groundstation.pipeline.many_flights.placement import Placement
 from groundstation.pipeline.many_flights.publishing import FLEET_FILES, write_beside, write_index_of
 from groundstation.pipeline.many_flights.remote import far_logs, is_remote
 from groundstation.pipeline.many_flights.remote_runs import RemoteJob, run_remote
+from groundstation.pipeline.many_flights.session import load_stations
 from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJob, Crew, cores, in_turn, side_by_side
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX, Job, run_flight
+from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, finished_flights
 
-LOCK = ".lock"
 PLANS: Mapping[str, str] = {
     "everything": "to run",
     "analysis": "to analyse again: a setting changed, or a file is missing; the MCAP stays",
@@ -48,9 +43,10 @@ def run_many(
     fail_on: str = "none",
     with_pdf: bool = True,
     redo: bool = False,
+    stations: Path | None = None,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
-    """Run logs and folders of logs into ``out``; the index lists every one of them.
+    """Run logs and folders of logs into ``out``, then the sessions among the flights; the index lists all of them.
 
     What an earlier run finished, with the same logs and settings, is not done again unless ``redo`` is set. Interrupted
     or killed, it keeps what was finished.
@@ -63,11 +59,13 @@ def run_many(
         Processes on this machine; 0: one per core.
     scheduler : str
         Address of a Dask scheduler, whose workers do the work; they see local paths as this machine does.
+    stations : Path, optional
+        TOML file with the ground stations of the sessions; left out: stations.toml beside the logs of each.
 
     Returns
     -------
     tuple of Outcome
-        One per log, in the stable order of the inputs.
+        One per log, in the stable order of the inputs, then one per session.
 
     Raises
     ------
@@ -75,6 +73,7 @@ def run_many(
         When an input is missing, there is nothing to run, a setting is wrong, ``out`` is something else's, another run
         is writing into it, or there is no such scheduler.
     """
+    ground = None if stations is None else load_stations(stations)
     inputs = _inputs(paths, out, configuration)
     crew = _crew(scheduler, jobs or cores(), len(inputs), listen)
     make = partial(Job, configuration=configuration, fail_on=fail_on, with_pdf=with_pdf)
@@ -82,17 +81,17 @@ def run_many(
     if any(is_remote(str(place)) for place in (out, *paths)):
         remote = [RemoteJob(make(Path(), Path(), is_named=named), log, str(out), redo) for log, named in inputs]
         return _run_remote(remote, str(out), crew, force, listen)
+    asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo)
     near = [make(Path(log), Path(out), is_named=named) for log, named in inputs]
-    return _run_here(near, Path(out), crew, force, redo, listen)
+    return _run_here(near, asked, crew, force, listen)
 
 
-def _run_here(
-    work: Sequence[Job], out: Path, crew: Crew, force: bool, redo: bool, listen: Listener
-) -> tuple[Outcome, ...]:
+def _run_here(work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen: Listener) -> tuple[Outcome, ...]:
+    out = asked.out
     refuse_foreign(out, force)
     with alone_in(out):
         prepare(out)
-        known = {} if redo else finished_flights(flight_folders(out))
+        known = {} if asked.redo else finished_flights(flight_folders(out))
         placement = Placement(LocalOutput(out), [job.log for job in work])
 
         def left() -> Iterator[tuple[int, Job]]:
@@ -107,7 +106,22 @@ def _run_here(
             return replace(work[number], add_suffix=True)
 
         _run_into(placement, out, left(), run_flight, suffixed, crew, listen)
-        return (*placement.outcomes(), *write_beside(out, placement.outcomes(), with_pdf=work[0].with_pdf))
+        sessions = _run_sessions(placement, asked, crew, listen)
+        outcomes = (*placement.outcomes(), *sessions)
+        return (*outcomes, *write_beside(out, outcomes, with_pdf=asked.with_pdf))
+
+
+def _run_sessions(placement: Placement, asked: Asked, crew: Crew, listen: Listener) -> tuple[Outcome, ...]:
+    """Run the sessions among the flights that are in place; interrupted, the index at least is written."""
+    flights = placement.outcomes()
+    try:
+        found = find_sessions(asked, {one.flight_id for one in flights if one.flight_id})
+        if found.jobs:
+            listen(Event("begin", total=len(flights) + len(found.jobs)))
+        return run_sessions(found, crew, listen)
+    except BaseException:
+        write_index_of(asked.out, flights)
+        raise
 
 
 def _run_remote(work: Sequence[RemoteJob], out: str, crew: Crew, force: bool, listen: Listener) -> tuple[Outcome, ...]:
@@ -205,42 +219,6 @@ def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configu
         hint = "what groundstation made is no input" if any(path.is_dir() and is_ours(path) for path in near) else ""
         raise UsageError(", ".join(map(str, paths)), "no log in it", "", hint)
     return tuple(sorted(found.items()))
-
-
-def refuse_foreign(out: Path, force: bool) -> None:
-    """Refuse to write results into what another made, or into a flight folder."""
-    if out.exists() and not out.is_dir():
-        raise UsageError(str(out), "a file", "a folder for the results")
-    if out.is_dir() and any(one.name != LOCK for one in out.iterdir()) and not is_ours(out) and not force:
-        raise UsageError(str(out), "a folder that groundstation did not make", "a new or own folder", "-f uses it")
-    if (out / FLIGHT_FOLDER_MARK).exists():
-        raise UsageError(str(out), "a flight folder", "a folder that holds flight folders", "name another -o")
-
-
-@contextmanager
-def alone_in(out: Path) -> Iterator[None]:
-    """Keep other runs out of a folder; the system takes the lock off a run that is killed."""
-    from filelock import FileLock, Timeout
-
-    out.mkdir(parents=True, exist_ok=True)
-    lock = FileLock(out / LOCK, timeout=0)
-    try:
-        lock.acquire()
-    except Timeout as error:
-        raise UsageError(str(out), "another run is writing into it", "", "wait for it, or name another -o") from error
-    try:
-        yield
-    finally:
-        lock.release()
-
-
-def prepare(out: Path) -> None:
-    """Clear away what a killed run left, and mark the folder as ours."""
-    for left_over in out.iterdir():
-        if left_over.name.startswith(PARTIAL_PREFIX):  # of a run that is no more: this one is alone in here
-            shutil.rmtree(left_over, ignore_errors=True)
-    if not (out / OUT_FOLDER_MARK).exists():
-        write_index_of(out, ())  # from now on the folder is known for ours, whatever happens to the run
 
 
 def _with_steps(jobs: Sequence[Job], known: Mapping[str, Finished]) -> Iterator[tuple[int, Job, int | None]]:

@@ -22,15 +22,16 @@ from groundstation.pipeline.many_flights.fleet_rows import (
     flight_row,
     flights_table,
     heading_samples,
+    session_row,
     skill_of,
 )
 from groundstation.pipeline.many_flights.fleet_samples import SampleStore
-from groundstation.pipeline.many_flights.inputs import flight_folders
+from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports.index import INDEX_JSON
 from groundstation.results.figures import FigureData
 from groundstation.results.files import load, write_bytes
-from groundstation.results.fleet import FLIGHT_COLUMNS, FleetResults, FlightColumn, Kind, NotInFleet
+from groundstation.results.fleet import FLIGHT_COLUMNS, FleetResults, FlightColumn, Kind, NotInFleet, SessionRow
 
 FLEET_PARQUET = "fleet.parquet"
 TEXTS: tuple[Kind, ...] = ("text", "category")
@@ -68,6 +69,7 @@ class _Collected:
     skill_rows: list[tuple[Any, ...]] = field(default_factory=list)
     checks: list[tuple[Any, ...]] = field(default_factory=list)
     unread: list[NotInFleet] = field(default_factory=list)
+    sessions: list[SessionRow] = field(default_factory=list)
 
 
 def gather(out: Path) -> FleetResults:
@@ -128,6 +130,11 @@ def _collect(out: Path, store: SampleStore | None) -> _Collected:
             collected.unread.append(NotInFleet("failed", str(folder), str(error)))
             if store is not None:
                 store.keep(folder.name)
+    for folder in session_folders(out):
+        try:
+            collected.sessions.append(session_row(load(folder, ANSWER_TYPES)))
+        except GroundstationError as error:
+            collected.unread.append(NotInFleet("failed", str(folder), str(error)))
     return collected
 
 
@@ -178,6 +185,7 @@ def _results(out: Path, collected: _Collected) -> FleetResults:
         outliers=answer.outliers(flights),
         not_in_fleet=_not_in_fleet(out, collected),
         deviations=deviations(flights),
+        sessions=tuple(collected.sessions),
         stated=answer.stated_rates(settings),
     )
 
@@ -190,7 +198,7 @@ def _table(name: str, types: Mapping[str, str], rows: list[tuple[Any, ...]]) -> 
 
 def _not_in_fleet(out: Path, collected: _Collected) -> tuple[NotInFleet, ...]:
     """Logs without a flight, as the index remembers them, and flight folders that could not be read just now."""
-    folders = {str(folder) for folder in flight_folders(out)}
+    folders = {str(folder) for folder in (*flight_folders(out), *session_folders(out))}
     told = [*(one for one in _indexed(out) if one.source not in folders), *collected.unread]
     return tuple(sorted(told, key=lambda one: (one.kind, one.source, one.reason)))
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,15 +11,17 @@ from numpy.typing import NDArray
 from groundstation.base.angles import wrap_180
 from groundstation.base.records import MAX_TEXT_CHARACTERS
 from groundstation.base.units import ARCMIN_PER_DEG
+from groundstation.chapters.cooperative import REFERENCE, trusted
 from groundstation.estimators.fleet.density import SampleHistogram, histogram_of
 from groundstation.estimators.fleet.moments import Moments, moments_of
 from groundstation.estimators.fleet.skill import SkillOfFlight
 from groundstation.estimators.heading.figures import IN_PAUSE
 from groundstation.estimators.heading.references import REFERENCE_SIGMA_DEG, logged_reference
 from groundstation.reports.index import index_row, reasons_of
+from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.figures import FigureData, flags, numbers, texts
 from groundstation.results.files import SavedFlight, utf8_text
-from groundstation.results.fleet import FLIGHT_COLUMNS, Kind
+from groundstation.results.fleet import FLIGHT_COLUMNS, Kind, SessionRow
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.heading import HeadingResult
 
@@ -132,6 +134,36 @@ def heading_samples(saved: SavedFlight) -> HeadingSamples | None:
     columns = {name: numbers(figure, name)[is_epoch] for name in names}
     columns |= {"error_deg": difference, "used": used, "gate": texts(figure, "gate")[is_epoch]}
     return HeadingSamples(columns, moments_of(about_estimate), histogram_of(about_estimate))
+
+
+def session_row(saved: SavedFlight) -> SessionRow:
+    """Build the row of a session: what its report says on top."""
+    results, indexed = saved.results, index_row(saved, "session")
+    row = SessionRow(
+        saved.folder.name,
+        indexed.aircraft or "",
+        results.start_utc_ns,
+        to_number(results.duration_s),
+        results.status,
+        findings_fail=indexed.findings_fail or 0,
+        findings_warn=indexed.findings_warn or 0,
+        reason="; ".join(reasons_of(results)),
+        report=indexed.report or "",
+        recording=indexed.recording or "",
+    )
+    answer = results.answer(CooperativeResult)
+    if answer is None or not answer.algorithms:
+        return row
+    best, reckoned = trusted(answer), next((one for one in answer.algorithms if one.algorithm == REFERENCE), None)
+    return replace(
+        row,
+        algorithm=best.algorithm,
+        two_sigma_r_m=best.two_sigma_r_m,
+        reckoned_two_sigma_r_m=reckoned.two_sigma_r_m if reckoned else None,
+        rms_m=best.rms_m,
+        is_consistent=best.is_consistent,
+        diverges=best.diverges,
+    )
 
 
 def checks_of(saved: SavedFlight) -> list[Check]:

@@ -17,7 +17,7 @@ from groundstation.pipeline.many_flights.inputs import (
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
 from groundstation.reports.fleet_report import write_fleet_report
-from groundstation.reports.index import INDEX_CSV, INDEX_JSON, IndexRow
+from groundstation.reports.index import INDEX_CSV, INDEX_JSON, IndexRow, Kind
 
 FLEET_RECORDING, FLEET_PDF = "fleet.rrd", str(Path(FLEET_PAGE).with_suffix(".pdf"))
 FLEET_FILES = (INDEX_JSON, INDEX_CSV, FLEET_PARQUET, SAMPLES, FLEET_RECORDING, FLEET_PAGE, FLEET_PDF)
@@ -44,21 +44,22 @@ def write_beside(
 
 
 def write_index_of(out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[IndexRow] = ()) -> tuple[Outcome, ...]:
-    """Write index.json and index.csv: every flight in ``out``, and the logs of this run that gave none.
+    """Write index.json and index.csv: every flight and session in ``out``, and the logs of this run that gave none.
 
-    Returns what could not be listed: flight folders that cannot be read, an index that cannot be written.
+    Returns what could not be listed: folders that cannot be read, an index that cannot be written.
     """
     from groundstation.reports.index import failed_row, index_row, write_index
     from groundstation.results.files import load
 
     problems: list[Outcome] = []
     rows = list(kept_rows)
-    for folder in flight_folders(out):
+    listed: tuple[tuple[Kind, list[Path]], ...] = (("flight", flight_folders(out)), ("session", session_folders(out)))
+    for kind, folder in ((kind, folder) for kind, folders in listed for folder in folders):
         try:
-            rows.append(index_row(load(folder, ANSWER_TYPES)))
+            rows.append(index_row(load(folder, ANSWER_TYPES), kind))
         except GroundstationError as error:
             problems.append(Outcome(str(folder), "failed", str(error)))
-    without_flight = [outcome for outcome in outcomes if not outcome.flight_id]
+    without_flight = [one for one in outcomes if not one.flight_id and not (one.is_session and one.state == "skipped")]
     rows += [failed_row(one.source, one.state, one.text) for one in (*without_flight, *problems)]
     try:
         write_index(out, rows)
@@ -103,12 +104,12 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
         return paths, tuple(problems)
     told = {one.source for one in problems}
     unread = [
-        one for one in write_beside(out, (), _rows_without_flight(out), with_pdf=with_pdf) if one.source not in told
+        one for one in write_beside(out, (), rows_without_flight(out), with_pdf=with_pdf) if one.source not in told
     ]
     return [*paths, *(out / name for name in FLEET_FILES if (out / name).exists())], (*problems, *unread)
 
 
-def _rows_without_flight(out: Path) -> list[IndexRow]:
+def rows_without_flight(out: Path) -> list[IndexRow]:
     """Rows of the logs that gave no flight, from the index as it stands: nothing else remembers them."""
     import json
 
@@ -119,5 +120,5 @@ def _rows_without_flight(out: Path) -> list[IndexRow]:
         rows = [from_json(IndexRow, row) for row in listed]
     except (OSError, ValueError, KeyError, TypeError, MismatchError):
         return []
-    folders = {str(folder) for folder in flight_folders(out)}
-    return [row for row in rows if row.kind != "flight" and row.source not in folders]
+    folders = {str(folder) for folder in (*flight_folders(out), *session_folders(out))}
+    return [row for row in rows if row.kind in ("failed", "skipped") and row.source not in folders]

@@ -15,7 +15,7 @@ WORST_FIRST = (1, 4, 3, 0)
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one log.
+    """What became of one log, or of a session of several.
 
     Parameters
     ----------
@@ -30,6 +30,8 @@ class Outcome:
         Seconds spent, by stage.
     trace : str
         Where an internal error came from; shown on request.
+    is_session : bool
+        Whether it is of a session: ``source`` are then the names of its logs, and ``flight_id`` is that of the session.
     """
 
     source: str
@@ -40,6 +42,7 @@ class Outcome:
     sha256: str = ""
     times_s: Mapping[str, float] = field(default_factory=dict)
     trace: str = ""
+    is_session: bool = False
 
     @property
     def code(self) -> int:

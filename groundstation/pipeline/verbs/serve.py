@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UsageError
-from groundstation.pipeline.many_flights.inputs import file_in, flight_folders
+from groundstation.pipeline.many_flights.inputs import file_in, flight_folders, session_folders
 from groundstation.pipeline.many_flights.publishing import FLEET_RECORDING
 
 PATIENCE_S = 1.0  # between two looks at whether it shall end
@@ -84,7 +84,7 @@ def _set_by_signals(stop: threading.Event, *, asked: bool) -> Iterator[None]:
 
 
 def recordings_in(out: Path, say: Callable[[str], None]) -> tuple[list[Path], Path | None]:
-    """Recordings of the flights in a folder, and that of the fleet; flights without one are told.
+    """Recordings of the flights and sessions in a folder, and that of the fleet; folders without one are told.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def recordings_in(out: Path, say: Callable[[str], None]) -> tuple[list[Path], Pa
     if not out.is_dir():
         raise UsageError(str(out), "no such folder")
     flights = []
-    for folder in flight_folders(out):
+    for folder in (*flight_folders(out), *session_folders(out)):
         try:
             flights.append(file_in(folder, ".rrd"))
         except UsageError as error:

@@ -8,8 +8,8 @@ import numpy as np
 
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Section, Tone
 from groundstation.chapters.verdict import VERDICTS
-from groundstation.chapters.wording import ABSENT, clean, number, typeset
-from groundstation.reports.fleet.common import aircraft_name, bounded, plural, title_of
+from groundstation.chapters.wording import clean, number, typeset
+from groundstation.reports.fleet.common import aircraft_name, bounded, minute, plural, title_of
 from groundstation.results.fleet import FleetResults
 
 KEY = "flights"
@@ -41,7 +41,7 @@ def lines(fleet: FleetResults) -> list[FlightLine]:
     """Every flight in the order of the fleet."""
     noted = remarks_of(fleet)
     columns = {name: values.tolist() for name, values in fleet.flights.columns.items() if name != "start_utc"}
-    columns["start"] = [_minute(time) for time in fleet.flights["start_utc"]]
+    columns["start"] = [minute(time) for time in fleet.flights["start_utc"]]
     rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
     return [_line(row, noted.get(row["flight_id"], ())) for row in rows]
 
@@ -56,10 +56,6 @@ def _line(row: dict[str, Any], remarks: Sequence[Mark]) -> FlightLine:
     )
     links = [(text, row[name]) for name, text in LINKED if row[name]]
     return FlightLine(row["report"], cells, remarks, [*links, ("folder", row["flight_id"] + "/")])
-
-
-def _minute(time: np.datetime64) -> str:
-    return ABSENT if np.isnat(time) else str(time.astype("datetime64[m]")).replace("T", " ")
 
 
 def verdict_mark(verdict: str) -> Mark:
