@@ -93,7 +93,7 @@ def test_left_and_right_are_alike() -> None:
 
 
 def test_errors_of_trials_agree_with_what_the_filter_computes() -> None:
-    trials = fly_trials(FOUR, 10, 11)
+    trials = fly_trials(replace(FOUR, trials=10, seed=11))
     places = [int(np.argmin(np.abs(trials.before_threshold_m - place))) for place in (2000.0, 500.0, 0.0, -270.0)]
     low, high = trials.limits
     for k in places:
@@ -102,14 +102,14 @@ def test_errors_of_trials_agree_with_what_the_filter_computes() -> None:
 
 
 def test_three_points_on_the_ground_leave_no_aircraft_below_it() -> None:
-    three = replace(FOUR, moving=None, own=OwnErrors(baro_m=20.0, position_m=30.0))
-    trials = fly_trials(three, 6, 0)
+    three = replace(FOUR, moving=None, own=OwnErrors(baro_m=20.0, position_m=30.0), trials=6, seed=0)
+    trials = fly_trials(three)
     assert np.abs(trials.error_m[:, -1, 2]).max() < 4.0 * trials.sigma_m[:, -1, 2].max()
 
 
 def test_correlated_ranges_taken_for_white_make_a_filter_too_sure() -> None:
-    scenario = replace(FOUR, noise=CORRELATED)
-    answer = range_landing(scenario, trials=6, seed=3)
+    scenario = replace(FOUR, noise=CORRELATED, trials=6, seed=3)
+    answer = range_landing(scenario)
     honest, white = ([row for row in answer.trials if row.filter == name][-1] for name in (HONEST, WHITE))
     assert honest.is_consistent
     assert not white.is_consistent
@@ -147,7 +147,7 @@ def test_the_controlled_aircraft_keeps_its_bounds_and_gains_geometry() -> None:
 
 
 def test_published_places_are_in_the_answer() -> None:
-    answer = range_landing(FOUR)
+    answer = range_landing(replace(FOUR, trials=0))
     touchdown = answer.at(TOUCHDOWN)
     assert touchdown.before_threshold_m == pytest.approx(-FOUR.path.touchdown_m, abs=20.0)
     assert touchdown.lateral_category == "CAT IIIB"

@@ -32,21 +32,14 @@ TOUCHDOWN = "touchdown"
 HONEST, WHITE = "models_correlation", "takes_it_for_white"
 
 
-def range_landing(scenario: RangeApproach, *, trials: int = 0, seed: int = 1) -> RangeLanding:
+def range_landing(scenario: RangeApproach) -> RangeLanding:
     """Accuracy along an approach by ranges, and how honest the filter is over simulated approaches.
 
-    Parameters
-    ----------
-    scenario : RangeApproach
-    trials : int
-        Simulated approaches; where ranges are correlated the filter that takes them for white flies them as well.
-    seed : int
+    Where ranges are correlated a filter that takes them for white flies the same approaches as well.
     """
     track, moving = covariance_along(scenario), fly_moving_point(scenario)
     filters = (HONEST, WHITE) if scenario.noise.correlated_m > 0.0 else (HONEST,)
-    flown = [
-        (name, fly_trials(scenario, trials, seed, models_correlation=name == HONEST)) for name in filters if trials
-    ]
+    flown = [(name, fly_trials(scenario, models_correlation=name == HONEST)) for name in filters if scenario.trials]
     rows = _rows(scenario, track)
     trial_rows = tuple(row for name, one in flown for row in _trial_rows(name, one))
     least = track.sigma_m.min(axis=0)
@@ -59,7 +52,7 @@ def range_landing(scenario: RangeApproach, *, trials: int = 0, seed: int = 1) ->
         least_right_m=float(least[1]),
         least_up_m=float(least[2]),
         trials=trial_rows,
-        trial_count=trials,
+        trial_count=scenario.trials,
         remarks=(ACCURACY_ONLY, *_remarks(trial_rows)),
         settings=_flat(scenario),
         figures=(_path_figure(scenario, track, moving), _space_figure(scenario, track, moving), *_errors(flown)),

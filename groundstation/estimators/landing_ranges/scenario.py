@@ -134,7 +134,7 @@ class OwnErrors:
     position_m: float = number(100.0, 0.01, 1e5)
     velocity_mps: float = number(0.5, 0.0, 100.0)
     velocity_s: float = number(1000.0, 1.0, 1e6)
-    baro_m: float = number(200.0, 0.01, 1e4)
+    baro_m: float = number(50.0, 0.01, 1e4)
     baro_s: float = number(3600.0, 1.0, 1e6)
     clock_m: float = number(1000.0, 0.01, 1e7)
     clock_mps: float = number(10.0, 0.0, 1e5)
@@ -153,6 +153,8 @@ class RangeApproach:
     title : str
     points : tuple of GroundPoint
     moving : MovingPoint, optional
+    trials, seed : int
+        Simulated approaches that judge the filter, and their seed.
     """
 
     title: str = ""
@@ -161,8 +163,11 @@ class RangeApproach:
     moving: MovingPoint | None = None
     noise: RangeNoise = field(default_factory=RangeNoise)
     own: OwnErrors = field(default_factory=OwnErrors)
+    trials: int = number(20, 0, 1000)
+    seed: int = number(1, 0)
 
     def __post_init__(self) -> None:
+        check_ranges(self)
         if not self.points:
             raise SettingsError("points", "none", "one ground point or more")
         names = [point.name for point in self.points]

@@ -51,20 +51,19 @@ class Trials:
         return np.asarray(np.sqrt(np.mean((self.error_m / self.sigma_m) ** 2, axis=0)))
 
 
-def fly_trials(scenario: RangeApproach, count: int, seed: int, *, models_correlation: bool = True) -> Trials:
-    """Draw and filter so many approaches; both filters see the same ones under one seed.
+def fly_trials(scenario: RangeApproach, *, models_correlation: bool = True) -> Trials:
+    """Draw and filter the trials of a scenario; every filter sees the same ones.
 
     Parameters
     ----------
     scenario : RangeApproach
         Its correlated errors are drawn, whether the filter models them or not.
-    count, seed : int
     models_correlation : bool
     """
     truth, nominal = error_model(scenario, has_slow_errors=True), nominal_readings(scenario)
     found = []
-    for trial in range(count):
-        rng = np.random.default_rng([seed, trial])
+    for trial in range(scenario.trials):
+        rng = np.random.default_rng([scenario.seed, trial])
         errors = draw_errors(rng, truth, len(nominal.place_m))
         white_m = scenario.noise.white_m * rng.standard_normal(nominal.range_m.shape)
         track = filter_ranges(
