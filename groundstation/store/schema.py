@@ -32,6 +32,8 @@ MESSAGE_OF_KIND: Mapping[str, str] = {
     "baro": "Baro",
     "air": "Air",
     "radio_altimeter": "RadioAltimeter",
+    "gnss_integrity": "GnssIntegrity",
+    "guidance": "Guidance",
     "discrete": "Discrete",
     "event": "Event",
     "link": "Link",

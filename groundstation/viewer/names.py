@@ -25,6 +25,8 @@ UNITS: dict[str, str] = {
     "s": "s",
     "a": "A",
     "hz": "Hz",
+    "mhz": "MHz",
+    "dots": "dots",
 }
 # Words not written as they stand.
 WORDS: dict[str, str] = {
