@@ -62,6 +62,7 @@ def minimise(
     project : callable
         Nearest point of the set.
     start : ndarray
+        From an infinite loss there is no way: the descent ends there and has not converged.
     width : float
         About the size of the set: the first step goes so far.
     iterations : int
@@ -83,7 +84,7 @@ def minimise(
     step, gap, done = unit, np.inf, 0
     for done in range(iterations + 1):
         gap = _gap(x, value, slope, project, width)
-        if gap <= tolerance or done == iterations:
+        if gap <= tolerance or done == iterations or not np.isfinite(value):
             break
         way = project(x - step * slope) - x
         gain, share = float((slope * way).sum()), 1.0

@@ -15,7 +15,7 @@ from groundstation.estimators.control.accuracy import PLACE, AccuracyModel
 from groundstation.estimators.control.descent import Minimum, minimise, nearest_law
 from groundstation.estimators.control.measures import Geometry, geometry_of, loss, loss_by_direction
 from groundstation.estimators.control.motion import Motion
-from groundstation.estimators.control.scenario import LocalCriterion, SessionPlan
+from groundstation.estimators.control.scenario import NEAREST_M, LocalCriterion, SessionPlan
 
 LOCAL_ITERATIONS, LOCAL_TOLERANCE = 60, 1e-9
 KNOT_S = 10.0  # of the random starts
@@ -79,8 +79,13 @@ class Session:
         return geometry_of(links.direction[:, mine], self.plan.control.axes)
 
     def variance(self, controls: FloatArray) -> tuple[float, FloatArray]:
-        """Weighted variance tr(Theta P) at the end, and its derivative by the controls."""
+        """Weighted variance tr(Theta P) at the end, and its derivative by the controls.
+
+        Infinite where anybody comes so near to a source that the geometry has no meaning: no descent steps there.
+        """
         paths = self.motion.paths(controls)
+        if self.model.links(paths.position_m).range_m.min() < NEAREST_M:
+            return np.inf, np.zeros(self.motion.shape)
         found = self.model.accuracy(paths.position_m)
         by_covariance = np.zeros(found.covariance.shape)
         by_covariance[-1] = self.theta
@@ -101,6 +106,8 @@ class StepMeasure:
         controls[:, step] = values
         paths = session.motion.paths(controls)
         links = session.model.links(paths.position_m[step : step + 2])
+        if links.range_m.min() < NEAREST_M:
+            return np.inf, np.zeros(len(values))
         mine = links.receiver == session.model.user
         geometry = geometry_of(links.direction[:, mine], axes)
         by_direction = np.zeros(links.line_m.shape)

@@ -46,11 +46,11 @@ def plan_session(plan: SessionPlan) -> Planned:
     Raises
     ------
     GroundstationError
-        When the judged aircraft meets a source on its way without control: there the geometry has no meaning.
+        When an aircraft meets a source on its way without control: there the geometry has no meaning.
     """
     session = Session(plan)
+    _require_distance(session)
     flown = {UNCONTROLLED: _flown(session, UNCONTROLLED, Law(session.motion.uncontrolled))}
-    _require_distance(session, flown[UNCONTROLLED])
     if session.motion.bounds:
         for criterion in LOCAL_CRITERIA:
             flown[criterion] = _flown(session, criterion, local_law(session, criterion))
@@ -69,17 +69,16 @@ def _flown(session: Session, name: str, law: Law) -> Flown:
     return Flown(name, law, paths, accuracy, session.geometry(paths.position_m))
 
 
-def _require_distance(session: Session, one: Flown) -> None:
-    mine = one.accuracy.links.receiver == session.model.user
-    ranges = one.accuracy.links.range_m[:, mine]
-    epoch, link = np.unravel_index(int(np.argmin(ranges)), ranges.shape)
-    if ranges[epoch, link] < NEAREST_M:
-        plan, source = session.plan, int(one.accuracy.links.source[mine][link])
+def _require_distance(session: Session) -> None:
+    """Refuse ways on which without control anybody meets a source."""
+    plan, links = session.plan, session.model.links(session.motion.paths(session.motion.uncontrolled).position_m)
+    epoch, link = (int(place) for place in np.unravel_index(np.argmin(links.range_m), links.range_m.shape))
+    if links.range_m[epoch, link] < NEAREST_M:
         names = [*(aircraft.name for aircraft in plan.aircraft), *(point.name for point in plan.points)]
-        when = (int(epoch) + 1) * plan.step_s
+        one, other = names[int(links.receiver[link])], names[int(links.source[link])]
         raise GroundstationError(
             plan.title,
-            f"{plan.user.name} {ranges[epoch, link]:.2g} m from {names[source]} at {when:g} s",
+            f"{one} {links.range_m[epoch, link]:.2g} m from {other} at {(epoch + 1) * plan.step_s:g} s",
             f"a way that stays {NEAREST_M:g} m away from every source",
             "move the start, the track or the source",
         )
