@@ -43,7 +43,7 @@ FLIGHT_COLUMNS: tuple[FlightColumn, ...] = (
     FlightColumn("start_utc", "time", "first corrected time; missing for a log without absolute time"),
     FlightColumn("month", "category", "year and month of start_utc: 2026-05"),
     FlightColumn("duration_s", "number", "from the first sample of any topic to the last"),
-    FlightColumn("status", "category", "ok, degraded (data lost or a grave finding) or failed"),
+    FlightColumn("status", "category", "ok, degraded (data lost) or failed"),
     FlightColumn("has_lost_data", "flag", "the log is cut or damaged"),
     FlightColumn("verdict", "category", "of the heading correction: accept, reject, extend, undecided"),
     FlightColumn("verdict_reason", "text", "why, in words"),

@@ -226,7 +226,7 @@ def read_flight(mcap: Path, converted: Converted) -> Flight:
 
 
 def state_of(gravest: Severity | None, has_lost_data: bool, fail_on: str) -> State:
-    """State of a run from its gravest finding and whether data was lost."""
+    """State of a run from its worst finding and whether data was lost."""
     if fail_on in SEVERITIES and gravest and SEVERITIES.index(gravest) >= SEVERITIES.index(fail_on):
         return "limit_reached"
     return "data_lost" if has_lost_data else "done"
