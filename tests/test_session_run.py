@@ -387,11 +387,3 @@ def test_a_session_that_cannot_be_read_is_told(out: Path, tmp_path: Path) -> Non
     assert called("report", copy, "--no-pdf") == 1
     assert [row["source"] for row in rows_of(copy) if row["kind"] == "failed"] == [str(copy / IDENTITY)]
     assert 'id="sessions"' not in (copy / "summary.html").read_text(encoding="utf-8")
-
-
-def test_serve_offers_the_session(out: Path) -> None:
-    from groundstation.pipeline.verbs.serve import recordings_in
-
-    flights, fleet = recordings_in(out, lambda _text: None)
-    assert [path.stem for path in flights] == [*(one.name for one in flight_folders(out)), IDENTITY]
-    assert fleet == out / "fleet.rrd"
