@@ -356,6 +356,29 @@ def test_the_recording_has_both_timelines_and_every_aircraft(contents: Contents)
     assert "/space/stations" in contents.fixed
 
 
+def test_ellipsoids_are_those_of_two_sigma(contents: Contents, results: FlightResults) -> None:
+    tracks = results.figure_with_rows("cooperative_tracks")
+    assert tracks is not None
+    rows = (tracks["algorithm"] == "centralised") & (tracks["vehicle"] == "B")
+    reckoned = tracks["sigma_up_m"][tracks["algorithm"] == "dead_reckoning"]
+    assert reckoned == pytest.approx(SHORT.errors.baro_m, rel=0.01), "the barometer's alone"
+    (batch,) = contents.batches["/space/B/ellipsoid"]
+    half_m, turn = (
+        np.array([row[0] for row in batch.column(f"Ellipsoids3D:{name}").to_pylist()])
+        for name in ("half_sizes", "quaternions")
+    )
+    assert half_m[:, 2] == pytest.approx(2.0 * tracks["sigma_up_m"][rows], rel=1e-5)
+    angle_rad = 2.0 * np.arctan2(turn[:, 2], turn[:, 3])  # of the first half axis, from east to north
+    first, second = half_m[:, 0] ** 2, half_m[:, 1] ** 2
+    east = first * np.cos(angle_rad) ** 2 + second * np.sin(angle_rad) ** 2
+    north = first * np.sin(angle_rad) ** 2 + second * np.cos(angle_rad) ** 2
+    both = (first - second) * np.sin(angle_rad) * np.cos(angle_rad)
+    assert east == pytest.approx(4.0 * tracks["sigma_east_m"][rows] ** 2, rel=1e-4)
+    assert north == pytest.approx(4.0 * tracks["sigma_north_m"][rows] ** 2, rel=1e-4)
+    expected = 4.0 * (tracks["correlation_north_east"] * tracks["sigma_north_m"] * tracks["sigma_east_m"])[rows]
+    assert both == pytest.approx(expected, rel=1e-3, abs=1e-3)
+
+
 def test_links_are_drawn_at_every_second_and_have_lanes(contents: Contents, answer: CooperativeResult) -> None:
     strips = contents.batches["/space/links"]
     rows = [len(row) for batch in strips for row in batch.column("LineStrips3D:strips").to_pylist()]

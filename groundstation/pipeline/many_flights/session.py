@@ -20,6 +20,7 @@ from groundstation.base.records import RecordBatch
 from groundstation.base.signals import kind_of
 from groundstation.base.toml_settings import settings_from
 from groundstation.base.version import __version__
+from groundstation.chapters.cooperative import names_or_count
 from groundstation.estimators.analyses import ANSWER_TYPES, SESSION_ANALYSES
 from groundstation.estimators.cooperative.analysis import SessionKnown
 from groundstation.pipeline.many_flights.inputs import session_folders
@@ -261,7 +262,7 @@ def _results(
     names = assembled.session.names
     start_utc_ns = assembled.start_ns if assembled.has_utc else None
     identity = flight_id(start_utc_ns, {"aircraft": "session", "flight": joined_names(names)}, job.sha256)
-    title = f"session of {', '.join(names)}"
+    title = f"session of {names_or_count(names)}"
     size = sum(log.source.size_bytes for log in job.logs)
     told = sorted({flight.metadata.get("flight", "") for flight in flights} - {""})
     return FlightResults(
