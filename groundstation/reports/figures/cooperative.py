@@ -47,6 +47,7 @@ def session_map(results: FlightResults) -> Drawing | None:
     plane = place if origin is None else origin.from_ecef_m(place)
     stations = results.figure_with_rows("session_points")
     larger = _magnified(plane, ellipses)
+    when = "at the end" if _is_crowd(answer) else f"at {ELLIPSES} times"
 
     def paint(figure: Any) -> None:
         axes = d.place(figure, 18, 12, 174, 104)
@@ -57,7 +58,7 @@ def session_map(results: FlightResults) -> Drawing | None:
             north, east = plane[mine, 0] / M_PER_KM, plane[mine, 1] / M_PER_KM
             d.line(axes, east, north, colour, 1.2, label=d.label(name, 12))
             d.dots(axes, east[:1], north[:1], colour, 4.0)
-            for row in mine[d.thin(len(mine), ELLIPSES)]:
+            for row in mine[-1:] if _is_crowd(answer) else mine[d.thin(len(mine), ELLIPSES)]:
                 drawn = (plane[row, :2] + larger * ellipses[row]) / M_PER_KM
                 d.line(axes, drawn[:, 1], drawn[:, 0], colour, 0.6)
             if _is_crowd(answer):
@@ -76,8 +77,8 @@ def session_map(results: FlightResults) -> Drawing | None:
 
     size = f", drawn {larger} times their size" if larger > 1 else ""
     caption = (
-        f"Tracks from above, {title_of(algorithm)}; the dot is where each begins. 2σ ellipses, at "
-        f"{ELLIPSES} times of each track{size}." + (" Triangles: ground stations." if stations is not None else "")
+        f"Tracks from above, {title_of(algorithm)}; the dot is where each begins. 2σ ellipses "
+        f"{when} of each track{size}." + (" Triangles: ground stations." if stations is not None else "")
     )
     return Drawing("Map", caption, "Tracks of the aircraft.", d.draw("cooperative-map", 112, paint), _numbers(results))
 
@@ -164,13 +165,13 @@ def _ceiling(*series: FloatArray) -> float:
 
 
 def _styles(answer: CooperativeResult) -> dict[str, tuple[str, str]]:
-    """Colour and label of the line of each aircraft; of a crowd the one with the least determinant stands out, last."""
+    """Colour and label of the line of each aircraft; of a crowd the one of the poorest geometry stands out, last."""
     names = answer.vehicle_names
     if not _is_crowd(answer) or not answer.geometry:
         return {name: (colour, d.label(name, 12)) for name, colour in zip(names, _colours(answer), strict=True)}
-    worst = min(answer.geometry, key=lambda row: row.determinant_least).vehicle
+    worst = min(answer.geometry, key=lambda row: row.determinant_median).vehicle
     others = {name: (d.FAINT, "") for name in names if name != worst}
-    return {**others, worst: (d.LIMIT, f"{d.label(worst, 12)}, least det(H'H)")}
+    return {**others, worst: (d.LIMIT, f"{d.label(worst, 12)}, least median det(H'H)")}
 
 
 def geometry(results: FlightResults) -> Drawing | None:
