@@ -12,6 +12,7 @@ from groundstation.pipeline.many_flights.inputs import (
     OUT_FOLDER_MARK,
     flight_folders,
     is_ours,
+    plan_folders,
     session_folders,
 )
 from groundstation.pipeline.one_flight.outcome import Outcome
@@ -88,7 +89,7 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
         raise UsageError(str(out), "no results", "a folder that `run` made")
     paths: list[Path] = []
     problems: list[Outcome] = []
-    for folder in [out] if is_flight else [*flight_folders(out), *session_folders(out)]:
+    for folder in [out] if is_flight else [*flight_folders(out), *session_folders(out), *plan_folders(out)]:
         try:
             with told_in_a_line(str(folder)):
                 written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf)

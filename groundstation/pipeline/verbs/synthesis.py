@@ -17,6 +17,7 @@ STUDIES = {
     "forecast": "forecast of INS errors: every method under true and false models, and how honest its sigma is",
     "magnetic": "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
     "cooperative": "navigation between aircraft: published figures with ours beside them, divergence, consistency",
+    "landing": "landing by reference points and by locators: every published figure with ours beside it",
 }
 
 
@@ -107,4 +108,8 @@ def _study(name: str) -> "Callable[..., StudyResult]":
         from groundstation.studies.cooperative import study_cooperative
 
         return study_cooperative
+    if name == "landing":
+        from groundstation.studies.landing import study_landing
+
+        return study_landing
     raise UsageError("study", repr(name), f"one of {', '.join(STUDIES)}")
