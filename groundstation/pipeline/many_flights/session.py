@@ -231,8 +231,8 @@ def _flights(partial: Path, job: SessionJob) -> tuple[list[Flight], tuple[LogOfS
             text = f"{source.name} lost data; `groundstation check` tells what"
             damaged.append(Finding("warn", "session.lost_data", text, place=source.name))
         flights.append(_read(mcap, info))
-        path = str(log.path.absolute())
         where = _seen_from_a_folder_in(job.out, mcap) if log.is_store else str(mcap.relative_to(partial))
+        path = where if log.is_store else str(log.path.absolute())
         logs.append(LogOfSession(path, source.name, source.sha256, source.size_bytes, source.reader, where))
     return flights, tuple(logs), damaged
 
