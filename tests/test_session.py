@@ -449,6 +449,21 @@ def test_ranges_that_contradict_the_stated_sigmas_are_a_warning(
     assert "sigma too small" in COOPERATIVE.sentence(found.answers)
 
 
+def test_a_station_a_little_off_is_named_by_its_ranges() -> None:
+    """Nearer than what the assembly takes for far: then it is the gate that finds it."""
+
+    def named(north_m: float) -> list[str]:
+        session = simulated(SHORT).session
+        first = session.points[0]
+        x, y, z = first.position_m
+        moved = replace(session, points=(replace(first, position_m=(x + north_m, y, z)), *session.points[1:]))
+        found = run_analyses((COOPERATIVE,), moved, SessionKnown(settings={"cooperative": believed(SHORT)}))
+        return [one.place for one in found.findings["cooperative"] if one.code == "cooperative.misplaced_station"]
+
+    assert named(0.0) == []
+    assert named(1000.0) == [simulated(SHORT).session.points[0].name]
+
+
 def test_run_into_the_same_folder_leaves_the_session_be(out: Path, tmp_path: Path) -> None:
     copy = tmp_path / "out"
     shutil.copytree(out, copy)
