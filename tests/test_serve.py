@@ -66,8 +66,8 @@ def client_of(url: str) -> CatalogClient:
 
 @contextmanager
 def served(out: Path, say: Callable[[str], None] = lambda _: None) -> Iterator[Catalog]:
-    flights, fleet = recordings_in(out, say)
-    with catalog_server(flights, fleet, host="127.0.0.1", port=0) as catalog:
+    flights, sessions, fleet = recordings_in(out, say)
+    with catalog_server(flights, fleet, host="127.0.0.1", port=0, sessions=sessions) as catalog:
         yield catalog
 
 

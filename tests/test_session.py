@@ -356,6 +356,29 @@ def test_the_recording_has_both_timelines_and_every_aircraft(contents: Contents)
     assert "/space/stations" in contents.fixed
 
 
+def test_ellipsoids_are_those_of_two_sigma(contents: Contents, results: FlightResults) -> None:
+    tracks = results.figure_with_rows("cooperative_tracks")
+    assert tracks is not None
+    rows = (tracks["algorithm"] == "centralised") & (tracks["vehicle"] == "B")
+    reckoned = tracks["sigma_up_m"][tracks["algorithm"] == "dead_reckoning"]
+    assert reckoned == pytest.approx(SHORT.errors.baro_m, rel=0.01), "the barometer's alone"
+    (batch,) = contents.batches["/space/B/ellipsoid"]
+    half_m, turn = (
+        np.array([row[0] for row in batch.column(f"Ellipsoids3D:{name}").to_pylist()])
+        for name in ("half_sizes", "quaternions")
+    )
+    assert half_m[:, 2] == pytest.approx(2.0 * tracks["sigma_up_m"][rows], rel=1e-5)
+    angle_rad = 2.0 * np.arctan2(turn[:, 2], turn[:, 3])  # of the first half axis, from east to north
+    first, second = half_m[:, 0] ** 2, half_m[:, 1] ** 2
+    east = first * np.cos(angle_rad) ** 2 + second * np.sin(angle_rad) ** 2
+    north = first * np.sin(angle_rad) ** 2 + second * np.cos(angle_rad) ** 2
+    both = (first - second) * np.sin(angle_rad) * np.cos(angle_rad)
+    assert east == pytest.approx(4.0 * tracks["sigma_east_m"][rows] ** 2, rel=1e-4)
+    assert north == pytest.approx(4.0 * tracks["sigma_north_m"][rows] ** 2, rel=1e-4)
+    expected = 4.0 * (tracks["correlation_north_east"] * tracks["sigma_north_m"] * tracks["sigma_east_m"])[rows]
+    assert both == pytest.approx(expected, rel=1e-3, abs=1e-3)
+
+
 def test_links_are_drawn_at_every_second_and_have_lanes(contents: Contents, answer: CooperativeResult) -> None:
     strips = contents.batches["/space/links"]
     rows = [len(row) for batch in strips for row in batch.column("LineStrips3D:strips").to_pylist()]
@@ -424,6 +447,21 @@ def test_ranges_that_contradict_the_stated_sigmas_are_a_warning(
     (finding, *_) = (one for one in found.findings["cooperative"] if one.code == "cooperative.too_sure")
     assert finding.severity == "warn" and "where 1 is right" in finding.text
     assert "sigma too small" in COOPERATIVE.sentence(found.answers)
+
+
+def test_a_station_a_little_off_is_named_by_its_ranges() -> None:
+    """Nearer than what the assembly takes for far: then it is the gate that finds it."""
+
+    def named(north_m: float) -> list[str]:
+        session = simulated(SHORT).session
+        first = session.points[0]
+        x, y, z = first.position_m
+        moved = replace(session, points=(replace(first, position_m=(x + north_m, y, z)), *session.points[1:]))
+        found = run_analyses((COOPERATIVE,), moved, SessionKnown(settings={"cooperative": believed(SHORT)}))
+        return [one.place for one in found.findings["cooperative"] if one.code == "cooperative.misplaced_station"]
+
+    assert named(0.0) == []
+    assert named(1000.0) == [simulated(SHORT).session.points[0].name]
 
 
 def test_run_into_the_same_folder_leaves_the_session_be(out: Path, tmp_path: Path) -> None:

@@ -6,12 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import fsspec
 import pytest
 
 from groundstation.cli.main import main
 from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
+from groundstation.pipeline.many_flights.remote import RemoteFolder
 from groundstation.pipeline.many_flights.session_search import Member, Span, sessions_among
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
@@ -186,6 +188,42 @@ def test_any_number_of_processes_gives_equal_bytes(
         names = {path.relative_to(out) for pattern in promised for path in (out / folder).glob(pattern)}
         for name in names - {Path(IDENTITY) / "manifest.json"}:
             assert (tmp_path / name).read_bytes() == (out / name).read_bytes(), name
+
+
+def test_a_run_elsewhere_gives_the_session_too(
+    out: Path, logs: Path, configuration: Configuration, tmp_path: Path
+) -> None:
+    store = fsspec.filesystem("memory")
+    store.store.clear()
+    store.pseudo_dirs[:] = [""]
+    few = tmp_path / "few"
+    few.mkdir()
+    for name in ("example-A.csv", "example-B.csv"):
+        shutil.copy(logs / name, few)
+    far, stations = RemoteFolder("memory://out"), logs / "stations.toml"
+
+    def ran(folder: Path) -> list[Outcome]:
+        return sessions_in(
+            run_many([folder], far.url, configuration, jobs=1, with_pdf=False, stations=stations),
+        )
+
+    (session,) = ran(few)
+    assert session.folder == session.flight_id == "20180305T120000Z_session_A-B"
+    assert far.read(f"{session.flight_id}/report.html")
+    (session,) = ran(logs)
+    assert session.flight_id == IDENTITY
+    assert "20180305T120000Z_session_A-B" not in far.names()
+    summary = json.loads(far.read(f"{IDENTITY}/summary.json") or b"")
+    assert summary["results"] == json.loads((out / IDENTITY / "summary.json").read_text())["results"]
+    made = far.read(f"{IDENTITY}/manifest.json")
+    assert ran(logs) == [replace(session, times_s={})], "nothing is done again"
+    assert far.read(f"{IDENTITY}/manifest.json") == made
+    page = far.read(f"{IDENTITY}/report.html")
+    far.remove(f"{IDENTITY}/report.html")
+    ran(logs)
+    assert far.read(f"{IDENTITY}/report.html") == page
+    index = json.loads(far.read("index.json") or b"")["rows"]
+    assert [row["flight_id"] for row in index if row["kind"] == "session"] == [IDENTITY]
 
 
 def test_the_session_grows_with_its_flights_and_one_of_the_verb_stays(
@@ -387,11 +425,3 @@ def test_a_session_that_cannot_be_read_is_told(out: Path, tmp_path: Path) -> Non
     assert called("report", copy, "--no-pdf") == 1
     assert [row["source"] for row in rows_of(copy) if row["kind"] == "failed"] == [str(copy / IDENTITY)]
     assert 'id="sessions"' not in (copy / "summary.html").read_text(encoding="utf-8")
-
-
-def test_serve_offers_the_session(out: Path) -> None:
-    from groundstation.pipeline.verbs.serve import recordings_in
-
-    flights, fleet = recordings_in(out, lambda _text: None)
-    assert [path.stem for path in flights] == [*(one.name for one in flight_folders(out)), IDENTITY]
-    assert fleet == out / "fleet.rrd"

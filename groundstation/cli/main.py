@@ -293,7 +293,10 @@ def study(
 @answers_with_exit_code
 def list_(
     log: Annotated[
-        Path | None, typer.Argument(help="A log: would each analysis run on it?", metavar="LOG", readable=False)
+        Path | None,
+        typer.Argument(
+            help="A log, flight folder or session: would each analysis run on it?", metavar="LOG", readable=False
+        ),
     ] = None,
     profile: Profile = None,
     json: Json = False,
@@ -313,7 +316,11 @@ def list_(
 def cooperative(
     logs: Annotated[
         list[Path],
-        typer.Argument(help="Logs, MCAPs or flight folders, one of each aircraft.", metavar="LOG", readable=False),
+        typer.Argument(
+            help="Logs, MCAPs or flight folders, one of each aircraft; or a session, to run it again.",
+            metavar="LOG",
+            readable=False,
+        ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.", metavar="OUT")],
     stations: Annotated[

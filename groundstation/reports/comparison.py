@@ -35,6 +35,8 @@ LINES = (  # figure, column, column of the half width and what it is multiplied 
     ("inertial_track", "ins_error_m", None, "radial error, m", "Radial error of the INS against GNSS"),
     ("inertial_states", "north_position_m", ("north_position_sigma_m", NORMAL_95), "north, m", "North position error"),
     ("inertial_states", "east_position_m", ("east_position_sigma_m", NORMAL_95), "east, m", "East position error"),
+    ("session_errors", "two_sigma_r_m", None, "m", "2σ_r as computed, worst aircraft"),
+    ("session_errors", "rms_error_m", None, "m", "Horizontal error against the truth, RMS of all aircraft"),
 )
 
 

@@ -87,6 +87,7 @@ def send_comparison(
     halves = (Half("A", a, colours.INS), Half("B", b, colours.GNSS, comparison.alignment.offset_s))
     recorder.document("comparison", comparison_text(comparison))
     tabs = [_overview(recorder, halves), _heading(recorder, halves), _inertial(recorder, halves)]
+    tabs.append(_cooperative(recorder, halves))
     return send_layout(stream, [tab for tab in (*tabs, _forecast(recorder, halves)) if tab is not None])
 
 
@@ -243,6 +244,14 @@ def _inertial(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | Non
     radial = _overlay(recorder, halves, "inertial_track", "ins_error_m", "Radial error of the INS against GNSS, m")
     contents: list[rrb.View | rrb.Container] = [*rows, *([] if radial is None else [radial])]
     return rrb.Vertical(contents=contents, name="INS errors") if contents else None
+
+
+def _cooperative(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | None:
+    """What two sessions computed of their errors, and what these were."""
+    computed = _overlay(recorder, halves, "session_errors", "two_sigma_r_m", "2σ_r as computed, worst aircraft, m")
+    error = _overlay(recorder, halves, "session_errors", "rms_error_m", "Horizontal error, RMS of all aircraft, m")
+    views = [one for one in (computed, error) if one is not None]
+    return rrb.Vertical(contents=views, name="Cooperative") if views else None
 
 
 def _forecast(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | None:

@@ -9,7 +9,7 @@ from pathlib import Path, PurePath
 
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.many_flights.found_sessions import Asked, find_sessions, run_sessions
-from groundstation.pipeline.many_flights.inputs import collect, flight_folders, is_ours
+from groundstation.pipeline.many_flights.inputs import collect, flight_folders, is_ours, session_folders
 from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
 from groundstation.pipeline.many_flights.output import LocalOutput, RemoteOutput
 from groundstation.pipeline.many_flights.placement import Placement
@@ -78,10 +78,10 @@ def run_many(
     crew = _crew(scheduler, jobs or cores(), len(inputs), listen)
     make = partial(Job, configuration=configuration, fail_on=fail_on, with_pdf=with_pdf)
     listen(Event("begin", total=len(inputs)))
+    asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo)
     if any(is_remote(str(place)) for place in (out, *paths)):
         remote = [RemoteJob(make(Path(), Path(), is_named=named), log, str(out), redo) for log, named in inputs]
-        return _run_remote(remote, str(out), crew, force, listen)
-    asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo)
+        return _run_remote(remote, asked, crew, force, listen)
     near = [make(Path(log), Path(out), is_named=named) for log, named in inputs]
     return _run_here(near, asked, crew, force, listen)
 
@@ -124,24 +124,46 @@ def _run_sessions(placement: Placement, asked: Asked, crew: Crew, listen: Listen
         raise
 
 
-def _run_remote(work: Sequence[RemoteJob], out: str, crew: Crew, force: bool, listen: Listener) -> tuple[Outcome, ...]:
+def _run_remote(
+    work: Sequence[RemoteJob], asked: Asked, crew: Crew, force: bool, listen: Listener
+) -> tuple[Outcome, ...]:
     def suffixed(number: int) -> RemoteJob:
         return replace(work[number], job=replace(work[number].job, add_suffix=True), redo=True)
 
     with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
         copy = Path(folder)
-        output = RemoteOutput(out, copy)
+        output = RemoteOutput(work[0].out, copy)
         output.refuse_foreign(force=force)
         output.copy_all()
         placement = Placement(output, [one.log for one in work])
         is_whole = False
         try:
             _run_into(placement, copy, enumerate(work), run_remote, suffixed, crew, listen)
-            problems = write_beside(copy, placement.outcomes(), with_pdf=work[0].job.with_pdf)
+            sessions = _run_remote_sessions(placement, output, asked, listen)
+            outcomes = (*placement.outcomes(), *sessions)
+            problems = write_beside(copy, outcomes, with_pdf=asked.with_pdf)
             is_whole = True
         finally:
             output.publish(FLEET_FILES, is_whole=is_whole)
-        return (*placement.outcomes(), *problems)
+        return (*outcomes, *problems)
+
+
+def _run_remote_sessions(
+    placement: Placement, output: RemoteOutput, asked: Asked, listen: Listener
+) -> tuple[Outcome, ...]:
+    """Run the sessions in the copy of an OUT elsewhere, in this process, where the MCAPs are fetched to."""
+    before = session_folders(output.root)
+    here = replace(asked, out=output.root, mcap_in=output.mcap_in)
+    outcomes = _run_sessions(placement, here, partial(in_turn, listen=listen), listen)
+    sent = []
+    for outcome in outcomes:
+        if outcome.folder:
+            output.send_session(outcome.flight_id)
+        sent.append(replace(outcome, folder=outcome.flight_id))
+    for folder in before:
+        if not folder.exists():
+            output.discard(folder.name)
+    return tuple(sent)
 
 
 def _run_into(

@@ -1,6 +1,6 @@
 """The sessions that a run finds among its flights: jobs on the MCAPs just made, with the stations beside the logs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
 from contextlib import closing, suppress
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from groundstation.base.findings import Finding
 from groundstation.pipeline.many_flights.inputs import file_in
 from groundstation.pipeline.many_flights.remote import is_remote
 from groundstation.pipeline.many_flights.session import SessionJob, load_stations, run_one, sessions_of
-from groundstation.pipeline.many_flights.session_search import Member, heard_span_ns, members_of, sessions_among
+from groundstation.pipeline.many_flights.session_search import Member, Span, heard_span_ns, members_of, sessions_among
 from groundstation.pipeline.many_flights.workers import Crew
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import remove
@@ -28,7 +28,8 @@ STATIONS_TOML = "stations.toml"  # beside the logs
 class Asked:
     """How a run is to do its sessions; the fields are those of :class:`SessionJob`.
 
-    ``stations`` is None where no file was named: then there may be one beside the logs.
+    ``stations`` is None where no file was named: then there may be one beside the logs. ``mcap_in`` gives the MCAP of a
+    flight folder.
     """
 
     out: Path
@@ -37,6 +38,7 @@ class Asked:
     fail_on: str
     with_pdf: bool
     redo: bool = False
+    mcap_in: Callable[[Path], Path] = lambda folder: file_in(folder, ".mcap")
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ def find_sessions(asked: Asked, flight_ids: AbstractSet[str]) -> FoundSessions:
     members = members_of(asked.out)
     if not any(one.hears and one.folder.name in flight_ids for one in members):
         return FoundSessions()
-    groups, apart = sessions_among(members, heard_span_ns)
+    groups, apart = sessions_among(members, lambda folder: _heard(asked.mcap_in, folder))
     jobs: list[SessionJob] = []
     told: list[Outcome] = []
     for group in groups:
@@ -72,6 +74,14 @@ def find_sessions(asked: Asked, flight_ids: AbstractSet[str]) -> FoundSessions:
     return FoundSessions(tuple(jobs), tuple(told))
 
 
+def _heard(mcap_in: Callable[[Path], Path], folder: Path) -> Span | None:
+    """What :func:`heard_span_ns` says of a flight; None where its MCAP cannot be read, which its own row tells."""
+    try:
+        return heard_span_ns(mcap_in(folder))
+    except (GroundstationError, OSError):
+        return None
+
+
 def run_sessions(found: FoundSessions, crew: Crew, listen: Listener) -> tuple[Outcome, ...]:
     """Run sessions, each into its place; returns their outcomes in the order of the jobs, and what else is told.
 
@@ -88,7 +98,7 @@ def run_sessions(found: FoundSessions, crew: Crew, listen: Listener) -> tuple[Ou
 
 
 def _job(asked: Asked, group: Sequence[Member]) -> SessionJob:
-    logs = [open_log(file_in(one.folder, ".mcap")) for one in group]
+    logs = [open_log(asked.mcap_in(one.folder)) for one in group]
     stations, notes = (asked.stations, ()) if asked.stations is not None else _stations_beside(group)
     return SessionJob(
         tuple(sorted(logs, key=lambda log: (log.source.sha256, log.source.name))),

@@ -56,6 +56,18 @@ def is_ours(folder: Path) -> bool:
         return False
 
 
+def is_session(folder: Path) -> bool:
+    """Whether a folder is that of a session of several aircraft."""
+    return (folder / SESSION_MARK).is_file()
+
+
+def no_log(folder: Path) -> UsageError:
+    """Why a folder is not the log that a verb takes."""
+    if is_session(folder):
+        return UsageError(str(folder), "a session of several aircraft", "a log", "manifest.json in it names its logs")
+    return UsageError(str(folder), "a folder", "a log", "`run` takes folders")
+
+
 def file_in(folder: Path, ending: str, *others: str) -> Path:
     """The file with an ending in a folder that ``run`` made: that of its name, of ``others``, or the only one.
 
@@ -68,6 +80,8 @@ def file_in(folder: Path, ending: str, *others: str) -> Path:
     found = [path for path in named if path.is_file()][:1] or [
         path for path in sorted(folder.glob(f"*{ending}")) if not path.name.endswith(CORRECTED)
     ]
+    if not found and is_session(folder):
+        raise no_log(folder)
     if len(found) != 1:
         what = f"{len(found)} files *{ending}"
         raise UsageError(str(folder), what, "a flight folder that `run` made", f"name the {ending}")
@@ -82,7 +96,7 @@ def flight_folders(out: Path) -> list[Path]:
 
 def session_folders(out: Path) -> list[Path]:
     """Session folders in an OUT, in the order of their names."""
-    return [folder for folder in _finished_folders(out) if (folder / SESSION_MARK).is_file()]
+    return [folder for folder in _finished_folders(out) if is_session(folder)]
 
 
 def plan_folders(out: Path) -> list[Path]:

@@ -1,17 +1,19 @@
 """Where the flights of a run finally stand: a folder here, or one elsewhere with a small copy of it here."""
 
 import shutil
+import uuid
 from collections.abc import Collection, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Protocol
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK
+from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, SESSION_MARK
 from groundstation.pipeline.many_flights.remote import RemoteFolder
 from groundstation.pipeline.many_flights.remote_runs import BY_LOG, STAGING, array_files
 from groundstation.pipeline.one_flight.flight import is_made, place, remove
 from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.reports.flight_report import PDF, REPORT
 from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY
 
 FLEET_ARRAYS = ("heading_samples",)  # of a flight's arrays, what the fleet is made from
@@ -106,9 +108,10 @@ class RemoteOutput:
         for name in names:
             if "." in name and name != ARRAYS:
                 (folder / name).touch()
-        wanted = (f"{ARRAYS}/{name}.parquet" for name in FLEET_ARRAYS)
-        there = set(array_files(self._out, flight_id))
-        for name in (SUMMARY, MANIFEST, *(one for one in wanted if one in there)):
+        there = array_files(self._out, flight_id)
+        wanted = {f"{ARRAYS}/{name}.parquet" for name in FLEET_ARRAYS}
+        kept = there if SESSION_MARK in there else [name for name in there if name in wanted]
+        for name in (SUMMARY, MANIFEST, *kept):
             self._out.fetch(f"{flight_id}/{name}", folder / name)
 
     def has_in_place(self, outcome: Outcome) -> bool:
@@ -121,6 +124,25 @@ class RemoteOutput:
         self._out.write(f"{BY_LOG}/{outcome.sha256}", outcome.flight_id.encode())
         self._copy(outcome.flight_id)
         return outcome.flight_id
+
+    def mcap_in(self, folder: Path) -> Path:
+        """The MCAP of a flight of the copy, fetched when it is first asked for."""
+        mcap = folder / f"{folder.name}.mcap"
+        if not mcap.is_file() or not mcap.stat().st_size:
+            self._out.fetch(f"{folder.name}/{mcap.name}", mcap)
+        return mcap
+
+    def send_session(self, session_id: str) -> None:
+        """Send what was made of a session of the copy; files that stand there by name alone are there already."""
+        folder = self.root / session_id
+        if (folder / f"{session_id}.rrd").stat().st_size:
+            staged = f"{STAGING}/{session_id}-{uuid.uuid4().hex[:8]}"
+            self._out.send(folder, staged)
+            self._out.replace(staged, session_id, partial(is_made, identity=session_id))
+            return
+        for name in (REPORT, PDF, MANIFEST):
+            if (folder / name).is_file() and (content := (folder / name).read_bytes()):
+                self._out.write(f"{session_id}/{name}", content)
 
     def discard(self, folder: str) -> None:
         """Throw a flight folder away; what somebody else put into one that is in place stays."""

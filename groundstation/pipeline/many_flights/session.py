@@ -20,6 +20,7 @@ from groundstation.base.records import RecordBatch
 from groundstation.base.signals import kind_of
 from groundstation.base.toml_settings import settings_from
 from groundstation.base.version import __version__
+from groundstation.chapters.cooperative import names_or_count
 from groundstation.estimators.analyses import ANSWER_TYPES, SESSION_ANALYSES
 from groundstation.estimators.cooperative.analysis import SessionKnown
 from groundstation.pipeline.many_flights.inputs import session_folders
@@ -230,8 +231,8 @@ def _flights(partial: Path, job: SessionJob) -> tuple[list[Flight], tuple[LogOfS
             text = f"{source.name} lost data; `groundstation check` tells what"
             damaged.append(Finding("warn", "session.lost_data", text, place=source.name))
         flights.append(_read(mcap, info))
-        path = str(log.path.absolute())
         where = _seen_from_a_folder_in(job.out, mcap) if log.is_store else str(mcap.relative_to(partial))
+        path = where if log.is_store else str(log.path.absolute())
         logs.append(LogOfSession(path, source.name, source.sha256, source.size_bytes, source.reader, where))
     return flights, tuple(logs), damaged
 
@@ -261,7 +262,7 @@ def _results(
     names = assembled.session.names
     start_utc_ns = assembled.start_ns if assembled.has_utc else None
     identity = flight_id(start_utc_ns, {"aircraft": "session", "flight": joined_names(names)}, job.sha256)
-    title = f"session of {', '.join(names)}"
+    title = f"session of {names_or_count(names)}"
     size = sum(log.source.size_bytes for log in job.logs)
     told = sorted({flight.metadata.get("flight", "") for flight in flights} - {""})
     return FlightResults(

@@ -17,7 +17,7 @@ from groundstation.base.records import RecordBatch
 from groundstation.base.signals import kind_of, topics_of_kind
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.many_flights.inputs import file_in, flight_folders
+from groundstation.pipeline.many_flights.inputs import flight_folders
 from groundstation.results.files import load_document
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.session_clock import transmission_ns
@@ -114,14 +114,14 @@ def sessions_among(
     return groups, apart
 
 
-def heard_span_ns(folder: Path) -> Span | None:
-    """First and last time of transmission that a flight heard, on the clock of the link; None where there is none."""
+def heard_span_ns(mcap: Path) -> Span | None:
+    """First and last time of transmission in an MCAP, on the clock of the link; None where there is none."""
     from groundstation.store.reader import Part, read
 
     everything = np.iinfo(np.int64)
     part = Part(everything.min, everything.max, lambda topic: kind_of(topic) == "link")
-    batches = (item for item in read(file_in(folder, ".mcap"), part) if isinstance(item, RecordBatch))
-    flight = flight_from_batches(batches, metadata={}, has_utc=False, source_name=folder.name)
+    batches = (item for item in read(mcap, part) if isinstance(item, RecordBatch))
+    flight = flight_from_batches(batches, metadata={}, has_utc=False, source_name=mcap.name)
     heard = [sent[known] for sent, known in map(transmission_ns, flight.tables.values())]
     sent_ns = np.sort(np.concatenate(heard)) if heard else np.zeros(0, dtype=np.int64)
     if not len(sent_ns):

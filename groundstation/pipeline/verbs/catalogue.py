@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
+from groundstation.pipeline.many_flights.inputs import file_in, is_session
+from groundstation.results.files import SUMMARY, load_document
 
 
 def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict[str, Any]]:
@@ -17,7 +19,8 @@ def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict
     """
     if log is None:
         return [*_analyses(), *_session_analyses(), *_formats(), *_scenarios(), *_sessions(), *_studies()]
-    return _with_answers(log, profile)
+    folder = log.parent if log.name == SUMMARY else log
+    return _of_a_session(folder) if is_session(folder) else _with_answers(log, profile)
 
 
 def _analyses() -> list[dict[str, Any]]:
@@ -34,6 +37,16 @@ def _session_analyses() -> list[dict[str, Any]]:
     ]
 
 
+def _of_a_session(folder: Path) -> list[dict[str, Any]]:
+    """The analyses of a session, each with whether it ran and the reason why not."""
+    found = load_document(folder)
+    reasons = {entry.analysis: entry.reason for entry in found.not_assessable}
+    return [
+        {**entry, "would_run": entry["name"] in found.results, "reason": reasons.get(entry["name"], "")}
+        for entry in _session_analyses()
+    ]
+
+
 def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
     """The analyses, each with whether it would run on a log and the reason why not."""
     from groundstation.base.errors import UsageError
@@ -45,6 +58,7 @@ def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
 
     if not path.exists():
         raise UsageError(str(path), "no such file")
+    path = file_in(path, ".mcap") if path.is_dir() else path
     with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
         mcap = Path(folder) / "flight.mcap"
         flight = read_flight(mcap, convert_log(open_log(path, profile), mcap))

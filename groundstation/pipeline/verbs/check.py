@@ -12,6 +12,7 @@ from groundstation.base.ledger import Ledger
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.base.serial import to_json_exactly
 from groundstation.integrity.limits import Thresholds, shipped
+from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import census_of, has_other_limits, recounted
 from groundstation.pipeline.one_flight.log import Log, open_log
@@ -75,7 +76,7 @@ def check_many(
         if not path.exists():
             raise UsageError(str(path), "no such file")
         if path.is_dir():
-            raise UsageError(str(path), "a folder", "a log", "`run` takes folders")
+            raise no_log(path)
     profile = configuration.profile_path
     listen(Event("begin", total=len(paths)))
     found = []

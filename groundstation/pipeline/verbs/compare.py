@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from groundstation.base.angles import wrap_180
 from groundstation.base.errors import UsageError
 from groundstation.base.findings import SEVERITIES, Finding
@@ -15,10 +17,12 @@ from groundstation.base.signals import is_canonical
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.wording import is_number
 from groundstation.estimators.analyses import ANSWER_TYPES
-from groundstation.pipeline.many_flights.inputs import COMPARISON_MARKS, COMPARISON_RECORDING, is_ours
+from groundstation.pipeline.many_flights.inputs import COMPARISON_MARKS, COMPARISON_RECORDING, is_ours, is_session
 from groundstation.pipeline.verbs.alignment import align
 from groundstation.pipeline.verbs.clip import CUT_SHA256
 from groundstation.results.comparison import Comparison, Delta, Event, SettingPair, Side, Value
+from groundstation.results.cooperative import CooperativeResult
+from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.files import MANIFEST, SavedFlight, csv_text, load, mapping, write_text
 from groundstation.results.flight import NotAssessable
 from groundstation.results.grouped_findings import grouped
@@ -27,6 +31,7 @@ from groundstation.results.grouped_findings import grouped
 IDENTITY = (  # what tells the rows of a table in the results apart
     *("name", "reference", "other", "quantity", "method", "phase"),
     *("start_h", "horizon_min", "length_min", "length_s"),
+    *("algorithm", "vehicle", "receiver", "source"),
 )
 STATED_SIGMA = {  # where it is not named as the number with "sigma" before the unit
     "error_deg": ("standard_error_deg", "sigma_deg"),
@@ -43,11 +48,13 @@ MAIN = re.compile(
     r"|inertial\.(kind|radial_error_rate_\d\d_nmiph|velocity_error_rms_mps|azimuth\.error_deg)"
     r"|inertial\.(north|east)\.states\.[^.]+\.value"
     r"|(magnetic|landing)\.verdict|forecast\.default_method"
+    r"|cooperative\.default_algorithm"
+    r"|cooperative\.algorithms\.[^.]+\.(two_sigma_r_m|rms_m|nees|is_consistent|diverges)"
 )
 
 
 def compare(a: Path, b: Path, event: Event | None = None) -> tuple[Comparison, SavedFlight, SavedFlight]:
-    """Compare two flight folders.
+    """Compare two flight folders, or two sessions.
 
     Parameters
     ----------
@@ -58,10 +65,13 @@ def compare(a: Path, b: Path, event: Event | None = None) -> tuple[Comparison, S
     Raises
     ------
     UsageError
-        When a path is no flight folder, or a flight does not have the event.
+        When a path is no flight folder, one is a session and the other a flight, or a flight does not have the event.
     UnreadableLogError
         When what a folder holds cannot be read.
     """
+    if is_session(a) != is_session(b):
+        session = a if is_session(a) else b
+        raise UsageError(str(session), "a session of several aircraft", "a flight, as the other is")
     saved_a, saved_b = _load(a), _load(b)
     one, other = _side(saved_a), _side(saved_b)
     origins = {_origin(saved) for saved in (saved_a, saved_b)}
@@ -113,7 +123,25 @@ def _load(folder: Path) -> SavedFlight:
     if not folder.is_dir() or not (folder / MANIFEST).is_file():
         found = "no such folder" if not folder.exists() else "no results"
         raise UsageError(str(folder), found, "a flight folder that `run` made")
-    return load(folder, ANSWER_TYPES)
+    saved = load(folder, ANSWER_TYPES)
+    errors = session_errors(saved)
+    return saved if errors is None else replace(saved, figures={**saved.figures, errors.name: errors})
+
+
+def session_errors(saved: SavedFlight) -> FigureData | None:
+    """Worst computed 2 sigma_r and RMS error of all aircraft with time, default algorithm; None for a flight."""
+    answer, tracks = saved.results.answer(CooperativeResult), saved.figure("cooperative_tracks")
+    if answer is None or tracks is None:
+        return None
+    rows = texts(tracks, "algorithm") == answer.default_algorithm
+    time_s, epoch = np.unique(np.round(numbers(tracks, "time_s")[rows], 3), return_inverse=True)
+    worst_m, error_m = np.full(len(time_s), np.nan), numbers(tracks, "error_m")[rows]
+    np.fmax.at(worst_m, epoch, numbers(tracks, "two_sigma_r_m")[rows])
+    known = np.isfinite(error_m)
+    counts = np.bincount(epoch[known], minlength=len(time_s))
+    squares = np.bincount(epoch[known], error_m[known] ** 2, minlength=len(time_s))
+    rms_m = np.sqrt(np.divide(squares, counts, out=np.full(len(time_s), np.nan), where=counts > 0))
+    return FigureData("session_errors", {"time_s": time_s, "two_sigma_r_m": worst_m, "rms_error_m": rms_m}, {})
 
 
 def _side(saved: SavedFlight) -> Side:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.integrity.limits import Thresholds
+from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
@@ -36,7 +37,7 @@ def convert_many(
         if not log.exists():
             raise UsageError(str(log), "no such file")
         if log.is_dir():
-            raise UsageError(str(log), "a folder", "a log", "`run` takes folders")
+            raise no_log(log)
     if len(logs) > 1 and output.is_file():
         raise UsageError(str(output), "a file", "a folder for several logs")
     into_folder = len(logs) > 1 or output.is_dir()

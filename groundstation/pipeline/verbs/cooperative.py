@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.many_flights.inputs import file_in
+from groundstation.pipeline.many_flights.inputs import file_in, is_session
 from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
 from groundstation.pipeline.many_flights.publishing import rows_without_flight, write_index_of
 from groundstation.pipeline.many_flights.session import SessionJob, load_stations, run_one
@@ -12,6 +12,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.log import Log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.results.files import load_manifest
 
 
 def run_session(
@@ -30,7 +31,7 @@ def run_session(
     Parameters
     ----------
     paths : sequence of Path
-        Logs of any format a reader knows, MCAPs, or flight folders.
+        Logs of any format a reader knows, MCAPs, flight folders, or the folder of a session: its logs again.
     out : Path
         A session in it with the same logs, stations, settings and versions is not run again.
     configuration : Configuration
@@ -48,7 +49,7 @@ def run_session(
         When a path is missing, a setting is wrong, or ``out`` is something else's.
     """
     ground = load_stations(stations)
-    files = [_file_of(path) for path in paths]
+    files = [file for path in paths for file in _files_of(path)]
     refuse_foreign(out, force)
     listen(Event("begin", total=1))
     logs, failed = _opened(files, configuration)
@@ -63,10 +64,13 @@ def run_session(
     return (*failed, outcome, *problems)
 
 
-def _file_of(path: Path) -> Path:
+def _files_of(path: Path) -> list[Path]:
+    """A log, the MCAP of a flight folder, or those of the flights of a session."""
     if not path.exists():
         raise UsageError(str(path), "no such file")
-    return file_in(path, ".mcap") if path.is_dir() else path
+    if is_session(path):
+        return [path / log.mcap for log in load_manifest(path).logs]
+    return [file_in(path, ".mcap") if path.is_dir() else path]
 
 
 def _opened(files: Sequence[Path], configuration: Configuration) -> tuple[tuple[Log, ...], tuple[Outcome, ...]]:

@@ -8,6 +8,7 @@ from typing import Any
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import Damage, RecordBatch
+from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.log import Log, open_log
 from groundstation.store.info import StoreInfo
 
@@ -50,7 +51,7 @@ def describe(path: Path, profile: Path | None = None) -> Description:
     if not path.exists():
         raise UsageError(str(path), "no such file")
     if path.is_dir():
-        raise UsageError(str(path), "a folder", "a log", "`run` takes folders")
+        raise no_log(path)
     if _is_foreign(path, profile):
         return _foreign(path)
     log = open_log(path, profile)

@@ -5,7 +5,7 @@ import os
 import signal
 import subprocess
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -48,16 +48,20 @@ def serve(
             "Rerun's catalog server answers pages of its own machine alone",
             next_step="leave --web out; others open the catalog in their own viewer",
         )
-    flights, fleet = recordings_in(out, say)
+    flights, sessions, fleet = recordings_in(out, say)
     stop = threading.Event()
-    with catalog_server(flights, fleet, host=host, port=port) as catalog, _set_by_signals(stop, asked=not web):
+    with (
+        catalog_server(flights, fleet, host=host, port=port, sessions=sessions) as catalog,
+        _set_by_signals(stop, asked=not web),
+    ):
         for path, reason in catalog.refused:
             say(f"warning: {path}: left out ({reason})")
-        if not catalog.flights and not catalog.has_fleet:
+        recordings = len(catalog.flights) + len(catalog.sessions)
+        if not recordings and not catalog.has_fleet:
             raise GroundstationError(str(out), "no recording can be read", next_step="run the logs again")
         fleet_too = ", and fleet.rrd" if catalog.has_fleet else ""
         tell(catalog.url)
-        say(f"{len(catalog.flights)} recordings{fleet_too}; open them with: groundstation view {catalog.url}")
+        say(f"{recordings} recordings{fleet_too}; open them with: groundstation view {catalog.url}")
         say("Ctrl-C ends")
         try:
             if web:
@@ -83,8 +87,8 @@ def _set_by_signals(stop: threading.Event, *, asked: bool) -> Iterator[None]:
             signal.signal(one, handler)
 
 
-def recordings_in(out: Path, say: Callable[[str], None]) -> tuple[list[Path], Path | None]:
-    """Recordings of the flights and sessions in a folder, and that of the fleet; folders without one are told.
+def recordings_in(out: Path, say: Callable[[str], None]) -> tuple[list[Path], list[Path], Path | None]:
+    """Recordings of the flights in a folder, of the sessions, and that of the fleet; folders without one are told.
 
     Raises
     ------
@@ -93,16 +97,21 @@ def recordings_in(out: Path, say: Callable[[str], None]) -> tuple[list[Path], Pa
     """
     if not out.is_dir():
         raise UsageError(str(out), "no such folder")
-    flights = []
-    for folder in (*flight_folders(out), *session_folders(out)):
+    flights, sessions = (_recordings(folders, say) for folders in (flight_folders(out), session_folders(out)))
+    fleet = out / FLEET_RECORDING
+    if not flights and not sessions and not fleet.is_file():
+        raise UsageError(str(out), "no recordings", "a folder that `run` made")
+    return flights, sessions, fleet if fleet.is_file() else None
+
+
+def _recordings(folders: Iterable[Path], say: Callable[[str], None]) -> list[Path]:
+    found = []
+    for folder in folders:
         try:
-            flights.append(file_in(folder, ".rrd"))
+            found.append(file_in(folder, ".rrd"))
         except UsageError as error:
             say(f"warning: left out: {error}")
-    fleet = out / FLEET_RECORDING
-    if not flights and not fleet.is_file():
-        raise UsageError(str(out), "no recordings", "a folder that `run` made")
-    return flights, fleet if fleet.is_file() else None
+    return found
 
 
 def _is_loopback(host: str) -> bool:
