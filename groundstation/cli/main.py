@@ -73,7 +73,9 @@ def check(
     thresholds: ThresholdsFile = None,
     config: ConfigFile = None,
     profile: Profile = None,
-    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is at least this severe.")] = "none",
+    fail_on: Annotated[
+        FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is at least this severe.")
+    ] = "none",
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
@@ -136,7 +138,9 @@ def run(
     scheduler: Annotated[
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
     ] = "",
-    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is at least this severe.")] = "none",
+    fail_on: Annotated[
+        FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is at least this severe.")
+    ] = "none",
     apply: Annotated[
         str,
         typer.Option(
@@ -329,7 +333,9 @@ def cooperative(
     ] = None,
     config: ConfigFile = None,
     profile: Profile = None,
-    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is at least this severe.")] = "none",
+    fail_on: Annotated[
+        FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is at least this severe.")
+    ] = "none",
     no_pdf: NoPdf = False,
     force: Force = False,
     quiet: Quiet = False,
