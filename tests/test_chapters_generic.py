@@ -7,11 +7,11 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from groundstation.chapters import FLIGHT_CHAPTERS, SESSION_CHAPTERS, chapters_of, without_chapter
+from groundstation.chapters import FLIGHT_CHAPTERS, PLAN_CHAPTERS, SESSION_CHAPTERS, chapters_of, without_chapter
 from groundstation.chapters.generic import MOST_ROWS, figures_over_time, generic
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Facts, Section
-from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES, SESSION_ANALYSES
+from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES, PLANS, SESSION_ANALYSES
 from groundstation.reports.drawing import Drawing, draw, sketching
 from groundstation.reports.figures import with_drawings
 from groundstation.results import restore
@@ -204,7 +204,8 @@ def test_an_answer_with_a_chapter_has_no_second_one(tmp_path: Path) -> None:
 
 
 def test_every_shipped_answer_has_a_chapter_of_its_own_and_is_read_back() -> None:
-    own = {kind for chapter in (*FLIGHT_CHAPTERS, *SESSION_CHAPTERS) for kind in chapter.answers}
-    assert own == {analysis.answer for analysis in (*FLIGHT_ANALYSES, *SESSION_ANALYSES)}
+    own = {kind for chapter in (*FLIGHT_CHAPTERS, *SESSION_CHAPTERS, *PLAN_CHAPTERS) for kind in chapter.answers}
+    planned = {kind for plan in PLANS for kind in plan.answers}
+    assert own == {analysis.answer for analysis in (*FLIGHT_ANALYSES, *SESSION_ANALYSES)} | planned
     assert dict(restore.ANSWER_TYPES) == dict(ANSWER_TYPES)
     assert by_analysis(wind())["wind"] == wind()

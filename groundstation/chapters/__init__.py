@@ -1,8 +1,6 @@
 """Chapters: what the answers of a flight say, told once, without markup."""
 
-from collections.abc import Callable
-from typing import NamedTuple
-
+from groundstation.chapters.chapter import Chapter
 from groundstation.chapters.cooperative import cooperative, is_session
 from groundstation.chapters.forecast import forecast
 from groundstation.chapters.generic import generic
@@ -12,6 +10,7 @@ from groundstation.chapters.landing_beacons import landing_beacons
 from groundstation.chapters.latency import latency
 from groundstation.chapters.magnetic import magnetic
 from groundstation.chapters.parts import Section
+from groundstation.chapters.plan import PLAN_CHAPTERS, is_plan
 from groundstation.results.answer import Answer
 from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.flight import FlightResults
@@ -22,14 +21,6 @@ from groundstation.results.landing_beacons import BeaconLanding
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
 from groundstation.results.magnetic_ground import GroundDeviation
-
-
-class Chapter(NamedTuple):
-    """A chapter of its own: the answers it tells, and what builds it; None where it has nothing to say."""
-
-    answers: tuple[type[Answer], ...]
-    build: Callable[[FlightResults], Section | None]
-
 
 # In the order of the report. An answer that none of them tells has the generic chapter.
 FLIGHT_CHAPTERS: tuple[Chapter, ...] = (
@@ -44,8 +35,8 @@ SESSION_CHAPTERS: tuple[Chapter, ...] = (Chapter((CooperativeResult,), cooperati
 
 
 def chapters_of(results: FlightResults) -> tuple[Section, ...]:
-    """The chapters on the answers of a flight or session: those of their own, then a generic one for every other."""
-    listed = SESSION_CHAPTERS if is_session(results) else FLIGHT_CHAPTERS
+    """The chapters on the answers of a flight, a session or a plan: their own, then a generic one for every other."""
+    listed = PLAN_CHAPTERS if is_plan(results) else SESSION_CHAPTERS if is_session(results) else FLIGHT_CHAPTERS
     own = [chapter.build(results) for chapter in listed]
     return (
         *(section for section in own if section is not None),
@@ -55,5 +46,5 @@ def chapters_of(results: FlightResults) -> tuple[Section, ...]:
 
 def without_chapter(results: FlightResults) -> tuple[Answer, ...]:
     """The answers that no chapter of its own tells."""
-    told = tuple(kind for chapter in (*FLIGHT_CHAPTERS, *SESSION_CHAPTERS) for kind in chapter.answers)
+    told = tuple(kind for chapter in (*FLIGHT_CHAPTERS, *SESSION_CHAPTERS, *PLAN_CHAPTERS) for kind in chapter.answers)
     return tuple(answer for answer in results.answers.values() if not isinstance(answer, told))

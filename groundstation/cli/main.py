@@ -8,11 +8,10 @@ from typing import Annotated, Any, Literal
 import typer
 
 from groundstation.base.version import __version__
-from groundstation.cli import fleets, flights
+from groundstation.cli import fleets, flights, plans
 from groundstation.cli.application import (
     DATA_LOST,
     DONE,
-    USAGE,
     AircraftFile,
     ConfigFile,
     FailOn,
@@ -32,7 +31,7 @@ from groundstation.cli.application import (
     tell_written,
 )
 
-__all__ = ["app", "fleets", "flights", "main"]  # the modules hold more verbs
+__all__ = ["app", "fleets", "flights", "main", "plans"]  # the modules hold more verbs
 
 
 def _version(is_asked: bool) -> None:
@@ -342,27 +341,6 @@ def cooperative(
         )
     printing.outcomes(outcomes, as_json_text=json, quiet=quiet, with_times=verbose)
     return printing.worst_code(outcomes)
-
-
-LATER_VERBS = {
-    "plan": "Plan a session or a landing.",
-}
-
-
-def _add_later_verb(name: str) -> None:
-    @app.command(
-        name=name,
-        hidden=True,
-        add_help_option=False,
-        context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
-    )
-    def not_in_this_version(context: typer.Context) -> None:
-        say(f"error: {name}: not in this version")
-        raise typer.Exit(USAGE)
-
-
-for _name in LATER_VERBS:
-    _add_later_verb(_name)
 
 
 def main(arguments: Any = None) -> None:

@@ -10,6 +10,7 @@ from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY
 
 FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, STUDY_MARK = MANIFEST, INDEX_JSON, ".groundstation-study"
 SESSION_MARK = f"{ARRAYS}/session_clocks.parquet"  # of a session of several aircraft, which is no flight
+PLAN_MARK = "plan.toml"  # the scenario of a plan, which is no flight
 COMPARISON_MARKS = "compare.html", "compare.csv"
 COMPARISON_RECORDING = "compare.rrd"
 CORRECTED = ".corrected.mcap"  # end of the name of what stands beside a flight's MCAP, and is none
@@ -75,12 +76,18 @@ def file_in(folder: Path, ending: str, *others: str) -> Path:
 
 def flight_folders(out: Path) -> list[Path]:
     """Flight folders in an OUT, in the order of their names."""
-    return [folder for folder in _finished_folders(out) if not (folder / SESSION_MARK).is_file()]
+    marks = SESSION_MARK, PLAN_MARK
+    return [folder for folder in _finished_folders(out) if not any((folder / mark).is_file() for mark in marks)]
 
 
 def session_folders(out: Path) -> list[Path]:
     """Session folders in an OUT, in the order of their names."""
     return [folder for folder in _finished_folders(out) if (folder / SESSION_MARK).is_file()]
+
+
+def plan_folders(out: Path) -> list[Path]:
+    """Folders of plans in an OUT, in the order of their names."""
+    return [folder for folder in _finished_folders(out) if (folder / PLAN_MARK).is_file()]
 
 
 def _finished_folders(out: Path) -> list[Path]:

@@ -7,7 +7,14 @@ from groundstation.base.errors import GroundstationError, UsageError, told_in_a_
 from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.fleet import FLEET_PARQUET, write_fleet
 from groundstation.pipeline.fleet_samples import SAMPLES
-from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, flight_folders, is_ours, session_folders
+from groundstation.pipeline.inputs import (
+    FLIGHT_FOLDER_MARK,
+    OUT_FOLDER_MARK,
+    flight_folders,
+    is_ours,
+    plan_folders,
+    session_folders,
+)
 from groundstation.pipeline.outcome import Outcome
 from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
 from groundstation.reports.fleet_report import write_fleet_report
@@ -81,7 +88,7 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
         raise UsageError(str(out), "no results", "a folder that `run` made")
     paths: list[Path] = []
     problems: list[Outcome] = []
-    for folder in [out] if is_flight else [*flight_folders(out), *session_folders(out)]:
+    for folder in [out] if is_flight else [*flight_folders(out), *session_folders(out), *plan_folders(out)]:
         try:
             with told_in_a_line(str(folder)):
                 written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf)

@@ -8,6 +8,7 @@ from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.serial import MismatchError, from_json, join
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.results.answer import A, Answer
+from groundstation.results.control import ControlPlan
 from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.document import SummaryDocument
 from groundstation.results.flight import FlightResults
@@ -25,7 +26,7 @@ ANSWER_TYPES: Mapping[str, type[Answer]] = MappingProxyType(
         kind.analysis: kind
         for kind in (
             *(HeadingResult, InertialResult, ForecastResult, Latencies, MagneticResult, GroundDeviation),
-            *(BeaconLanding, CooperativeResult),
+            *(BeaconLanding, CooperativeResult, ControlPlan),
         )
     }
 )

@@ -7,6 +7,7 @@ from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures import (
+    control,
     cooperative,
     forecast,
     generic,
@@ -60,6 +61,9 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "cooperative.errors": cooperative.errors,
     "cooperative.geometry": cooperative.geometry,
     "cooperative.links": cooperative.links,
+    "control.paths": control.paths,
+    "control.measures": control.measures,
+    "control.law": control.law,
 }
 
 
