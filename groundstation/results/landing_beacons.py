@@ -91,8 +91,9 @@ class BeaconLanding(Answer):
     remarks : tuple of str
     settings : dict
     figures : tuple of FigureData
-        ``landing_beacons_path`` (time_s, approach, before_threshold_m, distance_sigma_m, lateral_m, lateral_sigma_m,
-        glide_path_m, glide_path_sigma_m, height_m, off_course_deg).
+        ``landing_beacons_path`` (time_s, approach, straight_before_threshold_m of a straight flight through all places,
+        before_threshold_m, distance_sigma_m, lateral_m, lateral_sigma_m, glide_path_m, glide_path_sigma_m, height_m,
+        off_course_deg).
     """
 
     analysis: ClassVar[str] = "landing_beacons"

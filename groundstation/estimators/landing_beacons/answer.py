@@ -91,10 +91,11 @@ def _rows(number: int, flown: Flown) -> list[DeviationRow]:
 
 def _figure(flown: Sequence[Flown]) -> FigureData:
     parts: dict[str, list[np.ndarray]] = {}
-    for number, (part, found, _) in enumerate(flown, start=1):
+    for number, (part, found, told) in enumerate(flown, start=1):
         columns = {
             "time_s": part.time_s,
             "approach": np.full(len(part.time_s), number),
+            "straight_before_threshold_m": told.speed_mps * (told.threshold_s - part.time_s),
             "before_threshold_m": found.before_m,
             "distance_sigma_m": found.distance_sigma_m,
             "lateral_m": found.fix.right_m,
