@@ -9,12 +9,16 @@ from groundstation.estimators.control.analysis import SESSION_PLAN
 from groundstation.estimators.cooperative.analysis import COOPERATIVE
 from groundstation.estimators.heading.analysis import HEADING
 from groundstation.estimators.inertial.analysis import FORECAST, INERTIAL
+from groundstation.estimators.landing_beacons.analysis import LANDING_BEACONS
 from groundstation.estimators.latency.analysis import LATENCY
 from groundstation.estimators.magnetic.analysis import MAGNETIC, MAGNETIC_GROUND
 from groundstation.estimators.plan import Plan
 from groundstation.results.answer import Answer
 
-FLIGHT_ANALYSES: tuple[Analysis, ...] = (HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND)
+FLIGHT_ANALYSES: tuple[Analysis, ...] = (
+    *(HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND),
+    LANDING_BEACONS,
+)
 SESSION_ANALYSES: tuple[Analysis, ...] = (COOPERATIVE,)
 PLANS: tuple[Plan[Any], ...] = (SESSION_PLAN,)
 
