@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from groundstation.estimators.analysis import Analysis
+from groundstation.estimators.approaches.analysis import LANDING
 from groundstation.estimators.cooperative.analysis import COOPERATIVE
 from groundstation.estimators.heading.analysis import HEADING
 from groundstation.estimators.inertial.analysis import FORECAST, INERTIAL
@@ -11,7 +12,7 @@ from groundstation.estimators.latency.analysis import LATENCY
 from groundstation.estimators.magnetic.analysis import MAGNETIC, MAGNETIC_GROUND
 from groundstation.results.answer import Answer
 
-FLIGHT_ANALYSES: tuple[Analysis, ...] = (HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND)
+FLIGHT_ANALYSES: tuple[Analysis, ...] = (HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND, LANDING)
 SESSION_ANALYSES: tuple[Analysis, ...] = (COOPERATIVE,)
 
 # What the answers of a saved flight or session become, by the name of their analysis.

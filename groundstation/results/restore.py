@@ -14,6 +14,7 @@ from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
+from groundstation.results.landing import LandingResult
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
 from groundstation.results.magnetic_ground import GroundDeviation
@@ -23,7 +24,7 @@ ANSWER_TYPES: Mapping[str, type[Answer]] = MappingProxyType(
     {
         kind.analysis: kind
         for kind in (
-            *(HeadingResult, InertialResult, ForecastResult, Latencies, MagneticResult, GroundDeviation),
+            *(HeadingResult, InertialResult, ForecastResult, Latencies, MagneticResult, GroundDeviation, LandingResult),
             CooperativeResult,
         )
     }
