@@ -22,6 +22,7 @@ from groundstation.viewer.tabs.forecast import forecast
 from groundstation.viewer.tabs.generic import generic_tab
 from groundstation.viewer.tabs.heading import heading
 from groundstation.viewer.tabs.inertial import inertial
+from groundstation.viewer.tabs.landing import landing
 from groundstation.viewer.tabs.log import log
 from groundstation.viewer.tabs.magnetic import magnetic
 from groundstation.viewer.tabs.overview import overview
@@ -121,6 +122,7 @@ def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResul
         inertial(recorder, results),
         forecast(recorder, results),
         magnetic(recorder, results),
+        landing(recorder, results),
         *(generic_tab(recorder, results, answer) for answer in without_chapter(results)),
         raw(recorder, flight, results),
         log(recorder, flight, results),

@@ -48,6 +48,7 @@ from groundstation.results.landing_categories import ACCURACY_ONLY, axis_categor
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight
 
+SATELLITES = "GPS"  # as recorders name the source of guidance
 TURN_S = 180.0  # before a final, in which it is turned onto the course
 MOST_APPROACHES = 50
 
@@ -95,7 +96,7 @@ def _approach(number: int, flight: "Flight", path: FlightPath, final: Final, set
     height = near.height_m[near.is_final]
     step_m, source = _step_m(path), _source(flight, path, final)
     sensitivity = _sensitivity(path, near, runway, source, float(np.hypot(*step_m))) if path.guidance_topic else None
-    errors = _position_errors(flight, path, final, runway, sensitivity, settings)
+    errors = _position_errors(flight, path, final, runway, source, sensitivity, settings)
     protection = protection_along(flight, path.time_s[final.first], final.end.time_s)
     lands = final.end.outcome == "landing"
     approach = Approach(
@@ -176,7 +177,7 @@ def _sensitivity(path: FlightPath, near: Against, runway: RunwayUsed, source: st
     """From the turn onto a localizer as well: the final alone has few deviations."""
     last = near.rows.start + int(np.count_nonzero(near.is_final))
     first = near.rows.start
-    if "GPS" not in source:  # which guides along the leg before, until the turn is made
+    if SATELLITES not in source:  # which guides along the leg before, until the turn is made
         first = int(np.searchsorted(path.time_s, path.time_s[first] - TURN_S))
     distance_m, across_m = along_and_across(path.latitude_deg[first:last], path.longitude_deg[first:last], runway)
     return sensitivity_of(path.time_s[first:last], path.lateral_dots[first:last], distance_m, across_m, runway, step_m)
@@ -187,12 +188,16 @@ def _position_errors(
     path: FlightPath,
     final: Final,
     runway: RunwayUsed,
+    source: str,
     sensitivity: Sensitivity | None,
     settings: LandingSettings,
 ) -> tuple[PositionError, ...]:
     """The error of each source of positions across the course; nothing where no localizer was followed."""
     if final.established is None:
         return ()
+    if SATELLITES in source:
+        reason = "what guided is a satellite receiver, no localizer"
+        return (PositionError(path.position_topic, "not measured", reason, 0),)
     if sensitivity is not None and not fits(sensitivity):
         reason = f"positions move by {sensitivity.ratio:.2f} of what the localizer shows: no reference"
         return (PositionError(path.position_topic, "not measured", reason, 0),)
@@ -274,7 +279,7 @@ def sentence_of(one: Approach) -> str:
     where = f"runway {one.runway.name}" if one.runway.name else f"course {one.runway.true_course_deg:.1f} deg"
     closely = ""
     if one.established is not None:
-        closely = f", localizer {one.established.lateral_rms_dots:.2f} dot RMS"
+        closely = f", {one.established.lateral_rms_dots:.2f} dot RMS off the course"
     return f"{one.outcome} on {where}{closely}{': ' + verdicts if verdicts else ''}"
 
 

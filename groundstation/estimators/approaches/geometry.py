@@ -4,7 +4,7 @@ Distances are along the runway, positive before the threshold; across, right of 
 deviations are aircraft minus path.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,10 +50,13 @@ class Against:
     vertical_dot_m: FloatArray
 
 
-def line_through(path: FlightPath, rows: slice) -> Line:
-    """Total least squares line through the positions of some rows, in the direction of flight."""
+def line_through(path: FlightPath, rows: slice, shift_m: FloatArray | None = None) -> Line:
+    """Total least squares line through the positions of some rows, in the direction of flight.
+
+    ``shift_m`` (n, 2) moves them north and east first.
+    """
     latitude, longitude = float(np.mean(path.latitude_deg[rows])), float(path.longitude_deg[rows][0])
-    place = path.position_m(latitude, longitude)[rows]
+    place = path.position_m(latitude, longitude)[rows] + (0.0 if shift_m is None else shift_m)
     middle = place.mean(axis=0)
     _left, sizes, axes = np.linalg.svd(place - middle, full_matrices=False)
     direction = axes[0] * (1.0 if axes[0] @ (place[-1] - place[0]) >= 0.0 else -1.0)
@@ -86,25 +89,44 @@ def runway_of(path: FlightPath, final: Final, settings: LandingSettings) -> Runw
             listed.length_m,
             listed.width_m,
         )
-    line = line_through(path, _line_rows(path, final))
+    line = _course_line(path, final, settings)
     latitude, longitude, reason = _threshold(path, final, line, settings)
     speed_mps = float(np.nanmedian(path.ground_speed_mps[final.first : final.last]))
     drift_deg = 0.0 if path.position_topic.startswith("gnss") else np.rad2deg(VELOCITY_ERROR_MPS / max(speed_mps, 1.0))
     sigma_deg = float(np.hypot(np.rad2deg(np.sqrt(2.0) * line.scatter_m / max(line.length_m, 1.0)), drift_deg))
+    return replace(_placed(line, latitude, longitude, settings), course_sigma_deg=sigma_deg, place_reason=reason)
+
+
+def _placed(line: Line, latitude_deg: float, longitude_deg: float, settings: LandingSettings) -> RunwayUsed:
+    """A runway on a line, with the aids of the settings."""
     return RunwayUsed(
         "",
         "positions",
-        latitude,
-        longitude,
+        latitude_deg,
+        longitude_deg,
         line.course_deg,
-        sigma_deg,
+        0.0,
         None,
-        angle_deg,
-        crossing_m,
-        width_m,
-        distance_m,
-        place_reason=reason,
+        settings.glide_angle_deg,
+        settings.threshold_crossing_height_m,
+        settings.localizer_width_m,
+        settings.localizer_distance_m,
     )
+
+
+def _course_line(path: FlightPath, final: Final, settings: LandingSettings) -> Line:
+    """The course line that positions show: where they lie, less what the guidance says they lie beside it."""
+    rows = _line_rows(path, final)
+    line = line_through(path, rows)
+    dots = path.lateral_dots[rows]
+    if final.established is None or not np.isfinite(dots).any():
+        return line
+    latitude, longitude, _reason = _threshold(path, final, line, settings)
+    runway = _placed(line, latitude, longitude, settings)
+    distance_m, _across_m = along_and_across(path.latitude_deg[rows], path.longitude_deg[rows], runway)
+    aside_m = np.nan_to_num(dots) * metres_per_dot(distance_m, runway)
+    course_rad = np.deg2rad(line.course_deg)
+    return line_through(path, rows, np.outer(-aside_m, [-np.sin(course_rad), np.cos(course_rad)]))
 
 
 def _given(value: float | None, otherwise: float) -> float:

@@ -38,7 +38,7 @@ def _from(path: FlightPath, near: Against, gate_m: float, settings: LandingSetti
     faster = speed - float(np.median(last)) if last.size else np.full(len(speed), np.nan)
     limit = settings.deviation_max_dots
     gates = (
-        _gate("lateral", "localizer deviation", np.abs(path.lateral_dots[rows]), limit, "dots"),
+        _gate("lateral", "course deviation", np.abs(path.lateral_dots[rows]), limit, "dots"),
         _gate("vertical", "glide path deviation", np.abs(path.vertical_dots[rows]), limit, "dots"),
         _gate("sink_rate", "sink rate", path.sink_rate_mps[rows], settings.sink_rate_max_mps, "m/s"),
         _gate("bank", "bank", np.abs(path.bank_deg[rows]), settings.bank_max_deg, "deg"),

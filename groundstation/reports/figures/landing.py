@@ -10,6 +10,7 @@ from groundstation.base.records import BoolArray
 from groundstation.base.units import DOTS_PER_FULL_SCALE
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
+from groundstation.reports.figures.inertial import plain_log
 from groundstation.results.figures import FigureData, numbers
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing import Approach, LandingResult
@@ -47,7 +48,7 @@ def deviations(results: FlightResults, of: str) -> Drawing | None:
 
     def paint(figure: Any) -> None:
         for place, (name, guided, placed, dot_m) in enumerate(panels):
-            axes = d.place(figure, 18, 66 - 54 * place, 174, 106 - 54 * place)
+            axes = d.place(figure, 18, 60 - 48 * place, 174, 98 - 48 * place)
             _corridors(axes, distance, dot_m, vertical=bool(place))
             d.dots(axes, distance / M_PER_KM, placed, d.UNUSED, 2.0, label="positions" if not place else "height")
             d.line(axes, distance / M_PER_KM, guided, d.INS, 1.3, label="guidance")
@@ -68,7 +69,7 @@ def deviations(results: FlightResults, of: str) -> Drawing | None:
     )
     alt = "Lateral and vertical deviation of the approach against distance to the threshold."
     title = f"Approach {one.number}: deviations"
-    return Drawing(title, caption, alt, d.draw(f"landing-deviations-{of}", 112, paint), ("landing_path",))
+    return Drawing(title, caption, alt, d.draw(f"landing-deviations-{of}", 104, paint), ("landing_path",))
 
 
 def _corridors(axes: Any, distance_m: FloatArray, dot_m: FloatArray, *, vertical: bool) -> None:
@@ -98,9 +99,9 @@ def final(results: FlightResults, of: str) -> Drawing | None:
     height, path = numbers(data, "height_m")[mine], numbers(data, "path_height_m")[mine]
 
     def paint(figure: Any) -> None:
-        above = d.place(figure, 18, 60, 174, 92)
-        _from_above(above, one, distance, across, numbers(data, "lateral_dot_m")[mine])
-        side = d.place(figure, 18, 12, 174, 50)
+        above = d.place(figure, 18, 54, 174, 82)
+        _from_above(above, one, numbers(data, "time_s")[mine], distance, across, numbers(data, "lateral_dot_m")[mine])
+        side = d.place(figure, 18, 12, 174, 45)
         d.line(side, distance, path, d.LIMIT, 0.9, label="path")
         d.line(side, distance, height, d.INS, 1.2, label="flown")
         for gate in one.stabilised:
@@ -121,11 +122,13 @@ def final(results: FlightResults, of: str) -> Drawing | None:
         f"{one.height_source or 'nothing'} and the path; fine lines are the gate heights. Threshold: {where}."
     )
     alt = "The final from above with the course sector, and from the side with the glide path."
-    svg = d.draw(f"landing-final-{of}", 98, paint)
+    svg = d.draw(f"landing-final-{of}", 88, paint)
     return Drawing(f"Approach {one.number}: the final", caption, alt, svg, ("landing_path",))
 
 
-def _from_above(axes: Any, one: Approach, distance_km: FloatArray, across_km: FloatArray, dot_m: FloatArray) -> None:
+def _from_above(
+    axes: Any, one: Approach, time_s: FloatArray, distance_km: FloatArray, across_km: FloatArray, dot_m: FloatArray
+) -> None:
     edge = DOTS_PER_FULL_SCALE * dot_m / M_PER_KM
     axes.fill_between(distance_km, -edge, edge, color=d.FILL, alpha=0.5, linewidth=0, label="course sector")
     length_km = (one.runway.length_m or 0.0) / M_PER_KM
@@ -134,7 +137,7 @@ def _from_above(axes: Any, one: Approach, distance_km: FloatArray, across_km: Fl
     axes.axhline(0.0, color=d.LIMIT, linewidth=0.8)
     d.line(axes, distance_km, across_km, d.INS, 1.1, label="positions")
     if one.touchdown is not None:
-        place = int(np.nanargmin(np.abs(distance_km + (one.touchdown.past_threshold_m or 0.0) / M_PER_KM)))
+        place = int(np.argmin(np.abs(time_s - one.touchdown.time_s)))
         axes.plot([distance_km[place]], [across_km[place]], "o", color=d.GNSS, markersize=4.0, label="touchdown")
     reach = max(1.3 * float(np.nanmax(np.abs(across_km))), 0.3)
     axes.set_ylim(-reach, reach)
@@ -161,6 +164,7 @@ def protection(results: FlightResults, of: str) -> Drawing | None:
             if np.isfinite(limit).any():
                 d.line(axes, time_s, limit, colour, 0.9, linestyle=(0, (4, 2)), label=f"{axis} alarm limit")
         axes.set_yscale("log")
+        plain_log(axes.yaxis)
         axes.set_ylabel("m")
         d.time_axis(axes, float(time_s[0]), float(time_s[-1]))
         d.legend_above(axes, 4)
