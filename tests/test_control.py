@@ -162,9 +162,8 @@ def test_an_aircraft_has_the_errors_of_the_cooperative_filter() -> None:
     blind = AccuracyModel(replace(model.plan, ranging=Ranging(1e5, 600.0)))
     assert model.dynamics == pytest.approx(transition, rel=1e-12)
     assert blind.accuracy(still).covariance[0] == pytest.approx(P)
-    assert blind.accuracy(still).covariance[1] == pytest.approx(
-        transition @ P @ transition.T + noise, rel=1e-4, abs=1e-4
-    )
+    predicted = transition @ P @ transition.T + noise
+    assert blind.accuracy(still).covariance[1] == pytest.approx(predicted, rel=1e-4, abs=1e-4)
 
 
 @pytest.mark.parametrize("seed", range(40))

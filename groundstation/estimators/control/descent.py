@@ -1,7 +1,7 @@
 """The gradient method: spectral projected gradients over controls that have bounds and limits of their change.
 
 Source: Birgin, Martinez and Raydan, Nonmonotone spectral projected gradient methods on convex sets, SIAM Journal on
-Optimization 10(4), 2000 (algorithm SPG2); Frank and Wolfe, An algorithm for quadratic programming, 1956 (the gap that
+Optimization 10(4), 2000 (algorithm SPG1); Frank and Wolfe, An algorithm for quadratic programming, 1956 (the gap that
 tells how far from a stationary point one is).
 """
 
@@ -33,7 +33,7 @@ class Minimum:
         In the shape of the start.
     loss : float
     gap : float
-        Most that any point of the set would gain to first order, over the size of the loss; 0 at a stationary point.
+        Most that any point within reach would gain to first order, over the size of the loss; 0 at a stationary point.
     iterations, evaluations : int
     has_converged : bool
         Gap below the tolerance.
@@ -51,7 +51,14 @@ class Minimum:
 
 
 def minimise(
-    measure: Measure, project: Project, start: FloatArray, width: float, *, iterations: int, tolerance: float
+    measure: Measure,
+    project: Project,
+    start: FloatArray,
+    width: float,
+    *,
+    iterations: int,
+    tolerance: float,
+    reach: float = FAR,
 ) -> Minimum:
     """Least loss over a set from a start.
 
@@ -69,6 +76,9 @@ def minimise(
         At most.
     tolerance : float
         Of the gap.
+    reach : float
+        How far the gap looks, in widths. In a set that is not convex something near: a gain beyond what is forbidden is
+        no gain here.
 
     Examples
     --------
@@ -83,18 +93,18 @@ def minimise(
     unit = width / _largest(slope)
     step, gap, done = unit, np.inf, 0
     for done in range(iterations + 1):
-        gap = _gap(x, value, slope, project, width)
+        gap = _gap(x, value, slope, project, reach * width)
         if gap <= tolerance or done == iterations or not np.isfinite(value):
             break
-        way = project(x - step * slope) - x
-        gain, share = float((slope * way).sum()), 1.0
+        share = 1.0
         for _ in range(MOST_HALVINGS):
-            trial = x + share * way
+            trial = project(x - share * step * slope)
+            gain = min(float((slope * (trial - x)).sum()), 0.0)
             reached, rise = measure(trial)
             evaluations += 1
-            if reached <= max(recent) + SUFFICIENT * share * gain:
+            if reached <= max(recent) + SUFFICIENT * gain:
                 break
-            share *= _shorter(share, value, reached, gain)
+            share *= _shorter(value, reached, gain)
         else:
             break
         moved, turned = trial - x, rise - slope
@@ -107,7 +117,7 @@ def minimise(
             best = value, x
     if best[0] < value:
         value, x = best
-        gap = _gap(x, value, measure(x)[1], project, width)
+        gap = _gap(x, value, measure(x)[1], project, reach * width)
         evaluations += 1
     return Minimum(x, value, gap, done, evaluations, gap <= tolerance)
 
@@ -116,18 +126,18 @@ def _largest(slope: FloatArray) -> float:
     return max(float(np.abs(slope).max(initial=0.0)), 1e-300)
 
 
-def _shorter(share: float, value: float, reached: float, gain: float) -> float:
+def _shorter(value: float, reached: float, gain: float) -> float:
     """Factor on a step that was too long: the least of the parabola through what is known, kept within bounds."""
     if not np.isfinite(reached):
         return 0.1
-    bend = reached - value - share * gain
-    return float(np.clip(-0.5 * share * gain / bend, 0.1, 0.5)) if bend > 0.0 else 0.5
+    bend = reached - value - gain
+    return float(np.clip(-0.5 * gain / bend, 0.1, 0.5)) if bend > 0.0 else 0.5
 
 
-def _gap(x: FloatArray, value: float, slope: FloatArray, project: Project, width: float) -> float:
+def _gap(x: FloatArray, value: float, slope: FloatArray, project: Project, reach: float) -> float:
     if not np.isfinite(value):
         return float("inf")
-    far = project(x - FAR * width / _largest(slope) * slope)
+    far = project(x - reach / _largest(slope) * slope)
     return max(float((slope * (x - far)).sum()), 0.0) / max(abs(value), 1e-300)
 
 
@@ -153,7 +163,7 @@ def nearest_law(wanted: FloatArray, start: float, low: float, high: float, chang
     Examples
     --------
     >>> nearest_law(np.array([5.0, 5.0, 0.0, 0.0]), 0.0, -1.0, 4.0, 2.0).tolist()
-    [2.0, 3.0, 1.0, 0.0]
+    [2.0, 3.5, 1.5, 0.0]
     """
     at, slope = np.array([start]), np.array([0.0])
     lowest = np.empty(len(wanted) + 1)
