@@ -18,6 +18,7 @@ from groundstation.results.inertial import InertialResult
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
 from groundstation.results.magnetic_ground import GroundDeviation
+from groundstation.results.placement import PlacementPlan
 
 # The answers that a flight or a session may have, by the name of their analysis.
 ANSWER_TYPES: Mapping[str, type[Answer]] = MappingProxyType(
@@ -25,7 +26,7 @@ ANSWER_TYPES: Mapping[str, type[Answer]] = MappingProxyType(
         kind.analysis: kind
         for kind in (
             *(HeadingResult, InertialResult, ForecastResult, Latencies, MagneticResult, GroundDeviation),
-            *(CooperativeResult, ControlPlan),
+            *(CooperativeResult, ControlPlan, PlacementPlan),
         )
     }
 )
