@@ -17,6 +17,7 @@ STUDIES = {
     "forecast": "forecast of INS errors: every method under true and false models, and how honest its sigma is",
     "magnetic": "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
     "cooperative": "navigation between aircraft: published figures with ours beside them, divergence, consistency",
+    "control": "control of a session and placement of ground points: published figures with ours, laws flown",
     "landing": "landing by reference points and by locators: every published figure with ours beside it",
 }
 
@@ -108,6 +109,10 @@ def _study(name: str) -> "Callable[..., StudyResult]":
         from groundstation.studies.cooperative import study_cooperative
 
         return study_cooperative
+    if name == "control":
+        from groundstation.studies.control import study_control
+
+        return study_control
     if name == "landing":
         from groundstation.studies.landing import study_landing
 
