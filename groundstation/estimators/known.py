@@ -73,11 +73,11 @@ class Runway:
     sigma_deg: float = number(0.05, 0.0)
     latitude_deg: float | None = number(None, -90.0, 90.0)
     longitude_deg: float | None = number(None, -180.0, 180.0)
+    glide_angle_deg: float = number(3.0, 1.0, 10.0)
+    threshold_crossing_height_m: float = number(15.0, 0.0, 100.0)
     elevation_m: float | None = number(None, -500.0, 6_000.0)  # of the threshold, above mean sea level
     length_m: float | None = number(None, 50.0, 10_000.0)
     width_m: float | None = number(None, 1.0, 200.0)
-    threshold_crossing_height_m: float | None = number(None, 0.0, 50.0)
-    glide_angle_deg: float | None = number(None, 1.0, 10.0)
     localizer_width_m: float | None = number(None, 10.0, 1_000.0)
     localizer_distance_m: float | None = number(None, 500.0, 10_000.0)
 
@@ -91,15 +91,29 @@ class Runway:
 
 
 @dataclass(frozen=True)
+class Beacon:
+    """A non-directional beacon: where it stands against the threshold of a runway, the only one where none is named."""
+
+    name: str
+    before_threshold_m: float = required_number(-20_000.0, 100_000.0)
+    right_m: float = number(0.0, -50_000.0, 50_000.0)
+    runway: str = ""
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+@dataclass(frozen=True)
 class SiteData:
     """What is known of the airfield. ``stand`` names the stand the aircraft was parked on."""
 
     stands: tuple[Stand, ...] = ()
     runways: tuple[Runway, ...] = ()
     stand: str = ""
+    beacons: tuple[Beacon, ...] = ()
 
     def __post_init__(self) -> None:
-        for key, listed in (("stands", self.stands), ("runways", self.runways)):
+        for key, listed in (("stands", self.stands), ("runways", self.runways), ("beacons", self.beacons)):
             twice = [name for name, count in Counter(item.name for item in listed).items() if count > 1]
             if twice:
                 raise SettingsError(key, f"{twice[0]!r} more than once", "names that differ")
@@ -107,6 +121,10 @@ class SiteData:
         if self.stand and self.stand not in names:
             expected = f"one of {', '.join(names)}" if names else "a stand listed under [[stands]]: there is none"
             raise SettingsError("stand", repr(self.stand), expected)
+        runways = {runway.name for runway in self.runways}
+        lost = [beacon for beacon in self.beacons if beacon.runway and beacon.runway not in runways]
+        if lost:
+            raise SettingsError("beacons", f"{lost[0].name!r} of runway {lost[0].runway!r}", "a runway of [[runways]]")
 
     def parked_on(self) -> Stand | None:
         """The named stand; the only one where none is named; else None."""

@@ -7,12 +7,14 @@ from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures import (
+    control,
     cooperative,
     forecast,
     generic,
     heading,
     inertial,
     landing,
+    landing_beacons,
     latency,
     magnetic,
     magnetic_ground,
@@ -44,6 +46,7 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "inertial.radial": inertial.radial,
     "inertial.innovations": inertial.innovations,
     "inertial.observability": inertial.observability,
+    "landing_beacons.deviations": landing_beacons.deviations,
     "latency.search": latency.search,
     "magnetic.deviation": magnetic.deviation,
     "magnetic.held_out": magnetic.held_out,
@@ -62,6 +65,9 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "cooperative.errors": cooperative.errors,
     "cooperative.geometry": cooperative.geometry,
     "cooperative.links": cooperative.links,
+    "control.paths": control.paths,
+    "control.measures": control.measures,
+    "control.law": control.law,
 }
 
 
