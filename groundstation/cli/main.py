@@ -267,8 +267,8 @@ def simulate(
 @answers_with_exit_code
 def study(
     name: Annotated[
-        Literal["heading", "forecast", "magnetic", "cooperative", "control", "landing"],
-        typer.Argument(help="heading, forecast, magnetic, cooperative, control or landing.", metavar="NAME"),
+        Literal["heading", "forecast", "magnetic", "cooperative", "control", "landing", "approach"],
+        typer.Argument(help="heading, forecast, magnetic, cooperative, control, landing or approach.", metavar="NAME"),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the tables.", metavar="DIR")],
     runs: Annotated[int, typer.Option("--runs", help="Simulated runs of each family or case.", min=10)] = 200,

@@ -19,6 +19,7 @@ STUDIES = {
     "cooperative": "navigation between aircraft: published figures with ours beside them, divergence, consistency",
     "control": "control of a session and placement of ground points: published figures with ours, laws flown",
     "landing": "landing by reference points and by locators: every published figure with ours beside it",
+    "approach": "recorded approaches: the localizer as a reference for positions, how honest its interval is",
 }
 
 
@@ -38,6 +39,8 @@ def simulate_to(scenario: str, folder: Path, *, seed: int | None = None, force: 
 
     if is_session(scenario):
         return _session_to(scenario, folder, seed, force=force)
+    if is_approach(scenario):
+        return [_approach_to(scenario, folder, seed, force=force)]
     target = folder / f"{load_scenario(scenario).name}.csv"
     if target.exists() and not force:
         raise UsageError(str(target), "a file that exists", "a new folder", "-f overwrites it")
@@ -52,6 +55,26 @@ def is_session(scenario: str) -> bool:
         return scenario.lower() in session_names()
     path = Path(scenario)
     return path.is_file() and isinstance(read_toml(path).get("aircraft"), list)
+
+
+def is_approach(scenario: str) -> bool:
+    """Whether a scenario is an approach on an ILS: a shipped name of such, or a TOML file with ``[recorded]``."""
+    from groundstation.simulation.approach import approach_names
+
+    if not scenario.endswith(".toml"):
+        return scenario.lower() in approach_names()
+    path = Path(scenario)
+    return path.is_file() and isinstance(read_toml(path).get("recorded"), dict)
+
+
+def _approach_to(name: str, folder: Path, seed: int | None, *, force: bool) -> Path:
+    from groundstation.simulation.approach import load_approach, write_approach
+
+    scenario = load_approach(name)
+    target = folder / f"{scenario.name}.csv"
+    if target.exists() and not force:
+        raise UsageError(str(target), "a file that exists", "a new folder", "-f overwrites it")
+    return write_approach(scenario, folder, seed)
 
 
 def _session_to(name: str, folder: Path, seed: int | None, *, force: bool) -> list[Path]:
@@ -117,4 +140,8 @@ def _study(name: str) -> "Callable[..., StudyResult]":
         from groundstation.studies.landing import study_landing
 
         return study_landing
+    if name == "approach":
+        from groundstation.studies.approach import study_approach
+
+        return study_approach
     raise UsageError("study", repr(name), f"one of {', '.join(STUDIES)}")
