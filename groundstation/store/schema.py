@@ -35,6 +35,7 @@ MESSAGE_OF_KIND: Mapping[str, str] = {
     "discrete": "Discrete",
     "event": "Event",
     "link": "Link",
+    "odometry": "Odometry",
     "satellite": "Satellite",
     "adf": "Adf",
     "corrected_heading": "CorrectedHeading",
