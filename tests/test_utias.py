@@ -145,7 +145,7 @@ def test_damaged_files_are_counted(tmp_path: Path) -> None:
 def test_a_set_becomes_a_session(tmp_path: Path) -> None:
     """Without noise every algorithm stays with the truth: signs, barcodes, frames and times are right."""
     (found,) = recorded_sets(write_set(tmp_path / "set"))
-    session = found.session
+    (session,) = found.sessions
     assert session.names == ("R1", "R2") and not found.findings
     assert all(isinstance(track, Odometry) for track in session.vehicles)
     distance = np.hypot(*(np.array(session.points[0].position_m[:2]) - (1.0, -0.0)))
@@ -160,7 +160,7 @@ def test_a_set_becomes_a_session(tmp_path: Path) -> None:
 def test_robots_that_lack_a_file_are_left_out(tmp_path: Path) -> None:
     folder = write_set(tmp_path / "set", lambda name, text: "" if name == "Robot2_Odometry" else text)
     (found,) = recorded_sets(folder)
-    assert found.session.names == ("R1",)
+    assert found.sessions[0].names == ("R1",)
     assert any(finding.text == "R2 is left out: no odometry" for finding in found.findings)
     assert any("sightings of a barcode that is no landmark and no other robot" in one.text for one in found.findings)
 
@@ -192,7 +192,7 @@ def test_a_minute_of_a_recorded_set(tmp_path: Path) -> None:
         kept = [line for line in lines if not line.startswith("12484") or float(line.split()[0]) < last_s]
         (tmp_path / path.stem).write_text("\n".join([*kept, ""]))
     (found,) = recorded_sets(tmp_path)
-    assert found.session.names == ("R1", "R2", "R3", "R4", "R5") and len(found.session.points) == 15
+    assert found.sessions[0].names == ("R1", "R2", "R3", "R4", "R5") and len(found.sessions[0].points) == 15
     names = ("dead_reckoning", "centralised", "split_intersection")
     (table,) = study_recorded([found], algorithms=names).tables
     rms = dict(zip(zip(table["case"].tolist(), table["algorithm"].tolist(), strict=True), table["rms_m"], strict=True))

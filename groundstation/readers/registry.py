@@ -14,12 +14,12 @@ from typing import Any
 
 from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
 from groundstation.base.records import Item, RecordBatch, Remark
-from groundstation.readers import csv_profile, dataflash, flat_csv, magic, ulog, utias
+from groundstation.readers import csv_profile, dataflash, flat_csv, magic, miluv, ulog, utias
 from groundstation.readers.compressed import COMPRESSIONS
 from groundstation.readers.source import Claim, Source
 
 ENTRY_POINT_GROUP = "groundstation.readers"
-_OF_TEXT: tuple[Any, ...] = (csv_profile, flat_csv, utias)
+_OF_TEXT: tuple[Any, ...] = (csv_profile, flat_csv, miluv, utias)
 _BUILT_IN: tuple[Any, ...] = (dataflash, ulog, *_OF_TEXT)
 
 

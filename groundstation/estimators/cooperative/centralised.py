@@ -97,7 +97,7 @@ class _Joint:
         ends = [
             vehicles[who].place(np.zeros(vehicles[who].size), event.time_s)[0] for who in (event.receiver, event.source)
         ]
-        return np.asarray(ends[0] - ends[1])
+        return np.asarray(ends[0] - ends[1] + (0.0 if event.arm_m is None else event.arm_m))
 
     def _at(self, who: int, at_s: float) -> tuple[FloatArray, FloatArray]:
         """State of a vehicle at a time not later than its own, and its derivative by the state it has."""
