@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from groundstation.cli.application import VERBS, app
-from groundstation.cli.main import LATER_VERBS
+from groundstation.cli.application import VERBS
+from groundstation.cli.main import app
 
 HEAVY = (
     "cattrs",
     *("numpy", "pandas", "pyarrow", "numba", "scipy", "rerun", "matplotlib", "mcap", "google.protobuf"),
     *("jinja2", "typst"),
-    *("groundstation.pipeline.batch", "groundstation.readers", "groundstation.viewer"),
+    *("groundstation.pipeline.many_flights.batch", "groundstation.readers", "groundstation.viewer"),
 )
 
 
@@ -37,13 +37,6 @@ def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "HEAVY []"
-
-
-@pytest.mark.parametrize("verb", sorted(LATER_VERBS))
-def test_a_verb_of_a_later_version_says_so(verb: str) -> None:
-    code, out, err = groundstation(verb, "x.csv", "--whatever")
-    assert (code, out) == (2, "")
-    assert "not in this version" in err
 
 
 def test_every_verb_has_help() -> None:

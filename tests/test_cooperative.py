@@ -16,6 +16,7 @@ from groundstation.estimators.cooperative.transition import discretise, local_dy
 from groundstation.estimators.cooperative.vehicles import InertialVehicle, Vehicle
 from groundstation.estimators.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.simulation.session import simulate_session
+from groundstation.simulation.session_scenario import load_session
 from groundstation.tables.session import NO_SLOT, DeadReckoning, GroundPoint, Heights, Odometry, Ranges, Session
 from tests.cooperative_example import GLOBAL, LOCAL, believed, full_nees, truth_of
 
@@ -479,3 +480,14 @@ def test_wheeled_vehicles_and_bearings() -> None:
     track_found = run.tracks[0]
     assert np.interp(at[-1], track_found.time_s, track_found.position_m[:, 0]) == pytest.approx(north[-1], abs=0.02)
     assert np.interp(at[-1], track_found.time_s, track_found.position_m[:, 1]) == pytest.approx(east[-1], abs=0.02)
+
+
+def test_aircraft_in_line_keep_their_estimates_near_their_reckoning() -> None:
+    """Ranges say next to nothing across the line; both runs overflowed while the directions alone stood still."""
+    scenario = load_session("local-three-in-line")
+    settings = believed(scenario, gate_sigma=0.0)
+    for run in (6, 7):
+        simulated = simulate_session(scenario, 80_000, run)
+        found = run_algorithm(prepare(simulated.session, settings), settings, "centralised")
+        for track, truth in zip(found.tracks, simulated.truth, strict=True):
+            assert np.abs(track.state[:, :2] - truth.states[:, :2]).max() < 4.5 * scenario.errors.position_m

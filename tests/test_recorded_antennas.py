@@ -10,8 +10,8 @@ from groundstation.base.errors import GroundstationError, UnreadableLogError, Us
 from groundstation.estimators.cooperative.consistency import judge
 from groundstation.estimators.cooperative.estimate import run_algorithm
 from groundstation.estimators.cooperative.events import prepare
-from groundstation.pipeline import recorded
-from groundstation.pipeline.recorded import recorded_sets
+from groundstation.pipeline.verbs import recorded
+from groundstation.pipeline.verbs.recorded import recorded_sets
 from groundstation.readers import miluv, registry
 from groundstation.readers.source import Source
 from groundstation.simulation.reckoning import ReckoningErrors, drifting_reckoning

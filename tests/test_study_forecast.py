@@ -8,8 +8,8 @@ import pytest
 
 from groundstation.base.errors import UsageError
 from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.pipeline.catalogue import catalogue
-from groundstation.pipeline.synthesis import STUDIES, study_to
+from groundstation.pipeline.verbs.catalogue import catalogue
+from groundstation.pipeline.verbs.synthesis import STUDIES, study_to
 from groundstation.results.figures import FigureData
 from groundstation.results.forecast import METHODS
 from groundstation.simulation.inertial_family import simulate_family
@@ -166,7 +166,7 @@ def test_study_writes_its_tables_and_page() -> None:
 
 def test_every_study_is_listed_and_no_other_is_run(tmp_path: Path) -> None:
     listed = [entry["name"] for entry in catalogue() if entry["kind"] == "study"]
-    assert listed == list(STUDIES) == ["heading", "forecast", "magnetic", "cooperative"]
+    assert listed == list(STUDIES) == ["heading", "forecast", "magnetic", "cooperative", "landing"]
     with pytest.raises(UsageError, match="one of heading, forecast, magnetic"):
-        study_to("landing", tmp_path / "out", runs=10, seed=1, force=False, listen=lambda event: None)
+        study_to("weather", tmp_path / "out", runs=10, seed=1, force=False, listen=lambda event: None)
     assert not (tmp_path / "out").exists()

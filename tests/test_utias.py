@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError, UsageError
-from groundstation.pipeline.recorded import recorded_sets
+from groundstation.pipeline.verbs.recorded import recorded_sets
 from groundstation.readers import registry, utias
 from groundstation.readers.source import Source
 from groundstation.studies.recorded import SETTINGS, study_recorded

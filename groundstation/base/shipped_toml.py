@@ -13,11 +13,12 @@ SUFFIX = ".toml"
 
 @dataclass(frozen=True)
 class TomlFile:
-    """A file's name without suffix, how errors call it, and its content."""
+    """A file's name without suffix, how errors call it, and its content: as a table and as it stands."""
 
     name: str
     where: str
     table: dict[str, Any]
+    text: str
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,6 @@ class ShippedToml:
         else:
             raise SettingsError(self.what, repr(wanted), f"a file *{SUFFIX} or one of {', '.join(self.names())}")
         try:
-            return TomlFile(name, where, tomllib.loads(text))
+            return TomlFile(name, where, tomllib.loads(text), text)
         except tomllib.TOMLDecodeError as error:
             raise SettingsError(where, f"text that is not TOML ({error})") from error

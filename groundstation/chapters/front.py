@@ -4,6 +4,7 @@ from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.assessed import reason_of
 from groundstation.chapters.cooperative import is_session, session_front
 from groundstation.chapters.parts import Cell, Front, Mark
+from groundstation.chapters.plan import is_plan, plan_front
 from groundstation.chapters.verdict import NOT_ASSESSABLE, VERDICTS, figures, reasons, sentence, what_to_enter
 from groundstation.chapters.wording import ABSENT, clock, is_number, number
 from groundstation.results.flight import FlightResults, Status
@@ -16,7 +17,7 @@ FORECAST_MIN = 60.0  # the horizon the forecast is judged by at a glance
 HOUR_S = 3599.5  # rounds to an hour
 STATUS: dict[Status, Mark] = {
     "ok": Mark("good", "ok"),
-    "degraded": Mark("warn", "degraded: data were lost or a finding is grave"),
+    "degraded": Mark("warn", "degraded: data were lost"),
     "failed": Mark("bad", "failed: nothing could be computed"),
 }
 UNKNOWN_REASON = "the log does not hold what the method needs"
@@ -24,6 +25,8 @@ UNKNOWN_REASON = "the log does not hold what the method needs"
 
 def front(results: FlightResults) -> Front:
     """The top of the report."""
+    if is_plan(results):
+        return plan_front(results, _pairs_of_plan(results))
     names = [results.metadata.get(key, "") for key in ("aircraft", "flight")]
     title = " · ".join(filter(None, (names[0], names[1] and f"flight {names[1]}"))) or results.flight_id
     if is_session(results):
@@ -46,18 +49,35 @@ def front(results: FlightResults) -> Front:
 
 def _pairs(results: FlightResults, names: list[str]) -> tuple[tuple[str, Cell], ...]:
     start = "" if results.start_utc_ns is None else utc_ns_to_iso(results.start_utc_ns)
-    counts = [finding.severity for finding in results.findings]
-    found = " · ".join(f"{counts.count(name)} {name}" for name in ("fail", "warn", "info") if name in counts)
-    has_hours = is_number(results.duration_s) and results.duration_s >= HOUR_S
     return (
         ("Aircraft", names[0] or "not named in the log"),
         ("Flight", names[1] or "not named in the log"),
         ("Start", f"{start[:10]} {start[11:19]} UTC" if start else "no absolute time"),
-        ("Duration", f"{clock(results.duration_s)} {'h:min:s' if has_hours else 'min:s'}"),
+        _duration(results),
         ("Status", STATUS[results.status]),
-        ("Findings", found or "none"),
+        ("Findings", _counts(results)),
         ("Log", results.source.name or ABSENT),
     )
+
+
+def _pairs_of_plan(results: FlightResults) -> tuple[tuple[str, Cell], ...]:
+    scenario = ("Scenario", results.source.name or ABSENT)
+    return (
+        ("Plan", results.metadata.get("plan", "") or ABSENT),
+        _duration(results),
+        ("Findings", _counts(results)),
+        scenario,
+    )
+
+
+def _duration(results: FlightResults) -> tuple[str, str]:
+    has_hours = is_number(results.duration_s) and results.duration_s >= HOUR_S
+    return "Duration", f"{clock(results.duration_s)} {'h:min:s' if has_hours else 'min:s'}"
+
+
+def _counts(results: FlightResults) -> str:
+    counts = [finding.severity for finding in results.findings]
+    return " · ".join(f"{counts.count(name)} {name}" for name in ("fail", "warn", "info") if name in counts) or "none"
 
 
 def _of_the_ins(results: FlightResults) -> tuple[tuple[str, str, str], ...]:

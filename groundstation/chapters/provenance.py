@@ -2,6 +2,7 @@
 
 from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.parts import Facts, Note, Part, Section
+from groundstation.chapters.plan import is_plan
 from groundstation.chapters.wording import ABSENT, clean, number
 from groundstation.results.flight import FlightResults, Source
 
@@ -17,12 +18,14 @@ CHECKS = (
 def provenance(results: FlightResults) -> Section:
     """The chapter."""
     flight_id = clean(results.flight_id)
-    if is_session(results):
+    if is_plan(results):
+        store = ("Scenario as given", "plan.toml", "the file that this plan was made from")
+    elif is_session(results):
         store = ("Lossless stores", "manifest.json", "names the MCAP of every log")
     else:
         store = ("Lossless store", f"{flight_id}.mcap", "every topic of the log")
     pairs = (
-        *source_pairs(results.source),
+        *source_pairs(results.source, "scenario" if is_plan(results) else "log"),
         ("Flight id", flight_id, ""),
         ("Recording", f"{flight_id}.rrd", "open with: groundstation view"),
         store,
@@ -31,17 +34,17 @@ def provenance(results: FlightResults) -> Section:
     if results.metadata:
         listed = sorted(results.metadata.items())
         rows = [(key, value, "") for key, value in listed if not key.startswith(LONG_LISTS)][:MOST_METADATA]
-        parts.append(Facts("Metadata of the log", rows))
+        parts.append(Facts("Title and kind" if is_plan(results) else "Metadata of the log", rows))
         if len(rows) < len(listed):
             parts.append(Note(REST))
     parts.append(Note(CHECKS))
     return Section("provenance", "Provenance", "Where the numbers come from and how to check them.", parts)
 
 
-def source_pairs(source: Source) -> tuple[tuple[str, str, str], ...]:
-    """The log a flight came from."""
+def source_pairs(source: Source, what: str = "log") -> tuple[tuple[str, str, str], ...]:
+    """The log a flight came from, or the scenario of a plan."""
     return (
-        ("Log", source.name or ABSENT, f"{number(source.size_bytes, 0)} bytes"),
-        ("SHA-256 of the log", source.sha256 or ABSENT, ""),
+        (what.capitalize(), source.name or ABSENT, f"{number(source.size_bytes, 0)} bytes"),
+        (f"SHA-256 of the {what}", source.sha256 or ABSENT, ""),
         ("Read by", source.reader or ABSENT, ""),
     )

@@ -20,7 +20,7 @@ EXIT_CODES = (
 )
 
 VERBS = (
-    *("info", "check", "convert", "run", "report", "view", "clip", "compare", "cooperative", "serve"),
+    *("info", "check", "convert", "run", "report", "view", "clip", "compare", "cooperative", "plan", "serve"),
     *("simulate", "study", "list"),
 )
 

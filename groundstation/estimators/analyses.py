@@ -1,20 +1,35 @@
-"""The analyses of a flight and of a session, in the order they are shown. A new one is a folder and a line here."""
+"""The analyses of a flight and of a session, and the plans, in the order they are shown. A new one is a line here."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import Any
 
 from groundstation.estimators.analysis import Analysis
+from groundstation.estimators.approaches.analysis import LANDING
+from groundstation.estimators.control.analysis import SESSION_PLAN
 from groundstation.estimators.cooperative.analysis import COOPERATIVE
 from groundstation.estimators.heading.analysis import HEADING
 from groundstation.estimators.inertial.analysis import FORECAST, INERTIAL
+from groundstation.estimators.landing_beacons.analysis import LANDING_BEACONS
 from groundstation.estimators.latency.analysis import LATENCY
 from groundstation.estimators.magnetic.analysis import MAGNETIC, MAGNETIC_GROUND
+from groundstation.estimators.plan import Plan
 from groundstation.results.answer import Answer
 
-FLIGHT_ANALYSES: tuple[Analysis, ...] = (HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND)
+FLIGHT_ANALYSES: tuple[Analysis, ...] = (
+    *(HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND),
+    *(LANDING, LANDING_BEACONS),
+)
 SESSION_ANALYSES: tuple[Analysis, ...] = (COOPERATIVE,)
+PLANS: tuple[Plan[Any], ...] = (SESSION_PLAN,)
 
-# What the answers of a saved flight or session become, by the name of their analysis.
+# What the answers of a saved flight, session or plan become, by the name of their analysis.
 ANSWER_TYPES: Mapping[str, type[Answer]] = MappingProxyType(
-    {analysis.answer.analysis: analysis.answer for analysis in (*FLIGHT_ANALYSES, *SESSION_ANALYSES)}
+    {
+        kind.analysis: kind
+        for kind in (
+            *(analysis.answer for analysis in (*FLIGHT_ANALYSES, *SESSION_ANALYSES)),
+            *(kind for plan in PLANS for kind in plan.answers),
+        )
+    }
 )

@@ -8,17 +8,18 @@ from pathlib import Path
 from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.front import front
 from groundstation.chapters.parts import Document
+from groundstation.chapters.plan import is_plan
 from groundstation.reports.page import TEMPLATES, render
 from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.reports.sections import flight_sections
 from groundstation.reports.steer_card import write_exports
 from groundstation.results.answer import Answer
 from groundstation.results.files import SavedFlight, load, write_text
-from groundstation.results.restore import ANSWER_TYPES
 
 REPORT = "report.html"
 PDF = "report.pdf"
-SESSION = "Session report"
+SESSION, PLAN = "Session report", "Plan"
+VERDICT_OF = {SESSION: "the session", PLAN: "the plan"}
 _NOT_IN_AN_ID = re.compile(r"[^A-Za-z0-9_-]+")
 
 
@@ -30,9 +31,7 @@ class Written:
     problem: str = ""
 
 
-def write_flight_report(
-    folder: Path, answer_types: Mapping[str, type[Answer]] = ANSWER_TYPES, *, with_pdf: bool = True
-) -> Written:
+def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], *, with_pdf: bool = True) -> Written:
     """Write report.html and report.pdf into a flight folder; with a magnetic deviation its table and steer card too.
 
     Parameters
@@ -73,8 +72,8 @@ def write_pages(page: Path, html: str, document: Document, *, with_pdf: bool) ->
 
 
 def flight_document(saved: SavedFlight) -> Document:
-    """Put the report of one saved flight, or of a session of several, together."""
-    kind = SESSION if is_session(saved.results) else "Flight report"
+    """Put the report of one saved flight, a session of several or a plan, together."""
+    kind = PLAN if is_plan(saved.results) else SESSION if is_session(saved.results) else "Flight report"
     return Document(kind, saved.results.flight_id, front(saved.results), flight_sections(saved))
 
 
@@ -86,7 +85,7 @@ def flight_report_html(document: Document) -> str:
         label=document.label,
         front=document.front,
         sections=document.sections,
-        verdict_of="the session" if document.kind == SESSION else "the heading correction",
+        verdict_of=VERDICT_OF.get(document.kind, "the heading correction"),
         page_label=_NOT_IN_AN_ID.sub("-", document.label),  # stands inside a CSS string
         style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
     )

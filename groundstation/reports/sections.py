@@ -8,24 +8,25 @@ from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.findings import findings
 from groundstation.chapters.overview import overview
 from groundstation.chapters.parts import Note, Section
+from groundstation.chapters.plan import is_plan
 from groundstation.chapters.provenance import provenance
 from groundstation.chapters.quality import quality
 from groundstation.reports.figures import with_drawings
 from groundstation.results.files import SavedFlight
 
 ON_THE_FLIGHT = (overview, quality, findings, provenance)  # behind the chapters on its answers
-ON_THE_SESSION = (findings, provenance)
+ON_THE_SESSION = (findings, provenance)  # and of a plan
 
 
 def flight_sections(saved: SavedFlight) -> tuple[Section, ...]:
     """The chapters of a flight: those on its answers, then the flight itself, its data and findings, its source.
 
-    Of a session of several aircraft: those on its answers, its findings, its source.
+    Of a session of several aircraft, and of a plan: those on its answers, its findings, its source.
 
     A chapter that has nothing to say is left out, and one of nothing but figures without arrays.
     """
     results = saved.results
-    on_the_rest = ON_THE_SESSION if is_session(results) else ON_THE_FLIGHT
+    on_the_rest = ON_THE_SESSION if is_session(results) or is_plan(results) else ON_THE_FLIGHT
     told = (*chapters_of(results), *(build(results) for build in on_the_rest))
     drawn = (on_a_page(section, saved) for section in told if section is not None)
     return tuple(section for section in drawn if section.parts)

@@ -16,7 +16,7 @@ from groundstation.base.signals import topics_of_kind
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.base.units import NS_PER_S
 from groundstation.tables.session import NO_SLOT, GroundPoint, Odometry, Ranges, Session
-from groundstation.tables.session_tracks import aircraft_of
+from groundstation.tables.session_tracks import aircraft_named
 from groundstation.tables.table import Flight, Table
 
 POSE = "position_north_m", "position_east_m", "true_heading_deg"
@@ -113,7 +113,8 @@ def _joined(flights: Iterable[Flight], findings: list[Finding]) -> list[_Robot]:
     """Robots with odometry and a pose to start from, in the order of their names."""
     robots: dict[str, _Robot] = {}
     for flight in flights:
-        robot = robots.setdefault(aircraft_of(flight), _Robot(aircraft_of(flight)))
+        name = aircraft_named(flight.metadata, flight.source_name)
+        robot = robots.setdefault(name, _Robot(name))
         for topic in flight.topics():
             if topic == "odometry":
                 robot.odometry = flight[topic]

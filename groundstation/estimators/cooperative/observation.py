@@ -67,7 +67,7 @@ def rows_of(
     source_clock_m : float
         Clock offset of a peer; 0 else.
     about_m : ndarray, shape (3,), optional
-        Line from the source to the receiver whose direction is the derivative of the range; None: that of the estimate.
+        Line from the source to the receiver about which the range is linearised; None: that of the estimate.
 
     Returns
     -------
@@ -90,7 +90,11 @@ def rows_of(
         return []
     rows = []
     if np.isfinite(event.value_m):
-        direction = line / distance if about_m is None else about_m / float(np.sqrt(about_m @ about_m))
+        direction = line / distance
+        if about_m is not None:
+            distance = float(np.sqrt(about_m @ about_m))
+            direction = about_m / distance
+            distance += float(direction @ (line - about_m))
         rows.append(_range_row(event, vehicle, x, view, source, source_clock_m, direction, distance))
     if np.isfinite(event.bearing_rad):
         rows.append(_bearing_row(event, view, -line))

@@ -97,9 +97,8 @@ class CooperativeSettings:
     update : {'sequential', 'simultaneous'}
         Every measurement at its own time with its own linearisation, or all of one frame together.
     derivatives : {'estimate', 'reckoning'}
-        Where the centralised filter takes the direction of a range between two aircraft: at its estimate, or at their
-        dead reckoning. Directions that jump with the estimate tell of a turn of the whole group, which ranges between
-        its members cannot see (first-estimates Jacobian: Huang, Mourikis and Roumeliotis, 2010).
+        Where the centralised filter linearises a range between two aircraft: at its estimate, or at their dead
+        reckoning for as long as the estimate lies within three sigmas of it (see ``centralised``).
     frame_s : float
         Length of a frame, for simultaneous updates and for the modified algorithm.
     gate_sigma : float

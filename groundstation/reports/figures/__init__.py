@@ -7,11 +7,14 @@ from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures import (
+    control,
     cooperative,
     forecast,
     generic,
     heading,
     inertial,
+    landing,
+    landing_beacons,
     latency,
     magnetic,
     magnetic_ground,
@@ -43,6 +46,7 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "inertial.radial": inertial.radial,
     "inertial.innovations": inertial.innovations,
     "inertial.observability": inertial.observability,
+    "landing_beacons.deviations": landing_beacons.deviations,
     "latency.search": latency.search,
     "magnetic.deviation": magnetic.deviation,
     "magnetic.held_out": magnetic.held_out,
@@ -50,6 +54,9 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "magnetic.branches": magnetic.branches,
     "magnetic.modulus": magnetic.modulus,
     "magnetic.ground_runs": magnetic_ground.ground_runs,
+    "landing.deviations": landing.deviations,
+    "landing.final": landing.final,
+    "landing.protection": landing.protection,
     "overview.track": overview.track_map,
     "overview.profile": overview.profile,
     "overview.states": overview.states,
@@ -58,6 +65,9 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "cooperative.errors": cooperative.errors,
     "cooperative.geometry": cooperative.geometry,
     "cooperative.links": cooperative.links,
+    "control.paths": control.paths,
+    "control.measures": control.measures,
+    "control.law": control.law,
 }
 
 

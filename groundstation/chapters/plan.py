@@ -1,0 +1,38 @@
+"""Chapters of a plan and the top of its report: what is planned, and what its chapters say above all."""
+
+from groundstation.base.findings import worst
+from groundstation.chapters.chapter import Chapter
+from groundstation.chapters.control import control
+from groundstation.chapters.parts import Cell, Facts, Front, Mark, Note
+from groundstation.results.control import ControlPlan
+from groundstation.results.flight import FlightResults
+from groundstation.results.plan import PlanAnswer
+
+# In the order of the report. An answer that none of them tells has the generic chapter.
+PLAN_CHAPTERS: tuple[Chapter, ...] = (Chapter((ControlPlan,), control),)
+MARKS = {
+    None: Mark("good", "Planned"),
+    "info": Mark("good", "Planned"),
+    "warn": Mark("warn", "Planned, with warnings"),
+    "fail": Mark("bad", "No usable plan"),
+}
+
+
+def is_plan(results: FlightResults) -> bool:
+    """Whether the results tell of a plan and not of something flown."""
+    return any(isinstance(answer, PlanAnswer) for answer in results.answers.values())
+
+
+def plan_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -> Front:
+    """The top of a plan's report: headline of its first chapter, and what every chapter has above its parts."""
+    built = (chapter.build(results) for chapter in PLAN_CHAPTERS)
+    sections = [section for section in built if section is not None]
+    above = [part for section in sections for part in section.above]
+    return Front(
+        results.metadata.get("title", "") or results.flight_id,
+        pairs,
+        verdict=MARKS[worst(results.findings)],
+        headline=sections[0].headline if sections else "",
+        sentences=tuple(part.text for part in above if isinstance(part, Note)),
+        figures=tuple(pair for part in above if isinstance(part, Facts) for pair in part.pairs),
+    )

@@ -1,0 +1,85 @@
+"""The verb ``plan``: how a session or a landing should be set up for the accuracy one needs."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from groundstation.base.errors import UsageError
+from groundstation.cli.application import (
+    DONE,
+    FailOn,
+    Force,
+    Json,
+    NoPdf,
+    Progress,
+    Quiet,
+    Verbose,
+    answers_with_exit_code,
+    app,
+)
+
+plans = typer.Typer(
+    help="Plan a session: how aircraft should move for the accuracy of one of them.",
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.add_typer(plans, name="plan")
+
+Scenario = Annotated[
+    str | None, typer.Argument(help="Name of a shipped scenario, or a TOML file.", metavar="FILE", show_default=False)
+]
+Output = Annotated[
+    Path | None, typer.Option("-o", "--output", help="Folder for the results.", metavar="OUT", show_default=False)
+]
+Listed = Annotated[bool, typer.Option("--list", help="List the shipped scenarios and exit.")]
+
+
+@plans.command()
+@answers_with_exit_code
+def session(
+    scenario: Scenario = None,
+    output: Output = None,
+    listed: Listed = False,
+    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 at a finding this severe or worse.")] = "none",
+    no_pdf: NoPdf = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+    progress: Progress = "auto",
+) -> int | None:
+    """Plan how aircraft should move, within their bounds, for the accuracy of one of them."""
+    return _plan("session", scenario, output, listed, fail_on, no_pdf, force, quiet, verbose, json, progress)
+
+
+def _plan(
+    kind: str,
+    scenario: str | None,
+    output: Path | None,
+    listed: bool,
+    fail_on: FailOn,
+    no_pdf: bool,
+    force: bool,
+    quiet: bool,
+    verbose: bool,
+    json: bool,
+    progress: Progress,
+) -> int:
+    """What every kind of plan does with the options they share."""
+    from groundstation.chapters.terminal import columns
+    from groundstation.cli import printing
+    from groundstation.cli.progress import listener
+    from groundstation.pipeline.verbs.plan import run_plan, shipped_scenarios
+
+    if listed:
+        rows = [[one.name, one.title] for one in shipped_scenarios(kind)]
+        names = [{"name": name, "title": title} for name, title in rows]
+        typer.echo(printing.as_json(names) if json else columns(rows))
+        return DONE
+    if scenario is None or output is None:
+        raise UsageError(f"plan {kind}", "no FILE or no -o", "a scenario and a folder for the results")
+    with listener("none" if quiet else progress) as listen:
+        outcome = run_plan(kind, scenario, output, force=force, fail_on=fail_on, with_pdf=not no_pdf, listen=listen)
+    printing.outcomes((outcome,), as_json_text=json, quiet=quiet, with_times=verbose)
+    return outcome.code

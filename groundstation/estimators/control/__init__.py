@@ -1,0 +1,1 @@
+"""How aircraft should move and where ground points should stand, for the accuracy one needs."""

@@ -1,0 +1,156 @@
+"""Figures of a planned session: ways from above, accuracy and geometry with time, laws of control."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.chapters.control import title_of
+from groundstation.reports import drawing as d
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.figures.inertial import plain_log
+from groundstation.results.control import UNCONTROLLED, ControlPlan
+from groundstation.results.figures import FigureData, numbers, texts
+from groundstation.results.flight import FlightResults
+
+M_PER_KM = 1000.0
+PANEL_MM = 38.0
+TICKS_ON_A_WAY = 5
+COLOURS = {
+    UNCONTROLLED: d.FAINT,
+    "determinant": d.INS,
+    "eigenvalue": d.GNSS,
+    "dop": "#e69f00",
+    "covariance": d.USED,
+}
+WIDTHS = {"determinant": 3.2, "eigenvalue": 2.0, "dop": 1.0}  # laws that agree lie over each other and stay visible
+
+
+def _data(results: FlightResults, name: str) -> tuple[ControlPlan, FigureData] | None:
+    answer, data = results.answer(ControlPlan), results.figure_with_rows(name)
+    return None if answer is None or data is None else (answer, data)
+
+
+def _laws(answer: ControlPlan) -> list[tuple[str, str, float]]:
+    """Laws in the order they are drawn, with colour and width."""
+    return [(row.law, COLOURS.get(row.law, d.INK), WIDTHS.get(row.law, 1.2)) for row in answer.laws]
+
+
+def paths(results: FlightResults) -> Drawing | None:
+    """Ways of all aircraft from above: under the recommended law, and without control."""
+    found = _data(results, "control_paths")
+    if found is None:
+        return None
+    answer, data = found
+    law, aircraft = texts(data, "law"), texts(data, "aircraft")
+    north, east = (numbers(data, f"{axis}_m") / M_PER_KM for axis in ("north", "east"))
+    points = results.figure_with_rows("control_points")
+
+    def paint(figure: Any) -> None:
+        axes = d.place(figure, 18, 12, 174, 104)
+        for number, name in enumerate(answer.aircraft):
+            colour = d.SERIES[number % len(d.SERIES)]
+            nominal = np.flatnonzero((law == UNCONTROLLED) & (aircraft == name))
+            mine = np.flatnonzero((law == answer.recommended) & (aircraft == name))
+            exact = " (exact)" if name in answer.exact else ""
+            d.line(axes, east[nominal], north[nominal], colour, 0.8, linestyle=(0, (3, 2)))
+            d.line(axes, east[mine], north[mine], colour, 1.6, label=d.label(f"{name}{exact}", 20))
+            marks = mine[np.linspace(0, len(mine) - 1, TICKS_ON_A_WAY).astype(np.int64)]
+            d.dots(axes, east[marks], north[marks], colour, 3.0)
+            axes.plot(east[mine[-1:]], north[mine[-1:]], "o", color=colour, markersize=5.0)
+        if points is not None:
+            places = [numbers(points, f"{axis}_m") / M_PER_KM for axis in ("east", "north")]
+            axes.plot(*places, "^", color=d.INK, markersize=4.5, linestyle="none")
+            for x, y, name in zip(*places, texts(points, "name"), strict=True):
+                d.beside(axes, x, y, d.label(str(name), 16), d.INK, axes.transData, "center")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.set_xlabel("east, km")
+        axes.set_ylabel("north, km")
+        d.legend_above(axes, 6)
+
+    between = answer.duration_s / (TICKS_ON_A_WAY - 1)
+    caption = (
+        f"Ways from above: {title_of(answer.recommended)}; dashed without control. Small dots stand {between:g} s "
+        "apart, the large one at the end." + (" Triangles: ground points." if points is not None else "")
+    )
+    names = ("control_paths", *(("control_points",) if points is not None else ()))
+    return Drawing("Ways", caption, "Ways of the aircraft.", d.draw("control-paths", 112, paint), names)
+
+
+def measures(results: FlightResults) -> Drawing | None:
+    """Accuracy and geometry of the judged aircraft with time, every law in its colour."""
+    found = _data(results, "control_measures")
+    if found is None:
+        return None
+    answer, data = found
+    law, time_s = texts(data, "law"), numbers(data, "time_s")
+    panels = (
+        ("two_sigma_north_m", "2σ north, m", True),
+        ("two_sigma_east_m", "2σ east, m", True),
+        ("determinant", "det(H'H)", False),
+        ("dop", "DOP", False),
+    )
+    height = (PANEL_MM + 4) * len(panels) + 14.0
+
+    def paint(figure: Any) -> None:
+        for number, (column, title, is_log) in enumerate(panels):
+            top = height - 8 - (PANEL_MM + 4) * number
+            axes = d.place(figure, 18, top - PANEL_MM + 4, 174, top)
+            for name, colour, width in _laws(answer):
+                mine = law == name
+                d.line(axes, time_s[mine], numbers(data, column)[mine], colour, width, label=title_of(name))
+            axes.set_ylabel(title)
+            if is_log:
+                axes.set_yscale("log")
+                plain_log(axes.yaxis, (1.0, 2.0, 5.0))
+            d.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number == len(panels) - 1)
+            if not number:
+                d.legend_above(axes, 3)
+
+    caption = (
+        f"Accuracy of {answer.judged} as the centralised filter computes it, and geometry of its sources, along every "
+        "law. Laws of each step that agree lie over each other."
+    )
+    svg = d.draw("control-measures", height, paint)
+    return Drawing("Accuracy and geometry", caption, "Two sigma and geometry with time.", svg, ("control_measures",))
+
+
+def law(results: FlightResults) -> Drawing | None:
+    """Every control with time under every law, with its bounds."""
+    found = _data(results, "control_paths")
+    if found is None or not found[0].controls:
+        return None
+    answer, data = found
+    of, aircraft, time_s = texts(data, "law"), texts(data, "aircraft"), numbers(data, "time_s")
+    height = (PANEL_MM + 4) * len(answer.controls) + 14.0
+
+    def paint(figure: Any) -> None:
+        for number, row in enumerate(answer.controls):
+            top = height - 8 - (PANEL_MM + 4) * number
+            axes = d.place(figure, 18, top - PANEL_MM + 4, 174, top)
+            is_speed = row.control == "speed"
+            drawn = []
+            for name, colour, width in _laws(answer):
+                mine = (of == name) & (aircraft == row.aircraft)
+                values = numbers(data, "speed_mps")[mine] if is_speed else _unwrapped(data, mine, row.start)
+                d.line(axes, time_s[mine], values, colour, width, label=title_of(name))
+                drawn.append(values)
+            low, high = d.padded(float(d.finite(*drawn).min()), float(d.finite(*drawn).max()), 0.1, 0.5)
+            axes.set_ylim(low, high)
+            for value, text in ((row.low, "low"), (row.high, "high")):
+                if low <= value <= high:
+                    d.limit_line(axes, value, text)
+            axes.set_ylabel(f"{d.label(row.aircraft, 12)}: {row.control}, {'m/s' if is_speed else '°'}")
+            d.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number == len(answer.controls) - 1)
+            if not number:
+                d.legend_above(axes, 3)
+
+    caption = "The laws of control with time; the straight grey line is no control."
+    svg = d.draw("control-law", height, paint)
+    return Drawing("Laws of control", caption, "Controls with time.", svg, ("control_paths",))
+
+
+def _unwrapped(data: FigureData, rows: NDArray[np.bool_], start_deg: float) -> NDArray[np.float64]:
+    """Headings without jumps through north, beginning near the start."""
+    track = np.unwrap(numbers(data, "track_deg")[rows], period=360.0)
+    return np.asarray(track + 360.0 * np.round((start_deg - track[0]) / 360.0))

@@ -1,0 +1,30 @@
+"""The runs of the landing study: each approach answered once, in processes that share nothing."""
+
+import os
+from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from multiprocessing import get_context
+
+from groundstation.estimators.landing_ranges.answer import range_landing
+from groundstation.estimators.landing_ranges.scenario import RangeApproach
+from groundstation.results.landing_ranges import RangeLanding
+
+Progress = Callable[[str], None]
+WORKERS = 2
+
+
+def run_approaches(
+    approaches: Mapping[str, RangeApproach], trials: Mapping[str, int], seed: int, progress: Progress | None = None
+) -> dict[str, RangeLanding]:
+    """Answer of every approach, by name; ``trials`` says how many are simulated, none where it says nothing."""
+    wanted = {name: replace(one, trials=trials.get(name, 0), seed=seed) for name, one in approaches.items()}
+    found: dict[str, RangeLanding] = {}
+    if not any(one.trials for one in wanted.values()):
+        return {name: range_landing(one) for name, one in wanted.items()}
+    with ProcessPoolExecutor(min(WORKERS, os.cpu_count() or 1), mp_context=get_context("spawn")) as pool:
+        for name, answer in zip(wanted, pool.map(range_landing, wanted.values()), strict=True):
+            found[name] = answer
+            if progress:
+                progress(f"{name}: {wanted[name].trials} approaches")
+    return found

@@ -1,0 +1,126 @@
+"""Control of a session: the aircraft moving in space under the recommended law, the law, accuracy and geometry."""
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from groundstation.chapters.control import control as chapter
+from groundstation.chapters.control import title_of
+from groundstation.chapters.markdown import markdown
+from groundstation.results.control import UNCONTROLLED, ControlPlan
+from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults
+from groundstation.viewer import colours
+from groundstation.viewer.names import clean_text, path_parts
+from groundstation.viewer.recorder import Line, Recorder
+from groundstation.viewer.series import FloatArray
+from groundstation.viewer.views import document, figure_of, numbers, plot
+
+MARK, TRAIL, RANGE = 5.0, 1.2, 0.8  # radii in points of the screen
+THIN = 1.0
+MEASURES = (
+    ("two_sigma_north_m", "2σ north, m"),
+    ("two_sigma_east_m", "2σ east, m"),
+    ("determinant", "det(H'H)"),
+    ("dop", "DOP"),
+)
+CONTROLS = (("speed_mps", "speed", "Speed, m/s"), ("track_deg", "heading", "Track, deg"))
+
+
+def control(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
+    """Log the tab; None without an answer."""
+    answer, section = results.answer(ControlPlan), chapter(results)
+    paths = figure_of(results, "control_paths", "time_s", "law", "aircraft", "north_m", "east_m", "up_m")
+    if answer is None or section is None or paths is None:
+        return None
+    recorder.document("control/answer", markdown(section))
+    left = [_space(recorder, answer, paths, results), document("Laws of control", "control/answer")]
+    columns = [left, _laws(recorder, answer, paths), _measures(recorder, answer, results)]
+    shown = [rrb.Vertical(contents=column) for column in columns if column]
+    return rrb.Horizontal(contents=shown, column_shares=[1.6, 1.0, 1.0][: len(shown)], name="Control")
+
+
+def _space(recorder: Recorder, answer: ControlPlan, paths: FigureData, results: FlightResults) -> rrb.View:
+    """Aircraft and points in space, with a line from the judged aircraft to every source."""
+    law, aircraft = paths["law"].astype(np.str_), paths["aircraft"].astype(np.str_)
+    place = np.column_stack([numbers(paths, f"{axis}_m") for axis in ("east", "north", "up")])
+    shades = colours.for_series(len(answer.aircraft))
+    ways: dict[str, FloatArray] = {}
+    for name, part, shade in zip(answer.aircraft, path_parts(answer.aircraft), shades, strict=True):
+        rows = np.flatnonzero((law == answer.recommended) & (aircraft == name))
+        nominal = place[(law == UNCONTROLLED) & (aircraft == name)]
+        ways[name] = place[rows]
+        indexes = recorder.indexes(recorder.time_ns(numbers(paths, "time_s")[rows]))
+        path, trail = f"plan/{part}", rr.Radius.ui_points(TRAIL)
+        recorder.static(f"{path}/way", rr.LineStrips3D([place[rows]], colors=[shade], radii=trail))
+        recorder.static(f"{path}/uncontrolled", rr.LineStrips3D([nominal], colors=[colours.DIM], radii=trail))
+        told = rr.Points3D.from_fields(colors=[shade], radii=rr.Radius.ui_points(MARK), labels=[clean_text(name)])
+        recorder.static(f"{path}/now", told)
+        columns = rr.Points3D.columns(positions=place[rows].astype(np.float32))
+        recorder.stream.send_columns(f"{path}/now", indexes, columns)
+    points = figure_of(results, "control_points", "name", "north_m", "east_m", "up_m")
+    if points is not None:
+        stations = np.column_stack([numbers(points, f"{axis}_m") for axis in ("east", "north", "up")])
+        names = [clean_text(name) for name in points["name"].tolist()]
+        marks = rr.Points3D(
+            stations, labels=names, colors=[colours.LIGHT] * len(names), radii=rr.Radius.ui_points(MARK)
+        )
+        recorder.static("plan/points", marks)
+        ways |= {f"point {number}": np.tile(one, (len(ways[answer.judged]), 1)) for number, one in enumerate(stations)}
+    _ranges(recorder, answer.judged, ways, np.unique(numbers(paths, "time_s")))
+    recorder.static("plan", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    name = f"East, north, up: {title_of(answer.recommended)}; grey: no control"
+    return rrb.Spatial3DView(name=name, origin="/plan")
+
+
+def _ranges(recorder: Recorder, judged: str, ways: dict[str, FloatArray], time_s: FloatArray) -> None:
+    others = [way for name, way in ways.items() if name != judged]
+    strips = np.stack([np.stack([way, ways[judged]], axis=1) for way in others], axis=1)  # (epochs, sources, 2, 3)
+    recorder.static(
+        "plan/ranges", rr.LineStrips3D.from_fields(colors=[colours.PAPER], radii=rr.Radius.ui_points(RANGE))
+    )
+    flat = list(strips.reshape(-1, 2, 3).astype(np.float32))
+    columns = rr.LineStrips3D.columns(strips=flat).partition([len(others)] * len(strips))
+    recorder.stream.send_columns("plan/ranges", recorder.indexes(recorder.time_ns(time_s)), columns)
+
+
+def _laws(recorder: Recorder, answer: ControlPlan, paths: FigureData) -> list[rrb.View]:
+    """Every control with time, a view each, every law a line."""
+    law, aircraft, views = paths["law"].astype(np.str_), paths["aircraft"].astype(np.str_), list[rrb.View]()
+    for column, kind, title in CONTROLS:
+        for row in answer.controls:
+            if row.control != kind:
+                continue
+            path = f"control/{kind}/{path_parts([row.aircraft])[0]}"
+            _by_law(recorder, answer, path, paths, column, law, aircraft == row.aircraft)
+            views.append(plot(f"{clean_text(row.aircraft)}: {title}", path, legend=not views))
+    return views
+
+
+def _measures(recorder: Recorder, answer: ControlPlan, results: FlightResults) -> list[rrb.View]:
+    data = figure_of(results, "control_measures", "time_s", "law", *(column for column, _ in MEASURES))
+    if data is None:
+        return []
+    law, views = data["law"].astype(np.str_), list[rrb.View]()
+    for column, title in MEASURES:
+        path = f"control/measures/{column}"
+        _by_law(recorder, answer, path, data, column, law, np.ones(len(data), dtype=bool))
+        views.append(plot(f"{clean_text(answer.judged)}: {title}", path, legend=not views))
+    return views
+
+
+def _by_law(
+    recorder: Recorder,
+    answer: ControlPlan,
+    path: str,
+    data: FigureData,
+    column: str,
+    law: np.ndarray,
+    used: np.ndarray,
+) -> None:
+    shades = colours.for_series(len(answer.laws))
+    for row, shade in zip(answer.laws, shades, strict=True):
+        mine = used & (law == row.law)
+        time_ns = recorder.time_ns(numbers(data, "time_s")[mine])
+        line = Line(title_of(row.law), shade, THIN)
+        recorder.lines(f"{path}/{row.law}", time_ns, numbers(data, column)[mine][:, None], [line])
