@@ -198,6 +198,7 @@ def test_readings_that_repeat_themselves_weigh_what_they_tell() -> None:
     exact = 1.0 + 2.0 * share * np.sum((1.0 - lags / n) * np.exp(-lags * dt_s / time_s))
     assert events[0].variance_m2 == pytest.approx(0.01)
     assert events[50].variance_m2 / 0.01 == pytest.approx(exact, rel=0.01)
+    assert events[50].variance_m2 * events[50].spread == pytest.approx(0.01)  # the gate knows one reading
 
 
 def test_fusion_without_unknown_correlation_is_that_of_kalman() -> None:

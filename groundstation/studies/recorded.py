@@ -45,7 +45,7 @@ SETTINGS = {
         range_share=0.012,
         correlated_share=0.5,
         correlation_s=5.0,
-        gate_sigma=5.0,
+        gate_sigma=4.0,
         latency_slots=0,
         map_window_s=1e6,
     ),
@@ -55,9 +55,9 @@ SETTINGS["miluv"] = CooperativeSettings(
     derivatives="estimate",
     range_bias_m=0.05,
     range_bias_s=5.0,
-    correlated_share=0.3,
+    correlated_share=0.2,
     correlation_s=5.0,
-    gate_sigma=2.5,  # one range in eight is too long by a path that is not the straight one
+    gate_sigma=3.0,  # one range in ten is too long by a path that is not the straight one
     latency_slots=0,
     map_window_s=1e6,
 )

@@ -194,8 +194,10 @@ def _members(event: Event) -> tuple[int, ...]:
     return (event.receiver, event.source) if event.kind == PEER else (event.receiver,)
 
 
-def _is_gated(joint: _Joint, row: Row, h: FloatArray, settings: CooperativeSettings) -> tuple[bool, float]:
-    total = float(h @ joint.P @ h) + row.variance
+def _is_gated(
+    joint: _Joint, event: Event, row: Row, h: FloatArray, settings: CooperativeSettings
+) -> tuple[bool, float]:
+    total = float(h @ joint.P @ h) + row.variance * event.spread
     return settings.gate_sigma > 0.0 and row.innovation**2 > settings.gate_sigma**2 * total, total
 
 
@@ -206,7 +208,7 @@ def _use_one(
     if not rows:
         recorder.counts["lost"] += 1
     for k, (row, h) in enumerate(rows):
-        gated, total = _is_gated(joint, row, h, settings)
+        gated, total = _is_gated(joint, event, row, h, settings)
         recorder.judge(event, row.innovation, total, GATED if gated else USED)
         _count_rejections(joint, event, gated, rejected, recorder)
         if gated:
@@ -222,7 +224,7 @@ def _use_together(
     kept = []
     for event in events:
         for row, h in joint.rows(event):
-            gated, total = _is_gated(joint, row, h, settings)
+            gated, total = _is_gated(joint, event, row, h, settings)
             recorder.judge(event, row.innovation, total, GATED if gated else USED)
             _count_rejections(joint, event, gated, rejected, recorder)
             if not gated:

@@ -283,7 +283,7 @@ class Decentralised:
         offer, brought = rows[0].offer, np.diag(self._brought(rows))
         passes = True
         for used, noise in zip(rows, brought.tolist(), strict=True):
-            total = float(used.h @ own.P @ used.h) + used.row.variance + noise
+            total = float(used.h @ own.P @ used.h) + used.row.variance * offer.event.spread + noise
             fits = self._settings.gate_sigma <= 0.0 or used.row.innovation**2 <= self._settings.gate_sigma**2 * total
             passes = passes and fits
             if offer.sighting is None:

@@ -40,6 +40,8 @@ class Event:
     is_two_way : bool
     arm_m : ndarray, shape (3,), optional
         From the source's antenna to its place, and from the receiver's place to its antenna.
+    spread : float
+        Share of the variances that is the spread of one reading, for the gate; the rest is for its repeating itself.
     """
 
     time_s: float
@@ -54,6 +56,7 @@ class Event:
     bearing_variance_rad2: float = float("nan")
     is_two_way: bool = False
     arm_m: FloatArray | None = None
+    spread: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -228,6 +231,7 @@ def _link_events(
                 float(bearing_sigma[row] ** 2 * as_white[row]),
                 table.is_two_way,
                 None if table.arm_m is None else table.arm_m[row],
+                1.0 / float(as_white[row]),
             )
         )
     _count_away(findings, away, "link rows")

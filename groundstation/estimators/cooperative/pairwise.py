@@ -100,6 +100,7 @@ class Pairwise:
         return rows_of(event, self._prepared.vehicles[event.receiver], one.x, source_m, clock_m)
 
     def _passes(self, event: Event, row: Row, total: float) -> bool:
+        total -= row.variance * (1.0 - event.spread)
         passes = self._settings.gate_sigma <= 0.0 or row.innovation**2 <= self._settings.gate_sigma**2 * total
         self.recorder.judge(event, row.innovation, total, USED if passes else GATED)
         for who in (event.receiver, event.source) if event.kind == PEER else (event.receiver,):
