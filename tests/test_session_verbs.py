@@ -11,10 +11,10 @@ from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
 from groundstation.pipeline.verbs.compare import compare, session_errors
 from groundstation.pipeline.verbs.serve import recordings_in
-from groundstation.results.files import load
 from groundstation.simulation.session_log import write_session
 from groundstation.viewer.fleet_catalog import SESSIONS, catalog_server
 from tests.recording_contents import Contents
+from tests.saved import load
 from tests.session_example import SEED, SHORT
 
 

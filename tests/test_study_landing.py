@@ -7,6 +7,7 @@ import pytest
 from groundstation.estimators.landing_ranges.answer import TOUCHDOWN, range_landing
 from groundstation.results.landing_ranges import RangeLanding
 from groundstation.studies import landing_cases
+from groundstation.studies.landing_bearings import bearing_spans, bearing_table
 from groundstation.studies.landing_cases import APPROACHES, CLAIMS, FLOWN, PUBLISHED, SIGMAS, approach, variations
 from groundstation.studies.landing_tables import (
     category_table,
@@ -70,3 +71,24 @@ def test_trials_are_told_with_their_limits() -> None:
     assert len(table) == len(answer.trials)
     assert set(table["trials"]) == {3}
     assert answer.at(TOUCHDOWN).height_m < 2.0
+
+
+def test_drawn_bearings_err_as_the_formulas_say_and_refute_category_two_laterally() -> None:
+    table = bearing_table(3000, 5)
+    near = (table["before_threshold_m"] <= 2000.0) & (table["bearing_sigma_deg"] == 1.0)
+    for axis in ("lateral", "glide_path"):
+        assert table[f"{axis}_drawn_m"][near] == pytest.approx(table[f"{axis}_formula_m"][near], rel=0.1)
+    assert set(table["category_two_laterally"]) == {"refuted"}
+    holds_in_height = table["before_threshold_m"][table["category_two_in_height"] == "holds"]
+    assert 0.0 < holds_in_height.max() < 500.0
+
+
+def test_spans_name_where_bearings_meet_a_category() -> None:
+    table = bearing_spans()
+    rows = {
+        (sigma, category, axis): told
+        for sigma, category, axis, told in zip(*(table[name] for name in table.columns), strict=True)
+    }
+    assert rows[(1.0, "CAT II and IIIA", "vertical")] == "305 to 0"
+    assert rows[(2.0, "CAT II and IIIA", "vertical")] == "nowhere"
+    assert ", " in rows[(1.0, "CAT I", "lateral")]  # about either locator

@@ -6,6 +6,8 @@ from groundstation.chapters.forecast import forecast
 from groundstation.chapters.generic import generic
 from groundstation.chapters.heading import heading
 from groundstation.chapters.inertial import inertial
+from groundstation.chapters.landing import landing
+from groundstation.chapters.landing_beacons import landing_beacons
 from groundstation.chapters.latency import latency
 from groundstation.chapters.magnetic import magnetic
 from groundstation.chapters.parts import Section
@@ -16,6 +18,8 @@ from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
+from groundstation.results.landing import LandingResult
+from groundstation.results.landing_beacons import BeaconLanding
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
 from groundstation.results.magnetic_ground import GroundDeviation
@@ -27,6 +31,8 @@ FLIGHT_CHAPTERS: tuple[Chapter, ...] = (
     Chapter((ForecastResult,), forecast),
     Chapter((Latencies,), latency),
     Chapter((MagneticResult, GroundDeviation), magnetic),
+    Chapter((LandingResult,), landing),
+    Chapter((BeaconLanding,), landing_beacons),
 )
 SESSION_CHAPTERS: tuple[Chapter, ...] = (Chapter((CooperativeResult,), cooperative),)
 

@@ -41,9 +41,7 @@ def session(
     scenario: Scenario = None,
     output: Output = None,
     listed: Listed = False,
-    fail_on: Annotated[
-        FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is at least this severe.")
-    ] = "none",
+    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 at a finding this severe or worse.")] = "none",
     no_pdf: NoPdf = False,
     force: Force = False,
     quiet: Quiet = False,

@@ -5,16 +5,21 @@ from types import MappingProxyType
 from typing import Any
 
 from groundstation.estimators.analysis import Analysis
+from groundstation.estimators.approaches.analysis import LANDING
 from groundstation.estimators.control.analysis import SESSION_PLAN
 from groundstation.estimators.cooperative.analysis import COOPERATIVE
 from groundstation.estimators.heading.analysis import HEADING
 from groundstation.estimators.inertial.analysis import FORECAST, INERTIAL
+from groundstation.estimators.landing_beacons.analysis import LANDING_BEACONS
 from groundstation.estimators.latency.analysis import LATENCY
 from groundstation.estimators.magnetic.analysis import MAGNETIC, MAGNETIC_GROUND
 from groundstation.estimators.plan import Plan
 from groundstation.results.answer import Answer
 
-FLIGHT_ANALYSES: tuple[Analysis, ...] = (HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND)
+FLIGHT_ANALYSES: tuple[Analysis, ...] = (
+    *(HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND),
+    *(LANDING, LANDING_BEACONS),
+)
 SESSION_ANALYSES: tuple[Analysis, ...] = (COOPERATIVE,)
 PLANS: tuple[Plan[Any], ...] = (SESSION_PLAN,)
 

@@ -14,6 +14,8 @@ from groundstation.tables.phases import Phases
 S = TypeVar("S")
 LEAST_ENTRY_STEP_DEG = 1e-6  # the places an answer is shown with
 
+STANDARD_GLIDE_ANGLE_DEG, STANDARD_CROSSING_HEIGHT_M = 3.0, 15.0
+
 
 @dataclass(frozen=True)
 class AircraftData:
@@ -62,13 +64,24 @@ class Stand:
 
 @dataclass(frozen=True)
 class Runway:
-    """Runway with its true bearing (in the direction of take-off) and the position of its threshold."""
+    """Runway with its true bearing (in the direction of take-off), the position of its threshold and its approach aids.
+
+    Without a glide path of its own the standard one holds. ``localizer_width_m`` is the full width of the course sector
+    at the threshold, ``localizer_distance_m`` from the threshold to its antenna behind the far end.
+    """
 
     name: str
     true_bearing_deg: float = required_number(0.0, 360.0)
     sigma_deg: float = number(0.05, 0.0)
     latitude_deg: float | None = number(None, -90.0, 90.0)
     longitude_deg: float | None = number(None, -180.0, 180.0)
+    elevation_m: float | None = number(None, -500.0, 6_000.0)  # of the threshold, above mean sea level
+    length_m: float | None = number(None, 50.0, 10_000.0)
+    width_m: float | None = number(None, 1.0, 200.0)
+    threshold_crossing_height_m: float | None = number(None, 0.0, 50.0)
+    glide_angle_deg: float | None = number(None, 1.0, 10.0)
+    localizer_width_m: float | None = number(None, 10.0, 1_000.0)
+    localizer_distance_m: float | None = number(None, 500.0, 10_000.0)
 
     def __post_init__(self) -> None:
         check_ranges(self)
@@ -78,6 +91,28 @@ class Runway:
                 missing, other = other, missing
             raise SettingsError(missing, "nothing", f"a value beside {other}, or neither of the two")
 
+    @property
+    def glide_path(self) -> tuple[float, float]:
+        """Angle of the glide path in degrees, and its height above the threshold in metres."""
+        angle_deg, height_m = self.glide_angle_deg, self.threshold_crossing_height_m
+        return (
+            STANDARD_GLIDE_ANGLE_DEG if angle_deg is None else angle_deg,
+            STANDARD_CROSSING_HEIGHT_M if height_m is None else height_m,
+        )
+
+
+@dataclass(frozen=True)
+class Beacon:
+    """A non-directional beacon: where it stands against the threshold of a runway, the only one where none is named."""
+
+    name: str
+    before_threshold_m: float = required_number(-20_000.0, 100_000.0)
+    right_m: float = number(0.0, -50_000.0, 50_000.0)
+    runway: str = ""
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
 
 @dataclass(frozen=True)
 class SiteData:
@@ -86,9 +121,10 @@ class SiteData:
     stands: tuple[Stand, ...] = ()
     runways: tuple[Runway, ...] = ()
     stand: str = ""
+    beacons: tuple[Beacon, ...] = ()
 
     def __post_init__(self) -> None:
-        for key, listed in (("stands", self.stands), ("runways", self.runways)):
+        for key, listed in (("stands", self.stands), ("runways", self.runways), ("beacons", self.beacons)):
             twice = [name for name, count in Counter(item.name for item in listed).items() if count > 1]
             if twice:
                 raise SettingsError(key, f"{twice[0]!r} more than once", "names that differ")
@@ -96,6 +132,10 @@ class SiteData:
         if self.stand and self.stand not in names:
             expected = f"one of {', '.join(names)}" if names else "a stand listed under [[stands]]: there is none"
             raise SettingsError("stand", repr(self.stand), expected)
+        runways = {runway.name for runway in self.runways}
+        lost = [beacon for beacon in self.beacons if beacon.runway and beacon.runway not in runways]
+        if lost:
+            raise SettingsError("beacons", f"{lost[0].name!r} of runway {lost[0].runway!r}", "a runway of [[runways]]")
 
     def parked_on(self) -> Stand | None:
         """The named stand; the only one where none is named; else None."""

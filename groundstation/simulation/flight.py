@@ -12,6 +12,7 @@ from groundstation.simulation.deviation import scenario_deviation
 from groundstation.simulation.electric import electric_readings
 from groundstation.simulation.faults import apply_faults
 from groundstation.simulation.flight_errors import flight_errors
+from groundstation.simulation.landing_aids import adf_readings, radio_altimeter_readings
 from groundstation.simulation.magnetometer import magnetometer_readings
 from groundstation.simulation.onboard import onboard_readings
 from groundstation.simulation.readings import Readings, every, generator
@@ -153,6 +154,11 @@ def _all_readings(scenario: Scenario, trajectory: Trajectory) -> list[Readings]:
         readings.append(baro_readings(trajectory, scenario.baro, generator(seed, "baro")))
     if scenario.air is not None:
         readings.append(air_readings(trajectory, scenario.air, scenario.wind, generator(seed, "air")))
+    if scenario.adf is not None:
+        readings += adf_readings(trajectory, scenario.adf, scenario.runway, generator(seed, "adf"))
+    if scenario.radio_altimeter is not None:
+        rng = generator(seed, "radio_altimeter")
+        readings.append(radio_altimeter_readings(trajectory, scenario.radio_altimeter, scenario.runway, rng))
     if scenario.events:
         readings.append(event_readings(trajectory, scenario.events))
     return readings

@@ -13,6 +13,7 @@ from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.toml_settings import number, required_number, settings_from
 from groundstation.simulation.faults import Fault
 from groundstation.simulation.ins_class import ins_class_names
+from groundstation.simulation.landing_settings import AdfSettings, RadioAltimeterSettings, RunwayOfLanding
 from groundstation.simulation.legs import Leg
 
 _SCENARIOS = ShippedToml("groundstation.simulation", "scenarios", "scenario")
@@ -292,6 +293,9 @@ class Scenario:
     baro: BaroSettings | None = None
     air: AirSettings | None = None
     onboard: OnboardSettings | None = None
+    runway: RunwayOfLanding = field(default_factory=RunwayOfLanding)
+    adf: AdfSettings | None = None
+    radio_altimeter: RadioAltimeterSettings | None = None
     truth: TruthSettings = field(default_factory=TruthSettings)
     events: tuple[EventMarker, ...] = ()
     faults: tuple[Fault, ...] = ()

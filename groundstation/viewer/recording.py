@@ -22,6 +22,8 @@ from groundstation.viewer.tabs.forecast import forecast
 from groundstation.viewer.tabs.generic import generic_tab
 from groundstation.viewer.tabs.heading import heading
 from groundstation.viewer.tabs.inertial import inertial
+from groundstation.viewer.tabs.landing import landing
+from groundstation.viewer.tabs.landing_beacons import landing_beacons
 from groundstation.viewer.tabs.log import log
 from groundstation.viewer.tabs.magnetic import magnetic
 from groundstation.viewer.tabs.overview import overview
@@ -37,6 +39,8 @@ ANSWER_TABS: tuple[tuple[Callable[[Recorder, FlightResults], rrb.Container | Non
     (inertial, ("inertial",)),
     (forecast, ("forecast",)),
     (magnetic, ("magnetic", "magnetic_ground")),
+    (landing, ("landing",)),
+    (landing_beacons, ("landing_beacons",)),
 )
 SHOWN_ELSEWHERE = ("latency",)  # in the tab on data quality
 CONNECT_SECONDS, FLUSH_SECONDS = 3.0, 60.0

@@ -1,0 +1,142 @@
+"""One approach by bearings: the places along it, deviations with their sigmas, and whether they can be believed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray, mean_heading, wrap_180, wrap_360
+from groundstation.base.records import BoolArray, frozen
+from groundstation.estimators.known import Runway
+from groundstation.estimators.landing_beacons.geometry import BearingFix, solve_bearings
+from groundstation.estimators.landing_beacons.settings import LandingBeaconsSettings
+
+WELL_KNOWN_M = 300.0  # sigma of a distance that may say something about the speed
+LEAST_FIXES = 10
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """Everything at the times of one direction finder, shape (n,): bearings (n, k), NaN where there is nothing."""
+
+    time_s: FloatArray
+    bearings_deg: FloatArray
+    height_m: FloatArray
+    is_airborne: BoolArray
+    altitude_m: FloatArray
+    ground_speed_mps: FloatArray
+    heading_deg: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in self.__dataclass_fields__:
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def part(self, index: slice) -> "Sampled":
+        """The epochs of a slice."""
+        return Sampled(**{name: getattr(self, name)[index] for name in self.__dataclass_fields__})
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Deviations along one approach, shape (n,), NaN where there is no place.
+
+    ``glide_path_sigma_m`` holds the errors of radio altitude and of the distance alone, not the terrain.
+    """
+
+    fix: BearingFix
+    glide_path_m: FloatArray
+    lateral_sigma_m: FloatArray
+    distance_sigma_m: FloatArray
+    glide_path_sigma_m: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("glide_path_m", "lateral_sigma_m", "distance_sigma_m", "glide_path_sigma_m"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    @property
+    def before_m(self) -> FloatArray:
+        """Distance before the threshold."""
+        return np.asarray(-self.fix.along_m)
+
+    @property
+    def found(self) -> BoolArray:
+        """Where there is a place."""
+        return np.asarray(np.isfinite(self.fix.along_m))
+
+
+def approaches_in(sampled: Sampled, settings: LandingBeaconsSettings) -> list[slice]:
+    """Stretches of low flight with all bearings, long enough."""
+    low = sampled.is_airborne & (sampled.height_m <= settings.highest_m)
+    rows = np.flatnonzero(low & np.isfinite(sampled.bearings_deg).all(axis=1))
+    if not len(rows):
+        return []
+    breaks = np.flatnonzero(np.diff(sampled.time_s[rows]) > 5.0 * settings.largest_gap_s)
+    firsts, lasts = np.append(rows[0], rows[breaks + 1]), np.append(rows[breaks], rows[-1])
+    spans = [slice(int(first), int(last) + 1) for first, last in zip(firsts, lasts, strict=True)]
+    return [one for one in spans if np.ptp(sampled.time_s[one]) >= settings.shortest_s]
+
+
+def deviations(sampled: Sampled, beacons_m: FloatArray, runway: Runway, settings: LandingBeaconsSettings) -> Deviations:
+    """Deviations of one approach.
+
+    Parameters
+    ----------
+    sampled : Sampled
+    beacons_m : ndarray, shape (k, 2)
+        Along and right of the beacons.
+    runway : Runway
+    settings : LandingBeaconsSettings
+
+    Notes
+    -----
+    Above the glide path = radio altitude - (threshold crossing height + distance tan(glide angle)). Bearings of a
+    beacon overhead are left out, and with fewer than three there is no place.
+    """
+    fix = solve_bearings(sampled.bearings_deg, beacons_m, settings.bearing_sigma_deg)
+    place = np.column_stack([fix.along_m, fix.right_m])
+    reach = np.linalg.norm(place[:, None, :] - beacons_m, axis=2)
+    overhead = reach < settings.silence_ratio * sampled.height_m[:, None]
+    fix = solve_bearings(
+        np.where(overhead, np.nan, sampled.bearings_deg), beacons_m, settings.bearing_sigma_deg
+    )  # where a beacon is overhead nothing is found
+    glide_angle_deg, crossing_height_m = runway.glide_path
+    slope = float(np.tan(np.deg2rad(glide_angle_deg)))
+    glide = sampled.height_m - (crossing_height_m - fix.along_m * slope)
+    along_sigma, right_sigma = (np.sqrt(fix.covariance[:, axis, axis]) for axis in (0, 1))
+    return Deviations(fix, glide, right_sigma, along_sigma, np.hypot(settings.height_sigma_m, slope * along_sigma))
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What speaks for or against the places of one approach; NaN where the log does not say.
+
+    ``threshold_s`` is when the straight flight that ``speed_mps`` belongs to crosses the threshold.
+    """
+
+    speed_mps: float
+    threshold_s: float
+    ground_speed_mps: float
+    heading_difference_deg: float
+    terrain_m: float
+
+
+def belief(sampled: Sampled, found: Deviations, runway: Runway) -> Belief:
+    """Speed at which the distance shrinks, heading against the INS, and the ground under the approach."""
+    good = found.found & (found.distance_sigma_m < WELL_KNOWN_M)
+    speed = threshold_s = float("nan")
+    if good.sum() >= LEAST_FIXES:
+        weight = 1.0 / found.distance_sigma_m[good]
+        speed, offset_m = (
+            float(part) for part in np.polyfit(sampled.time_s[good], found.fix.along_m[good], 1, w=weight)
+        )
+        threshold_s = -offset_m / speed if speed else float("nan")
+    heading = wrap_360(runway.true_bearing_deg + found.fix.off_course_deg)
+    difference = wrap_180(heading - sampled.heading_deg)
+    known = np.isfinite(difference)
+    middle = float(wrap_180(mean_heading(difference[known]))) if known.any() else float("nan")
+    ground = sampled.altitude_m - sampled.height_m
+    ground = ground[np.isfinite(ground)]
+    terrain = float(np.ptp(np.quantile(ground, [0.02, 0.98]))) if len(ground) else float("nan")
+    known_speed = sampled.ground_speed_mps[np.isfinite(sampled.ground_speed_mps)]
+    return Belief(
+        speed, threshold_s, float(np.median(known_speed)) if len(known_speed) else float("nan"), middle, terrain
+    )

@@ -1,0 +1,109 @@
+"""Answer of landing by locators: deviations from course and glide path by relative bearings and radio altitude."""
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from groundstation.results.answer import Answer
+from groundstation.results.figures import FigureData
+
+
+@dataclass(frozen=True)
+class BeaconRow:
+    """A beacon: where it stands and how many bearings of it were used."""
+
+    name: str
+    before_threshold_m: float
+    right_m: float
+    bearings: int
+
+
+@dataclass(frozen=True)
+class BeaconApproachRow:
+    """One approach.
+
+    Parameters
+    ----------
+    approach : int
+        From 1.
+    start_s, end_s : float
+        Flight seconds.
+    first_before_threshold_m, last_before_threshold_m : float
+        Found at its start and end.
+    fixes, blind : int
+        Places found; epochs without one (a beacon overhead, or geometry without a solution).
+    speed_mps : float
+        At which the distance shrinks.
+    ground_speed_mps, heading_difference_deg : float or None
+        Of the INS, and heading by the bearings minus its heading: both show whether bearings and beacons belong.
+    terrain_m : float or None
+        How much the ground under the approach rises and falls, by radio altitude against altitude.
+    """
+
+    approach: int
+    start_s: float
+    end_s: float
+    first_before_threshold_m: float
+    last_before_threshold_m: float
+    fixes: int
+    blind: int
+    speed_mps: float
+    ground_speed_mps: float | None
+    heading_difference_deg: float | None
+    terrain_m: float | None
+
+
+@dataclass(frozen=True)
+class DeviationRow:
+    """Deviations at one distance: means over a second, with what a single one of them may err by.
+
+    Parameters
+    ----------
+    lateral_m, glide_path_m : float
+        Right of the course, above the glide path.
+    lateral_95_m, glide_path_95_m, distance_95_m : float
+        1.96 sigma of one axis, from the errors of bearings and radio altitude.
+    lateral_category, vertical_category : str
+        The most demanding one whose accuracy that meets; empty: none.
+    """
+
+    approach: int
+    before_threshold_m: float
+    distance_95_m: float
+    lateral_m: float
+    lateral_95_m: float
+    glide_path_m: float
+    glide_path_95_m: float
+    lateral_category: str
+    vertical_category: str
+
+
+@dataclass(frozen=True)
+class BeaconLanding(Answer):
+    """Approaches by two locators and an additional beacon.
+
+    Parameters
+    ----------
+    runway : str
+    bearing_sigma_deg, height_sigma_m : float
+        Errors that the figures assume.
+    beacons, approaches, rows : tuples
+        Tables; see the rows.
+    remarks : tuple of str
+    settings : dict
+    figures : tuple of FigureData
+        ``landing_beacons_path`` (time_s, approach, straight_before_threshold_m of a straight flight through all places,
+        before_threshold_m, distance_sigma_m, lateral_m, lateral_sigma_m, glide_path_m, glide_path_sigma_m, height_m,
+        off_course_deg).
+    """
+
+    analysis: ClassVar[str] = "landing_beacons"
+
+    runway: str
+    bearing_sigma_deg: float
+    height_sigma_m: float
+    beacons: tuple[BeaconRow, ...]
+    approaches: tuple[BeaconApproachRow, ...]
+    rows: tuple[DeviationRow, ...]
+    remarks: tuple[str, ...] = ()
+    settings: dict[str, float | str | bool] = field(default_factory=dict)
+    figures: tuple[FigureData, ...] = ()

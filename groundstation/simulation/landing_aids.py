@@ -1,0 +1,95 @@
+"""Landing aids of a simulated flight: bearings of beacons by an automatic direction finder, and a radio altimeter.
+
+The runway is where the flight lands: its course is the track at touchdown, its threshold lies a stated distance before
+the touchdown and to a stated side of it, so that a scenario lands off the centre line without flying otherwise.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray, direction_of, wrap_180
+from groundstation.base.errors import SettingsError
+from groundstation.base.geodesy import curvature_radii_m
+from groundstation.base.records import Column
+from groundstation.simulation.landing_settings import AdfSettings, RadioAltimeterSettings, RunwayOfLanding
+from groundstation.simulation.processes import gauss_markov
+from groundstation.simulation.readings import Readings, every, quantised
+from groundstation.simulation.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class RunwayPlaces:
+    """A trajectory in the frame of its runway, shape (n,): along, right, up; heading off the course."""
+
+    along_m: FloatArray
+    right_m: FloatArray
+    up_m: FloatArray
+    off_course_deg: FloatArray
+    course_deg: float
+
+
+def runway_places(trajectory: Trajectory, runway: RunwayOfLanding) -> RunwayPlaces:
+    """The trajectory about the threshold of its last landing.
+
+    Raises
+    ------
+    SettingsError
+        When it never lands.
+    """
+    touched = np.flatnonzero(trajectory.airborne[:-1] & ~trajectory.airborne[1:])
+    if not len(touched):
+        raise SettingsError("legs", "no landing", "a leg of kind landing, for the runway of the landing aids")
+    k = int(touched[-1]) + 1
+    course_deg = float(direction_of(trajectory.velocity_north_mps[k], trajectory.velocity_east_mps[k]))
+    meridian, normal = (float(radius) for radius in curvature_radii_m(trajectory.latitude_deg[k]))
+    height = float(trajectory.altitude_m[k])
+    north = np.deg2rad(trajectory.latitude_deg - trajectory.latitude_deg[k]) * (meridian + height)
+    parallel = (normal + height) * np.cos(np.deg2rad(trajectory.latitude_deg[k]))
+    east = np.deg2rad(wrap_180(trajectory.longitude_deg - trajectory.longitude_deg[k])) * parallel
+    sine, cosine = np.sin(np.deg2rad(course_deg)), np.cos(np.deg2rad(course_deg))
+    return RunwayPlaces(
+        north * cosine + east * sine + runway.threshold_before_touchdown_m,
+        east * cosine - north * sine - runway.threshold_right_m,
+        trajectory.altitude_m - height,
+        wrap_180(trajectory.heading_deg - course_deg),
+        course_deg,
+    )
+
+
+def adf_readings(
+    trajectory: Trajectory, settings: AdfSettings, runway: RunwayOfLanding, rng: np.random.Generator
+) -> list[Readings]:
+    """Relative bearings of every beacon, one topic each; none beyond the range."""
+    index = every(trajectory, settings.rate_hz)
+    places, motion = runway_places(trajectory, runway), trajectory.at(index)
+    readings = []
+    for beacon in settings.beacons:
+        ahead = -beacon.before_threshold_m - places.along_m[index]
+        aside = beacon.right_m - places.right_m[index]
+        error = settings.sigma_deg * rng.standard_normal(len(index))
+        error += gauss_markov(
+            rng, (len(index),), 1.0 / settings.rate_hz, settings.correlated_deg, settings.correlation_s
+        )
+        bearing = wrap_180(np.rad2deg(np.arctan2(aside, ahead)) - places.off_course_deg[index] + error)
+        bearing = wrap_180(-bearing) if settings.is_reversed else bearing
+        columns = {
+            "relative_bearing_deg": Column(
+                quantised(bearing, settings.resolution_deg), np.hypot(ahead, aside) < settings.longest_range_m
+            )
+        }
+        step = {"relative_bearing_deg": settings.resolution_deg}
+        readings.append(Readings(f"adf.{beacon.name}", motion.time_ns, columns, step))
+    return readings
+
+
+def radio_altimeter_readings(
+    trajectory: Trajectory, settings: RadioAltimeterSettings, runway: RunwayOfLanding, rng: np.random.Generator
+) -> Readings:
+    """Height above the ground: that of the runway, and before the threshold as it rises."""
+    index = every(trajectory, settings.rate_hz)
+    places, motion = runway_places(trajectory, runway), trajectory.at(index)
+    ground = settings.rise_m_per_km * np.maximum(-places.along_m[index], 0.0) / 1000.0
+    height = places.up_m[index] - ground + settings.sigma_m * rng.standard_normal(len(index))
+    columns = {"height_m": Column(quantised(height, settings.resolution_m), height <= settings.highest_m)}
+    return Readings("radio_altimeter", motion.time_ns, columns, {"height_m": settings.resolution_m})
