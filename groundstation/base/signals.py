@@ -119,8 +119,8 @@ TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
             *(_double(f"{axis}_alarm_limit_m", "m", 0.0, 100_000.0) for axis in ("horizontal", "vertical")),
         ),
         "guidance": (
-            _double("lateral_deviation_dots", "dots", -10.0, 10.0),
-            _double("vertical_deviation_dots", "dots", -10.0, 10.0),
+            _double("lateral_deviation_dots", "dots", -1_000.0, 1_000.0),
+            _double("vertical_deviation_dots", "dots", -1_000.0, 1_000.0),
             _text("source"),
             _double("frequency_mhz", "mhz", 0.0, 1_000.0),
             _heading("course_magnetic_deg"),

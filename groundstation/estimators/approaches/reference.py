@@ -267,10 +267,13 @@ def _drifting(place: FloatArray) -> FloatArray:
 
 
 def _rounding_m(positions: Positions, runway: RunwayUsed, settings: LandingSettings) -> float:
-    """Sigma of a shift of all positions: cut off, each coordinate lies half a step too low; nobody says whether."""
+    """Sigma of a shift of all positions: cut off, each coordinate lies half a step too low; nobody says whether.
+
+    It is nothing or the whole of it; both coordinates may add up.
+    """
     if settings.positions_rounded != "unknown":
         return 0.0
-    return float(0.5 * np.hypot(*step_across_m(positions, runway)) / np.sqrt(2.0))
+    return float(0.5 * np.sum(step_across_m(positions, runway)) / np.sqrt(2.0))
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,8 @@ from groundstation.results.landing_categories import CATEGORIES
 
 M_PER_KM = 1000.0
 CATEGORY_COLOURS = ("#e69f00", "#cc79a7", "#7a6a00")
-LEAST_REACH_M = 30.0
+LEAST_REACH_M, LINEAR_M = 30.0, 20.0
+MARKS_M = (10.0, 20.0, 100.0, 500.0, 2000.0)
 
 
 def _parts(results: FlightResults, of: str) -> tuple[Approach, FigureData, NDArray[np.intp]] | None:
@@ -54,8 +55,7 @@ def deviations(results: FlightResults, of: str) -> Drawing | None:
             d.line(axes, distance / M_PER_KM, guided, d.INS, 1.3, label="guidance")
             axes.axhline(0.0, color=d.FAINT, linewidth=0.6)
             axes.axvline(0.0, color=d.FAINT, linewidth=0.6)
-            reach = _reach(guided, placed, before)
-            axes.set_ylim(-reach, reach)
+            _scale(axes, _reach(guided, placed, before))
             axes.set_xlim(float(np.nanmax(distance)) / M_PER_KM, min(float(np.nanmin(distance)), -500.0) / M_PER_KM)
             axes.set_ylabel(f"{name}, m")
             axes.set_xlabel("distance before the threshold, km" if place else "")
@@ -65,7 +65,7 @@ def deviations(results: FlightResults, of: str) -> Drawing | None:
     caption = (
         "Line: deviation by the guidance, in metres. Dots: the same by recorded positions, and by the recorded height. "
         "Shade: one dot. Broken lines: ± 95 % figures of the categories (horizontal and vertical), CAT II and III ILS "
-        "look-alike."
+        "look-alike. Linear within 20 m, logarithmic beyond."
     )
     alt = "Lateral and vertical deviation of the approach against distance to the threshold."
     title = f"Approach {one.number}: deviations"
@@ -81,6 +81,16 @@ def _corridors(axes: Any, distance_m: FloatArray, dot_m: FloatArray, *, vertical
         for sign in (-1.0, 1.0):
             name = category.name if sign > 0.0 else "_"
             axes.axhline(sign * half, color=colour, linewidth=0.8, linestyle=(0, (4, 2)), label=name)
+
+
+def _scale(axes: Any, reach_m: float) -> None:
+    """Linear where the categories are, logarithmic beyond: corridors of metres and turns of kilometres are seen."""
+    axes.set_yscale("symlog", linthresh=LINEAR_M, linscale=1.2)
+    marks = [mark for mark in MARKS_M if mark <= reach_m]
+    axes.set_yticks([*(-mark for mark in reversed(marks)), 0.0, *marks])
+    axes.yaxis.set_major_formatter(lambda value, _place: f"{value:g}".replace("-", "\u2212"))
+    axes.minorticks_off()
+    axes.set_ylim(-reach_m, reach_m)
 
 
 def _reach(guided: FloatArray, placed: FloatArray, before: BoolArray) -> float:
