@@ -24,6 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
+from groundstation.estimators.cooperative.arrays import PEER, USED
 from groundstation.estimators.cooperative.consistency import judge
 from groundstation.estimators.cooperative.estimate import run_algorithm
 from groundstation.estimators.cooperative.events import prepare
@@ -225,11 +226,12 @@ def _row(recorded: Recorded, settings: CooperativeSettings, name: str, given: ar
         nees.append(judgement.nees[judged])
     square, ratio = np.concatenate(squares), np.concatenate(nees)
     gated = run.counts.get("gated", 0)
-    peers = [one.innovation for one in run.judged if one.kind == "peer" and one.mark == 1]
+    used = (run.judged.mark == USED) & (prepared.events.kind[run.judged.event] == PEER)
+    peers = run.judged.innovation[used] if used.any() else np.array([np.nan])
     before = BEFORE.get(name, (float("nan"), float("nan")))[int(given.blind)]
     return (
         f"| {name} | {np.sqrt(np.nanmean(square)):.3f} | {before:.3f} | {np.nanmean(ratio):.2f} | "
-        f"{gated / max(gated + run.counts.get('used', 0), 1):.1%} | {np.mean(peers) if peers else float('nan'):+.3f} |"
+        f"{gated / max(gated + run.counts.get('used', 0), 1):.1%} | {np.mean(peers):+.3f} |"
     )
 
 

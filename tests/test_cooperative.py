@@ -7,34 +7,50 @@ import pytest
 from scipy.linalg import expm
 from scipy.stats import chi2
 
+from groundstation.estimators.cooperative.arrays import KINDS, PEER, USED, Events, Rows
 from groundstation.estimators.cooperative.estimate import estimate_session, run_algorithm
-from groundstation.estimators.cooperative.events import HEIGHT, PEER, POINT, SATELLITE, Event, prepare
+from groundstation.estimators.cooperative.events import prepare
 from groundstation.estimators.cooperative.messages import Broadcast, decode, pairwise_bytes, report_bytes
-from groundstation.estimators.cooperative.observation import rows_of
-from groundstation.estimators.cooperative.settings import ALGORITHMS, CooperativeSettings, OdometryBelief
-from groundstation.estimators.cooperative.transition import discretise, local_dynamics
-from groundstation.estimators.cooperative.vehicles import InertialVehicle, Vehicle, WheeledVehicle
+from groundstation.estimators.cooperative.motion import place
+from groundstation.estimators.cooperative.observation import observe, rows_for
+from groundstation.estimators.cooperative.settings import (
+    ALGORITHMS,
+    CooperativeSettings,
+    InsBelief,
+    OdometryBelief,
+)
+from groundstation.estimators.cooperative.vehicles import Vehicle, fleet_of, vehicle_of
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_scenario import load_session
 from groundstation.tables.session import NO_SLOT, DeadReckoning, GroundPoint, Heights, Odometry, Ranges, Session
 from tests.cooperative_example import GLOBAL, LOCAL, believed, full_nees, truth_of
+from tests.cooperative_plain import plain
 
 SEEDS = range(7000, 7024)  # written down before the first run; no other is used here
 TAIL = 0.0005  # either side: seven tests of this kind fail by chance once in a hundred and fifty suites
 ROUNDING_M = 1e-6  # of positions of 6e6 m, through subtractions
-SPREAD = (-150.0, 40.0, 3.0)  # metres of a state for the differences
+ROUNDING_SIGMAS = 1e-7  # the plain forms subtract nearly equal numbers; a global covariance spans sixteen powers of ten
 
 
 def test_transition_against_the_matrix_exponential() -> None:
-    F, q = local_dynamics(100.0, 50.0, 20.0), np.array([0.0, 0.0, 2.0, 2.0, 1.0, 0.0, 0.5])
+    """Local frame: x, y, vx, vy, height, clock offset, clock frequency."""
+    belief = InsBelief(
+        velocity_mps=10.0, velocity_s=100.0, baro_m=5.0, baro_s=50.0, clock_mps=np.sqrt(5.0), clock_s=20.0
+    )
+    track = simulate_session(LOCAL, 1).session.vehicles[0]
+    vehicle = vehicle_of(track, "local", CooperativeSettings(ins=belief))
+    F, q = np.zeros((7, 7)), np.array([0.0, 0.0, 2.0, 2.0, 1.0, 0.0, 0.5])
+    F[0, 2] = F[1, 3] = F[5, 6] = 1.0
+    F[2, 2] = F[3, 3] = -1.0 / 100.0
+    F[4, 4], F[6, 6] = -1.0 / 50.0, -1.0 / 20.0
     for step_s in (0.1, 1.0, 7.0):
         both = np.zeros((14, 14))
         both[:7, :7], both[:7, 7:], both[7:, 7:] = -F, np.diag(q), F.T
         exact = expm(both * step_s)
-        phi, noise = discretise(F, q, step_s)
+        _, phi, noise = vehicle.step(np.zeros(7), 0.0, step_s)
         assert phi == pytest.approx(exact[7:, 7:].T, rel=1e-12, abs=1e-14)
         assert noise == pytest.approx(exact[7:, 7:].T @ exact[:7, 7:], rel=1e-9, abs=1e-13)
-    forth, back = discretise(F, q, 2.0)[0], discretise(F, q, -2.0)[0]
+    forth, back = vehicle.step(np.zeros(7), 0.0, 2.0)[1], vehicle.step(np.zeros(7), 2.0, 0.0)[1]
     assert forth @ back == pytest.approx(np.eye(7), abs=1e-13)
 
 
@@ -47,7 +63,7 @@ def test_global_transition_is_that_of_the_error_propagation_of_the_simulation() 
     settings = believed(scenario)
     for track, truth in zip(exact.session.vehicles, simulated.truth, strict=True):
         assert isinstance(track, DeadReckoning)
-        end = InertialVehicle(track, "ecef", settings).step(truth.states[0], 0.0, 600.0)[0]
+        end = vehicle_of(track, "ecef", settings).step(truth.states[0], 0.0, 600.0)[0]
         grown = truth.states[-1] - truth.states[0]
         assert end[:2] == pytest.approx(truth.states[-1, :2], abs=2e-3 * float(np.abs(grown[:2]).max()))
         assert end[2:4] == pytest.approx(truth.states[-1, 2:4], abs=2e-3 * float(np.abs(grown[2:4]).max()))
@@ -58,46 +74,88 @@ def inertial(frame: str) -> Vehicle:
     scenario = GLOBAL if frame == "ecef" else LOCAL
     track = simulate_session(scenario, 1).session.vehicles[1]
     assert isinstance(track, DeadReckoning)
-    return InertialVehicle(track, scenario.frame, believed(scenario, range_bias_m=5.0, lever_arm_m=3.0))
+    return vehicle_of(track, scenario.frame, believed(scenario, range_bias_m=5.0, lever_arm_m=3.0))
 
 
-def wheeled() -> WheeledVehicle:
+def wheeled() -> Vehicle:
     time_s = np.arange(5.0)
     track = Odometry("R", time_s, np.full(5, 0.4), np.full(5, 20.0), (1.0, 2.0), 30.0)
     belief = OdometryBelief(speed_scale=0.1, turn_scale=0.1)
-    return WheeledVehicle(track, CooperativeSettings(odometry=belief, range_bias_m=0.1))
+    return vehicle_of(track, "local", CooperativeSettings(odometry=belief, range_bias_m=0.1))
 
 
-@pytest.mark.parametrize("kind", [PEER, POINT, SATELLITE, HEIGHT, "bearing"])
+def rows_of(
+    kind: int, vehicle: Vehicle, x: np.ndarray, source: np.ndarray, clock: float, bearing_rad: float
+) -> tuple[int, Rows]:
+    """One range of 10 km, and a bearing where there is one, about a state at 2.5 s."""
+    event = [np.array([value]) for value in (2.5, kind, 0, 1, 1e4, 100.0, 0, source, bearing_rad, 1e-4, False)]
+    rows, reading, derivative = rows_for(vehicle.size), np.empty(3), np.empty((3, vehicle.size))
+    fleet = fleet_of((vehicle,))
+    place(fleet, 0, 2.5, reading, derivative)
+    return observe(fleet, Events(*event), 0, x, reading, derivative, source, clock, source, False, rows), rows
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "bearing"])
 def test_derivatives_against_central_differences(kind: str) -> None:
-    vehicle: Vehicle = wheeled() if kind == "bearing" else inertial("ecef" if kind in (SATELLITE, PEER) else "local")
+    is_bearing = kind == "bearing"
+    vehicle = wheeled() if is_bearing else inertial("ecef" if kind in ("satellite", "peer") else "local")
     rng = np.random.default_rng(4)
     x = vehicle.start()[0] + 0.1 * rng.standard_normal(vehicle.size)
-    place, _ = vehicle.place(x, 2.5)
-    scale = 2e7 if kind == SATELLITE else 4.0 if kind == "bearing" else 2e4
-    source = place + scale * np.array([0.5, -0.8, 0.0 if kind == "bearing" else 0.3])
-    bearing = 0.3 if kind == "bearing" else float("nan")
-    event = Event(2.5, PEER if kind == "bearing" else kind, 0, 1, 1e4, 100.0, 0, source, bearing, 1e-4)
+    at, _ = vehicle.place(x, 2.5)
+    scale = 2e7 if kind == "satellite" else 4.0 if is_bearing else 2e4
+    source = at + scale * np.array([0.5, -0.8, 0.0 if is_bearing else 0.3])
+    number, bearing = PEER if is_bearing else KINDS.index(kind), 0.3 if is_bearing else float("nan")
+    step = 1e-3 if is_bearing else 1.0
 
-    def innovations(state: np.ndarray, at: np.ndarray, clock: float) -> np.ndarray:
-        moved = replace(event, place_m=at)
-        return np.array([row.innovation for row in rows_of(moved, vehicle, state, at, clock)])
+    def innovations(state: np.ndarray, there: np.ndarray, clock: float) -> np.ndarray:
+        count, rows = rows_of(number, vehicle, state, there, clock, bearing)
+        return rows.innovation[:count].copy()
 
-    rows = rows_of(event, vehicle, x, source, 7.0)
-    assert len(rows) == (2 if kind == "bearing" else 1)
-    for at in range(vehicle.size):
-        step = np.zeros(vehicle.size)
-        step[at] = 1e-3 if kind == "bearing" else 1.0
-        numeric = (innovations(x + step, source, 7.0) - innovations(x - step, source, 7.0)) / (2.0 * step[at])
-        assert -numeric == pytest.approx([row.receiver[at] for row in rows], abs=2e-5), vehicle.states[at]
-    if kind in (PEER, "bearing"):
+    count, rows = rows_of(number, vehicle, x, source, 7.0, bearing)
+    assert count == (2 if is_bearing else 1)
+    for state, name in enumerate(vehicle.states):
+        away = step * np.eye(vehicle.size)[state]
+        numeric = (innovations(x + away, source, 7.0) - innovations(x - away, source, 7.0)) / (2.0 * step)
+        assert -numeric == pytest.approx(rows.receiver[:count, state], abs=2e-5), name
+    if kind in ("peer", "bearing"):
         for axis in range(3):
-            step = np.zeros(3)
-            step[axis] = 1e-3 if kind == "bearing" else 1.0
-            numeric = (innovations(x, source + step, 7.0) - innovations(x, source - step, 7.0)) / (2.0 * step[axis])
-            assert -numeric == pytest.approx([row.place[axis] for row in rows], abs=1e-5)
+            away = step * np.eye(3)[axis]
+            numeric = (innovations(x, source + away, 7.0) - innovations(x, source - away, 7.0)) / (2.0 * step)
+            assert -numeric == pytest.approx(rows.place[:count, axis], abs=1e-5)
         numeric = innovations(x, source, 8.0) - innovations(x, source, 7.0)
-        assert -numeric == pytest.approx([row.clock for row in rows], abs=1e-9)
+        assert -numeric == pytest.approx(rows.clock[:count], abs=1e-9)
+
+
+UNSURE = replace(LOCAL, duration_s=30.0, points=(replace(LOCAL.points[0], position_sigma_m=200.0), LOCAL.points[1]))
+WILD = replace(LOCAL, duration_s=30.0, link=replace(LOCAL.link, outlier_share=0.05, outlier_m=2e4, lost_share=0.2))
+APART = replace(GLOBAL, duration_s=15.0, errors=replace(GLOBAL.errors, has_separate_clocks=True))
+PLAIN = {
+    "local": (UNSURE, {}),
+    "frame by frame": (UNSURE, {"update": "simultaneous"}),
+    "wild": (WILD, {"range_bias_m": 5.0, "latency_slots": 3}),
+    "global": (APART, {"lever_arm_m": 3.0}),
+}
+
+
+@pytest.mark.parametrize("algorithm", [name for name in ALGORITHMS if name != "dead_reckoning"])
+@pytest.mark.parametrize("session", PLAIN)
+def test_compiled_loops_are_the_plain_filters(session: str, algorithm: str) -> None:
+    scenario, changes = PLAIN[session]
+    settings = believed(scenario, **changes)  # type: ignore[arg-type]
+    prepared = prepare(simulate_session(scenario, 5).session, settings)
+    run, expected = run_algorithm(prepared, settings, algorithm), plain(prepared, settings, algorithm)
+    for track, rows in zip(run.tracks, expected.rows, strict=True):
+        time_s, x, P = (np.array(column) for column in zip(*rows, strict=True))
+        sigma = np.sqrt(np.einsum("nii->ni", P))
+        assert track.time_s == pytest.approx(time_s, abs=0.0)
+        assert (track.state - x) / sigma == pytest.approx(np.zeros_like(x), abs=ROUNDING_SIGMAS)
+        both = sigma[:, :, None] * sigma[:, None, :]
+        assert (track.covariance - P) / both == pytest.approx(np.zeros_like(P), abs=ROUNDING_SIGMAS)
+    innovation, sigma, inside = np.array(expected.judged).T
+    assert run.judged.innovation == pytest.approx(innovation, abs=1e-6) and len(run.judged) == len(innovation)
+    assert run.judged.sigma == pytest.approx(sigma, rel=1e-6)
+    assert ((run.judged.mark == USED) == (inside == 1.0)).all()
+    assert run.map_radius == pytest.approx(expected.radius, rel=1e-6)
 
 
 def test_motion_of_a_wheeled_vehicle_against_central_differences() -> None:
@@ -448,7 +506,7 @@ def test_wheeled_vehicles_and_bearings() -> None:
     time_s = np.arange(0.0, 40.0, 0.5)
     speed, turn = np.full(len(time_s), 0.3), np.full(len(time_s), 5.0)
     track = Odometry("R1", time_s, speed, turn, (0.1, -0.1), 2.0)
-    exact = WheeledVehicle(replace(track, position_m=(0.0, 0.0), heading_deg=0.0), CooperativeSettings())
+    exact = vehicle_of(replace(track, position_m=(0.0, 0.0), heading_deg=0.0), "local", CooperativeSettings())
     marks, rows = np.array([[5.0, 1.0], [-3.0, 4.0]]), []
     x = exact.start()[0]
     for k in range(1, 70):

@@ -1,342 +1,268 @@
-"""Error states of one vehicle: start, transition, and where its antenna is.
+"""Error states of one vehicle: which there are, how they start, and the tables from which the compiled loops move them.
 
-Two kinds share one interface. An aircraft's state is the error of its INS, barometer and clocks, counted off its dead
-reckoning: corrected = reading - estimated error. A wheeled vehicle's state is its place and heading themselves, with
-the scale errors of its odometry.
+Two kinds. An aircraft's state is the error of its INS, barometer and clocks, counted off its dead reckoning: corrected
+= reading - estimated error. A wheeled vehicle's state is its place and heading themselves, with the scale errors of its
+odometry.
 """
 
-from itertools import pairwise
-from typing import Protocol
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
+from groundstation.estimators.cooperative.arrays import (
+    AXES,
+    EPOCH_COLUMNS,
+    FORCE,
+    GLOBAL,
+    HEADING,
+    LATITUDE,
+    LOCAL,
+    MERIDIAN,
+    NORMAL,
+    PLACE,
+    RATE,
+    SPEED,
+    TIME,
+    TURN,
+    VELOCITY,
+    WHEELED,
+    Fleet,
+    Numbers,
+)
+from groundstation.estimators.cooperative.motion import ROOMS, place, step
 from groundstation.estimators.cooperative.settings import CooperativeSettings
-from groundstation.estimators.cooperative.transition import discretise, global_dynamics, local_dynamics
 from groundstation.tables.session import DeadReckoning, Frame, Odometry
 
 RAD_PER_ARCSEC = float(np.deg2rad(1.0 / 3600.0))
 GRAVITY_MPS2 = 9.7803253359, 0.00193185265241, 0.00669437999  # Somigliana, WGS-84 (NIMA TR8350.2)
-SAME_TIME_S = 1e-9
+_LOCAL = ("north_m", "east_m", "velocity_north_mps", "velocity_east_mps")
+_PLATFORM = tuple(
+    f"{what}_{axis}_{unit}"
+    for what, unit in (("tilt", "rad"), ("drift", "radps"))
+    for axis in ("north", "east", "down")
+)
 Step = tuple[FloatArray, FloatArray, FloatArray]
 
 
-class Vehicle(Protocol):
+@dataclass(frozen=True)
+class Vehicle:
     """One vehicle as the filters see it.
 
-    ``clock`` and ``receiver_clock`` are places of the clock offsets in the state, ``bias`` that of the range bias,
-    ``heading`` that of the heading in radians; -1 where there is no such state. ``height`` likewise.
+    Parameters
+    ----------
+    name : str
+    model : int
+        LOCAL, GLOBAL or WHEELED.
+    states : tuple of str
+        Names with units.
+    start_sigma : ndarray, shape (n,)
+        Of each state at the first epoch.
+    start_x : ndarray, shape (n,)
+    density : ndarray, shape (n,)
+        Of the white noise on each state; a wheeled vehicle's noise goes with its odometry.
+    epochs : ndarray, shape (t, EPOCH_COLUMNS)
+    numbers : Numbers
     """
 
     name: str
+    model: int
     states: tuple[str, ...]
-    clock: int
-    receiver_clock: int
-    bias: int
-    heading: int
-    height: int
-    first_s: float
-    last_s: float
-
-    @property
-    def size(self) -> int:
-        """Number of states."""
-
-    def start(self) -> tuple[FloatArray, FloatArray]:
-        """State and covariance at ``first_s``."""
-
-    def step(self, x: FloatArray, from_s: float, to_s: float) -> Step:
-        """State after a step, its transition matrix and the covariance of the noise."""
-
-    def place(self, x: FloatArray, at_s: float) -> tuple[FloatArray, FloatArray]:
-        """Position of the antenna in the frame of the session, and its derivative by the state, shape (3, n)."""
-
-    def height_m(self, at_s: float) -> float:
-        """Height as dead reckoning has it."""
-
-
-class InertialVehicle:
-    """An aircraft with INS, barometric altimeter and clock: 7 states in a local frame, 13 or 15 in the global one."""
-
-    heading: int = -1
-
-    def __init__(self, track: DeadReckoning, frame: Frame, settings: CooperativeSettings) -> None:
-        self.name, self._track, self._frame, self._settings = track.name, track, frame, settings
-        self.first_s, self.last_s = float(track.time_s[0]), float(track.time_s[-1])
-        belief = settings.ins
-        self.states: tuple[str, ...] = ("north_m", "east_m", "velocity_north_mps", "velocity_east_mps")
-        if frame == "ecef":
-            self.states += _PLATFORM
-        self.height = len(self.states)
-        self.clock = self.receiver_clock = self.height + 1
-        self.states += ("height_m", "clock_m", "clock_mps")
-        if belief.has_separate_clocks:
-            self.receiver_clock = len(self.states)
-            self.states += ("receiver_clock_m", "receiver_clock_mps")
-        self.bias, self._lever = -1, -1
-        if settings.range_bias_m > 0.0:
-            self.bias = len(self.states)
-            self.states += ("range_bias_m",)
-        if settings.lever_arm_m > 0.0:
-            self._lever = len(self.states)
-            self.states += ("lever_forward_m", "lever_right_m")
-        self._steps: dict[tuple[float, float], tuple[FloatArray, FloatArray]] = {}
-        self._places: dict[float, tuple[FloatArray, FloatArray]] = {}
-        self._dynamics_at: dict[int, FloatArray] = {}
-        self._density = self._noise_density()
+    start_sigma: FloatArray
+    start_x: FloatArray
+    density: FloatArray
+    epochs: FloatArray
+    numbers: Numbers
 
     @property
     def size(self) -> int:
         """Number of states."""
         return len(self.states)
 
+    @property
+    def first_s(self) -> float:
+        """First epoch of its own navigation."""
+        return float(self.epochs[0, TIME])
+
+    @property
+    def last_s(self) -> float:
+        """Last epoch."""
+        return float(self.epochs[-1, TIME])
+
+    def at(self, state: str) -> int:
+        """Place of a state, -1 without."""
+        return self.states.index(state) if state in self.states else -1
+
+    @property
+    def clock(self) -> int:
+        """Place of the clock offset of the link."""
+        return self.at("clock_m")
+
+    @property
+    def receiver_clock(self) -> int:
+        """Place of the clock offset of the satellite receiver: the link's where there is one clock."""
+        return self.at("receiver_clock_m") if "receiver_clock_m" in self.states else self.clock
+
+    @property
+    def bias(self) -> int:
+        """Place of the range bias."""
+        return self.at("range_bias_m")
+
+    @property
+    def height(self) -> int:
+        """Place of the error of height."""
+        return self.at("height_m")
+
     def start(self) -> tuple[FloatArray, FloatArray]:
-        """No error known, with the sigmas of the belief."""
-        b = self._settings.ins
-        sigma = [b.position_m, b.position_m, b.velocity_mps, b.velocity_mps]
-        if self._frame == "ecef":
-            tilt, azimuth = b.tilt_arcsec * RAD_PER_ARCSEC, 60.0 * b.azimuth_arcmin * RAD_PER_ARCSEC
-            sigma += [tilt, tilt, azimuth] + 3 * [b.gyro_dph * RAD_PER_ARCSEC]
-        sigma += [b.baro_m, b.clock_m, b.clock_mps]
-        if b.has_separate_clocks:
-            sigma += [b.clock_m, b.clock_mps]
-        sigma += [self._settings.range_bias_m] if self.bias >= 0 else []
-        sigma += 2 * [self._settings.lever_arm_m] if self._lever >= 0 else []
-        return np.zeros(self.size), np.diag(np.square(sigma))
+        """State and covariance at ``first_s``."""
+        return self.start_x.copy(), np.diag(np.square(self.start_sigma))
 
     def step(self, x: FloatArray, from_s: float, to_s: float) -> Step:
-        """Linear: the matrices of a pair of times are kept, all algorithms ask for the same."""
-        key = (0.0, round(to_s - from_s, 9)) if self._frame == "local" else (from_s, to_s)
-        if key not in self._steps:
-            self._steps[key] = self._matrices(from_s, to_s)
-        transition, noise = self._steps[key]
-        return transition @ x, transition, noise
+        """State after a step, its transition matrix and the covariance of the noise."""
+        n = self.size
+        moved, phi, noise = np.array(x, dtype=np.float64), np.empty((n, n)), np.empty((n, n))
+        step(self._alone, 0, moved, from_s, to_s, phi, noise, np.empty((ROOMS, n, n)))
+        return moved, phi, noise
 
     def place(self, x: FloatArray, at_s: float) -> tuple[FloatArray, FloatArray]:
-        """Dead-reckoned position less the estimated error."""
-        if at_s not in self._places:
-            self._places[at_s] = self._reading(at_s)
-        reading, derivative = self._places[at_s]
+        """Position of the antenna in the frame of the session, and its derivative by the state, shape (3, n)."""
+        reading, derivative = np.empty(3), np.empty((3, self.size))
+        place(self._alone, 0, at_s, reading, derivative)
         return reading + derivative @ x, derivative
 
-    def height_m(self, at_s: float) -> float:
-        """Barometric height; meaningful in a local frame."""
-        return -float(self.place(np.zeros(self.size), at_s)[0][2])
-
-    def _reading(self, at_s: float) -> tuple[FloatArray, FloatArray]:
-        """Position between two epochs (cubic through both positions and velocities) and derivative by the state."""
-        track = self._track
-        after = min(max(int(np.searchsorted(track.time_s, at_s)), 1), len(track) - 1)
-        nearest = after
-        if len(track) == 1:
-            position = track.position_m[0]
-        else:
-            before = after - 1
-            span = float(track.time_s[after] - track.time_s[before])
-            part = (at_s - float(track.time_s[before])) / span
-            nearest = before if part < 0.5 else after
-            one, two = track.position_m[before], track.position_m[after]
-            rate_one = track.axes[before] @ track.velocity_mps[before] * span
-            rate_two = track.axes[after] @ track.velocity_mps[after] * span
-            a, b = part * part * (3.0 - 2.0 * part), part * (1.0 - part)
-            position = one + a * (two - one) + b * ((1.0 - part) * rate_one - part * rate_two)
-        axes = track.axes[nearest]
-        derivative = np.zeros((3, self.size))
-        derivative[:, 0], derivative[:, 1], derivative[:, self.height] = -axes[:, 0], -axes[:, 1], axes[:, 2]
-        if self._lever >= 0:
-            heading_rad = np.deg2rad(track.heading_deg[nearest])
-            cosine, sine = np.cos(heading_rad), np.sin(heading_rad)
-            derivative[:, self._lever] = cosine * axes[:, 0] + sine * axes[:, 1]
-            derivative[:, self._lever + 1] = cosine * axes[:, 1] - sine * axes[:, 0]
-        return position, derivative
-
-    def _matrices(self, from_s: float, to_s: float) -> tuple[FloatArray, FloatArray]:
-        """Transition and noise over a step, piece by piece between the epochs of the dead reckoning."""
-        if self._frame == "local":
-            return discretise(self._dynamics(0), self._density, to_s - from_s)
-        cuts = self._track.time_s[(self._track.time_s > from_s + SAME_TIME_S) & (self._track.time_s < to_s)]
-        edges = [from_s, *cuts.tolist(), to_s]
-        transition, noise = np.eye(self.size), np.zeros((self.size, self.size))
-        for one, two in pairwise(edges):
-            at = int(
-                np.clip(np.searchsorted(self._track.time_s, 0.5 * (one + two)) - 1, 0, max(len(self._track) - 2, 0))
-            )
-            if at not in self._dynamics_at:
-                self._dynamics_at[at] = self._dynamics(at)
-            phi, q = discretise(self._dynamics_at[at], self._density, two - one)
-            transition, noise = phi @ transition, phi @ noise @ phi.T + q
-        return transition, noise
-
-    def _dynamics(self, epoch: int) -> FloatArray:
-        b, track = self._settings.ins, self._track
-        F = np.zeros((self.size, self.size))
-        if self._frame == "local":
-            F[:7, :7] = local_dynamics(b.velocity_s, b.baro_s, b.clock_s)
-            base = 7
-        else:
-            after = min(epoch + 1, len(track) - 1)
-            velocity = 0.5 * (track.velocity_mps[epoch] + track.velocity_mps[after])
-            latitude = 0.5 * float(track.latitude_deg[epoch] + track.latitude_deg[after])
-            height = self._ellipsoid_height_m(epoch)
-            span = float(track.time_s[after] - track.time_s[epoch]) or 1.0
-            change = (track.velocity_mps[after] - track.velocity_mps[epoch]) / span
-            force = _specific_force(latitude, height, velocity, change)
-            F[:13, :13] = global_dynamics(latitude, height, velocity, force, b.gyro_s, b.baro_s, b.clock_s)
-            base = 13
-        if b.has_separate_clocks:
-            F[base, base + 1], F[base + 1, base + 1] = 1.0, -1.0 / b.clock_s
-        if self.bias >= 0:
-            F[self.bias, self.bias] = -1.0 / self._settings.range_bias_s
-        return F
-
-    def _ellipsoid_height_m(self, epoch: int) -> float:
-        place, up = self._track.position_m[epoch], -self._track.axes[epoch][:, 2]
-        radius = 6_378_137.0 * (1.0 - 0.00335281 * float(up[2]) ** 2)
-        return float(np.linalg.norm(place)) - radius
-
-    def _noise_density(self) -> FloatArray:
-        b = self._settings.ins
-        density = np.zeros(self.size)
-        if self._frame == "local":
-            density[2:4] = 2.0 * b.velocity_mps**2 / b.velocity_s
-        else:
-            density[7:10] = 2.0 * (b.gyro_dph * RAD_PER_ARCSEC) ** 2 / b.gyro_s
-        density[self.height] = 2.0 * b.baro_m**2 / b.baro_s
-        for clock in {self.clock, self.receiver_clock}:
-            density[clock + 1] = 2.0 * b.clock_mps**2 / b.clock_s
-        if self.bias >= 0:
-            density[self.bias] = 2.0 * self._settings.range_bias_m**2 / self._settings.range_bias_s
-        return density
+    @cached_property
+    def _alone(self) -> Fleet:
+        return fleet_of((self,))
 
 
-_PLATFORM = tuple(
-    f"{what}_{axis}_{unit}"
-    for what, unit in (("tilt", "rad"), ("drift", "radps"))
-    for axis in ("north", "east", "down")
-)
+def fleet_of(vehicles: Sequence[Vehicle]) -> Fleet:
+    """Vehicles as the compiled loops want them; shorter states are filled up."""
+    most = max(vehicle.size for vehicle in vehicles)
+
+    def places(*names: str) -> np.ndarray:
+        return np.array([max(vehicle.at(name) for name in names) for vehicle in vehicles], dtype=np.int64)
+
+    return Fleet(
+        model=np.array([vehicle.model for vehicle in vehicles], dtype=np.int64),
+        size=np.array([vehicle.size for vehicle in vehicles], dtype=np.int64),
+        clock=places("clock_m"),
+        receiver_clock=np.array([vehicle.receiver_clock for vehicle in vehicles], dtype=np.int64),
+        bias=places("range_bias_m"),
+        heading=places("heading_rad"),
+        height=places("height_m"),
+        lever=places("lever_forward_m"),
+        speed_scale=places("speed_scale"),
+        turn_scale=places("turn_scale"),
+        first=np.concatenate([[0], np.cumsum([len(vehicle.epochs) for vehicle in vehicles])]).astype(np.int64),
+        epochs=np.concatenate([vehicle.epochs for vehicle in vehicles]),
+        density=np.array([np.pad(vehicle.density, (0, most - vehicle.size)) for vehicle in vehicles]),
+        numbers=np.array([vehicle.numbers for vehicle in vehicles], dtype=np.float64),
+    )
 
 
-def _specific_force(latitude_deg: float, height_m: float, velocity: FloatArray, change: FloatArray) -> FloatArray:
+def aircraft_of(track: DeadReckoning, frame: Frame, settings: CooperativeSettings) -> Vehicle:
+    """An aircraft with INS, barometric altimeter and clock: 7 states in a local frame, 13 or 15 in the global one."""
+    b = settings.ins
+    tilt, azimuth = b.tilt_arcsec * RAD_PER_ARCSEC, 60.0 * b.azimuth_arcmin * RAD_PER_ARCSEC
+    gyro = b.gyro_dph * RAD_PER_ARCSEC
+    sigma = dict(zip(_LOCAL, (b.position_m, b.position_m, b.velocity_mps, b.velocity_mps), strict=True))
+    density: dict[str, float] = {}
+    if frame == "ecef":
+        sigma |= dict(zip(_PLATFORM, (tilt, tilt, azimuth, gyro, gyro, gyro), strict=True))
+        density |= dict.fromkeys(_PLATFORM[3:], 2.0 * gyro**2 / b.gyro_s)
+    else:
+        density |= dict.fromkeys(_LOCAL[2:], 2.0 * b.velocity_mps**2 / b.velocity_s)
+    sigma |= {"height_m": b.baro_m, "clock_m": b.clock_m, "clock_mps": b.clock_mps}
+    density |= {"height_m": 2.0 * b.baro_m**2 / b.baro_s, "clock_mps": 2.0 * b.clock_mps**2 / b.clock_s}
+    if b.has_separate_clocks:
+        sigma |= {"receiver_clock_m": b.clock_m, "receiver_clock_mps": b.clock_mps}
+        density["receiver_clock_mps"] = density["clock_mps"]
+    if settings.range_bias_m > 0.0:
+        sigma["range_bias_m"] = settings.range_bias_m
+        density["range_bias_m"] = 2.0 * settings.range_bias_m**2 / settings.range_bias_s
+    if settings.lever_arm_m > 0.0:
+        sigma |= {"lever_forward_m": settings.lever_arm_m, "lever_right_m": settings.lever_arm_m}
+    return Vehicle(
+        track.name,
+        GLOBAL if frame == "ecef" else LOCAL,
+        tuple(sigma),
+        np.array(list(sigma.values())),
+        np.zeros(len(sigma)),
+        np.array([density.get(name, 0.0) for name in sigma]),
+        _epochs_of(track, frame),
+        Numbers(b.velocity_s, b.gyro_s, b.baro_s, b.clock_s, settings.range_bias_s),
+    )
+
+
+def _epochs_of(track: DeadReckoning, frame: Frame) -> FloatArray:
+    """Table of an aircraft's epochs; what stands for the step to the next epoch is the mean of both."""
+    table = np.zeros((len(track), EPOCH_COLUMNS))
+    table[:, TIME], table[:, PLACE : PLACE + 3] = track.time_s, track.position_m
+    table[:, RATE : RATE + 3] = np.einsum("nij,nj->ni", track.axes, track.velocity_mps)
+    table[:, AXES : AXES + 9] = track.axes.reshape(-1, 9)
+    table[:, HEADING] = np.deg2rad(track.heading_deg)
+    if frame == "local":
+        return table
+    after = np.minimum(np.arange(1, len(track) + 1), len(track) - 1)
+    velocity = 0.5 * (track.velocity_mps + track.velocity_mps[after])
+    latitude_deg = 0.5 * (track.latitude_deg + track.latitude_deg[after])
+    up = -track.axes[:, 2, 2]
+    height_m = np.linalg.norm(track.position_m, axis=1) - 6_378_137.0 * (1.0 - 0.00335281 * up**2)
+    span = track.time_s[after] - track.time_s
+    change = (track.velocity_mps[after] - track.velocity_mps) / np.where(span > 0.0, span, 1.0)[:, None]
+    meridian, normal = curvature_radii_m(latitude_deg)
+    table[:, LATITUDE], table[:, MERIDIAN], table[:, NORMAL] = (
+        np.deg2rad(latitude_deg),
+        meridian + height_m,
+        normal + height_m,
+    )
+    table[:, VELOCITY : VELOCITY + 3] = velocity
+    table[:, FORCE : FORCE + 3] = _specific_force(table, height_m, change)
+    return table
+
+
+def _specific_force(table: FloatArray, height_m: FloatArray, change: FloatArray) -> FloatArray:
     """Specific force north, east, down: change of velocity, Coriolis and transport terms, less gravity."""
-    latitude_rad = np.deg2rad(latitude_deg)
-    sine, cosine = float(np.sin(latitude_rad)), float(np.cos(latitude_rad))
-    meridian, normal = (float(radius) + height_m for radius in curvature_radii_m(latitude_deg))
-    north, east, down = (float(value) for value in velocity)
+    sine, cosine = np.sin(table[:, LATITUDE]), np.cos(table[:, LATITUDE])
+    meridian, normal = table[:, MERIDIAN], table[:, NORMAL]
+    north, east, down = table[:, VELOCITY : VELOCITY + 3].T
     equator, k, e2 = GRAVITY_MPS2
     gravity = equator * (1.0 + k * sine**2) / (1.0 - e2 * sine**2) ** 0.5 * (1.0 - 2.0 * height_m / 6_371_000.0)
     w_n = 2.0 * EARTH_RATE_RADPS * cosine + east / normal
     w_e = -north / meridian
     w_d = -2.0 * EARTH_RATE_RADPS * sine - east * sine / cosine / normal
     coriolis = [w_e * down - w_d * east, w_d * north - w_n * down, w_n * east - w_e * north - gravity]
-    return np.asarray(change + np.array(coriolis))
+    return np.asarray(change + np.array(coriolis).T)
 
 
-class WheeledVehicle:
+def wheeled_of(track: Odometry, settings: CooperativeSettings) -> Vehicle:
     """A ground vehicle with odometry: north, east, heading, and scale errors of speed and turn where believed."""
-
-    clock: int = -1
-    receiver_clock: int = -1
-    height: int = -1
-    heading: int = 2
-
-    def __init__(self, track: Odometry, settings: CooperativeSettings) -> None:
-        self.name, self._track, self._settings = track.name, track, settings
-        self.first_s, self.last_s = float(track.time_s[0]), float(track.time_s[-1])
-        belief = settings.odometry
-        self.states: tuple[str, ...] = ("north_m", "east_m", "heading_rad")
-        self._speed_scale = self._turn_scale = self.bias = -1
-        if belief.speed_scale > 0.0:
-            self._speed_scale, self.states = len(self.states), (*self.states, "speed_scale")
-        if belief.turn_scale > 0.0:
-            self._turn_scale, self.states = len(self.states), (*self.states, "turn_scale")
-        if settings.range_bias_m > 0.0:
-            self.bias, self.states = len(self.states), (*self.states, "range_bias_m")
-
-    @property
-    def size(self) -> int:
-        """Number of states."""
-        return len(self.states)
-
-    def start(self) -> tuple[FloatArray, FloatArray]:
-        """Where the table says it stood."""
-        belief = self._settings.odometry
-        x = np.zeros(self.size)
-        x[:3] = [*self._track.position_m, np.deg2rad(self._track.heading_deg)]
-        sigma = np.zeros(self.size)
-        sigma[:3] = [belief.position_m, belief.position_m, np.deg2rad(belief.heading_deg)]
-        for at, value in (
-            (self._speed_scale, belief.speed_scale),
-            (self._turn_scale, belief.turn_scale),
-            (self.bias, self._settings.range_bias_m),
-        ):
-            if at >= 0:
-                sigma[at] = value
-        return x, np.diag(np.square(sigma))
-
-    def step(self, x: FloatArray, from_s: float, to_s: float) -> Step:
-        """Integrate odometry, each reading held until the next; derivative by the state with it."""
-        track, n = self._track, self.size
-        early, late = min(from_s, to_s), max(from_s, to_s)
-        first = max(int(np.searchsorted(track.time_s, early + SAME_TIME_S)) - 1, 0)
-        last = max(int(np.searchsorted(track.time_s, late - SAME_TIME_S)) - 1, first)
-        edges = [early, *track.time_s[first + 1 : last + 1].tolist(), late]
-        epochs = list(range(first, first + len(edges) - 1))
-        if to_s < from_s:  # back in time, for measurements that are used together
-            edges, epochs = edges[::-1], epochs[::-1]
-        x, transition, noise = x.copy(), np.eye(n), np.zeros((n, n))
-        for epoch, (one, two) in zip(epochs, pairwise(edges), strict=True):
-            x, phi, q = self._short_step(x, epoch, two - one)
-            transition, noise = phi @ transition, phi @ noise @ phi.T + q
-        return x, transition, noise
-
-    def _short_step(self, x: FloatArray, epoch: int, step_s: float) -> Step:
-        belief, n = self._settings.odometry, self.size
-        speed, turn = float(self._track.speed_mps[epoch]), float(np.deg2rad(self._track.turn_rate_dps[epoch]))
-        speed_factor = 1.0 - x[self._speed_scale] if self._speed_scale >= 0 else 1.0
-        turn_factor = 1.0 - x[self._turn_scale] if self._turn_scale >= 0 else 1.0
-        way, turned = speed * speed_factor * step_s, turn * turn_factor * step_s
-        middle = x[2] + 0.5 * turned
-        cosine, sine = np.cos(middle), np.sin(middle)
-        moved = x.copy()
-        moved[0], moved[1], moved[2] = x[0] + way * cosine, x[1] + way * sine, x[2] + turned
-        phi = np.eye(n)
-        phi[0, 2], phi[1, 2] = -way * sine, way * cosine
-        if self._speed_scale >= 0:
-            phi[0, self._speed_scale], phi[1, self._speed_scale] = -speed * step_s * cosine, -speed * step_s * sine
-        if self._turn_scale >= 0:
-            half = -0.5 * turn * step_s
-            phi[0, self._turn_scale], phi[1, self._turn_scale] = -way * sine * half, way * cosine * half
-            phi[2, self._turn_scale] = -turn * step_s
-        size = abs(step_s)
-        is_moving = speed != 0.0 or turn != 0.0
-        along = (belief.along_m_per_sqrt_s**2 if is_moving else 0.0) * size + belief.slip_m_per_sqrt_m**2 * abs(way)
-        across = belief.slip_m_per_sqrt_m**2 * abs(way)
-        q = np.zeros((n, n))
-        q[0, 0] = along * cosine**2 + across * sine**2
-        q[1, 1] = along * sine**2 + across * cosine**2
-        q[0, 1] = q[1, 0] = (along - across) * sine * cosine
-        q[2, 2] = np.deg2rad(belief.turn_deg_per_sqrt_s) ** 2 * size if is_moving else 0.0
-        for at, value in ((self._speed_scale, belief.speed_scale), (self._turn_scale, belief.turn_scale)):
-            if at >= 0:
-                q[at, at] = 2.0 * value**2 / belief.scale_s * size
-        if self.bias >= 0:
-            q[self.bias, self.bias] = 2.0 * self._settings.range_bias_m**2 / self._settings.range_bias_s * size
-        return moved, phi, q
-
-    def place(self, x: FloatArray, at_s: float) -> tuple[FloatArray, FloatArray]:
-        """The first two states."""
-        derivative = np.zeros((3, self.size))
-        derivative[0, 0] = derivative[1, 1] = 1.0
-        return np.array([x[0], x[1], 0.0]), derivative
-
-    def height_m(self, at_s: float) -> float:
-        """On the floor."""
-        return 0.0
+    b = settings.odometry
+    sigma = {"north_m": b.position_m, "east_m": b.position_m, "heading_rad": float(np.deg2rad(b.heading_deg))}
+    sigma |= {"speed_scale": b.speed_scale} if b.speed_scale > 0.0 else {}
+    sigma |= {"turn_scale": b.turn_scale} if b.turn_scale > 0.0 else {}
+    sigma |= {"range_bias_m": settings.range_bias_m} if settings.range_bias_m > 0.0 else {}
+    x = np.zeros(len(sigma))
+    x[:3] = [*track.position_m, np.deg2rad(track.heading_deg)]
+    table = np.zeros((len(track), EPOCH_COLUMNS))
+    table[:, TIME], table[:, SPEED], table[:, TURN] = track.time_s, track.speed_mps, np.deg2rad(track.turn_rate_dps)
+    numbers = Numbers(
+        along_m2ps=b.along_m_per_sqrt_s**2,
+        slip_m2pm=b.slip_m_per_sqrt_m**2,
+        turn_rad2ps=float(np.deg2rad(b.turn_deg_per_sqrt_s)) ** 2,
+        speed_scale_ps=2.0 * b.speed_scale**2 / b.scale_s,
+        turn_scale_ps=2.0 * b.turn_scale**2 / b.scale_s,
+        bias_m2ps=2.0 * settings.range_bias_m**2 / settings.range_bias_s,
+    )
+    start = np.array(list(sigma.values()))
+    return Vehicle(track.name, WHEELED, tuple(sigma), start, x, np.zeros(len(sigma)), table, numbers)
 
 
 def vehicle_of(track: DeadReckoning | Odometry, frame: Frame, settings: CooperativeSettings) -> Vehicle:
     """The model of a vehicle's own navigation."""
     if isinstance(track, Odometry):
-        return WheeledVehicle(track, settings)
-    return InertialVehicle(track, frame, settings)
+        return wheeled_of(track, settings)
+    return aircraft_of(track, frame, settings)
