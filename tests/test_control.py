@@ -25,8 +25,8 @@ from groundstation.estimators.control.scenario import (
     Ranging,
     SessionPlan,
 )
+from groundstation.estimators.cooperative.aircraft import aircraft_of
 from groundstation.estimators.cooperative.settings import CooperativeSettings, InsBelief
-from groundstation.estimators.cooperative.vehicles import InertialVehicle
 from groundstation.results.control import UNCONTROLLED, ControlPlan
 from groundstation.tables.session import DeadReckoning
 
@@ -155,7 +155,7 @@ def test_an_aircraft_has_the_errors_of_the_cooperative_filter() -> None:
     track = DeadReckoning(
         "user", time_s, np.zeros((3, 3)), np.zeros((3, 3)), np.tile(np.eye(3), (3, 1, 1)), *np.full((2, 3), np.nan)
     )
-    vehicle = InertialVehicle(track, "local", CooperativeSettings(ins=belief))
+    vehicle = aircraft_of(track, "local", CooperativeSettings(ins=belief))
     x, P = vehicle.start()
     _, transition, noise = vehicle.step(x, 0.0, 2.0)
     still = np.tile([[0.0, 0.0, 1000.0], [1e6, 0.0, 0.0], [0.0, 1e6, 0.0]], (3, 1, 1))

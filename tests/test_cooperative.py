@@ -7,13 +7,25 @@ import pytest
 from scipy.linalg import expm
 from scipy.stats import chi2
 
-from groundstation.estimators.cooperative.estimate import estimate_session, run_algorithm
-from groundstation.estimators.cooperative.events import HEIGHT, PEER, POINT, SATELLITE, Event, prepare
+from groundstation.estimators.cooperative import plain
+from groundstation.estimators.cooperative.aircraft import Aircraft, aircraft_of, fleet_of
+from groundstation.estimators.cooperative.algorithms import run_algorithm
+from groundstation.estimators.cooperative.arrays import KINDS, PEER, Events
+from groundstation.estimators.cooperative.estimate import estimate_session
+from groundstation.estimators.cooperative.events import Prepared, prepare
 from groundstation.estimators.cooperative.messages import Broadcast, decode, pairwise_bytes, report_bytes
-from groundstation.estimators.cooperative.observation import rows_of
-from groundstation.estimators.cooperative.settings import ALGORITHMS, CameraBelief, CooperativeSettings, OdometryBelief
-from groundstation.estimators.cooperative.transition import discretise, local_dynamics
-from groundstation.estimators.cooperative.vehicles import InertialVehicle, Vehicle
+from groundstation.estimators.cooperative.motion import place
+from groundstation.estimators.cooperative.observation import observe, rows_for
+from groundstation.estimators.cooperative.plain.observation import rows_of
+from groundstation.estimators.cooperative.plain.steps import Event
+from groundstation.estimators.cooperative.settings import (
+    ALGORITHMS,
+    CameraBelief,
+    CooperativeSettings,
+    InsBelief,
+    OdometryBelief,
+)
+from groundstation.estimators.cooperative.tracks import AlgorithmRun
 from groundstation.estimators.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_scenario import load_session
@@ -23,19 +35,28 @@ from tests.cooperative_example import GLOBAL, LOCAL, believed, full_nees, truth_
 SEEDS = range(7000, 7024)  # written down before the first run; no other is used here
 TAIL = 0.0005  # either side: seven tests of this kind fail by chance once in a hundred and fifty suites
 ROUNDING_M = 1e-6  # of positions of 6e6 m, through subtractions
-SPREAD = (-150.0, 40.0, 3.0)  # metres of a state for the differences
+ROUNDING_SIGMAS = 1e-5  # rounding the measurements alone moves a plain filter that trusts its neighbours by 1.4e-6
 
 
 def test_transition_against_the_matrix_exponential() -> None:
-    F, q = local_dynamics(100.0, 50.0, 20.0), np.array([0.0, 0.0, 2.0, 2.0, 1.0, 0.0, 0.5])
+    """Local frame: x, y, vx, vy, height, clock offset, clock frequency."""
+    belief = InsBelief(
+        velocity_mps=10.0, velocity_s=100.0, baro_m=5.0, baro_s=50.0, clock_mps=np.sqrt(5.0), clock_s=20.0
+    )
+    track = simulate_session(LOCAL, 1).session.vehicles[0]
+    vehicle = aircraft_of(track, "local", CooperativeSettings(ins=belief))
+    F, q = np.zeros((7, 7)), np.array([0.0, 0.0, 2.0, 2.0, 1.0, 0.0, 0.5])
+    F[0, 2] = F[1, 3] = F[5, 6] = 1.0
+    F[2, 2] = F[3, 3] = -1.0 / 100.0
+    F[4, 4], F[6, 6] = -1.0 / 50.0, -1.0 / 20.0
     for step_s in (0.1, 1.0, 7.0):
         both = np.zeros((14, 14))
         both[:7, :7], both[:7, 7:], both[7:, 7:] = -F, np.diag(q), F.T
         exact = expm(both * step_s)
-        phi, noise = discretise(F, q, step_s)
+        _, phi, noise = vehicle.step(np.zeros(7), 0.0, step_s)
         assert phi == pytest.approx(exact[7:, 7:].T, rel=1e-12, abs=1e-14)
         assert noise == pytest.approx(exact[7:, 7:].T @ exact[:7, 7:], rel=1e-9, abs=1e-13)
-    forth, back = discretise(F, q, 2.0)[0], discretise(F, q, -2.0)[0]
+    forth, back = vehicle.step(np.zeros(7), 0.0, 2.0)[1], vehicle.step(np.zeros(7), 2.0, 0.0)[1]
     assert forth @ back == pytest.approx(np.eye(7), abs=1e-13)
 
 
@@ -48,18 +69,18 @@ def test_global_transition_is_that_of_the_error_propagation_of_the_simulation() 
     settings = believed(scenario)
     for track, truth in zip(exact.session.vehicles, simulated.truth, strict=True):
         assert isinstance(track, DeadReckoning)
-        end = InertialVehicle(track, "ecef", settings).step(truth.states[0], 0.0, 600.0)[0]
+        end = aircraft_of(track, "ecef", settings).step(truth.states[0], 0.0, 600.0)[0]
         grown = truth.states[-1] - truth.states[0]
         assert end[:2] == pytest.approx(truth.states[-1, :2], abs=2e-3 * float(np.abs(grown[:2]).max()))
         assert end[2:4] == pytest.approx(truth.states[-1, 2:4], abs=2e-3 * float(np.abs(grown[2:4]).max()))
         assert end[4:7] == pytest.approx(truth.states[-1, 4:7], abs=1e-7)
 
 
-def inertial(frame: str) -> Vehicle:
+def inertial(frame: str) -> Aircraft:
     scenario = GLOBAL if frame == "ecef" else LOCAL
     track = simulate_session(scenario, 1).session.vehicles[1]
     assert isinstance(track, DeadReckoning)
-    return InertialVehicle(track, scenario.frame, believed(scenario, range_bias_m=5.0, lever_arm_m=3.0))
+    return aircraft_of(track, scenario.frame, believed(scenario, range_bias_m=5.0, lever_arm_m=3.0))
 
 
 def wheeled() -> WheeledVehicle:
@@ -70,36 +91,93 @@ def wheeled() -> WheeledVehicle:
     return WheeledVehicle(track, CooperativeSettings(odometry=belief, camera=camera, range_bias_m=0.1))
 
 
-@pytest.mark.parametrize("kind", [PEER, POINT, SATELLITE, HEIGHT, "bearing"])
+ARM_M = np.array([30.0, -20.0, 5.0])
+
+
+def lines_of(
+    kind: int, vehicle: Aircraft | WheeledVehicle, x: np.ndarray, source: np.ndarray, clock: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Innovations of one range of 10 km about a state at 2.5 s, and derivatives by state, place and clock."""
+    values = (2.5, kind, 0, 1, 1e4, 100.0, 0, source, np.nan, np.nan, False, ARM_M, 1.0)
+    if isinstance(vehicle, WheeledVehicle):  # sees a bearing too
+        event = Event(*values[:8], 0.3, 1e-4, False, 1e-3 * ARM_M, 1.0, 0)
+        rows = rows_of(event, vehicle, x, source, clock)
+        names = ("innovation", "receiver", "place", "clock")
+        return tuple(np.array([getattr(row, name) for row in rows]) for name in names)
+    rows, reading, derivative = rows_for(vehicle.size), np.empty(3), np.empty((3, vehicle.size))
+    fleet, events = fleet_of((vehicle,)), Events(*(np.array([value]) for value in values))
+    place(fleet, 0, 2.5, reading, derivative)
+    assert observe(fleet, events, 0, x, reading, derivative, source, clock, source, False, rows) == 1
+    return rows.innovation, rows.receiver, rows.place, rows.clock
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "bearing"])
 def test_derivatives_against_central_differences(kind: str) -> None:
-    vehicle: Vehicle = wheeled() if kind == "bearing" else inertial("ecef" if kind in (SATELLITE, PEER) else "local")
+    is_bearing = kind == "bearing"
+    vehicle = wheeled() if is_bearing else inertial("ecef" if kind in ("satellite", "peer") else "local")
     rng = np.random.default_rng(4)
     x = vehicle.start()[0] + 0.1 * rng.standard_normal(vehicle.size)
-    place, _ = vehicle.place(x, 2.5)
-    scale = 2e7 if kind == SATELLITE else 4.0 if kind == "bearing" else 2e4
-    source = place + scale * np.array([0.5, -0.8, 0.0 if kind == "bearing" else 0.3])
-    bearing = 0.3 if kind == "bearing" else float("nan")
-    event = Event(2.5, PEER if kind == "bearing" else kind, 0, 1, 1e4, 100.0, 0, source, bearing, 1e-4)
+    at, _ = vehicle.place(x, 2.5)
+    scale = 2e7 if kind == "satellite" else 4.0 if is_bearing else 2e4
+    source = at + scale * np.array([0.5, -0.8, 0.0 if is_bearing else 0.3])
+    number, step = PEER if is_bearing else KINDS.index(kind), 1e-3 if is_bearing else 1.0
+    innovation, by_state, by_place, by_clock = lines_of(number, vehicle, x, source, 7.0)
+    assert len(innovation) == (2 if is_bearing else 1)
 
-    def innovations(state: np.ndarray, at: np.ndarray, clock: float) -> np.ndarray:
-        moved = replace(event, place_m=at)
-        return np.array([row.innovation for row in rows_of(moved, vehicle, state, at, clock)])
+    def numeric(dx: np.ndarray | float = 0.0, moved: np.ndarray | float = 0.0) -> np.ndarray:
+        ends = [lines_of(number, vehicle, x + sign * dx, source + sign * moved, 7.0)[0].copy() for sign in (1.0, -1.0)]
+        return (ends[1] - ends[0]) / (2.0 * step)
 
-    rows = rows_of(event, vehicle, x, source, 7.0)
-    assert len(rows) == (2 if kind == "bearing" else 1)
-    for at in range(vehicle.size):
-        step = np.zeros(vehicle.size)
-        step[at] = 1e-3 if kind == "bearing" else 1.0
-        numeric = (innovations(x + step, source, 7.0) - innovations(x - step, source, 7.0)) / (2.0 * step[at])
-        assert -numeric == pytest.approx([row.receiver[at] for row in rows], abs=2e-5), vehicle.states[at]
-    if kind in (PEER, "bearing"):
+    for state, name in enumerate(vehicle.states):
+        assert numeric(step * np.eye(vehicle.size)[state]) == pytest.approx(by_state[:, state], abs=2e-5), name
+    if kind in ("peer", "bearing"):
         for axis in range(3):
-            step = np.zeros(3)
-            step[axis] = 1e-3 if kind == "bearing" else 1.0
-            numeric = (innovations(x, source + step, 7.0) - innovations(x, source - step, 7.0)) / (2.0 * step[axis])
-            assert -numeric == pytest.approx([row.place[axis] for row in rows], abs=1e-5)
-        numeric = innovations(x, source, 8.0) - innovations(x, source, 7.0)
-        assert -numeric == pytest.approx([row.clock for row in rows], abs=1e-9)
+            assert numeric(moved=step * np.eye(3)[axis]) == pytest.approx(by_place[:, axis], abs=1e-5)
+        change = innovation - lines_of(number, vehicle, x, source, 8.0)[0]
+        assert change == pytest.approx(by_clock, abs=1e-9)
+
+
+UNSURE = replace(LOCAL, duration_s=30.0, points=(replace(LOCAL.points[0], position_sigma_m=200.0), LOCAL.points[1]))
+WILD = replace(LOCAL, duration_s=30.0, link=replace(LOCAL.link, outlier_share=0.05, outlier_m=2e4, lost_share=0.2))
+APART = replace(GLOBAL, duration_s=15.0, errors=replace(GLOBAL.errors, has_separate_clocks=True))
+PLAIN = {
+    "local": (UNSURE, {}),
+    "frame by frame": (UNSURE, {"update": "simultaneous", "frame_s": 1.5}),  # hears everybody more than once in one
+    "wild": (WILD, {"range_bias_m": 5.0, "latency_slots": 3, "correlated_share": 0.6, "range_share": 1e-4}),
+    "global": (APART, {"lever_arm_m": 3.0}),
+}
+
+
+def in_plain(prepared: Prepared, settings: CooperativeSettings, algorithm: str) -> AlgorithmRun:
+    if algorithm == "centralised":
+        return plain.run_centralised(prepared, settings)
+    if algorithm == "pairwise":
+        return plain.run_pairwise(prepared, settings)
+    return plain.run_decentralised(prepared, settings, algorithm)
+
+
+@pytest.mark.parametrize("algorithm", [name for name in ALGORITHMS if name != "dead_reckoning"])
+@pytest.mark.parametrize("session", PLAIN)
+def test_compiled_loops_are_the_plain_filters(session: str, algorithm: str) -> None:
+    scenario, changes = PLAIN[session]
+    settings = believed(scenario, **changes)  # type: ignore[arg-type]
+    flown = simulate_session(scenario, 5).session
+    arms = 20.0 * np.random.default_rng(6).standard_normal((len(flown.ranges), 3))
+    prepared = prepare(replace(flown, ranges=replace(flown.ranges, arm_m=arms)), settings)
+    run, expected = run_algorithm(prepared, settings, algorithm), in_plain(prepared, settings, algorithm)
+    for track, other in zip(run.tracks, expected.tracks, strict=True):
+        sigma = np.sqrt(np.einsum("nii->ni", other.covariance))
+        assert track.time_s == pytest.approx(other.time_s, abs=0.0)
+        assert (track.state - other.state) / sigma == pytest.approx(np.zeros_like(sigma), abs=ROUNDING_SIGMAS)
+        assert track.position_m == pytest.approx(other.position_m, abs=ROUNDING_SIGMAS * float(sigma[:, :2].max()))
+        change = (track.covariance - other.covariance) / (sigma[:, :, None] * sigma[:, None, :])
+        assert change == pytest.approx(np.zeros_like(change), abs=ROUNDING_SIGMAS)
+    assert (run.judged.event == expected.judged.event).all() and (run.judged.mark == expected.judged.mark).all()
+    change = (run.judged.innovation - expected.judged.innovation) / expected.judged.sigma
+    assert change == pytest.approx(np.zeros_like(change), abs=ROUNDING_SIGMAS)
+    assert run.judged.sigma == pytest.approx(expected.judged.sigma, rel=1e-6)
+    assert run.map_radius == pytest.approx(expected.map_radius, rel=1e-6)
+    assert (run.counts, run.messages, run.update) == (expected.counts, expected.messages, expected.update)
 
 
 def test_motion_of_a_wheeled_vehicle_against_central_differences() -> None:

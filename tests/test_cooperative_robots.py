@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from groundstation.estimators.cooperative.algorithms import run_algorithm
+from groundstation.estimators.cooperative.arrays import PEER
 from groundstation.estimators.cooperative.consistency import judge
-from groundstation.estimators.cooperative.estimate import run_algorithm
-from groundstation.estimators.cooperative.events import PEER, Event, prepare
+from groundstation.estimators.cooperative.events import prepare
+from groundstation.estimators.cooperative.plain.sighting import sighting_of
+from groundstation.estimators.cooperative.plain.split_covariance import fuse
+from groundstation.estimators.cooperative.plain.steps import Event
 from groundstation.estimators.cooperative.settings import CameraBelief, CooperativeSettings, OdometryBelief
-from groundstation.estimators.cooperative.sighting import sighting_of
-from groundstation.estimators.cooperative.split_covariance import fuse
 from groundstation.estimators.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.tables.session import NO_SLOT, GroundPoint, Odometry, Ranges, Session
 
@@ -170,7 +172,7 @@ def test_a_sighting_against_central_differences() -> None:
     team = Team(np.random.default_rng(3))
     observer = WheeledVehicle(team.vehicles[0], BELIEF)
     x = observer.start()[0] + 0.05 * np.random.default_rng(4).standard_normal(observer.size)
-    event = Event(3.1, PEER, 0, 1, 2.0, 1e-4, NO_SLOT, None, 0.4, 1e-4, is_two_way=True)
+    event = Event(3.1, PEER, 0, 1, 2.0, 1e-4, NO_SLOT, np.zeros(3), 0.4, 1e-4, True, np.zeros(3), 1.0, 0)
     found = sighting_of(event, observer, x)
     assert found is not None
     for at in range(observer.size):
@@ -196,9 +198,9 @@ def test_readings_that_repeat_themselves_weigh_what_they_tell() -> None:
     events = prepare(session, settings).events
     lags = np.arange(1, n)
     exact = 1.0 + 2.0 * share * np.sum((1.0 - lags / n) * np.exp(-lags * dt_s / time_s))
-    assert events[0].variance_m2 == pytest.approx(0.01)
-    assert events[50].variance_m2 / 0.01 == pytest.approx(exact, rel=0.01)
-    assert events[50].variance_m2 * events[50].spread == pytest.approx(0.01)  # the gate knows one reading
+    assert events.variance_m2[0] == pytest.approx(0.01)
+    assert events.variance_m2[50] / 0.01 == pytest.approx(exact, rel=0.01)
+    assert events.variance_m2[50] * events.spread[50] == pytest.approx(0.01)  # the gate knows one reading
 
 
 def test_fusion_without_unknown_correlation_is_that_of_kalman() -> None:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError, UsageError
+from groundstation.estimators.cooperative.algorithms import run_algorithm
 from groundstation.estimators.cooperative.consistency import judge
-from groundstation.estimators.cooperative.estimate import run_algorithm
 from groundstation.estimators.cooperative.events import prepare
 from groundstation.pipeline.verbs import recorded
 from groundstation.pipeline.verbs.recorded import recorded_sets

@@ -40,17 +40,23 @@ def compiled(function: Function) -> Function:
 
     Modules that use it are imported lazily: importing numba takes about half a second.
     """
-    return _compile(function, is_forced_into_callers=False)
+    return _compile(function)
+
+
+def part(function: Function) -> Function:
+    """The same for what only other compiled loops call: without the code that takes its arguments from Python, which
+    takes longer to compile than the function itself when those are tuples of arrays. From Python a call crashes."""
+    return _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 def inlined(function: Function) -> Function:
     """The same for a small part of other compiled loops: its code is put into each of them and no call is made."""
-    return _compile(function, is_forced_into_callers=True)
+    return _compile(function, forceinline=True)
 
 
-def _compile(function: Function, is_forced_into_callers: bool) -> Function:
+def _compile(function: Function, **options: bool) -> Function:
     cache = _choose_cache()  # before numba is imported: it reads NUMBA_CACHE_DIR once
     import numba
 
-    decorate = numba.njit(cache=cache, nogil=True, error_model="numpy", forceinline=is_forced_into_callers)
-    return cast(Function, decorate(function))
+    decorate: Callable[..., Any] = numba.njit  # its stubs do not know all of its options
+    return cast(Function, decorate(cache=cache, nogil=True, error_model="numpy", **options)(function))

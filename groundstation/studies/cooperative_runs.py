@@ -10,8 +10,8 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import frozen
+from groundstation.estimators.cooperative.algorithms import run_algorithm
 from groundstation.estimators.cooperative.consistency import DIVERGED, normalised
-from groundstation.estimators.cooperative.estimate import run_algorithm
 from groundstation.estimators.cooperative.events import prepare
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_scenario import load_session

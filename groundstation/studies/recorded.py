@@ -12,8 +12,8 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.findings import Finding
+from groundstation.estimators.cooperative.algorithms import run_algorithm
 from groundstation.estimators.cooperative.consistency import judge
-from groundstation.estimators.cooperative.estimate import run_algorithm
 from groundstation.estimators.cooperative.events import prepare
 from groundstation.estimators.cooperative.settings import (
     ALGORITHMS,

@@ -16,142 +16,15 @@ Source: Kalman, A new approach to linear filtering and prediction problems, 1960
 measurements: Maybeck, Stochastic Models, Estimation, and Control, volume 1, 1979, section 5.6.
 """
 
-from itertools import pairwise
-
 import numpy as np
 
-from groundstation.base.angles import FloatArray
-from groundstation.base.records import Int64Array
-from groundstation.estimators.cooperative.events import HEIGHT, PEER, POINT, Event, Prepared
+from groundstation.estimators.cooperative.arrays import Rules
+from groundstation.estimators.cooperative.events import Prepared
+from groundstation.estimators.cooperative.joint import Joint, run_joint
 from groundstation.estimators.cooperative.messages import report_bytes
-from groundstation.estimators.cooperative.observation import Row, rows_of
 from groundstation.estimators.cooperative.settings import CooperativeSettings
-from groundstation.estimators.cooperative.timeline import timeline
-from groundstation.estimators.cooperative.tracks import GATED, USED, AlgorithmRun, Recorder
-from groundstation.estimators.kalman.arrays import Pattern
-from groundstation.estimators.kalman.kernels import add_noise, predict_covariance, update_covariance
-
-PATIENCE = 30  # rejections of a vehicle in a row: then its clock has leapt, or it is not where it thinks
-KNOWN_WRONG_SIGMAS = 3.0
-
-
-class _Joint:
-    """State x and covariance P of all vehicles and uncertain points."""
-
-    def __init__(self, prepared: Prepared, settings: CooperativeSettings) -> None:
-        self.prepared, self.about_reckoning = prepared, settings.derivatives == "reckoning"
-        starts = [vehicle.start() for vehicle in prepared.vehicles]
-        sizes = [len(x) for x, _ in starts]
-        edges = np.concatenate([[0], np.cumsum(sizes)])
-        self.slices = [slice(int(one), int(two)) for one, two in pairwise(edges)]
-        uncertain = [i for i, point in enumerate(prepared.session.points) if point.position_sigma_m > 0.0]
-        total = int(edges[-1])
-        self.points = {i: slice(total + 2 * k, total + 2 * k + 2) for k, i in enumerate(uncertain)}
-        total += 2 * len(uncertain)
-        self.x, self.P = np.zeros(total), np.zeros((total, total))
-        for place, (x, P) in zip(self.slices, starts, strict=True):
-            self.x[place], self.P[place, place] = x, P
-        for i, place in self.points.items():
-            self.P[place, place] = prepared.session.points[i].position_sigma_m ** 2 * np.eye(2)
-        self.times = [vehicle.first_s for vehicle in prepared.vehicles]
-        self.offsets_m = np.zeros((len(prepared.vehicles), 3))  # dead reckoning less reference place
-        self._states, self._held = np.arange(total), np.zeros(0, dtype=np.int64)
-        self._room, self._g, self._gain = np.zeros((total, total)), np.zeros(total), np.zeros(total)
-        self._patterns = [_whole_block(place.start, size) for place, size in zip(self.slices, sizes, strict=True)]
-
-    def advance(self, who: int, to_s: float) -> None:
-        """Move one vehicle's block on."""
-        if to_s <= self.times[who] + 1e-12:
-            return
-        place = self.slices[who]
-        x, phi, noise = self.prepared.vehicles[who].step(self.x[place], self.times[who], to_s)
-        self.x[place] = x
-        pattern, rows, columns = self._patterns[who]
-        predict_covariance(self._states, pattern, phi.reshape(1, -1), 0, self.P, self._room)
-        block = noise[rows - place.start, columns - place.start]
-        add_noise(self._states, rows, columns, block.reshape(1, -1), 0, self.P)
-        self.times[who] = to_s
-
-    def rows(self, event: Event) -> list[tuple[Row, FloatArray]]:
-        """Rows of an event at the vehicles' own times, each with its derivative by the whole state."""
-        vehicles, found = self.prepared.vehicles, []
-        here = self._at(event.receiver, event.time_s)
-        source_m, clock_m = None, 0.0
-        there: tuple[FloatArray, FloatArray] | None = None
-        derivative = np.zeros((3, 0))
-        if event.kind == PEER:
-            peer = vehicles[event.source]
-            there = self._at(event.source, event.time_s)
-            source_m, derivative = peer.place(there[0], event.time_s)
-            clock_m = float(there[0][peer.clock]) if peer.clock >= 0 else 0.0
-        elif event.kind == POINT and event.source in self.points:
-            assert event.place_m is not None
-            source_m = event.place_m - self.prepared.point_axes[event.source] @ self.x[self.points[event.source]]
-        about = self._reference_line(event) if self.about_reckoning else None
-        for row in rows_of(event, vehicles[event.receiver], here[0], source_m, clock_m, about):
-            h = np.zeros(len(self.x))
-            h[self.slices[event.receiver]] = row.receiver @ here[1]
-            if there is not None:
-                h[self.slices[event.source]] = row.by_source(vehicles[event.source], derivative) @ there[1]
-            elif event.kind == POINT and event.source in self.points:
-                h[self.points[event.source]] = -row.place @ self.prepared.point_axes[event.source]
-            found.append((row, h))
-        return found
-
-    def _reference_line(self, event: Event) -> FloatArray | None:
-        """Line between two aircraft about which their range is linearised; its ends move when known to be wrong."""
-        vehicles = self.prepared.vehicles
-        ends = (event.receiver, event.source)
-        if event.kind != PEER or any(vehicles[who].clock < 0 for who in ends):
-            return None
-        x = [self._at(who, event.time_s)[0] for who in ends]
-        (here, by_here), (there, by_there) = (
-            vehicles[who].place(state, event.time_s) for who, state in zip(ends, x, strict=True)
-        )
-        arm = np.zeros(3) if event.arm_m is None else event.arm_m
-        read = [here - by_here @ x[0], there - by_there @ x[1]]
-        line = arm + read[0] - self.offsets_m[ends[0]] - read[1] + self.offsets_m[ends[1]]
-        away = arm + here - there - line
-        across = away - line * float(line @ away) / float(line @ line)
-        derivative = np.zeros((3, len(self.x)))
-        derivative[:, self.slices[ends[0]]], derivative[:, self.slices[ends[1]]] = by_here, -by_there
-        shared = across @ derivative
-        if float(across @ across) ** 2 > KNOWN_WRONG_SIGMAS**2 * float(shared @ self.P @ shared):
-            self.offsets_m[ends[0]], self.offsets_m[ends[1]] = read[0] - here, read[1] - there
-            return np.asarray(arm + here - there)
-        return np.asarray(line)
-
-    def _at(self, who: int, at_s: float) -> tuple[FloatArray, FloatArray]:
-        """State of a vehicle at a time not later than its own, and its derivative by the state it has."""
-        x = self.x[self.slices[who]]
-        if abs(at_s - self.times[who]) < 1e-12:
-            return x, np.eye(len(x))
-        moved, phi, _ = self.prepared.vehicles[who].step(x, self.times[who], at_s)
-        return moved, phi
-
-    def update(self, h: FloatArray, innovation: float, variance: float) -> None:
-        """One scalar measurement with the optimal gain, in the symmetric form of the Kalman core."""
-        columns = np.flatnonzero(h)
-        update_covariance(
-            self._states, columns, h[columns], 0, len(columns), variance, self._held, self.P, self._g, self._gain
-        )
-        self.x += self._gain * innovation
-
-    def update_together(self, H: FloatArray, innovation: FloatArray, variance: FloatArray) -> None:
-        """Several measurements in one step."""
-        shared = self.P @ H.T
-        S = H @ shared + np.diag(variance)
-        gain = np.linalg.solve(S, shared.T).T
-        self.x += gain @ innovation
-        self.P -= gain @ shared.T
-        self.P = 0.5 * (self.P + self.P.T)
-
-
-def _whole_block(first: int, size: int) -> tuple[Pattern, Int64Array, Int64Array]:
-    """Where the transition of one vehicle has entries, and where its noise has (one side of the diagonal)."""
-    rows = np.arange(first, first + size)
-    one, two = np.triu_indices(size)
-    return Pattern(rows, size * np.arange(size + 1), np.tile(rows, size)), one + first, two + first
+from groundstation.estimators.cooperative.timeline import SAME_TIME_S, timeline
+from groundstation.estimators.cooperative.tracks import AlgorithmRun, finished, log_for
 
 
 def run_centralised(
@@ -168,93 +41,38 @@ def run_centralised(
     innovates : bool
         False: measurements shrink the covariance and leave the state where it is, as if each were predicted exactly.
     """
-    joint, recorder = _Joint(prepared, settings), Recorder(prepared.vehicles)
-    rejected = [0] * len(prepared.vehicles)
     together = settings.update == "simultaneous"
-    for at_s, what in timeline(prepared, settings, together=together):
-        if isinstance(what, int):
-            joint.advance(what, at_s)
-            recorder.keep(what, at_s, joint.x[joint.slices[what]], joint.P[joint.slices[what], joint.slices[what]])
-        elif uses_measurements:
-            for who in sorted({one for event in what for one in _members(event)}):
-                joint.advance(who, at_s)
-            before = joint.x.copy()
-            if together:
-                _use_together(joint, what, settings, recorder, rejected)
-            else:
-                _use_one(joint, what[0], settings, recorder, rejected)
-            if not innovates:
-                joint.x[:] = before
-    if uses_measurements:
-        _count_messages(prepared, settings, recorder)
-    return recorder.finish("centralised" if uses_measurements else "dead_reckoning", settings.update)
+    items = timeline(prepared, settings, together=together)
+    rules = Rules(settings.gate_sigma, together, settings.derivatives == "reckoning", uses_measurements, innovates)
+    log = log_for(prepared, items)
+    run_joint(prepared.fleet, prepared.points, prepared.events, items, rules, _start(prepared), log)
+    messages = reports(prepared, settings) if uses_measurements else {}
+    name = "centralised" if uses_measurements else "dead_reckoning"
+    return finished(prepared, items, log, name, settings.update, messages)
 
 
-def _members(event: Event) -> tuple[int, ...]:
-    return (event.receiver, event.source) if event.kind == PEER else (event.receiver,)
+def _start(prepared: Prepared) -> Joint:
+    """State and covariance of all vehicles and uncertain points; a vehicle that is not there yet keeps its start."""
+    sigmas = prepared.points.sigma_m[prepared.points.uncertain >= 0]
+    starts = [vehicle.start() for vehicle in prepared.vehicles]
+    sizes = [len(x) for x, _ in starts]
+    places = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    variances = [np.diag(P) for _, P in starts]
+    x = np.concatenate([x for x, _ in starts] + [np.zeros(2 * len(sigmas))])
+    P = np.diag(np.concatenate([*variances, np.repeat(sigmas, 2) ** 2]))
+    k = len(prepared.vehicles)
+    first_s = np.array([vehicle.first_s for vehicle in prepared.vehicles])
+    return Joint(places, x, np.ascontiguousarray(P), first_s, np.zeros((k, 3)), np.zeros(k, dtype=np.int64))
 
 
-def _is_gated(
-    joint: _Joint, event: Event, row: Row, h: FloatArray, settings: CooperativeSettings
-) -> tuple[bool, float]:
-    total = float(h @ joint.P @ h) + row.variance * event.spread
-    return settings.gate_sigma > 0.0 and row.innovation**2 > settings.gate_sigma**2 * total, total
-
-
-def _use_one(
-    joint: _Joint, event: Event, settings: CooperativeSettings, recorder: Recorder, rejected: list[int]
-) -> None:
-    rows = joint.rows(event)
-    if not rows:
-        recorder.counts["lost"] += 1
-    for k, (row, h) in enumerate(rows):
-        gated, total = _is_gated(joint, event, row, h, settings)
-        recorder.judge(event, row.innovation, total, GATED if gated else USED)
-        _count_rejections(joint, event, gated, rejected, recorder)
-        if gated:
-            break  # the bearing of a wrong range is another object's
-        joint.update(h, row.innovation, row.variance)
-        if k == 0 and len(rows) > 1:  # the second row about the new estimate
-            rows[1:] = joint.rows(event)[1:]
-
-
-def _use_together(
-    joint: _Joint, events: tuple[Event, ...], settings: CooperativeSettings, recorder: Recorder, rejected: list[int]
-) -> None:
-    kept = []
-    for event in events:
-        for row, h in joint.rows(event):
-            gated, total = _is_gated(joint, event, row, h, settings)
-            recorder.judge(event, row.innovation, total, GATED if gated else USED)
-            _count_rejections(joint, event, gated, rejected, recorder)
-            if not gated:
-                kept.append((row, h))
-    if kept:
-        joint.update_together(
-            np.array([h for _, h in kept]),
-            np.array([row.innovation for row, _ in kept]),
-            np.array([row.variance for row, _ in kept]),
-        )
-
-
-def _count_rejections(joint: _Joint, event: Event, gated: bool, rejected: list[int], recorder: Recorder) -> None:
-    """Open the states in doubt of a vehicle none of whose ranges fits any more."""
-    for who in _members(event):
-        rejected[who] = rejected[who] + 1 if gated else 0
-        vehicle = joint.prepared.vehicles[who]
-        if rejected[who] >= PATIENCE and event.kind != HEIGHT:
-            rejected[who] = 0
-            recorder.opened(vehicle)
-            for state, variance in vehicle.doubts.items():
-                at = joint.slices[who].start + state
-                joint.P[at, at] += variance
-
-
-def _count_messages(prepared: Prepared, settings: CooperativeSettings, recorder: Recorder) -> None:
+def reports(prepared: Prepared, settings: CooperativeSettings) -> dict[str, tuple[int, int]]:
     """What the vehicles send to the centre: their dead reckoning and what they measured, once a frame."""
-    reports: dict[tuple[int, int], int] = {}
-    for event in prepared.events:
-        key = (int((event.time_s + 1e-9) // settings.frame_s), event.receiver)
-        reports[key] = reports.get(key, 0) + 1
-    for (_, who), ranges in reports.items():
-        recorder.sent(who, report_bytes(ranges))
+    events = prepared.events
+    frame = np.floor((events.time_s + SAME_TIME_S) / settings.frame_s).astype(np.int64)
+    pairs, ranges = np.unique(np.stack([frame, events.receiver]), axis=1, return_counts=True)
+    found: dict[str, tuple[int, int]] = {}
+    for who, vehicle in enumerate(prepared.vehicles):
+        mine = ranges[pairs[1] == who].tolist()
+        if mine:
+            found[vehicle.name] = (len(mine), sum(report_bytes(count) for count in mine))
+    return found

@@ -5,47 +5,45 @@ A decentralised filter that takes its neighbours' estimates mixes their errors i
 radius above 1 means that some pattern of errors grows, whatever the noise. Errors here are truth - estimate.
 """
 
-from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-
-Other = tuple[FloatArray, FloatArray]
-
-
-def unit_rows(sizes: Sequence[int]) -> list[FloatArray]:
-    """Rows of the unit map, a block (m, N) for each vehicle."""
-    edges = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
-    unit = np.eye(int(edges[-1]))
-    return [unit[one:two] for one, two in pairwise(edges)]
+from groundstation.estimators.cooperative.arrays import Fleet, Items
 
 
-def spectral_radius(rows: Sequence[FloatArray]) -> float:
-    """Largest absolute eigenvalue of the map.
+def unit_rows(fleet: Fleet) -> FloatArray:
+    """Rows of the unit map, shape (k, n, N): a block for each vehicle, filled up to the longest state."""
+    k, n = fleet.density.shape
+    edges = np.concatenate([[0], np.cumsum(fleet.size)])
+    rows = np.zeros((k, n, int(edges[-1])))
+    for who, (one, two) in enumerate(pairwise(edges.tolist())):
+        rows[who, : two - one, one:two] = np.eye(two - one)
+    return rows
+
+
+def windows(items: Items, window_s: float) -> list[tuple[int, int]]:
+    """Stretches of items, first and behind the last of each, that begin where the one before has lasted so long."""
+    begins, end_s = [], -np.inf
+    for at, at_s in enumerate(items.time_s.tolist()):
+        if at_s >= end_s:
+            begins.append(at)
+            end_s = at_s + window_s
+    return list(pairwise([*begins, len(items.time_s)]))
+
+
+def spectral_radius(rows: FloatArray, fleet: Fleet) -> float:
+    """Largest absolute eigenvalue of the map; infinite where it has overflowed.
 
     Examples
     --------
-    >>> spectral_radius([np.array([[1.0, 0.5]]), np.array([[0.5, 1.0]])])
+    >>> from types import SimpleNamespace
+    >>> rows = np.array([[[1.0, 0.5]], [[0.5, 1.0]]])
+    >>> spectral_radius(rows, SimpleNamespace(size=np.array([1, 1])))
     1.5
     """
-    return float(np.abs(np.linalg.eigvals(np.concatenate(rows))).max())
-
-
-def corrected_rows(rows: FloatArray, gain: FloatArray, H: FloatArray, others: Sequence[Other | None]) -> FloatArray:
-    """Rows of a vehicle after an update.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (m, N)
-    gain : ndarray, shape (m, r)
-    H : ndarray, shape (r, m)
-    others : sequence of (ndarray (s,), ndarray (s, N)) or None
-        For each measurement the derivative by its source's state and the source's rows; None for exact sources.
-    """
-    mixed = H @ rows
-    for number, other in enumerate(others):
-        if other is not None:
-            mixed[number] += other[0] @ other[1]
-    return np.asarray(rows - gain @ mixed)
+    whole = np.concatenate([part[:size] for part, size in zip(rows, fleet.size.tolist(), strict=True)])
+    if not np.isfinite(whole).all():
+        return float("inf")
+    return float(np.abs(np.linalg.eigvals(whole)).max())

@@ -9,14 +9,13 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.estimators.cooperative import figures
-from groundstation.estimators.cooperative.centralised import run_centralised
+from groundstation.estimators.cooperative.algorithms import run_algorithm
+from groundstation.estimators.cooperative.arrays import KINDS, PEER, POINT, USED
 from groundstation.estimators.cooperative.consistency import Judgement, judge, nees_limits
-from groundstation.estimators.cooperative.decentralised import run_decentralised
-from groundstation.estimators.cooperative.events import PEER, POINT, Prepared, prepare
+from groundstation.estimators.cooperative.events import Prepared, prepare
 from groundstation.estimators.cooperative.geometry import Geometry, Truth, bound_of, geometry_of
-from groundstation.estimators.cooperative.pairwise import run_pairwise
 from groundstation.estimators.cooperative.settings import ALGORITHMS, CooperativeSettings
-from groundstation.estimators.cooperative.tracks import USED, AlgorithmRun
+from groundstation.estimators.cooperative.tracks import AlgorithmRun
 from groundstation.results.cooperative import AlgorithmRow, CooperativeResult, GeometryRow, LinkRow, VehicleRow
 from groundstation.tables.session import Session
 
@@ -35,24 +34,6 @@ class Judged:
     def known(self) -> list[tuple[int, Judgement]]:
         """Vehicles with truth."""
         return [(index, one) for index, one in enumerate(self.judgements) if one is not None]
-
-
-@np.errstate(over="ignore", invalid="ignore")  # a filter that diverges to infinity says so by its NaN
-def run_algorithm(prepared: Prepared, settings: CooperativeSettings, algorithm: str) -> AlgorithmRun:
-    """Run one algorithm by its name.
-
-    Raises
-    ------
-    KeyError
-        When there is no such algorithm.
-    """
-    if algorithm not in ALGORITHMS:
-        raise KeyError(algorithm)
-    if algorithm in ("dead_reckoning", "centralised"):
-        return run_centralised(prepared, settings, uses_measurements=algorithm == "centralised")
-    if algorithm == "pairwise":
-        return run_pairwise(prepared, settings)
-    return run_decentralised(prepared, settings, algorithm)
 
 
 def estimate_session(
@@ -91,19 +72,19 @@ def estimate_session(
     bound = bound_of(prepared.session, settings, truth)
     geometry = geometry_of(prepared.session, settings, default.run)
     findings = [*prepared.findings, *_findings(judged, settings)]
-    slots = {event.slot for event in prepared.events if event.kind in (PEER, POINT)}
+    slots = len(np.unique(prepared.events.slot[np.isin(prepared.events.kind, (PEER, POINT))]))
     last = max(vehicle.last_s for vehicle in prepared.vehicles)
     answer = CooperativeResult(
         frame=session.frame,
         default_algorithm=default.run.algorithm,
-        algorithms=tuple(_algorithm_row(prepared, one, bound, len(slots)) for one in judged),
+        algorithms=tuple(_algorithm_row(prepared, one, bound, slots) for one in judged),
         vehicles=tuple(row for one in judged for row in _vehicle_rows(prepared, one)),
         geometry=tuple(_geometry_row(one) for one in geometry),
         links=_link_rows(prepared, default.run),
         vehicle_names=prepared.session.names,
         point_names=tuple(point.name for point in session.points),
         duration_s=float(last - min(vehicle.first_s for vehicle in prepared.vehicles)),
-        slots=len(slots),
+        slots=slots,
         settings=_flat(asdict(settings)),
         figures=(
             figures.tracks_figure([(one.run, one.judgements) for one in judged]),
@@ -211,14 +192,17 @@ def _geometry_row(one: Geometry) -> GeometryRow:
 
 def _link_rows(prepared: Prepared, run: AlgorithmRun) -> tuple[LinkRow, ...]:
     """Ranges and residuals of every direction of every link."""
-    found: dict[tuple[str, str, str], list[tuple[float, float, int]]] = {}
-    for one in run.judged:
-        source = figures.source_name(prepared, one.kind, one.source)
-        key = (prepared.vehicles[one.receiver].name, source, one.kind)
-        found.setdefault(key, []).append((one.innovation, one.sigma, one.mark))
+    judged, events = run.judged, prepared.events
+    links = np.stack([part[judged.event] for part in (events.receiver, events.source, events.kind)], axis=1)
+    unique, link = np.unique(links, axis=0, return_inverse=True)
+    named = [
+        (prepared.vehicles[receiver].name, figures.source_name(prepared, kind, source), KINDS[kind])
+        for receiver, source, kind in unique.tolist()
+    ]
     rows = []
-    for (receiver, source, kind), values in sorted(found.items()):
-        innovation, sigma, mark = (np.array(column) for column in zip(*values, strict=True))
+    for at in sorted(range(len(named)), key=lambda number: named[number]):
+        (receiver, source, kind), mine = named[at], link.ravel() == at
+        innovation, sigma, mark = judged.innovation[mine], judged.sigma[mine], judged.mark[mine]
         used = mark == USED
         has_any = bool(used.any())
         rows.append(
@@ -226,7 +210,7 @@ def _link_rows(prepared: Prepared, run: AlgorithmRun) -> tuple[LinkRow, ...]:
                 receiver,
                 source,
                 kind,
-                len(values),
+                int(mine.sum()),
                 int(used.sum()),
                 int((~used).sum()),
                 float(innovation[used].mean()) if has_any else None,

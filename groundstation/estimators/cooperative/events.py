@@ -1,62 +1,31 @@
 """A session as events in order of time, with what could not be used counted."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.ecef import ecef_from_n, geodetic_deg_m
 from groundstation.base.findings import Finding
-from groundstation.base.records import BoolArray
+from groundstation.base.records import BoolArray, Int64Array
+from groundstation.estimators.cooperative.aircraft import Aircraft, aircraft_of, fleet_of
+from groundstation.estimators.cooperative.arrays import (
+    HEIGHT,
+    PEER,
+    POINT,
+    SATELLITE,
+    Events,
+    Fleet,
+    Points,
+)
 from groundstation.estimators.cooperative.settings import CooperativeSettings
-from groundstation.estimators.cooperative.vehicles import InertialVehicle, Vehicle
+from groundstation.estimators.cooperative.vehicles import Vehicle
 from groundstation.estimators.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.tables.session import NO_SLOT, DeadReckoning, Odometry, Ranges, Session
 
-PEER, POINT, SATELLITE, HEIGHT = "peer", "point", "satellite", "height"
 LOWEST_RANK = 1_000_000
 AT_MOST_RANGE_M = 1e8
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """One measurement.
-
-    Parameters
-    ----------
-    time_s : float
-    kind : {'peer', 'point', 'satellite', 'height'}
-    receiver : int
-        Vehicle.
-    source : int
-        Vehicle or point; -1 for a satellite or a height.
-    value_m, variance_m2 : float
-        Pseudo-range or height; NaN for a bearing alone.
-    slot : int
-    place_m : ndarray, shape (3,), optional
-        Of a point or satellite.
-    bearing_rad, bearing_variance_rad2 : float
-        NaN without.
-    is_two_way : bool
-    arm_m : ndarray, shape (3,), optional
-        From the source's antenna to its place, and from the receiver's place to its antenna.
-    spread : float
-        Share of the variances that is the spread of one reading, for the gate; the rest is for its repeating itself.
-    """
-
-    time_s: float
-    kind: str
-    receiver: int
-    source: int
-    value_m: float
-    variance_m2: float
-    slot: int
-    place_m: FloatArray | None = None
-    bearing_rad: float = float("nan")
-    bearing_variance_rad2: float = float("nan")
-    is_two_way: bool = False
-    arm_m: FloatArray | None = None
-    spread: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -68,10 +37,9 @@ class Prepared:
     session : Session
         Without the vehicles and rows of dead reckoning that cannot be used.
     vehicles : tuple of Vehicle
-    events : tuple of Event
+    events : Events
         In order of time; peers among vehicles that are there.
-    point_axes : ndarray, shape (p, 3, 2)
-        North and east at each ground point in the frame of the session.
+    points : Points
     ranks : tuple of int
         Of the vehicles.
     findings : tuple of Finding
@@ -79,19 +47,20 @@ class Prepared:
 
     session: Session
     vehicles: tuple[Vehicle, ...]
-    events: tuple[Event, ...]
-    point_axes: FloatArray
+    events: Events
+    points: Points
     ranks: tuple[int, ...]
     findings: tuple[Finding, ...]
 
-    def output_times_s(self, step_s: float) -> list[tuple[float, int]]:
-        """Times of output with the vehicle each belongs to, in order of time."""
-        found = []
-        for index, vehicle in enumerate(self.vehicles):
-            first = np.ceil(vehicle.first_s / step_s - 1e-9)
-            for number in range(int(first), int(np.floor(vehicle.last_s / step_s + 1e-9)) + 1):
-                found.append((number * step_s, index))
-        return sorted(found)
+    @property
+    def is_of_aircraft(self) -> bool:
+        """Whether all vehicles are aircraft: then the compiled loops know them."""
+        return all(isinstance(vehicle, Aircraft) for vehicle in self.vehicles)
+
+    @cached_property
+    def fleet(self) -> Fleet:
+        """The aircraft for the compiled loops."""
+        return fleet_of([vehicle for vehicle in self.vehicles if isinstance(vehicle, Aircraft)])
 
 
 def prepare(session: Session, settings: CooperativeSettings) -> Prepared:
@@ -103,28 +72,39 @@ def prepare(session: Session, settings: CooperativeSettings) -> Prepared:
     findings: list[Finding] = []
     tracks = [kept for kept in (_clean(track, findings) for track in session.vehicles) if kept is not None]
     vehicles = tuple(
-        WheeledVehicle(track, settings)
-        if isinstance(track, Odometry)
-        else InertialVehicle(track, session.frame, settings)
+        WheeledVehicle(track, settings) if isinstance(track, Odometry) else aircraft_of(track, session.frame, settings)
         for track in tracks
     )
     places = {vehicle.name: index for index, vehicle in enumerate(vehicles)}
     points = {point.name: index for index, point in enumerate(session.points)}
-    events = [
-        *_link_events(session, vehicles, places, points, settings, findings),
-        *_satellite_events(session, vehicles, places, findings),
-        *_height_events(session, vehicles, places, findings),
-    ]
-    events.sort(key=lambda event: (event.time_s, event.slot))
+    parts = (
+        _link_events(session, vehicles, places, points, settings, findings),
+        _satellite_events(session, vehicles, places, findings),
+        _height_events(session, vehicles, places, findings),
+    )
+    joined = Events._make(np.concatenate(columns) for columns in zip(*parts, strict=True))
+    order = np.lexsort((joined.slot, joined.time_s))
+    ranks = tuple(session.ranks.get(vehicle.name, LOWEST_RANK) for vehicle in vehicles)
+    return Prepared(
+        replace(session, vehicles=tuple(tracks)),
+        vehicles,
+        Events._make(np.ascontiguousarray(column[order]) for column in joined),
+        _points_of(session),
+        ranks,
+        tuple(findings),
+    )
+
+
+def _points_of(session: Session) -> Points:
     axes = np.zeros((len(session.points), 3, 2))
     for index, point in enumerate(session.points):
         axes[index] = np.eye(3)[:, :2]
         if session.frame == "ecef":
             latitude, longitude, _ = geodetic_deg_m(np.array(point.position_m))
             axes[index] = ecef_from_n(latitude, longitude)[:, :2]
-    ranks = tuple(session.ranks.get(vehicle.name, LOWEST_RANK) for vehicle in vehicles)
-    kept = replace(session, vehicles=tuple(tracks))
-    return Prepared(kept, vehicles, tuple(events), axes, ranks, tuple(findings))
+    sigma = np.array([point.position_sigma_m for point in session.points], dtype=np.float64)
+    number = np.cumsum(sigma > 0.0, dtype=np.int64) - 1
+    return Points(axes, sigma, np.where(sigma > 0.0, number, -1))
 
 
 def _clean(track: DeadReckoning | Odometry, findings: list[Finding]) -> DeadReckoning | Odometry | None:
@@ -159,8 +139,59 @@ def _count(findings: list[Finding], code: str, text: str, bad: BoolArray, topic:
         findings.append(Finding("warn", f"cooperative.{code}", f"left out {count} {text}", topic, count=count))
 
 
-def _is_there(vehicles: tuple[Vehicle, ...], who: int, time_s: float) -> bool:
-    return vehicles[who].first_s - 1e-9 <= time_s <= vehicles[who].last_s + 1e-9
+def _is_there(vehicles: tuple[Vehicle, ...], who: Int64Array, time_s: FloatArray) -> BoolArray:
+    """Whether each vehicle has dead reckoning then; ``who`` below 0: nobody asks."""
+    spans = np.array([(vehicle.first_s, vehicle.last_s) for vehicle in vehicles] + [(-np.inf, np.inf)])
+    return np.asarray((spans[who, 0] - 1e-9 <= time_s) & (time_s <= spans[who, 1] + 1e-9))
+
+
+def _numbers_of(names: np.ndarray, places: dict[str, int]) -> Int64Array:
+    """Number of each name, -1 for one that is not there."""
+    unique, inverse = np.unique(names, return_inverse=True)
+    found = np.array([places.get(str(name), -1) for name in unique], dtype=np.int64)
+    return np.asarray(found[inverse] if len(names) else np.zeros(0, dtype=np.int64))
+
+
+def _columns(
+    time_s: FloatArray,
+    kind: int | Int64Array,
+    receiver: Int64Array,
+    value_m: FloatArray,
+    variance_m2: FloatArray,
+    *,
+    source: int | Int64Array = -1,
+    slot: int | Int64Array = NO_SLOT,
+    place_m: FloatArray | float = 0.0,
+    bearing_rad: FloatArray | float = np.nan,
+    bearing_variance_rad2: FloatArray | float = np.nan,
+    is_two_way: bool = False,
+    arm_m: FloatArray | float = 0.0,
+    spread: FloatArray | float = 1.0,
+) -> Events:
+    """Columns of one length; ``kind`` and what else is the same for all are given once."""
+    n = len(time_s)
+
+    def whole(value: object) -> Int64Array:
+        return np.broadcast_to(np.asarray(value, dtype=np.int64), n)
+
+    def real(value: object, *more: int) -> FloatArray:
+        return np.broadcast_to(np.asarray(value, dtype=np.float64), (n, *more))
+
+    return Events(
+        real(time_s),
+        whole(kind),
+        whole(receiver),
+        whole(source),
+        real(value_m),
+        real(variance_m2),
+        whole(slot),
+        real(place_m, 3),
+        real(bearing_rad),
+        real(bearing_variance_rad2),
+        np.full(n, is_two_way),
+        real(arm_m, 3),
+        real(spread),
+    )
 
 
 def _link_events(
@@ -170,23 +201,23 @@ def _link_events(
     points: dict[str, int],
     settings: CooperativeSettings,
     findings: list[Finding],
-) -> list[Event]:
+) -> Events:
     table = session.ranges
     n = len(table)
     bearing = np.full(n, np.nan) if table.bearing_deg is None else np.deg2rad(table.bearing_deg)
     bearing_sigma = np.full(n, np.nan) if table.bearing_sigma_deg is None else np.deg2rad(table.bearing_sigma_deg)
-    has_bearing = np.isfinite(bearing) & (bearing_sigma > 0.0)
     is_number = np.isfinite(table.pseudorange_m) & (table.sigma_m > 0.0) & np.isfinite(table.time_s)
     # a one-way pseudo-range has clocks in it and may be negative; a two-way one may not
     negative = is_number & (table.pseudorange_m < 0.0) if table.is_two_way else np.zeros(n, dtype=bool)
     absurd = is_number & (np.abs(table.pseudorange_m) > AT_MOST_RANGE_M)
-    known = np.array(
-        [
-            r in places and (s in places or s in points) and r != s
-            for r, s in zip(table.receiver, table.source, strict=True)
-        ],
-        dtype=bool,
+    receiver, peer, point = (
+        _numbers_of(names, of)
+        for names, of in ((table.receiver, places), (table.source, places), (table.source, points))
     )
+    has_heading = np.array([vehicle.heading >= 0 for vehicle in vehicles] + [False])[receiver]
+    has_bearing = np.isfinite(bearing) & (bearing_sigma > 0.0) & has_heading
+    is_peer = peer >= 0
+    known = (receiver >= 0) & (is_peer | (point >= 0)) & (receiver != peer)
     _count(
         findings, "not_a_number", "link rows without a range and a bearing that are numbers", ~is_number & ~has_bearing
     )
@@ -204,38 +235,30 @@ def _link_events(
                 count=count,
             )
         )
+    is_good = is_number & ~negative & ~absurd
+    usable = known & np.isfinite(table.time_s) & (is_good | has_bearing)
+    is_there = _is_there(vehicles, receiver, table.time_s) & _is_there(vehicles, peer, table.time_s)
+    _count_away(findings, int((usable & ~is_there).sum()), "link rows")
+    kept = usable & is_there
+    place = np.array([point.position_m for point in session.points] + [(0.0, 0.0, 0.0)], dtype=np.float64)
     as_white = _as_white(table, settings)
     stated = (table.sigma_m**2 + (settings.range_share * table.pseudorange_m) ** 2) * as_white
-    usable = known & np.isfinite(table.time_s) & ((is_number & ~negative & ~absurd) | has_bearing)
-    events, away = [], 0
-    for row in np.flatnonzero(usable).tolist():
-        time_s, source = float(table.time_s[row]), str(table.source[row])
-        receiver = places[str(table.receiver[row])]
-        is_peer = source in places
-        if not _is_there(vehicles, receiver, time_s) or (is_peer and not _is_there(vehicles, places[source], time_s)):
-            away += 1
-            continue
-        variance = float(stated[row]) + (settings.extra_range_sigma_m**2 if is_peer else 0.0)
-        is_good = bool(is_number[row] and not negative[row] and not absurd[row])
-        events.append(
-            Event(
-                time_s,
-                PEER if is_peer else POINT,
-                receiver,
-                places[source] if is_peer else points[source],
-                float(table.pseudorange_m[row]) if is_good else float("nan"),
-                variance,
-                int(table.slot[row]),
-                None if is_peer else np.array(session.points[points[source]].position_m),
-                float(bearing[row]) if has_bearing[row] else float("nan"),
-                float(bearing_sigma[row] ** 2 * as_white[row]),
-                table.is_two_way,
-                None if table.arm_m is None else table.arm_m[row],
-                1.0 / float(as_white[row]),
-            )
-        )
-    _count_away(findings, away, "link rows")
-    return events
+    variance = stated + np.where(is_peer, settings.extra_range_sigma_m**2, 0.0)
+    return _columns(
+        table.time_s[kept],
+        np.where(is_peer, PEER, POINT)[kept],
+        receiver[kept],
+        np.where(is_good, table.pseudorange_m, np.nan)[kept],
+        variance[kept],
+        source=np.where(is_peer, peer, point)[kept],
+        slot=table.slot[kept],
+        place_m=place[np.where(is_peer, -1, point)[kept]],
+        bearing_rad=np.where(has_bearing, bearing, np.nan)[kept],
+        bearing_variance_rad2=(bearing_sigma**2 * as_white)[kept],
+        is_two_way=table.is_two_way,
+        arm_m=0.0 if table.arm_m is None else table.arm_m[kept],
+        spread=1.0 / as_white[kept],
+    )
 
 
 def _as_white(table: Ranges, settings: CooperativeSettings) -> FloatArray:
@@ -267,37 +290,34 @@ def _count_away(findings: list[Finding], away: int, what: str) -> None:
 
 def _satellite_events(
     session: Session, vehicles: tuple[Vehicle, ...], places: dict[str, int], findings: list[Finding]
-) -> list[Event]:
+) -> Events:
     table = session.satellites
     good = np.isfinite(table.pseudorange_m) & np.isfinite(table.time_s) & np.isfinite(table.position_m).all(axis=1)
     good &= (table.sigma_m > 0.0) & (table.pseudorange_m > 0.0)
-    known = np.array([str(name) in places for name in table.receiver], dtype=bool)
+    receiver = _numbers_of(table.receiver, places)
+    known = receiver >= 0
     _count(findings, "satellite_rows", "satellite rows that are no numbers or negative", ~good)
     _count(findings, "unknown_receiver", "satellite rows of a vehicle that the session does not have", ~known)
-    events, away = [], 0
-    for row in np.flatnonzero(good & known).tolist():
-        receiver, time_s = places[str(table.receiver[row])], float(table.time_s[row])
-        if not _is_there(vehicles, receiver, time_s):
-            away += 1
-            continue
-        variance = float(table.sigma_m[row]) ** 2
-        value, place = float(table.pseudorange_m[row]), table.position_m[row]
-        events.append(Event(time_s, SATELLITE, receiver, -1, value, variance, NO_SLOT, place))
-    _count_away(findings, away, "satellite rows")
-    return events
+    is_there = _is_there(vehicles, receiver, table.time_s)
+    _count_away(findings, int((good & known & ~is_there).sum()), "satellite rows")
+    kept = good & known & is_there
+    return _columns(
+        table.time_s[kept],
+        SATELLITE,
+        receiver[kept],
+        table.pseudorange_m[kept],
+        table.sigma_m[kept] ** 2,
+        place_m=table.position_m[kept],
+    )
 
 
 def _height_events(
     session: Session, vehicles: tuple[Vehicle, ...], places: dict[str, int], findings: list[Finding]
-) -> list[Event]:
+) -> Events:
     table = session.heights
     good = np.isfinite(table.height_m) & np.isfinite(table.time_s) & (table.sigma_m > 0.0)
-    known = np.array([str(name) in places for name in table.aircraft], dtype=bool)
+    who = _numbers_of(table.aircraft, places)
     _count(findings, "height_rows", "rows of heights that are no numbers", ~good)
-    events = []
-    for row in np.flatnonzero(good & known).tolist():
-        who, time_s = places[str(table.aircraft[row])], float(table.time_s[row])
-        if _is_there(vehicles, who, time_s) and vehicles[who].height >= 0:
-            variance = float(table.sigma_m[row]) ** 2
-            events.append(Event(time_s, HEIGHT, who, -1, float(table.height_m[row]), variance, NO_SLOT))
-    return events
+    has_height = np.array([vehicle.height >= 0 for vehicle in vehicles] + [False])
+    kept = good & (who >= 0) & has_height[who] & _is_there(vehicles, who, table.time_s)
+    return _columns(table.time_s[kept], HEIGHT, who[kept], table.height_m[kept], table.sigma_m[kept] ** 2)

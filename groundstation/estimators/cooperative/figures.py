@@ -4,18 +4,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from groundstation.estimators.cooperative.arrays import KINDS, PEER, POINT
 from groundstation.estimators.cooperative.consistency import Judgement
-from groundstation.estimators.cooperative.events import PEER, POINT, Prepared
+from groundstation.estimators.cooperative.events import Prepared
 from groundstation.estimators.cooperative.geometry import Geometry
 from groundstation.estimators.cooperative.tracks import AlgorithmRun
 from groundstation.results.figures import FigureData
 
 
-def source_name(prepared: Prepared, kind: str, source: int) -> str:
+def source_name(prepared: Prepared, kind: int, source: int) -> str:
     """Name of what a measurement came from."""
     if kind == PEER:
         return prepared.vehicles[source].name
-    return prepared.session.points[source].name if kind == POINT else kind
+    return prepared.session.points[source].name if kind == POINT else KINDS[kind]
 
 
 def tracks_figure(runs: Sequence[tuple[AlgorithmRun, Sequence[Judgement | None]]]) -> FigureData:
@@ -75,15 +76,18 @@ def map_figure(runs: Sequence[AlgorithmRun]) -> FigureData:
 
 def links_figure(prepared: Prepared, run: AlgorithmRun) -> FigureData:
     """Innovations of every range of one algorithm; mark 1 used, -1 gated."""
+    judged, events = run.judged, prepared.events
+    kind, source, receiver = (part[judged.event].tolist() for part in (events.kind, events.source, events.receiver))
+    names = [vehicle.name for vehicle in prepared.vehicles]
     return FigureData(
         "cooperative_links",
         {
-            "time_s": np.array([one.time_s for one in run.judged]),
-            "receiver": np.array([prepared.vehicles[one.receiver].name for one in run.judged], dtype=np.str_),
-            "source": np.array([source_name(prepared, one.kind, one.source) for one in run.judged], dtype=np.str_),
-            "innovation": np.array([one.innovation for one in run.judged]),
-            "sigma": np.array([one.sigma for one in run.judged]),
-            "mark": np.array([one.mark for one in run.judged], dtype=np.int64),
+            "time_s": events.time_s[judged.event],
+            "receiver": np.array([names[one] for one in receiver], dtype=np.str_),
+            "source": np.array([source_name(prepared, *one) for one in zip(kind, source, strict=True)], dtype=np.str_),
+            "innovation": judged.innovation,
+            "sigma": judged.sigma,
+            "mark": judged.mark,
         },
         {"time_s": 3},
     )

@@ -15,8 +15,9 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import frozen
-from groundstation.estimators.cooperative.centralised import run_centralised
-from groundstation.estimators.cooperative.events import HEIGHT, PEER, SATELLITE, Event, prepare
+from groundstation.estimators.cooperative.algorithms import run_algorithm
+from groundstation.estimators.cooperative.arrays import HEIGHT, PEER, SATELLITE, Events
+from groundstation.estimators.cooperative.events import prepare
 from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.estimators.cooperative.tracks import AlgorithmRun, Track
 from groundstation.estimators.cooperative.vehicles import Vehicle
@@ -79,25 +80,26 @@ def geometry_of(session: Session, settings: CooperativeSettings, run: AlgorithmR
     The frame in which the session ends is left out: it holds but a part of what is heard in one.
     """
     prepared = prepare(session, settings)
-    frames: list[dict[int, dict[tuple[str, int, bytes], Event]]] = [{} for _ in prepared.vehicles]
-    for event in prepared.events:
-        if event.kind == HEIGHT or not np.isfinite(event.value_m):
-            continue
-        number = int((event.time_s + 1e-9) // settings.frame_s)
-        place = b"" if event.place_m is None or event.kind != SATELLITE else event.place_m.tobytes()
-        frames[event.receiver].setdefault(number, {})[(event.kind, event.source, place)] = event
+    events = prepared.events
+    frames: list[dict[int, dict[tuple[int, int, bytes], int]]] = [{} for _ in prepared.vehicles]
+    number = np.floor((events.time_s + 1e-9) / settings.frame_s).astype(np.int64)
+    for event in np.flatnonzero((events.kind != HEIGHT) & np.isfinite(events.value_m)).tolist():
+        kind, source = int(events.kind[event]), int(events.source[event])
+        place = events.place_m[event].tobytes() if kind == SATELLITE else b""
+        frames[events.receiver[event]].setdefault(int(number[event]), {})[(kind, source, place)] = event
     last = max((number for heard in frames for number in heard), default=0)
     if last:
         frames = [{number: heard[number] for number in heard if number != last} for heard in frames]
     return tuple(
-        _one(vehicle, heard, run.tracks, index, settings, prepared.session)
+        _one(vehicle, heard, events, run.tracks, index, settings, prepared.session)
         for index, (vehicle, heard) in enumerate(zip(prepared.vehicles, frames, strict=True))
     )
 
 
 def _one(
     vehicle: Vehicle,
-    heard: dict[int, dict[tuple[str, int, bytes], Event]],
+    heard: dict[int, dict[tuple[int, int, bytes], int]],
+    events: Events,
     tracks: tuple[Track, ...],
     index: int,
     settings: CooperativeSettings,
@@ -115,8 +117,9 @@ def _one(
             axes = track.axes[min(int(np.searchsorted(track.time_s, time_s)), len(track) - 1)]
         lines = []
         for event in heard[number].values():
-            there = _position_at(tracks[event.source], time_s) if event.kind == PEER else event.place_m
-            line = here - np.asarray(there)
+            is_peer = events.kind[event] == PEER
+            there = _position_at(tracks[events.source[event]], time_s) if is_peer else events.place_m[event]
+            line = here - there
             lines.append((line / np.linalg.norm(line)) @ axes[:, :2])
         H = np.array(lines)
         information = H.T @ H
@@ -157,4 +160,4 @@ def bound_of(session: Session, settings: CooperativeSettings, truth: Truth) -> A
     along = replace(session, vehicles=tuple(vehicles))
     prepared = prepare(along, settings)
     exact = replace(settings, gate_sigma=0.0)
-    return run_centralised(prepared, exact, innovates=False)
+    return run_algorithm(prepared, exact, "centralised", innovates=False)

@@ -1,152 +1,134 @@
-"""Predicted measurements and their derivatives; tests hold them against central differences."""
-
-from dataclasses import dataclass
+"""Compiled predictions of measurements and their derivatives; tests hold them against central differences."""
 
 import numpy as np
 
-from groundstation.base.angles import FloatArray
+from groundstation.base.compile import compiled, part
 from groundstation.base.geodesy import EARTH_RATE_RADPS
-from groundstation.estimators.cooperative.events import HEIGHT, PEER, POINT, SATELLITE, Event
-from groundstation.estimators.cooperative.vehicles import Vehicle, View
+from groundstation.estimators.cooperative.arrays import HEIGHT, POINT, SATELLITE, Events, Fleet, FloatArray, Rows
 
 LIGHT_MPS = 299_792_458.0
 NEAREST_M = 1e-3  # a source on top of the receiver has no direction
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One scalar measurement, linearised: innovation = h (receiver) + place (source) + clock (source) + noise.
-
-    Parameters
-    ----------
-    innovation : float
-        Measured minus predicted.
-    receiver : ndarray, shape (n,)
-        Derivative of the prediction by the receiver's state.
-    place : ndarray, shape (3,)
-        By the source's position.
-    clock : float
-        By the source's clock offset.
-    variance : float
-        Of the sensor alone.
-    """
-
-    innovation: float
-    receiver: FloatArray
-    place: FloatArray
-    clock: float
-    variance: float
-
-    def by_source(self, vehicle: Vehicle, derivative: FloatArray) -> FloatArray:
-        """Derivative by the state of a vehicle that is the source."""
-        h = self.place @ derivative
-        if vehicle.clock >= 0 and self.clock != 0.0:
-            h[vehicle.clock] += self.clock
-        return h
+def rows_for(n: int) -> Rows:
+    """Room for the row of an event."""
+    return Rows(np.zeros(1), np.zeros((1, n)), np.zeros((1, 3)), np.zeros(1), np.zeros(1))
 
 
-def rows_of(
-    event: Event,
-    vehicle: Vehicle,
+@compiled
+def observe(
+    fleet: Fleet,
+    events: Events,
+    event: int,
     x: FloatArray,
-    source_m: FloatArray | None,
+    reading: FloatArray,
+    derivative: FloatArray,
+    source_m: FloatArray,
     source_clock_m: float,
-    about_m: FloatArray | None = None,
-) -> list[Row]:
-    """Linearise one event about the receiver's state and what is known of the source.
+    about_m: FloatArray,
+    is_about: bool,
+    rows: Rows,
+) -> int:
+    """Linearise one event about the receiver's state and what is known of the source; return how many rows it has.
+
+    One; none where the source is on top of the receiver.
 
     Parameters
     ----------
-    event : Event
-    vehicle : Vehicle
-        The receiver.
     x : ndarray, shape (n,)
-        Its state at the time of the event.
-    source_m : ndarray, shape (3,), optional
-        Position of a peer; points and satellites carry their own.
+        State of the receiver at the time of the event.
+    reading, derivative : ndarrays, shapes (3,), (3, n)
+        Its place = reading + derivative x.
+    source_m : ndarray, shape (3,)
+        Where the source is taken to be; means nothing for a height.
     source_clock_m : float
         Clock offset of a peer; 0 else.
-    about_m : ndarray, shape (3,), optional
-        Line from the source to the receiver about which the range is linearised; None: that of the estimate.
-
-    Returns
-    -------
-    list of Row
-        Range, then bearing, as far as the event has them.
+    about_m : ndarray, shape (3,)
+        Where ``is_about``: line from the source to the receiver about which the range is linearised, value and
+        direction; else that of the estimate.
+    rows : Rows
+        Filled.
     """
-    if event.kind == HEIGHT:
-        h = np.zeros(vehicle.size)
-        h[vehicle.height] = -1.0
-        predicted = vehicle.height_m(event.time_s) - float(x[vehicle.height])
-        return [Row(event.value_m - predicted, h, np.zeros(3), 0.0, event.variance_m2)]
-    source = event.place_m if source_m is None else source_m
-    assert source is not None
-    view = vehicle.view(x, event.time_s)
-    if event.arm_m is not None:
-        source = source - event.arm_m
-    line = view.place_m - source
-    distance = float(np.sqrt(line @ line))
+    who = events.receiver[event]
+    n = fleet.size[who]
+    if events.kind[event] == HEIGHT:
+        for j in range(n):
+            rows.receiver[0, j] = 0.0
+        rows.receiver[0, fleet.height[who]] = -1.0
+        for axis in range(3):
+            rows.place[0, axis] = 0.0
+        rows.clock[0], rows.variance[0] = 0.0, events.variance_m2[event]
+        rows.innovation[0] = events.value_m[event] - (-reading[2] - x[fleet.height[who]])
+        return 1
+    line = np.empty(3)
+    for axis in range(3):
+        line[axis] = events.arm_m[event, axis] + reading[axis] - source_m[axis]
+        for j in range(n):
+            line[axis] += derivative[axis, j] * x[j]
+    distance = np.sqrt(line[0] ** 2 + line[1] ** 2 + line[2] ** 2)
     if distance < NEAREST_M:
-        return []
-    rows = []
-    if np.isfinite(event.value_m):
-        direction = line / distance
-        if about_m is not None:
-            distance = float(np.sqrt(about_m @ about_m))
-            direction = about_m / distance
-            distance += float(direction @ (line - about_m))
-        rows.append(_range_row(event, vehicle, x, view, source, source_clock_m, direction, distance))
-    if np.isfinite(event.bearing_rad):
-        rows.append(_bearing_row(event, view, -line))
-    return rows
+        return 0
+    _range_row(fleet, events, event, x, derivative, line, source_m, source_clock_m, about_m, is_about, rows)
+    return 1
 
 
+@part
 def _range_row(
-    event: Event,
-    vehicle: Vehicle,
+    fleet: Fleet,
+    events: Events,
+    event: int,
     x: FloatArray,
-    view: View,
-    source: FloatArray,
+    derivative: FloatArray,
+    line: FloatArray,
+    source_m: FloatArray,
     source_clock_m: float,
-    direction: FloatArray,
-    distance: float,
-) -> Row:
-    if event.kind == SATELLITE:
-        direction, distance = _while_the_earth_turns(view.place_m, source, distance)
+    about_m: FloatArray,
+    is_about: bool,
+    rows: Rows,
+) -> None:
+    who, kind = events.receiver[event], events.kind[event]
+    direction = np.empty(3)
+    distance = np.sqrt(line[0] ** 2 + line[1] ** 2 + line[2] ** 2)
+    for axis in range(3):
+        direction[axis] = line[axis] / distance
+    if is_about:
+        distance = np.sqrt(about_m[0] ** 2 + about_m[1] ** 2 + about_m[2] ** 2)
+        for axis in range(3):
+            direction[axis] = about_m[axis] / distance
+        for axis in range(3):
+            distance += direction[axis] * (line[axis] - about_m[axis])
+    if kind == SATELLITE:
+        distance = _while_the_earth_turns(line, source_m, distance, direction)
     predicted = distance
-    h = direction @ view.derivative
-    by_source, by_clock = -direction, 0.0
-    clock = vehicle.receiver_clock if event.kind == SATELLITE else vehicle.clock
-    if clock >= 0 and not event.is_two_way:
-        predicted += float(x[clock]) - source_clock_m
-        h[clock] += 1.0
-        by_clock = 0.0 if event.kind in (POINT, SATELLITE) else -1.0
-    if event.kind != SATELLITE:
-        error, by_error, scale = vehicle.range_error(x, distance, is_peer=event.kind == PEER)
-        predicted += error
-        h = (1.0 + scale) * h + by_error if scale else h + by_error
-        by_source = (1.0 + scale) * by_source
-    return Row(event.value_m - predicted, h, by_source, by_clock, event.variance_m2)
+    for j in range(fleet.size[who]):
+        rows.receiver[0, j] = (
+            direction[0] * derivative[0, j] + direction[1] * derivative[1, j] + direction[2] * derivative[2, j]
+        )
+    rows.clock[0] = 0.0
+    clock, bias = fleet.receiver_clock[who] if kind == SATELLITE else fleet.clock[who], fleet.bias[who]
+    if clock >= 0 and not events.is_two_way[event]:
+        predicted += x[clock] - source_clock_m
+        rows.receiver[0, clock] += 1.0
+        rows.clock[0] = 0.0 if kind in (POINT, SATELLITE) else -1.0
+    if bias >= 0 and kind != SATELLITE:
+        predicted += x[bias]
+        rows.receiver[0, bias] += 1.0
+    for axis in range(3):
+        rows.place[0, axis] = -direction[axis]
+    rows.innovation[0], rows.variance[0] = events.value_m[event] - predicted, events.variance_m2[event]
 
 
-def _while_the_earth_turns(place: FloatArray, source: FloatArray, distance: float) -> tuple[FloatArray, float]:
+@part
+def _while_the_earth_turns(line: FloatArray, source_m: FloatArray, distance: float, direction: FloatArray) -> float:
     """Direction and distance from where a satellite was at emission, in the ECEF axes of the instant of reception."""
-    line = place - source
+    seen = np.empty(3)
     for _ in range(3):  # each gains six digits
         turn = EARTH_RATE_RADPS * distance / LIGHT_MPS
         cosine, sine = np.cos(turn), np.sin(turn)
-        x, y = cosine * source[0] + sine * source[1], cosine * source[1] - sine * source[0]
-        line = place - np.array([x, y, source[2]])
-        distance = float(np.sqrt(line @ line))
-    return line / distance, distance
-
-
-def _bearing_row(event: Event, view: View, line: FloatArray) -> Row:
-    """Bearing off the sensor's heading: direction to the source less it; line leads from the sensor to the source."""
-    north, east = float(line[0]), float(line[1])
-    square = north * north + east * east
-    by_line = np.array([-east, north, 0.0]) / square
-    h = -by_line @ view.derivative - view.by_heading
-    innovation = event.bearing_rad - (np.arctan2(east, north) - view.heading_rad)
-    wrapped = float((innovation + np.pi) % (2.0 * np.pi) - np.pi)
-    return Row(wrapped, h, by_line, 0.0, event.bearing_variance_rad2)
+        seen[0] = line[0] + source_m[0] - (cosine * source_m[0] + sine * source_m[1])
+        seen[1] = line[1] + source_m[1] - (cosine * source_m[1] - sine * source_m[0])
+        seen[2] = line[2]
+        distance = np.sqrt(seen[0] ** 2 + seen[1] ** 2 + seen[2] ** 2)
+    for axis in range(3):
+        direction[axis] = seen[axis] / distance
+    return distance

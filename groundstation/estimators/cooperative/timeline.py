@@ -1,40 +1,52 @@
 """The order in which a filter works: measurements, alone or a frame together, and times of output between them."""
 
-from collections.abc import Iterator
+import numpy as np
 
-from groundstation.estimators.cooperative.events import Event, Prepared
+from groundstation.base.records import Int64Array
+from groundstation.estimators.cooperative.arrays import Items
+from groundstation.estimators.cooperative.events import Prepared
 from groundstation.estimators.cooperative.settings import CooperativeSettings
 
-Group = tuple[float, tuple[Event, ...]]
-Output = tuple[float, int]
+SAME_TIME_S = 1e-9
 
 
-def groups_of(events: tuple[Event, ...], *, together: bool, frame_s: float) -> list[Group]:
-    """Measurements that are used in one update, with the time at which it is made: that of the last of them."""
-    if not together:
-        return [(event.time_s, (event,)) for event in events]
-    groups: list[Group] = []
-    frame: list[Event] = []
-    number = None
-    for event in events:
-        here = int((event.time_s + 1e-9) // frame_s)
-        if frame and here != number:
-            groups.append((frame[-1].time_s, tuple(frame)))
-            frame = []
-        frame.append(event)
-        number = here
-    if frame:
-        groups.append((frame[-1].time_s, tuple(frame)))
-    return groups
+def timeline(prepared: Prepared, settings: CooperativeSettings, *, together: bool) -> Items:
+    """Groups of measurements and outputs in order of time; an output sees every group that is not later.
+
+    Measurements that are used together make their update at the time of the last of them.
+    """
+    time_s = prepared.events.time_s
+    first = np.arange(len(time_s))
+    if together:
+        frame = np.floor((time_s + SAME_TIME_S) / settings.frame_s)
+        first = np.flatnonzero(np.diff(frame, prepend=-np.inf))
+    last = np.append(first[1:], len(time_s))[: len(first)]
+    group_s = time_s[last - 1]
+    output_s, vehicle = _outputs(prepared, settings.output_step_s)
+    after = np.searchsorted(group_s - SAME_TIME_S, output_s, side="right")  # groups that each output sees
+    # an output stands behind every group at least as early, within rounding
+    order = np.lexsort((np.concatenate([np.zeros(len(first)), np.ones(len(output_s))]), _places(len(first), after)))
+    none = np.zeros(len(output_s), dtype=np.int64)
+    return Items(
+        np.concatenate([group_s, output_s])[order],
+        np.concatenate([np.full(len(first), -1, dtype=np.int64), vehicle])[order],
+        np.concatenate([first, none]).astype(np.int64)[order],
+        np.concatenate([last, none]).astype(np.int64)[order],
+    )
 
 
-def timeline(prepared: Prepared, settings: CooperativeSettings, *, together: bool) -> Iterator[Group | Output]:
-    """Groups and outputs in order of time; an output sees every group that is not later."""
-    outputs = prepared.output_times_s(settings.output_step_s)
-    next_output = 0
-    for group in groups_of(prepared.events, together=together, frame_s=settings.frame_s):
-        while next_output < len(outputs) and outputs[next_output][0] < group[0] - 1e-9:
-            yield outputs[next_output]
-            next_output += 1
-        yield group
-    yield from outputs[next_output:]
+def _places(groups: int, after: Int64Array) -> Int64Array:
+    """Sort key: group g has g + 1, an output that sees g groups has g and follows by the second key."""
+    return np.concatenate([np.arange(1, groups + 1), after])
+
+
+def _outputs(prepared: Prepared, step_s: float) -> tuple[np.ndarray, Int64Array]:
+    """Times of output with the vehicle each belongs to, in order of time."""
+    numbers = [
+        np.arange(np.ceil(one.first_s / step_s - 1e-9), np.floor(one.last_s / step_s + 1e-9) + 1.0)
+        for one in prepared.vehicles
+    ]
+    vehicle = np.repeat(np.arange(len(numbers)), [len(part) for part in numbers])
+    time_s = np.concatenate(numbers) * step_s
+    order = np.lexsort((vehicle, time_s))
+    return time_s[order], vehicle[order]

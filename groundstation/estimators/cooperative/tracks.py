@@ -1,16 +1,24 @@
 """What a run leaves behind: every vehicle's states at the times of output, and counts."""
 
-from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.records import frozen
-from groundstation.estimators.cooperative.events import Event
-from groundstation.estimators.cooperative.vehicles import Vehicle
-
-USED, GATED = 1, -1
+from groundstation.base.records import Int64Array, frozen
+from groundstation.estimators.cooperative.arrays import (
+    CLOCK_LEAPS,
+    COUNTS,
+    GATED,
+    JUDGED,
+    LOST,
+    UNUSED,
+    USED,
+    Items,
+    Log,
+)
+from groundstation.estimators.cooperative.events import Prepared
+from groundstation.estimators.cooperative.motion import place
 
 
 @dataclass(frozen=True)
@@ -67,15 +75,28 @@ class Track:
 
 @dataclass(frozen=True)
 class Judged:
-    """One range as the filter judged it: innovation, its sigma, and whether it was used (1) or gated (-1)."""
+    """Every measurement as the filter judged it: innovation, its sigma, and whether it was used (1) or gated (-1).
 
-    time_s: float
-    kind: str
-    receiver: int
-    source: int
-    innovation: float
-    sigma: float
-    mark: int
+    Parameters
+    ----------
+    event : ndarray of int, shape (r,)
+        Which of the prepared events.
+    innovation, sigma : ndarrays, shape (r,)
+        Metres; radians of a bearing.
+    mark : ndarray of int, shape (r,)
+    """
+
+    event: Int64Array
+    innovation: FloatArray
+    sigma: FloatArray
+    mark: Int64Array
+
+    def __post_init__(self) -> None:
+        for name in ("event", "innovation", "sigma", "mark"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def __len__(self) -> int:
+        return len(self.event)
 
 
 @dataclass(frozen=True)
@@ -87,8 +108,7 @@ class AlgorithmRun:
     algorithm, update : str
     tracks : tuple of Track
         In the order of the vehicles.
-    judged : tuple of Judged
-        Ranges alone.
+    judged : Judged
     counts : dict
         ``used``, ``gated``, ``lost``, ``unused``, ``clock_leaps``, ``reopened``.
     messages : dict of vehicle to (messages, bytes)
@@ -99,71 +119,77 @@ class AlgorithmRun:
     algorithm: str
     update: str
     tracks: tuple[Track, ...]
-    judged: tuple[Judged, ...]
+    judged: Judged
     counts: dict[str, int]
     messages: dict[str, tuple[int, int]]
     map_time_s: FloatArray
     map_radius: FloatArray
 
 
-@dataclass
-class Recorder:
-    """Collects what becomes an :class:`AlgorithmRun`."""
+def log_for(prepared: Prepared, items: Items) -> Log:
+    """Room for what a run writes down."""
+    k, n = prepared.fleet.density.shape
+    outputs, rows = int((items.vehicle >= 0).sum()), len(prepared.events.time_s)
+    return Log(
+        np.zeros((outputs, n)),
+        np.zeros((outputs, n, n)),
+        np.zeros(rows, dtype=np.int64),
+        np.zeros(rows),
+        np.zeros(rows),
+        np.zeros(rows, dtype=np.int64),
+        np.zeros(COUNTS, dtype=np.int64),
+        np.zeros(k, dtype=np.int64),
+    )
 
-    vehicles: tuple[Vehicle, ...]
-    counts: Counter[str] = field(default_factory=Counter)
-    judged: list[Judged] = field(default_factory=list)
-    messages: dict[str, tuple[int, int]] = field(default_factory=dict)
-    map_time_s: list[float] = field(default_factory=list)
-    map_radius: list[float] = field(default_factory=list)
-    _rows: list[list[tuple[float, FloatArray, FloatArray, FloatArray]]] = field(default_factory=list)
 
-    def __post_init__(self) -> None:
-        self._rows = [[] for _ in self.vehicles]
+def finished(
+    prepared: Prepared,
+    items: Items,
+    log: Log,
+    algorithm: str,
+    update: str,
+    messages: dict[str, tuple[int, int]],
+    radius: tuple[list[float], list[float]] = ([], []),
+) -> AlgorithmRun:
+    """Everything as one frozen answer; ``radius``: times, and spectral radii of the error map."""
+    rows = int(log.counts[JUDGED])
+    mark = log.mark[:rows]
+    counts = {
+        "used": int((mark == USED).sum()),
+        "gated": int((mark == GATED).sum()),
+        "lost": int(log.counts[LOST]),
+        "unused": int(log.counts[UNUSED]),
+        "clock_leaps": int(log.counts[CLOCK_LEAPS]),
+    }
+    return AlgorithmRun(
+        algorithm,
+        update,
+        tuple(_track(prepared, items, log, who) for who in range(len(prepared.vehicles))),
+        Judged(log.event[:rows], log.innovation[:rows], np.sqrt(log.variance[:rows]), mark),
+        {name: count for name, count in counts.items() if count},
+        messages,
+        np.array(radius[0]),
+        np.array(radius[1]),
+    )
 
-    def keep(self, who: int, time_s: float, x: FloatArray, P: FloatArray) -> None:
-        """Keep a vehicle's state at a time of output."""
-        position, _ = self.vehicles[who].place(x, time_s)
-        self._rows[who].append((time_s, position, x.copy(), P.copy()))
 
-    def judge(self, event: Event, innovation: float, variance: float, mark: int) -> None:
-        """Count a measurement and keep how it was judged."""
-        self.counts["used" if mark == USED else "gated"] += 1
-        sigma = float(np.sqrt(variance))
-        self.judged.append(Judged(event.time_s, event.kind, event.receiver, event.source, innovation, sigma, mark))
+def _track(prepared: Prepared, items: Items, log: Log, who: int) -> Track:
+    vehicle, n = prepared.vehicles[who], prepared.vehicles[who].size
+    mine = items.vehicle[items.vehicle >= 0] == who
+    time_s = items.time_s[items.vehicle == who]
+    state, covariance = log.x[mine][:, :n], log.P[mine][:, :n, :n]
+    position_m = np.empty((len(time_s), 3))
+    derivative = np.empty((3, n))
+    for row, at_s in enumerate(time_s.tolist()):
+        place(prepared.fleet, who, at_s, position_m[row], derivative)
+        position_m[row] += derivative @ state[row]
+    return Track(vehicle.name, time_s, position_m, state, covariance, vehicle.height)
 
-    def opened(self, vehicle: Vehicle) -> None:
-        """Count that nothing fitted a vehicle's estimate any more and its states in doubt were opened."""
-        self.counts["clock_leaps" if vehicle.clock >= 0 else "reopened"] += 1
 
-    def sent(self, who: int, size: int) -> None:
-        """Count a message of a vehicle."""
-        name = self.vehicles[who].name
-        messages, total = self.messages.get(name, (0, 0))
-        self.messages[name] = (messages + 1, total + size)
-
-    def finish(self, algorithm: str, update: str) -> AlgorithmRun:
-        """Everything as one frozen answer."""
-        tracks = []
-        for vehicle, rows in zip(self.vehicles, self._rows, strict=True):
-            n, m = len(rows), vehicle.size
-            tracks.append(
-                Track(
-                    vehicle.name,
-                    np.array([row[0] for row in rows]),
-                    np.array([row[1] for row in rows]).reshape(n, 3),
-                    np.array([row[2] for row in rows]).reshape(n, m),
-                    np.array([row[3] for row in rows]).reshape(n, m, m),
-                    vehicle.height,
-                )
-            )
-        return AlgorithmRun(
-            algorithm,
-            update,
-            tuple(tracks),
-            tuple(self.judged),
-            dict(self.counts),
-            dict(self.messages),
-            np.array(self.map_time_s),
-            np.array(self.map_radius),
-        )
+def counted(prepared: Prepared, sent: Int64Array, size: int) -> dict[str, tuple[int, int]]:
+    """Messages and bytes of every vehicle that sent any."""
+    return {
+        vehicle.name: (count, count * size)
+        for vehicle, count in zip(prepared.vehicles, sent.tolist(), strict=True)
+        if count
+    }

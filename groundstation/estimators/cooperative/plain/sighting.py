@@ -9,8 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.estimators.cooperative.events import PEER, Event
-from groundstation.estimators.cooperative.observation import NEAREST_M, Row
+from groundstation.estimators.cooperative.arrays import PEER
+from groundstation.estimators.cooperative.observation import NEAREST_M
+from groundstation.estimators.cooperative.plain.observation import Row
+from groundstation.estimators.cooperative.plain.steps import Event
 from groundstation.estimators.cooperative.vehicles import Vehicle
 
 

@@ -1,0 +1,44 @@
+"""Every algorithm by its name: in compiled loops where these know the vehicles, else in plain numpy."""
+
+import numpy as np
+
+from groundstation.estimators.cooperative import plain
+from groundstation.estimators.cooperative.centralised import run_centralised
+from groundstation.estimators.cooperative.decentralised import run_decentralised
+from groundstation.estimators.cooperative.events import Prepared
+from groundstation.estimators.cooperative.pairwise import run_pairwise
+from groundstation.estimators.cooperative.settings import ALGORITHMS, CooperativeSettings
+from groundstation.estimators.cooperative.tracks import AlgorithmRun
+
+
+@np.errstate(over="ignore", invalid="ignore")  # a filter that diverges to infinity says so by its NaN
+def run_algorithm(
+    prepared: Prepared, settings: CooperativeSettings, algorithm: str, *, innovates: bool = True
+) -> AlgorithmRun:
+    """Run one algorithm by its name.
+
+    The compiled loops know aircraft. A session with a vehicle on wheels runs in ``plain``, which knows cameras and
+    bearings too, and tells who is seen where it stands.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    settings : CooperativeSettings
+    algorithm : str
+    innovates : bool
+        False (the centralised filter alone): measurements shrink the covariance and leave the state where it is.
+
+    Raises
+    ------
+    KeyError
+        When there is no such algorithm.
+    """
+    if algorithm not in ALGORITHMS:
+        raise KeyError(algorithm)
+    is_compiled = prepared.is_of_aircraft
+    if algorithm in ("dead_reckoning", "centralised"):
+        run = run_centralised if is_compiled else plain.run_centralised
+        return run(prepared, settings, uses_measurements=algorithm == "centralised", innovates=innovates)
+    if algorithm == "pairwise":
+        return (run_pairwise if is_compiled else plain.run_pairwise)(prepared, settings)
+    return (run_decentralised if is_compiled else plain.run_decentralised)(prepared, settings, algorithm)

@@ -1,0 +1,410 @@
+"""Compiled loop of the centralised filter, on the Kalman core. See ``centralised``."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from groundstation.base.compile import compiled, part
+from groundstation.base.records import Int64Array
+from groundstation.estimators.cooperative.arrays import (
+    CLOCK_LEAPS,
+    GATED,
+    HEIGHT,
+    JUDGED,
+    LOST,
+    OUTPUTS,
+    PEER,
+    POINT,
+    USED,
+    Events,
+    Fleet,
+    FloatArray,
+    Items,
+    Log,
+    Points,
+    Rows,
+    Rules,
+)
+from groundstation.estimators.cooperative.motion import ROOMS, place, position, step
+from groundstation.estimators.cooperative.observation import observe
+from groundstation.estimators.kalman.arrays import Pattern
+from groundstation.estimators.kalman.kernels import predict_covariance, predicted_variance, update_covariance
+
+PATIENCE = 30  # rejections of a vehicle in a row: then its clock has leapt, or it is not where it thinks
+LEAP_M = 1e5
+KNOWN_WRONG_SIGMAS = 3.0
+SAME_TIME_S = 1e-12
+
+
+class Joint(NamedTuple):
+    """State x and covariance P of all vehicles, then of the uncertain points; changed in place."""
+
+    first: Int64Array  # (k + 1,) places of the vehicles in x
+    x: FloatArray  # (N,)
+    P: FloatArray  # (N, N)
+    time_s: FloatArray  # (k,) of each vehicle's states
+    offset_m: FloatArray  # (k, 3) dead reckoning less reference place
+    rejected: Int64Array  # (k,) in a row
+
+
+class Room(NamedTuple):
+    """Room of the loop: N states in all, n of a vehicle at most."""
+
+    x: FloatArray  # (2, n) receiver and source at the time of an event
+    phi: FloatArray  # (2, n, n)
+    noise: FloatArray  # (n, n)
+    step: FloatArray  # (ROOMS, n, n)
+    reading: FloatArray  # (2, 3)
+    derivative: FloatArray  # (2, 3, n)
+    line: FloatArray  # (3, 3) source, reference line, another
+    wide: FloatArray  # (N, N)
+    g: FloatArray  # (N,)
+    gain: FloatArray  # (N,)
+
+
+class Lines(NamedTuple):
+    """Rows of one update: sparse derivatives by the joint state, one below the other."""
+
+    starts: Int64Array
+    columns: Int64Array
+    values: FloatArray
+    innovation: FloatArray
+    variance: FloatArray
+
+
+@compiled
+def run_joint(fleet: Fleet, points: Points, events: Events, items: Items, rules: Rules, joint: Joint, log: Log) -> None:
+    """Work through a session."""
+    size, n = len(joint.x), fleet.density.shape[1]
+    room = Room(
+        np.zeros((2, n)),
+        np.zeros((2, n, n)),
+        np.zeros((n, n)),
+        np.zeros((ROOMS, n, n)),
+        np.zeros((2, 3)),
+        np.zeros((2, 3, n)),
+        np.zeros((3, 3)),
+        np.zeros((size, size)),
+        np.zeros(size),
+        np.zeros(size),
+    )
+    rows = Rows(np.zeros(1), np.zeros((1, n)), np.zeros((1, 3)), np.zeros(1), np.zeros(1))
+    most = 1
+    for item in range(len(items.vehicle)):
+        most = max(most, items.last[item] - items.first[item])
+    wide = most * (2 * n + 2)
+    lines = Lines(
+        np.zeros(most + 1, dtype=np.int64),
+        np.zeros(wide, dtype=np.int64),
+        np.zeros(wide),
+        np.zeros(most),
+        np.zeros(most),
+    )
+    before = np.zeros(size)
+    for item in range(len(items.vehicle)):
+        who = items.vehicle[item]
+        if who >= 0:
+            _advance(fleet, joint, who, items.time_s[item], room)
+            _keep(fleet, joint, who, log)
+            continue
+        if not rules.uses_measurements:
+            continue
+        first, last = items.first[item], items.last[item]
+        for event in range(first, last):
+            _advance(fleet, joint, events.receiver[event], items.time_s[item], room)
+            if events.kind[event] == PEER:
+                _advance(fleet, joint, events.source[event], items.time_s[item], room)
+        for i in range(size):
+            before[i] = joint.x[i]
+        if rules.is_together:
+            _use_together(fleet, points, events, first, last, rules, joint, room, rows, lines, log)
+        else:
+            _use_one(fleet, points, events, first, rules, joint, room, rows, lines, log)
+        for i in range(0 if rules.innovates else size):
+            joint.x[i] = before[i]
+
+
+@part
+def _keep(fleet: Fleet, joint: Joint, who: int, log: Log) -> None:
+    """Write down a vehicle's states."""
+    at, first = log.counts[OUTPUTS], joint.first[who]
+    for i in range(fleet.size[who]):
+        log.x[at, i] = joint.x[first + i]
+        for j in range(fleet.size[who]):
+            log.P[at, i, j] = joint.P[first + i, first + j]
+    log.counts[OUTPUTS] += 1
+
+
+@part
+def _advance(fleet: Fleet, joint: Joint, who: int, to_s: float, room: Room) -> None:
+    """Move one vehicle's block on."""
+    if to_s <= joint.time_s[who] + SAME_TIME_S:
+        return
+    n, first, size = fleet.size[who], joint.first[who], len(joint.x)
+    x, phi, noise = room.x[0], room.phi[0], room.noise
+    for i in range(n):
+        x[i] = joint.x[first + i]
+    step(fleet, who, x, joint.time_s[who], to_s, phi, noise, room.step)
+    changed, starts = np.empty(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64)
+    columns, values = np.empty(n * n, dtype=np.int64), np.empty((1, n * n))
+    rows = count = 0
+    for i in range(n):
+        joint.x[first + i] = x[i]
+        is_changed = phi[i, i] != 1.0
+        for j in range(n):
+            is_changed |= j != i and phi[i, j] != 0.0
+        if is_changed:
+            changed[rows], starts[rows] = first + i, count
+            rows += 1
+            for j in range(n):
+                if phi[i, j] != 0.0:
+                    columns[count], values[0, count] = first + j, phi[i, j]
+                    count += 1
+    starts[rows] = count
+    pattern = Pattern(changed[:rows], starts, columns)
+    predict_covariance(np.arange(size), pattern, values, 0, joint.P, room.wide)
+    for i in range(n):
+        for j in range(i, n):
+            if noise[i, j] != 0.0:
+                joint.P[first + i, first + j] += noise[i, j]
+                joint.P[first + j, first + i] = joint.P[first + i, first + j]
+    joint.time_s[who] = to_s
+
+
+@part
+def _look_at(fleet: Fleet, joint: Joint, who: int, at_s: float, end: int, room: Room) -> None:
+    """State of a vehicle at a time, its derivative by the state it has now, and its place; end 0 receives, 1 sends."""
+    n, first = fleet.size[who], joint.first[who]
+    x, phi = room.x[end], room.phi[end]
+    for i in range(n):
+        x[i] = joint.x[first + i]
+    if abs(at_s - joint.time_s[who]) < SAME_TIME_S:
+        for i in range(n):
+            for j in range(n):
+                phi[i, j] = 1.0 if i == j else 0.0
+    else:
+        step(fleet, who, x, joint.time_s[who], at_s, phi, room.noise, room.step)
+    place(fleet, who, at_s, room.reading[end], room.derivative[end])
+
+
+@part
+def _linearise(
+    fleet: Fleet,
+    points: Points,
+    events: Events,
+    event: int,
+    rules: Rules,
+    joint: Joint,
+    room: Room,
+    rows: Rows,
+    lines: Lines,
+    at: int,
+) -> int:
+    """Put the rows of an event into ``lines`` from row ``at`` on; return how many there are."""
+    who, source, at_s = events.receiver[event], events.source[event], events.time_s[event]
+    _look_at(fleet, joint, who, at_s, 0, room)
+    source_m, clock_m, is_about = room.line[0], 0.0, False
+    for axis in range(3):
+        source_m[axis] = events.place_m[event, axis]
+    is_peer = events.kind[event] == PEER
+    uncertain = points.uncertain[source] if events.kind[event] == POINT else -1
+    shared = joint.first[-1] + 2 * uncertain
+    if is_peer:
+        _look_at(fleet, joint, source, at_s, 1, room)
+        position(fleet.size[source], room.reading[1], room.derivative[1], room.x[1], source_m)
+        has_clocks = fleet.clock[who] >= 0 and fleet.clock[source] >= 0
+        clock_m = room.x[1][fleet.clock[source]] if fleet.clock[source] >= 0 else 0.0
+        if rules.about_reckoning and has_clocks:
+            _refer(fleet, joint, who, source, events.arm_m[event], room)
+            is_about = True
+    elif uncertain >= 0:
+        for axis in range(3):
+            for j in range(2):
+                source_m[axis] -= points.axes[source, axis, j] * joint.x[shared + j]
+    count = observe(
+        fleet,
+        events,
+        event,
+        room.x[0],
+        room.reading[0],
+        room.derivative[0],
+        source_m,
+        clock_m,
+        room.line[1],
+        is_about,
+        rows,
+    )
+    for row in range(count):
+        entry = lines.starts[at + row]
+        entry = _put(fleet.size[who], rows.receiver[row], room.phi[0], joint.first[who], lines, entry)
+        if is_peer:
+            by_source = room.gain
+            for j in range(fleet.size[source]):
+                by_source[j] = 0.0
+                for axis in range(3):
+                    by_source[j] += rows.place[row, axis] * room.derivative[1, axis, j]
+            if fleet.clock[source] >= 0:
+                by_source[fleet.clock[source]] += rows.clock[row]
+            entry = _put(fleet.size[source], by_source, room.phi[1], joint.first[source], lines, entry)
+        elif uncertain >= 0:
+            for j in range(2):
+                lines.columns[entry], lines.values[entry] = shared + j, 0.0
+                for axis in range(3):
+                    lines.values[entry] -= rows.place[row, axis] * points.axes[source, axis, j]
+                entry += 1
+        lines.starts[at + row + 1] = entry
+        lines.innovation[at + row], lines.variance[at + row] = rows.innovation[row], rows.variance[row]
+    return count
+
+
+@part
+def _put(n: int, h: FloatArray, phi: FloatArray, first: int, lines: Lines, entry: int) -> int:
+    """Write the derivative by a vehicle's states now, h phi, where it is not zero; return the next free entry."""
+    for j in range(n):
+        total = 0.0
+        for i in range(n):
+            if h[i] != 0.0:
+                total += h[i] * phi[i, j]
+        if total != 0.0:
+            lines.columns[entry], lines.values[entry] = first + j, total
+            entry += 1
+    return entry
+
+
+@part
+def _refer(fleet: Fleet, joint: Joint, who: int, source: int, arm_m: FloatArray, room: Room) -> None:
+    """Line between two aircraft about which their range is linearised; its ends move when known to be wrong."""
+    here, about, across = room.line[2], room.line[1], np.empty(3)
+    position(fleet.size[who], room.reading[0], room.derivative[0], room.x[0], here)
+    along = square = length = 0.0
+    for axis in range(3):
+        offset = joint.offset_m[who, axis] - joint.offset_m[source, axis]
+        about[axis] = arm_m[axis] + room.reading[0, axis] - room.reading[1, axis] - offset
+        across[axis] = arm_m[axis] + here[axis] - room.line[0, axis] - about[axis]
+        along += about[axis] * across[axis]
+        length += about[axis] ** 2
+    for axis in range(3):
+        across[axis] -= about[axis] * along / length
+        square += across[axis] ** 2
+    variance = 0.0
+    for a in range(2):
+        one = who if a == 0 else source
+        for b in range(2):
+            two = who if b == 0 else source
+            for i in range(fleet.size[one]):
+                left = 0.0
+                for axis in range(3):
+                    left += across[axis] * room.derivative[a, axis, i]
+                if left == 0.0:
+                    continue
+                for j in range(fleet.size[two]):
+                    right = 0.0
+                    for axis in range(3):
+                        right += across[axis] * room.derivative[b, axis, j]
+                    sign = 1.0 if a == b else -1.0
+                    variance += sign * left * right * joint.P[joint.first[one] + i, joint.first[two] + j]
+    if square * square > KNOWN_WRONG_SIGMAS**2 * variance:
+        for axis in range(3):
+            joint.offset_m[who, axis] = room.reading[0, axis] - here[axis]
+            joint.offset_m[source, axis] = room.reading[1, axis] - room.line[0, axis]
+            about[axis] = arm_m[axis] + here[axis] - room.line[0, axis]
+
+
+@part
+def _judge(
+    fleet: Fleet, events: Events, event: int, rules: Rules, joint: Joint, lines: Lines, at: int, log: Log
+) -> bool:
+    """Whether a row is inside the gate; opens the clock of a vehicle none of whose ranges fits any more."""
+    total = lines.variance[at] * events.spread[event] + predicted_variance(
+        lines.columns, lines.values, lines.starts[at], lines.starts[at + 1], joint.P
+    )
+    is_gated = rules.gate_sigma > 0.0 and lines.innovation[at] ** 2 > rules.gate_sigma**2 * total
+    row = log.counts[JUDGED]
+    log.event[row], log.innovation[row], log.variance[row] = event, lines.innovation[at], total
+    log.mark[row] = GATED if is_gated else USED
+    log.counts[JUDGED] += 1
+    for end in range(2 if events.kind[event] == PEER else 1):
+        who = events.receiver[event] if end == 0 else events.source[event]
+        joint.rejected[who] = joint.rejected[who] + 1 if is_gated else 0
+        if joint.rejected[who] >= PATIENCE and fleet.clock[who] >= 0 and events.kind[event] != HEIGHT:
+            joint.rejected[who] = 0
+            log.counts[CLOCK_LEAPS] += 1
+            at_clock, other = joint.first[who] + fleet.clock[who], joint.first[who] + fleet.receiver_clock[who]
+            joint.P[at_clock, at_clock] += LEAP_M**2
+            if other != at_clock:
+                joint.P[other, other] += LEAP_M**2
+    return not is_gated
+
+
+@part
+def _correct(joint: Joint, room: Room, lines: Lines, at: int, innovation: float) -> None:
+    """One scalar measurement with the optimal gain, in the symmetric form of the Kalman core."""
+    size = len(joint.x)
+    update_covariance(
+        np.arange(size),
+        lines.columns,
+        lines.values,
+        lines.starts[at],
+        lines.starts[at + 1],
+        lines.variance[at],
+        np.zeros(0, dtype=np.int64),
+        joint.P,
+        room.g,
+        room.gain,
+    )
+    for i in range(size):
+        joint.x[i] += room.gain[i] * innovation
+
+
+@part
+def _use_one(
+    fleet: Fleet,
+    points: Points,
+    events: Events,
+    event: int,
+    rules: Rules,
+    joint: Joint,
+    room: Room,
+    rows: Rows,
+    lines: Lines,
+    log: Log,
+) -> None:
+    """One measurement in an update of its own."""
+    if _linearise(fleet, points, events, event, rules, joint, room, rows, lines, 0) == 0:
+        log.counts[LOST] += 1
+    elif _judge(fleet, events, event, rules, joint, lines, 0, log):
+        _correct(joint, room, lines, 0, lines.innovation[0])
+
+
+@part
+def _use_together(
+    fleet: Fleet,
+    points: Points,
+    events: Events,
+    first: int,
+    last: int,
+    rules: Rules,
+    joint: Joint,
+    room: Room,
+    rows: Rows,
+    lines: Lines,
+    log: Log,
+) -> None:
+    """All measurements in one update: one linearisation for all. Their noise is independent, so they may be used one
+    after the other, each with what those before it have moved taken off its innovation."""
+    count = 0
+    for event in range(first, last):
+        found = _linearise(fleet, points, events, event, rules, joint, room, rows, lines, count)
+        for at in range(count, count + found):
+            if not _judge(fleet, events, event, rules, joint, lines, at, log):
+                lines.innovation[at] = np.nan
+        count += found
+    before = np.empty(len(joint.x))
+    for i in range(len(before)):
+        before[i] = joint.x[i]
+    for at in range(count):
+        innovation = lines.innovation[at]
+        if np.isfinite(innovation):
+            for e in range(lines.starts[at], lines.starts[at + 1]):
+                innovation -= lines.values[e] * (joint.x[lines.columns[e]] - before[lines.columns[e]])
+            _correct(joint, room, lines, at, innovation)

@@ -1,0 +1,323 @@
+"""Compiled motion of an aircraft's error states, and where its antenna is.
+
+Two models, both linear: in a local frame (7 states) and in the global one (13 or 15). Source: Van Loan, Computing
+integrals involving the matrix exponential, IEEE Transactions on Automatic Control 23(3), 1978 (the integral of
+exp(F s) Q exp(F' s); both are summed as power series here: their terms follow from one another); Titterton and Weston,
+Strapdown Inertial Navigation Technology, 2nd ed. 2004, section 12.3 (dynamics of the thirteen states).
+"""
+
+import numpy as np
+
+from groundstation.base.compile import compiled, part
+from groundstation.base.geodesy import EARTH_RATE_RADPS
+from groundstation.estimators.cooperative.arrays import (
+    AXES,
+    FORCE,
+    GLOBAL,
+    HEADING,
+    LATITUDE,
+    LOCAL,
+    MERIDIAN,
+    NORMAL,
+    PLACE,
+    RATE,
+    TIME,
+    VELOCITY,
+    Fleet,
+    FloatArray,
+)
+
+TERMS, FEWEST_TERMS = 40, 4
+SMALLEST = 1e-16  # of a term of the transition: its largest entry is 1 or more
+SAME_TIME_S = 1e-9
+ROOMS = 9  # matrices of n by n that a step works in
+
+
+@part
+def discretise(
+    n: int, F: FloatArray, q: FloatArray, step_s: float, phi: FloatArray, noise: FloatArray, room: FloatArray
+) -> None:
+    """Transition and covariance of the noise of a step of dx/dt = F x + w; entries of F that are zero cost nothing.
+
+    Phi = sum (F h)^k / k!; Q = sum L_k h^(k+1) / (k+1)! with L_0 = diag(q), L_(k+1) = F L_k + L_k F'. A step may go
+    back; then the noise means nothing.
+    """
+    term, level, moved, entries = room[0], room[1], room[2], room[3]
+    count = 0
+    rows, columns = np.empty(n * n, dtype=np.int64), np.empty(n * n, dtype=np.int64)
+    for i in range(n):
+        for j in range(n):
+            term[i, j] = level[i, j] = phi[i, j] = noise[i, j] = 0.0
+            if F[i, j] != 0.0:
+                rows[count], columns[count] = i, j
+                entries[count // n, count % n] = F[i, j]
+                count += 1
+        term[i, i] = phi[i, i] = 1.0
+        level[i, i] = q[i]
+        noise[i, i] = q[i] * step_s
+    factor = step_s
+    for k in range(1, TERMS):
+        largest = 0.0
+        for i in range(n):
+            for j in range(n):
+                moved[i, j] = 0.0
+        for e in range(count):
+            i, m, a = rows[e], columns[e], entries[e // n, e % n]
+            for j in range(n):
+                moved[i, j] += a * term[m, j]
+        for i in range(n):
+            for j in range(n):
+                value = moved[i, j] * step_s / k
+                term[i, j] = value
+                phi[i, j] += value
+                largest = max(largest, abs(value))
+                moved[i, j] = 0.0
+        for e in range(count):
+            i, m, a = rows[e], columns[e], entries[e // n, e % n]
+            for j in range(n):
+                moved[i, j] += a * level[m, j]
+        factor *= step_s / (k + 1)
+        for i in range(n):
+            for j in range(n):
+                level[i, j] = moved[i, j] + moved[j, i]
+                noise[i, j] += level[i, j] * factor
+        if k >= FEWEST_TERMS and largest < SMALLEST:
+            break
+
+
+@part
+def fill_dynamics(fleet: Fleet, who: int, epoch: int, F: FloatArray) -> None:
+    """Dynamics of an aircraft's errors from one epoch of its dead reckoning to the next.
+
+    Local: x, y, vx, vy, height, clock offset, clock frequency. Global: position error north, east (m), velocity error
+    north, east (m/s), platform angles about north, east, down (rad), drifts about the same (rad/s), height, clock
+    offset (m), clock frequency (m/s). The angles have the sign with which the computed attitude is (I - [angle x])
+    times the true one; a positive drift makes its angle fall.
+    """
+    n, height = fleet.size[who], fleet.height[who]
+    numbers = fleet.numbers[who]  # a row of Numbers
+    velocity_s, gyro_s, baro_s, clock_s, bias_s = numbers[0], numbers[1], numbers[2], numbers[3], numbers[4]
+    for i in range(n):
+        for j in range(n):
+            F[i, j] = 0.0
+    F[0, 2] = F[1, 3] = 1.0
+    if fleet.model[who] == LOCAL:
+        F[2, 2] = F[3, 3] = -1.0 / velocity_s
+    else:
+        _fill_platform(fleet.epochs[epoch], gyro_s, F)
+    F[height, height] = -1.0 / baro_s
+    for clock in (fleet.clock[who], fleet.receiver_clock[who]):
+        F[clock, clock + 1] = 1.0
+        F[clock + 1, clock + 1] = -1.0 / clock_s
+    if fleet.bias[who] >= 0:
+        F[fleet.bias[who], fleet.bias[who]] = -1.0 / bias_s
+
+
+@part
+def _fill_platform(flown: FloatArray, gyro_s: float, F: FloatArray) -> None:
+    """Rows of position, velocity, platform angles and drifts in the global frame."""
+    earth, meridian, normal = EARTH_RATE_RADPS, flown[MERIDIAN], flown[NORMAL]
+    sine, cosine = np.sin(flown[LATITUDE]), np.cos(flown[LATITUDE])
+    tangent = sine / cosine
+    north, east, down = flown[VELOCITY], flown[VELOCITY + 1], flown[VELOCITY + 2]
+    f_n, f_e, f_d = flown[FORCE], flown[FORCE + 1], flown[FORCE + 2]
+    w_n = earth * cosine + east / normal
+    w_e = -north / meridian
+    w_d = -earth * sine - east * tangent / normal
+    # error of Earth and transport rate per metre north and per metre a second
+    ie_n, ie_d = -earth * sine / meridian, -earth * cosine / meridian
+    en_d = -east / (normal * cosine * cosine) / meridian
+    F[1, 0] = east * tangent / meridian
+    F[1, 1] = -tangent * north / meridian
+    coriolis_d = w_d - earth * sine
+    F[2, 5], F[2, 6], F[2, 3] = -f_d, f_e, coriolis_d + (-tangent / normal) * east
+    F[2, 2] = down / meridian
+    F[2, 0] = (2.0 * ie_d + en_d) * east
+    F[3, 4], F[3, 6] = f_d, -f_n
+    F[3, 2] = -coriolis_d
+    F[3, 3] = down / normal + tangent / normal * north
+    F[3, 0] = -(2.0 * ie_d + en_d) * north + 2.0 * ie_n * down
+    F[4, 6], F[4, 5] = -w_e, w_d
+    F[4, 0], F[4, 3], F[4, 7] = ie_n, 1.0 / normal, -1.0
+    F[5, 4], F[5, 6] = -w_d, w_n
+    F[5, 2], F[5, 8] = -1.0 / meridian, -1.0
+    F[6, 5], F[6, 4] = -w_n, w_e
+    F[6, 0], F[6, 3], F[6, 9] = ie_d + en_d, -tangent / normal, -1.0
+    F[7, 7] = F[8, 8] = F[9, 9] = -1.0 / gyro_s
+
+
+@part
+def first_not_before(fleet: Fleet, who: int, at_s: float) -> int:
+    """Place among a vehicle's epochs of the first that is not before a time (their number: none)."""
+    low, high = fleet.first[who], fleet.first[who + 1]
+    while low < high:
+        middle = (low + high) // 2
+        if fleet.epochs[middle, TIME] < at_s:
+            low = middle + 1
+        else:
+            high = middle
+    return int(low - fleet.first[who])
+
+
+@part
+def compose(n: int, one: FloatArray, q: FloatArray, phi: FloatArray, noise: FloatArray, w: FloatArray) -> None:
+    """phi <- one phi; noise <- one noise one' + q."""
+    for i in range(n):
+        for j in range(n):
+            total = 0.0
+            for m in range(n):
+                total += one[i, m] * phi[m, j]
+            w[i, j] = total
+    for i in range(n):
+        for j in range(n):
+            phi[i, j] = w[i, j]
+    turn_covariance(n, one, noise, w)
+    for i in range(n):
+        for j in range(n):
+            noise[i, j] += q[i, j]
+
+
+@part
+def turn_covariance(n: int, phi: FloatArray, p: FloatArray, w: FloatArray) -> None:
+    """p <- phi p phi'; entries of phi that are zero cost nothing but the look at them."""
+    for i in range(n):
+        for j in range(n):
+            w[i, j] = 0.0
+        for m in range(n):
+            if phi[i, m] != 0.0:
+                for j in range(n):
+                    w[i, j] += phi[i, m] * p[m, j]
+    for i in range(n):
+        for j in range(n):
+            p[i, j] = 0.0
+    for j in range(n):
+        for m in range(n):
+            if phi[j, m] != 0.0:
+                for i in range(n):
+                    p[i, j] += w[i, m] * phi[j, m]
+
+
+@part
+def turn_rows(n: int, phi: FloatArray, rows: FloatArray, w: FloatArray) -> None:
+    """rows <- phi rows, the first n of them."""
+    width = rows.shape[1]
+    for i in range(n):
+        for c in range(width):
+            w[i, c] = 0.0
+        for m in range(n):
+            if phi[i, m] != 0.0:
+                for c in range(width):
+                    w[i, c] += phi[i, m] * rows[m, c]
+    for i in range(n):
+        for c in range(width):
+            rows[i, c] = w[i, c]
+
+
+@compiled
+def step(
+    fleet: Fleet,
+    who: int,
+    x: FloatArray,
+    from_s: float,
+    to_s: float,
+    phi: FloatArray,
+    noise: FloatArray,
+    room: FloatArray,
+) -> None:
+    """Move the state of a vehicle to another time; fill its transition and the covariance of the noise.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+        Changed in place.
+    phi, noise : ndarrays, shape (n, n)
+        Filled; back in time the noise means nothing.
+    room : ndarray, shape (ROOMS, n, n)
+    """
+    n = fleet.size[who]
+    F = room[4]
+    if fleet.model[who] == GLOBAL:
+        _over_epochs(fleet, who, from_s, to_s, phi, noise, room)
+    else:
+        fill_dynamics(fleet, who, fleet.first[who], F)
+        discretise(n, F, fleet.density[who], to_s - from_s, phi, noise, room)
+    for i in range(n):
+        room[0, 0, i] = 0.0
+        for j in range(n):
+            room[0, 0, i] += phi[i, j] * x[j]
+    for i in range(n):
+        x[i] = room[0, 0, i]
+
+
+@part
+def _over_epochs(
+    fleet: Fleet, who: int, from_s: float, to_s: float, phi: FloatArray, noise: FloatArray, room: FloatArray
+) -> None:
+    """Transition and noise in the global frame, piece by piece between the epochs of the dead reckoning."""
+    n, F, one, q, w = fleet.size[who], room[4], room[5], room[6], room[7]
+    first, count = fleet.first[who], fleet.first[who + 1] - fleet.first[who]
+    cut = first_not_before(fleet, who, from_s + SAME_TIME_S)
+    while cut < count and fleet.epochs[first + cut, TIME] <= from_s + SAME_TIME_S:
+        cut += 1
+    at_s, is_first = from_s, True
+    while True:
+        is_last = cut >= count or fleet.epochs[first + cut, TIME] >= to_s
+        next_s = to_s if is_last else fleet.epochs[first + cut, TIME]
+        epoch = min(max(first_not_before(fleet, who, 0.5 * (at_s + next_s)) - 1, 0), max(count - 2, 0))
+        fill_dynamics(fleet, who, first + epoch, F)
+        if is_first:
+            discretise(n, F, fleet.density[who], next_s - at_s, phi, noise, room)
+        else:
+            discretise(n, F, fleet.density[who], next_s - at_s, one, q, room)
+            compose(n, one, q, phi, noise, w)
+        if is_last:
+            return
+        at_s, is_first = next_s, False
+        cut += 1
+
+
+@compiled
+def place(fleet: Fleet, who: int, at_s: float, reading: FloatArray, derivative: FloatArray) -> None:
+    """Position of the antenna = reading + derivative x: fill what dead reckoning has, (3,), and the derivative, (3, n).
+
+    Between two epochs the position is cubic through both positions and velocities.
+    """
+    for axis in range(3):
+        reading[axis] = 0.0
+        for j in range(fleet.size[who]):
+            derivative[axis, j] = 0.0
+    first, count = fleet.first[who], fleet.first[who + 1] - fleet.first[who]
+    epochs, nearest = fleet.epochs, first
+    if count == 1:
+        for axis in range(3):
+            reading[axis] = epochs[first, PLACE + axis]
+    else:
+        after = first + min(max(first_not_before(fleet, who, at_s), 1), count - 1)
+        before = after - 1
+        span = epochs[after, TIME] - epochs[before, TIME]
+        part = (at_s - epochs[before, TIME]) / span
+        nearest = before if part < 0.5 else after
+        a, b = part * part * (3.0 - 2.0 * part), part * (1.0 - part)
+        for axis in range(3):
+            one, two = epochs[before, PLACE + axis], epochs[after, PLACE + axis]
+            rate_one, rate_two = epochs[before, RATE + axis] * span, epochs[after, RATE + axis] * span
+            reading[axis] = one + a * (two - one) + b * ((1.0 - part) * rate_one - part * rate_two)
+    height, lever = fleet.height[who], fleet.lever[who]
+    cosine, sine = np.cos(epochs[nearest, HEADING]), np.sin(epochs[nearest, HEADING])
+    for axis in range(3):
+        north, east = epochs[nearest, AXES + 3 * axis], epochs[nearest, AXES + 3 * axis + 1]
+        derivative[axis, 0], derivative[axis, 1] = -north, -east
+        derivative[axis, height] = epochs[nearest, AXES + 3 * axis + 2]
+        if lever >= 0:
+            derivative[axis, lever] = cosine * north + sine * east
+            derivative[axis, lever + 1] = cosine * east - sine * north
+
+
+@part
+def position(n: int, reading: FloatArray, derivative: FloatArray, x: FloatArray, out: FloatArray) -> None:
+    """Fill the position, (3,): reading + derivative x."""
+    for axis in range(3):
+        total = 0.0
+        for j in range(n):
+            total += derivative[axis, j] * x[j]
+        out[axis] = reading[axis] + total
