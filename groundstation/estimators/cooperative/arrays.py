@@ -55,6 +55,7 @@ class Fleet(NamedTuple):
     speed_scale: Int64Array
     turn_scale: Int64Array
     first: Int64Array  # (k + 1,) epochs of vehicle i: first[i] to first[i + 1]
+    time_s: FloatArray  # (t,) of the epochs
     epochs: FloatArray  # (t, EPOCH_COLUMNS)
     density: FloatArray  # (k, n) of the white noise on each state
     numbers: FloatArray  # (k, 11) Numbers

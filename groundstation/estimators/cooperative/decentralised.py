@@ -66,7 +66,7 @@ def _work(
 
     Errors of messages under way count as those of their senders at the beginning of the window.
     """
-    fleet, unit = prepared.fleet, unit_rows(prepared.fleet)
+    fleet, unit = prepared.fleet, unit_rows(prepared.fleet, settings.map_window_s)
     variance = np.repeat(prepared.points.sigma_m[prepared.points.uncertain >= 0] ** 2, 2)
     ranks = np.array(prepared.ranks, dtype=np.int64)
     method = Method(NUMBERS[algorithm], settings.gate_sigma, ranks, variance, WEIGHTS)
@@ -177,6 +177,7 @@ def _room(most: int, n: int, errors: int, width: int) -> Room:
         np.zeros((3, n)),
         np.zeros(3),
         np.zeros((n, errors)),
+        np.zeros((n, n)),
         np.zeros((n, max(width, errors))),
         np.zeros((most, most)),
         np.zeros((most, most)),

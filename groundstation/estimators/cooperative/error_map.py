@@ -13,9 +13,11 @@ from groundstation.base.angles import FloatArray
 from groundstation.estimators.cooperative.arrays import Fleet, Items
 
 
-def unit_rows(fleet: Fleet) -> FloatArray:
-    """Rows of the unit map, shape (k, n, N): a block for each vehicle, filled up to the longest state."""
+def unit_rows(fleet: Fleet, window_s: float) -> FloatArray:
+    """Rows of the unit map, shape (k, n, N): a block for each vehicle, filled up to the longest state; N 0: no map."""
     k, n = fleet.density.shape
+    if window_s <= 0.0:
+        return np.zeros((k, n, 0))
     edges = np.concatenate([[0], np.cumsum(fleet.size)])
     rows = np.zeros((k, n, int(edges[-1])))
     for who, (one, two) in enumerate(pairwise(edges.tolist())):
@@ -25,6 +27,8 @@ def unit_rows(fleet: Fleet) -> FloatArray:
 
 def windows(items: Items, window_s: float) -> list[tuple[int, int]]:
     """Stretches of items, first and behind the last of each, that begin where the one before has lasted so long."""
+    if window_s <= 0.0:
+        return [(0, len(items.time_s))]
     begins, end_s = [], -np.inf
     for at, at_s in enumerate(items.time_s.tolist()):
         if at_s >= end_s:

@@ -25,7 +25,7 @@ from groundstation.estimators.cooperative.tracks import AlgorithmRun, finished, 
 def run_pairwise(prepared: Prepared, settings: CooperativeSettings) -> AlgorithmRun:
     """Run the filter with pairwise cross-covariances; sequential by its nature."""
     items = timeline(prepared, settings, together=False)
-    log, fleet, unit = log_for(prepared, items), prepared.fleet, unit_rows(prepared.fleet)
+    log, fleet, unit = log_for(prepared, items), prepared.fleet, unit_rows(prepared.fleet, settings.map_window_s)
     k, n, _ = unit.shape
     members = Members(
         np.array([vehicle.first_s for vehicle in prepared.vehicles]),
