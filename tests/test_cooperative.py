@@ -143,8 +143,11 @@ APART = replace(GLOBAL, duration_s=15.0, errors=replace(GLOBAL.errors, has_separ
 PLAIN = {
     "local": (UNSURE, {}),
     "frame by frame": (UNSURE, {"update": "simultaneous", "frame_s": 1.5}),  # hears everybody more than once in one
-    "wild": (WILD, {"range_bias_m": 5.0, "latency_slots": 3, "correlated_share": 0.6, "range_share": 1e-4}),
-    "global": (APART, {"lever_arm_m": 3.0}),
+    "wild": (
+        WILD,
+        {"range_bias_m": 5.0, "latency_slots": 3, "map_window_s": 0.0, "correlated_share": 0.6, "range_share": 1e-4},
+    ),
+    "global": (APART, {"lever_arm_m": 3.0, "map_window_s": 0.0}),
 }
 
 

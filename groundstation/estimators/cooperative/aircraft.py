@@ -125,7 +125,7 @@ class Aircraft:
         """State after a step, its transition matrix and the covariance of the noise."""
         n = self.size
         moved, phi, noise = np.array(x, dtype=np.float64), np.empty((n, n)), np.empty((n, n))
-        step(self._alone, 0, moved, from_s, to_s, phi, noise, np.empty((ROOMS, n, n)))
+        step(self._alone, 0, moved, from_s, to_s, phi, noise, np.zeros((ROOMS, n, n)))
         return moved, phi, noise
 
     def place(self, x: FloatArray, at_s: float) -> tuple[FloatArray, FloatArray]:
@@ -172,6 +172,7 @@ def fleet_of(vehicles: Sequence[Aircraft]) -> Fleet:
         height=places("height_m"),
         lever=places("lever_forward_m"),
         first=np.concatenate([[0], np.cumsum([len(vehicle.epochs) for vehicle in vehicles])]).astype(np.int64),
+        time_s=np.concatenate([vehicle.epochs[:, TIME] for vehicle in vehicles]),
         epochs=np.concatenate([vehicle.epochs for vehicle in vehicles]),
         density=np.array([np.pad(vehicle.density, (0, most - vehicle.size)) for vehicle in vehicles]),
         numbers=np.array([vehicle.numbers for vehicle in vehicles], dtype=np.float64),

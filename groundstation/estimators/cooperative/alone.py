@@ -26,7 +26,7 @@ from groundstation.estimators.cooperative.arrays import (
     Rows,
 )
 from groundstation.estimators.cooperative.joint import LEAP_M, PATIENCE, SAME_TIME_S
-from groundstation.estimators.cooperative.motion import ROOMS, place, position, step, turn_covariance, turn_rows
+from groundstation.estimators.cooperative.motion import place, position, step, turn_covariance, turn_rows
 from groundstation.estimators.cooperative.observation import observe
 from groundstation.tables.session import NO_SLOT
 
@@ -107,6 +107,7 @@ class Room(NamedTuple):
     derivative: FloatArray  # (3, n)
     source: FloatArray  # (3,)
     held: FloatArray  # (n, q)
+    P: FloatArray  # (n, n)
     wide: FloatArray  # (n, N) or wider than q
     S: FloatArray  # (r, r)
     kept: FloatArray  # (r, r)
@@ -270,7 +271,7 @@ def _listen(
         heard.slot[heard.owner[entry]] = NO_SLOT  # overwritten
     heard.owner[entry] = source
     n = fleet.size[source]
-    x, P, held, map_rows = room.x, room.step[ROOMS - 1], room.held, heard.map_rows[entry]
+    x, P, held, map_rows = room.x, room.P, room.held, heard.map_rows[entry]
     known_s = own.time_s[source]
     if slot == NO_SLOT:
         _copy(n, own.x[source], own.P[source], own.shared[source], own.map_rows[source], x, P, held, map_rows)

@@ -45,6 +45,7 @@ class Fleet(NamedTuple):
     height: Int64Array
     lever: Int64Array
     first: Int64Array  # (k + 1,) epochs of vehicle i: first[i] to first[i + 1]
+    time_s: FloatArray  # (t,) of the epochs
     epochs: FloatArray  # (t, EPOCH_COLUMNS)
     density: FloatArray  # (k, n) of the white noise on each state
     numbers: FloatArray  # (k, 5) Numbers

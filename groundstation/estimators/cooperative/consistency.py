@@ -66,8 +66,8 @@ def normalised(error: FloatArray, covariance: FloatArray) -> FloatArray:
     return out
 
 
-def nees_limits(freedom: int, independent: int) -> tuple[float, float]:
-    """Limits of the mean of ``independent`` normalised squared errors of ``freedom`` degrees, 95 %.
+def nees_limits(freedom: int, independent: int, share: float = 0.95) -> tuple[float, float]:
+    """Limits of the mean of ``independent`` normalised squared errors of ``freedom`` degrees: ``share`` lie inside.
 
     Examples
     --------
@@ -78,4 +78,5 @@ def nees_limits(freedom: int, independent: int) -> tuple[float, float]:
     from scipy.stats import chi2
 
     total = freedom * independent
-    return float(chi2.ppf(0.025, total) / independent), float(chi2.ppf(0.975, total) / independent)
+    low, high = (float(chi2.ppf(part, total)) / independent for part in (0.5 - 0.5 * share, 0.5 + 0.5 * share))
+    return low, high

@@ -35,7 +35,7 @@ from groundstation.estimators.cooperative.alone import (
     run_alone,
 )
 from groundstation.estimators.cooperative.arrays import Items, Log
-from groundstation.estimators.cooperative.error_map import spectral_radius, unit_rows, windows
+from groundstation.estimators.cooperative.error_map import blocks, spectral_radius, unit_rows, windows
 from groundstation.estimators.cooperative.events import Prepared
 from groundstation.estimators.cooperative.messages import Broadcast
 from groundstation.estimators.cooperative.motion import ROOMS
@@ -66,7 +66,7 @@ def _work(
 
     Errors of messages under way count as those of their senders at the beginning of the window.
     """
-    fleet, unit = prepared.fleet, unit_rows(prepared.fleet)
+    fleet, unit = prepared.fleet, unit_rows(prepared.fleet, settings.map_window_s)
     variance = np.repeat(prepared.points.sigma_m[prepared.points.uncertain >= 0] ** 2, 2)
     ranks = np.array(prepared.ranks, dtype=np.int64)
     method = Method(NUMBERS[algorithm], settings.gate_sigma, ranks, variance, WEIGHTS)
@@ -82,7 +82,7 @@ def _work(
     for begin, end in windows(items, settings.map_window_s):
         if begin > 0:
             times.append(float(items.time_s[begin]))
-            radii.append(spectral_radius(own.map_rows, fleet))
+            radii.append(spectral_radius(blocks(own.map_rows, fleet)))
         own.map_rows[:] = unit
         past.begun[0] = 0
         heard.slot[:] = NO_SLOT
@@ -177,6 +177,7 @@ def _room(most: int, n: int, errors: int, width: int) -> Room:
         np.zeros((3, n)),
         np.zeros(3),
         np.zeros((n, errors)),
+        np.zeros((n, n)),
         np.zeros((n, max(width, errors))),
         np.zeros((most, most)),
         np.zeros((most, most)),

@@ -5,6 +5,7 @@ A decentralised filter that takes its neighbours' estimates mixes their errors i
 radius above 1 means that some pattern of errors grows, whatever the noise. Errors here are truth - estimate.
 """
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -13,9 +14,11 @@ from groundstation.base.angles import FloatArray
 from groundstation.estimators.cooperative.arrays import Fleet, Items
 
 
-def unit_rows(fleet: Fleet) -> FloatArray:
-    """Rows of the unit map, shape (k, n, N): a block for each vehicle, filled up to the longest state."""
+def unit_rows(fleet: Fleet, window_s: float) -> FloatArray:
+    """Rows of the unit map, shape (k, n, N): a block for each vehicle, filled up to the longest state; N 0: no map."""
     k, n = fleet.density.shape
+    if window_s <= 0.0:
+        return np.zeros((k, n, 0))
     edges = np.concatenate([[0], np.cumsum(fleet.size)])
     rows = np.zeros((k, n, int(edges[-1])))
     for who, (one, two) in enumerate(pairwise(edges.tolist())):
@@ -25,6 +28,8 @@ def unit_rows(fleet: Fleet) -> FloatArray:
 
 def windows(items: Items, window_s: float) -> list[tuple[int, int]]:
     """Stretches of items, first and behind the last of each, that begin where the one before has lasted so long."""
+    if window_s <= 0.0:
+        return [(0, len(items.time_s))]
     begins, end_s = [], -np.inf
     for at, at_s in enumerate(items.time_s.tolist()):
         if at_s >= end_s:
@@ -33,17 +38,20 @@ def windows(items: Items, window_s: float) -> list[tuple[int, int]]:
     return list(pairwise([*begins, len(items.time_s)]))
 
 
-def spectral_radius(rows: FloatArray, fleet: Fleet) -> float:
+def blocks(rows: FloatArray, fleet: Fleet) -> list[FloatArray]:
+    """Rows of every vehicle without what fills them up."""
+    return [part[:size] for part, size in zip(rows, fleet.size.tolist(), strict=True)]
+
+
+def spectral_radius(rows: Sequence[FloatArray]) -> float:
     """Largest absolute eigenvalue of the map; infinite where it has overflowed.
 
     Examples
     --------
-    >>> from types import SimpleNamespace
-    >>> rows = np.array([[[1.0, 0.5]], [[0.5, 1.0]]])
-    >>> spectral_radius(rows, SimpleNamespace(size=np.array([1, 1])))
+    >>> spectral_radius([np.array([[1.0, 0.5]]), np.array([[0.5, 1.0]])])
     1.5
     """
-    whole = np.concatenate([part[:size] for part, size in zip(rows, fleet.size.tolist(), strict=True)])
+    whole = np.concatenate(rows)
     if not np.isfinite(whole).all():
         return float("inf")
     return float(np.abs(np.linalg.eigvals(whole)).max())

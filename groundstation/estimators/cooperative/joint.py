@@ -60,6 +60,8 @@ class Room(NamedTuple):
     wide: FloatArray  # (N, N)
     g: FloatArray  # (N,)
     gain: FloatArray  # (N,)
+    states: Int64Array  # (N,) 0, 1, ...
+    held: Int64Array  # (0,) no state is considered only
 
 
 class Lines(NamedTuple):
@@ -87,6 +89,8 @@ def run_joint(fleet: Fleet, points: Points, events: Events, items: Items, rules:
         np.zeros((size, size)),
         np.zeros(size),
         np.zeros(size),
+        np.arange(size),
+        np.zeros(0, dtype=np.int64),
     )
     rows = Rows(np.zeros(1), np.zeros((1, n)), np.zeros((1, 3)), np.zeros(1), np.zeros(1))
     most = 1
@@ -140,7 +144,7 @@ def _advance(fleet: Fleet, joint: Joint, who: int, to_s: float, room: Room) -> N
     """Move one vehicle's block on."""
     if to_s <= joint.time_s[who] + SAME_TIME_S:
         return
-    n, first, size = fleet.size[who], joint.first[who], len(joint.x)
+    n, first = fleet.size[who], joint.first[who]
     x, phi, noise = room.x[0], room.phi[0], room.noise
     for i in range(n):
         x[i] = joint.x[first + i]
@@ -162,7 +166,7 @@ def _advance(fleet: Fleet, joint: Joint, who: int, to_s: float, room: Room) -> N
                     count += 1
     starts[rows] = count
     pattern = Pattern(changed[:rows], starts, columns)
-    predict_covariance(np.arange(size), pattern, values, 0, joint.P, room.wide)
+    predict_covariance(room.states, pattern, values, 0, joint.P, room.wide)
     for i in range(n):
         for j in range(i, n):
             if noise[i, j] != 0.0:
@@ -172,19 +176,20 @@ def _advance(fleet: Fleet, joint: Joint, who: int, to_s: float, room: Room) -> N
 
 
 @part
-def _look_at(fleet: Fleet, joint: Joint, who: int, at_s: float, end: int, room: Room) -> None:
-    """State of a vehicle at a time, its derivative by the state it has now, and its place; end 0 receives, 1 sends."""
+def _look_at(fleet: Fleet, joint: Joint, who: int, at_s: float, end: int, room: Room) -> bool:
+    """State of a vehicle at a time, its derivative by the state it has now, and its place; end 0 receives, 1 sends.
+
+    Return whether the time is another than that of its state.
+    """
     n, first = fleet.size[who], joint.first[who]
     x, phi = room.x[end], room.phi[end]
     for i in range(n):
         x[i] = joint.x[first + i]
-    if abs(at_s - joint.time_s[who]) < SAME_TIME_S:
-        for i in range(n):
-            for j in range(n):
-                phi[i, j] = 1.0 if i == j else 0.0
-    else:
+    is_other = bool(abs(at_s - joint.time_s[who]) >= SAME_TIME_S)
+    if is_other:
         step(fleet, who, x, joint.time_s[who], at_s, phi, room.noise, room.step)
     place(fleet, who, at_s, room.reading[end], room.derivative[end])
+    return is_other
 
 
 @part
@@ -202,7 +207,7 @@ def _linearise(
 ) -> int:
     """Put the rows of an event into ``lines`` from row ``at`` on; return how many there are."""
     who, source, at_s = events.receiver[event], events.source[event], events.time_s[event]
-    _look_at(fleet, joint, who, at_s, 0, room)
+    is_back, is_source_back = _look_at(fleet, joint, who, at_s, 0, room), False
     source_m, clock_m, is_about = room.line[0], 0.0, False
     for axis in range(3):
         source_m[axis] = events.place_m[event, axis]
@@ -210,7 +215,7 @@ def _linearise(
     uncertain = points.uncertain[source] if events.kind[event] == POINT else -1
     shared = joint.first[-1] + 2 * uncertain
     if is_peer:
-        _look_at(fleet, joint, source, at_s, 1, room)
+        is_source_back = _look_at(fleet, joint, source, at_s, 1, room)
         position(fleet.size[source], room.reading[1], room.derivative[1], room.x[1], source_m)
         has_clocks = fleet.clock[who] >= 0 and fleet.clock[source] >= 0
         clock_m = room.x[1][fleet.clock[source]] if fleet.clock[source] >= 0 else 0.0
@@ -236,7 +241,7 @@ def _linearise(
     )
     for row in range(count):
         entry = lines.starts[at + row]
-        entry = _put(fleet.size[who], rows.receiver[row], room.phi[0], joint.first[who], lines, entry)
+        entry = _put(fleet.size[who], rows.receiver[row], is_back, room.phi[0], joint.first[who], lines, entry)
         if is_peer:
             by_source = room.gain
             for j in range(fleet.size[source]):
@@ -245,7 +250,7 @@ def _linearise(
                     by_source[j] += rows.place[row, axis] * room.derivative[1, axis, j]
             if fleet.clock[source] >= 0:
                 by_source[fleet.clock[source]] += rows.clock[row]
-            entry = _put(fleet.size[source], by_source, room.phi[1], joint.first[source], lines, entry)
+            entry = _put(fleet.size[source], by_source, is_source_back, room.phi[1], joint.first[source], lines, entry)
         elif uncertain >= 0:
             for j in range(2):
                 lines.columns[entry], lines.values[entry] = shared + j, 0.0
@@ -258,12 +263,13 @@ def _linearise(
 
 
 @part
-def _put(n: int, h: FloatArray, phi: FloatArray, first: int, lines: Lines, entry: int) -> int:
+def _put(n: int, h: FloatArray, is_back: bool, phi: FloatArray, first: int, lines: Lines, entry: int) -> int:
     """Write the derivative by a vehicle's states now, h phi, where it is not zero; return the next free entry."""
     for j in range(n):
-        total = 0.0
-        for i in range(n):
-            if h[i] != 0.0:
+        total = h[j]
+        if is_back:
+            total = 0.0
+            for i in range(n):
                 total += h[i] * phi[i, j]
         if total != 0.0:
             lines.columns[entry], lines.values[entry] = first + j, total
@@ -341,13 +347,13 @@ def _correct(joint: Joint, room: Room, lines: Lines, at: int, innovation: float)
     """One scalar measurement with the optimal gain, in the symmetric form of the Kalman core."""
     size = len(joint.x)
     update_covariance(
-        np.arange(size),
+        room.states,
         lines.columns,
         lines.values,
         lines.starts[at],
         lines.starts[at + 1],
         lines.variance[at],
-        np.zeros(0, dtype=np.int64),
+        room.held,
         joint.P,
         room.g,
         room.gain,

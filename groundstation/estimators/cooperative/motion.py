@@ -21,7 +21,6 @@ from groundstation.estimators.cooperative.arrays import (
     NORMAL,
     PLACE,
     RATE,
-    TIME,
     VELOCITY,
     Fleet,
     FloatArray,
@@ -30,7 +29,8 @@ from groundstation.estimators.cooperative.arrays import (
 TERMS, FEWEST_TERMS = 40, 4
 SMALLEST = 1e-16  # of a term of the transition: its largest entry is 1 or more
 SAME_TIME_S = 1e-9
-ROOMS = 9  # matrices of n by n that a step works in
+ROOMS = 11  # matrices of n by n that a step works in; the last three keep the last step of aircraft in a local frame
+KEPT_STEP, KEPT_PHI, KEPT_NOISE = 8, 9, 10  # all aircraft of a session have one model there
 
 
 @part
@@ -152,7 +152,7 @@ def first_not_before(fleet: Fleet, who: int, at_s: float) -> int:
     low, high = fleet.first[who], fleet.first[who + 1]
     while low < high:
         middle = (low + high) // 2
-        if fleet.epochs[middle, TIME] < at_s:
+        if fleet.time_s[middle] < at_s:
             low = middle + 1
         else:
             high = middle
@@ -233,14 +233,20 @@ def step(
     phi, noise : ndarrays, shape (n, n)
         Filled; back in time the noise means nothing.
     room : ndarray, shape (ROOMS, n, n)
+        Zeros at first.
     """
     n = fleet.size[who]
     F = room[4]
     if fleet.model[who] == GLOBAL:
         _over_epochs(fleet, who, from_s, to_s, phi, noise, room)
     else:
-        fill_dynamics(fleet, who, fleet.first[who], F)
-        discretise(n, F, fleet.density[who], to_s - from_s, phi, noise, room)
+        if room[KEPT_STEP, 0, 0] != to_s - from_s or to_s == from_s:
+            fill_dynamics(fleet, who, fleet.first[who], F)
+            discretise(n, F, fleet.density[who], to_s - from_s, room[KEPT_PHI], room[KEPT_NOISE], room)
+            room[KEPT_STEP, 0, 0] = to_s - from_s
+        for i in range(n):
+            for j in range(n):
+                phi[i, j], noise[i, j] = room[KEPT_PHI, i, j], room[KEPT_NOISE, i, j]
     for i in range(n):
         room[0, 0, i] = 0.0
         for j in range(n):
@@ -257,12 +263,12 @@ def _over_epochs(
     n, F, one, q, w = fleet.size[who], room[4], room[5], room[6], room[7]
     first, count = fleet.first[who], fleet.first[who + 1] - fleet.first[who]
     cut = first_not_before(fleet, who, from_s + SAME_TIME_S)
-    while cut < count and fleet.epochs[first + cut, TIME] <= from_s + SAME_TIME_S:
+    while cut < count and fleet.time_s[first + cut] <= from_s + SAME_TIME_S:
         cut += 1
     at_s, is_first = from_s, True
     while True:
-        is_last = cut >= count or fleet.epochs[first + cut, TIME] >= to_s
-        next_s = to_s if is_last else fleet.epochs[first + cut, TIME]
+        is_last = cut >= count or fleet.time_s[first + cut] >= to_s
+        next_s = to_s if is_last else fleet.time_s[first + cut]
         epoch = min(max(first_not_before(fleet, who, 0.5 * (at_s + next_s)) - 1, 0), max(count - 2, 0))
         fill_dynamics(fleet, who, first + epoch, F)
         if is_first:
@@ -294,8 +300,8 @@ def place(fleet: Fleet, who: int, at_s: float, reading: FloatArray, derivative: 
     else:
         after = first + min(max(first_not_before(fleet, who, at_s), 1), count - 1)
         before = after - 1
-        span = epochs[after, TIME] - epochs[before, TIME]
-        part = (at_s - epochs[before, TIME]) / span
+        span = fleet.time_s[after] - fleet.time_s[before]
+        part = (at_s - fleet.time_s[before]) / span
         nearest = before if part < 0.5 else after
         a, b = part * part * (3.0 - 2.0 * part), part * (1.0 - part)
         for axis in range(3):

@@ -13,7 +13,7 @@ asynchronous pairwise communication, International Journal of Robotics Research 
 import numpy as np
 
 from groundstation.estimators.cooperative.arrays import PEER
-from groundstation.estimators.cooperative.error_map import spectral_radius, unit_rows, windows
+from groundstation.estimators.cooperative.error_map import blocks, spectral_radius, unit_rows, windows
 from groundstation.estimators.cooperative.events import Prepared
 from groundstation.estimators.cooperative.messages import pairwise_bytes
 from groundstation.estimators.cooperative.pair import Members, run_pairs
@@ -25,7 +25,7 @@ from groundstation.estimators.cooperative.tracks import AlgorithmRun, finished, 
 def run_pairwise(prepared: Prepared, settings: CooperativeSettings) -> AlgorithmRun:
     """Run the filter with pairwise cross-covariances; sequential by its nature."""
     items = timeline(prepared, settings, together=False)
-    log, fleet, unit = log_for(prepared, items), prepared.fleet, unit_rows(prepared.fleet)
+    log, fleet, unit = log_for(prepared, items), prepared.fleet, unit_rows(prepared.fleet, settings.map_window_s)
     k, n, _ = unit.shape
     members = Members(
         np.array([vehicle.first_s for vehicle in prepared.vehicles]),
@@ -43,7 +43,7 @@ def run_pairwise(prepared: Prepared, settings: CooperativeSettings) -> Algorithm
     for begin, end in windows(items, settings.map_window_s):
         if begin > 0:
             times.append(float(items.time_s[begin]))
-            radii.append(spectral_radius(members.map_rows, fleet))
+            radii.append(spectral_radius(blocks(members.map_rows, fleet)))
         members.map_rows[:] = unit
         run_pairs(fleet, prepared.points, prepared.events, items, begin, end, settings.gate_sigma, members, log)
     return finished(prepared, items, log, "pairwise", "sequential", _messages(prepared), (times, radii))

@@ -111,7 +111,8 @@ class CooperativeSettings:
         Sigma of an unknown lever arm (forward, right) of each aircraft's antenna; 0: no such states.
     output_step_s : float
     map_window_s : float
-        Length of the stretches whose joint error map is judged.
+        Length of the stretches whose joint error map is judged; 0: none is, which leaves out work that grows with the
+        number of vehicles.
     extra_range_sigma_m : float
         Added to the stated sigma of peer ranges, in squares: what the stated one leaves out.
     range_share : float
@@ -130,7 +131,7 @@ class CooperativeSettings:
     range_bias_s: float = number(1e6, 1.0)
     lever_arm_m: float = number(0.0, 0.0)
     output_step_s: float = number(1.0, 0.01)
-    map_window_s: float = number(10.0, 0.1)
+    map_window_s: float = number(10.0, 0.0)
     extra_range_sigma_m: float = number(0.0, 0.0)
     range_share: float = number(0.0, 0.0, 1.0)
     correlated_share: float = number(0.0, 0.0, 1.0)

@@ -25,10 +25,11 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.estimators.cooperative.arrays import HEIGHT, PEER, POINT
+from groundstation.estimators.cooperative.error_map import spectral_radius
 from groundstation.estimators.cooperative.events import Prepared
 from groundstation.estimators.cooperative.joint import PATIENCE
 from groundstation.estimators.cooperative.messages import Broadcast, decode
-from groundstation.estimators.cooperative.plain.error_map import Other, corrected_rows, spectral_radius, unit_rows
+from groundstation.estimators.cooperative.plain.error_map import Other, corrected_rows, unit_rows
 from groundstation.estimators.cooperative.plain.observation import Row, rows_of
 from groundstation.estimators.cooperative.plain.sighting import Sighting, sighting_of
 from groundstation.estimators.cooperative.plain.split_covariance import fuse
@@ -104,7 +105,7 @@ class Decentralised:
         self._Pc = np.diag(np.square(sigmas)) if sigmas else np.zeros((0, 0))
         self._inverse_Pc = np.diag(1.0 / np.square(sigmas)) if sigmas else np.zeros((0, 0))
         self.recorder = Recorder(prepared.vehicles)
-        self._unit_map = unit_rows([vehicle.size for vehicle in prepared.vehicles])
+        self._unit_map = unit_rows([vehicle.size for vehicle in prepared.vehicles], settings.map_window_s)
         self._window_end_s = float("-inf")
         self._own: list[Own] = []
         for rows, vehicle in zip(self._unit_map, prepared.vehicles, strict=True):
@@ -132,7 +133,7 @@ class Decentralised:
         if np.isfinite(self._window_end_s):
             self.recorder.map_time_s.append(at_s)
             self.recorder.map_radius.append(spectral_radius([own.map_rows for own in self._own]))
-        self._window_end_s = at_s + self._settings.map_window_s
+        self._window_end_s = at_s + (self._settings.map_window_s or np.inf)
         self._own = [replace(own, map_rows=rows) for own, rows in zip(self._own, self._unit_map, strict=True)]
         self._history.clear()
         self._heard.clear()

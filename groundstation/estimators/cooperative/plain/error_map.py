@@ -1,9 +1,4 @@
-"""How errors of all vehicles act on one another: the linear map of a stretch of time, and its spectral radius.
-
-A decentralised filter that takes its neighbours' estimates mixes their errors into its own: e_i becomes
-(I - K h_i) e_i - K h_j e_j. The product of these maps over a stretch tells whether errors feed themselves: a spectral
-radius above 1 means that some pattern of errors grows, whatever the noise. Errors here are truth - estimate.
-"""
+"""Rows of the error map (see ``cooperative.error_map``) of one vehicle after another."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -15,22 +10,13 @@ from groundstation.base.angles import FloatArray
 Other = tuple[FloatArray, FloatArray]
 
 
-def unit_rows(sizes: Sequence[int]) -> list[FloatArray]:
-    """Rows of the unit map, a block (m, N) for each vehicle."""
+def unit_rows(sizes: Sequence[int], window_s: float) -> list[FloatArray]:
+    """Rows of the unit map, a block (m, N) for each vehicle; N is 0 where no window is judged."""
+    if window_s <= 0.0:
+        return [np.zeros((size, 0)) for size in sizes]
     edges = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
     unit = np.eye(int(edges[-1]))
     return [unit[one:two] for one, two in pairwise(edges)]
-
-
-def spectral_radius(rows: Sequence[FloatArray]) -> float:
-    """Largest absolute eigenvalue of the map.
-
-    Examples
-    --------
-    >>> spectral_radius([np.array([[1.0, 0.5]]), np.array([[0.5, 1.0]])])
-    1.5
-    """
-    return float(np.abs(np.linalg.eigvals(np.concatenate(rows))).max())
 
 
 def corrected_rows(rows: FloatArray, gain: FloatArray, H: FloatArray, others: Sequence[Other | None]) -> FloatArray:

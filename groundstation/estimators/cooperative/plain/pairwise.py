@@ -14,10 +14,11 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.estimators.cooperative.arrays import PEER, POINT
+from groundstation.estimators.cooperative.error_map import spectral_radius
 from groundstation.estimators.cooperative.events import Prepared
 from groundstation.estimators.cooperative.joint import PATIENCE
 from groundstation.estimators.cooperative.messages import pairwise_bytes
-from groundstation.estimators.cooperative.plain.error_map import spectral_radius, unit_rows
+from groundstation.estimators.cooperative.plain.error_map import unit_rows
 from groundstation.estimators.cooperative.plain.observation import Row, rows_of
 from groundstation.estimators.cooperative.plain.steps import Event, Recorder, steps
 from groundstation.estimators.cooperative.settings import CooperativeSettings
@@ -38,7 +39,7 @@ class Pairwise:
     def __init__(self, prepared: Prepared, settings: CooperativeSettings) -> None:
         self._prepared, self._settings = prepared, settings
         self.recorder = Recorder(prepared.vehicles)
-        self._unit_map = unit_rows([vehicle.size for vehicle in prepared.vehicles])
+        self._unit_map = unit_rows([vehicle.size for vehicle in prepared.vehicles], settings.map_window_s)
         self._window_end_s = float("-inf")
         self._members = [
             _Member(vehicle.first_s, *vehicle.start(), rows)
@@ -62,7 +63,7 @@ class Pairwise:
         if np.isfinite(self._window_end_s):
             self.recorder.map_time_s.append(at_s)
             self.recorder.map_radius.append(spectral_radius([one.map_rows for one in self._members]))
-        self._window_end_s = at_s + self._settings.map_window_s
+        self._window_end_s = at_s + (self._settings.map_window_s or np.inf)
         for one, rows in zip(self._members, self._unit_map, strict=True):
             one.map_rows = rows
 
