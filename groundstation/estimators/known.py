@@ -14,8 +14,6 @@ from groundstation.tables.phases import Phases
 S = TypeVar("S")
 LEAST_ENTRY_STEP_DEG = 1e-6  # the places an answer is shown with
 
-STANDARD_GLIDE_ANGLE_DEG, STANDARD_CROSSING_HEIGHT_M = 3.0, 15.0
-
 
 @dataclass(frozen=True)
 class AircraftData:
@@ -66,7 +64,7 @@ class Stand:
 class Runway:
     """Runway with its true bearing (in the direction of take-off), the position of its threshold and its approach aids.
 
-    Without a glide path of its own the standard one holds. ``localizer_width_m`` is the full width of the course sector
+    ``localizer_width_m`` is the full width of the course sector
     at the threshold, ``localizer_distance_m`` from the threshold to its antenna behind the far end.
     """
 
@@ -75,11 +73,11 @@ class Runway:
     sigma_deg: float = number(0.05, 0.0)
     latitude_deg: float | None = number(None, -90.0, 90.0)
     longitude_deg: float | None = number(None, -180.0, 180.0)
+    glide_angle_deg: float = number(3.0, 1.0, 10.0)
+    threshold_crossing_height_m: float = number(15.0, 0.0, 100.0)
     elevation_m: float | None = number(None, -500.0, 6_000.0)  # of the threshold, above mean sea level
     length_m: float | None = number(None, 50.0, 10_000.0)
     width_m: float | None = number(None, 1.0, 200.0)
-    threshold_crossing_height_m: float | None = number(None, 0.0, 50.0)
-    glide_angle_deg: float | None = number(None, 1.0, 10.0)
     localizer_width_m: float | None = number(None, 10.0, 1_000.0)
     localizer_distance_m: float | None = number(None, 500.0, 10_000.0)
 
@@ -90,15 +88,6 @@ class Runway:
             if self.longitude_deg is None:
                 missing, other = other, missing
             raise SettingsError(missing, "nothing", f"a value beside {other}, or neither of the two")
-
-    @property
-    def glide_path(self) -> tuple[float, float]:
-        """Angle of the glide path in degrees, and its height above the threshold in metres."""
-        angle_deg, height_m = self.glide_angle_deg, self.threshold_crossing_height_m
-        return (
-            STANDARD_GLIDE_ANGLE_DEG if angle_deg is None else angle_deg,
-            STANDARD_CROSSING_HEIGHT_M if height_m is None else height_m,
-        )
 
 
 @dataclass(frozen=True)

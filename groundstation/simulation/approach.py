@@ -87,6 +87,7 @@ class ApproachScenario:
 
     runway: TrueRunway
     name: str = "approach"
+    title: str = ""
     seed: int = 1
     start_utc: str = "2026-05-04T06:00:00Z"
     flown: Flown = field(default_factory=Flown)
@@ -131,12 +132,13 @@ def simulate_approach(scenario: ApproachScenario, seed: int | None = None) -> Si
     scenario = scenario if seed is None else replace(scenario, seed=seed)
     time_s, distance_m, height_m, speed_mps = _along(scenario)
     rng = generator(scenario.seed, "approach")
-    across_m = _across(scenario.flown, time_s, distance_m, height_m, rng)
+    line_m = _course_line(scenario, distance_m)
+    across_m = _across(scenario.flown, time_s, distance_m, height_m, rng) + np.where(height_m > 0.0, line_m, 0.0)
     crossing_s = float(np.interp(0.0, -distance_m, time_s)) if distance_m.min() < 0.0 else float(time_s[-1])
     on_ground = height_m <= 0.0
     tables = {
         "ins": _ins(scenario, time_s, distance_m, across_m, speed_mps, crossing_s),
-        "guidance": _guidance(scenario, distance_m, across_m, height_m, rng),
+        "guidance": _guidance(scenario, distance_m, across_m - line_m, height_m, rng),
         "baro": {"height_above_airfield_m": np.round(height_m / 0.3048) * 0.3048},
         "radio_altimeter": {"height_m": np.where(height_m < 750.0, np.round(height_m, 1), np.nan)},
     }
@@ -178,6 +180,12 @@ def _along(scenario: ApproachScenario) -> tuple[FloatArray, FloatArray, FloatArr
             height = max(height - speed * slope * (1.0 if height > FLARE_M else max(height / FLARE_M, 0.25)), 0.0)
     time_s, distance_m, height_m, speed_mps = np.array(rows).T
     return time_s, distance_m, height_m, speed_mps
+
+
+def _course_line(scenario: ApproachScenario, distance_m: FloatArray) -> FloatArray:
+    """How far right of the true course the mean course line lies; the aircraft follows it."""
+    to_antenna = np.maximum(distance_m + scenario.runway.localizer_distance_m, 50.0)
+    return np.asarray(scenario.recorded.course_line_m * to_antenna / scenario.runway.localizer_distance_m)
 
 
 def _across(
@@ -226,7 +234,7 @@ def _stepped(values_deg: FloatArray, recorded: Recorded) -> FloatArray:
 def _guidance(
     scenario: ApproachScenario,
     distance_m: FloatArray,
-    across_m: FloatArray,
+    off_line_m: FloatArray,
     height_m: FloatArray,
     rng: np.random.Generator,
 ) -> dict[str, FloatArray]:
@@ -234,10 +242,9 @@ def _guidance(
     recorded, runway = scenario.recorded, scenario.runway
     to_antenna = np.maximum(distance_m + runway.localizer_distance_m, 50.0)
     per_dot = 0.5 * runway.localizer_width_m / DOTS_PER_FULL_SCALE * to_antenna / runway.localizer_distance_m
-    line_m = recorded.course_line_m * to_antenna / runway.localizer_distance_m
     bend_s = recorded.bend_length_m / scenario.flown.speed_mps
     bend = gauss_markov(rng, (len(distance_m),), 1.0, recorded.bend_ddm / 2.0 / FULL_SCALE_DDM * 2.0, bend_s)
-    lateral = (across_m - line_m) / per_dot * (1.0 + recorded.width_error) + bend
+    lateral = off_line_m / per_dot * (1.0 + recorded.width_error) + bend
     slope = np.tan(np.deg2rad(runway.glide_angle_deg))
     origin_m = np.maximum(distance_m + runway.threshold_crossing_height_m / slope, 20.0)
     angle_deg = np.rad2deg(np.arctan2(height_m, origin_m))

@@ -20,6 +20,7 @@ STEPS_OF_A_CHORD = 12.0  # of the positions, where they are written in coarse on
 GROUND_M = 1.0  # of a height that counts from the airfield
 AFTER_S = 60.0  # a landing so soon after the lowest point of a descent belongs to it
 CLIMB_S = 240.0
+NEAR_M = 2_000.0  # from the end, within which the course is taken
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,8 @@ def final_of(path: FlightPath, end: End, site: SiteData, settings: LandingSettin
     far = np.flatnonzero(from_end_m > settings.final_max_m)
     earliest = int(far[-1]) + 1 if far.size else 0
     track_deg = _track(path, earliest, last)
-    near = (from_end_m[earliest:] < max(settings.final_min_m, 2_000.0)) & np.isfinite(track_deg)
+    beyond = np.flatnonzero(from_end_m[earliest:] >= max(settings.final_min_m, NEAR_M))
+    near = (np.arange(len(track_deg)) > (beyond[-1] if beyond.size else -1)) & np.isfinite(track_deg)
     if not near.any():
         return LeftOutApproach(end.time_s, "no direction of flight before its end")
     rough_deg = _median_direction(track_deg[near][-max(int(near.sum() // 2), 1) :])

@@ -70,7 +70,6 @@ def line_through(path: FlightPath, rows: slice, shift_m: FloatArray | None = Non
 def runway_of(path: FlightPath, final: Final, settings: LandingSettings) -> RunwayUsed:
     """The runway of the site file, else one placed by the positions themselves."""
     listed = final.runway
-    angle_deg, crossing_m = settings.glide_angle_deg, settings.threshold_crossing_height_m
     width_m, distance_m = settings.localizer_width_m, settings.localizer_distance_m
     if listed is not None and listed.latitude_deg is not None and listed.longitude_deg is not None:
         behind_m = distance_m if listed.length_m is None else max(listed.length_m + 300.0, 500.0)
@@ -82,8 +81,8 @@ def runway_of(path: FlightPath, final: Final, settings: LandingSettings) -> Runw
             listed.true_bearing_deg,
             listed.sigma_deg,
             listed.elevation_m,
-            _given(listed.glide_angle_deg, angle_deg),
-            _given(listed.threshold_crossing_height_m, crossing_m),
+            listed.glide_angle_deg,
+            listed.threshold_crossing_height_m,
             _given(listed.localizer_width_m, width_m),
             _given(listed.localizer_distance_m, behind_m),
             listed.length_m,

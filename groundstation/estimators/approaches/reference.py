@@ -26,6 +26,7 @@ from groundstation.results.landing_categories import LINEAR_95
 FULL_SCALE_DDM = 0.155  # of a localizer, at the edge of its course sector (ICAO 3.1.3.7)
 MOST_SAMPLES = 400
 FEWEST_ON_GROUND = 3
+UNEVEN_S, FEW_STEPS = 120.0, 4
 SHORTEST_DRIFT_S = 600.0
 BEARING, THRESHOLD, ROUNDING, CURVATURE = (
     *("bearing of the runway", "place of the threshold", "rounding of the positions", "curvature of the error"),
@@ -232,25 +233,37 @@ def step_across_m(positions: Positions, runway: RunwayUsed) -> FloatArray:
 def _steps(positions: Positions, used: Rows, runway: RunwayUsed) -> FloatArray:
     """Covariance of the rounding of stepped coordinates.
 
-    While a coordinate crosses a step, its rounding error is a sawtooth: samples a share u of the step apart correlate
-    as 1 - 6 u (1 - u), a whole step has mean zero. In a step that is not crossed from one side to the other the error
-    may lie and drift anywhere. Errors of different steps are independent.
+    While a coordinate crosses a step evenly, its rounding error is a sawtooth: samples a share u of the step apart
+    correlate as 1 - 6 u (1 - u), a whole step has mean zero. The longer it takes, the less even it is; in a step that
+    is not crossed from one side to the other the error may lie and drift anywhere. Errors of different steps are
+    independent; a coordinate that crosses few of them shows little of its own drift.
     """
     total = np.zeros((len(used), len(used)))
+    time_s = positions.time_s[used]
     coordinates = (positions.latitude_deg[used], positions.longitude_deg[used])
     for size_m, step_deg, values in zip(step_across_m(positions, runway), positions.step_deg, coordinates, strict=True):
         if step_deg <= 0.0:
             continue
+        alike, crossed = np.zeros_like(total), 0
         change = np.sign(np.diff(values)) * (np.abs(np.diff(values)) > 0.5 * step_deg)
         edges = [0, *(np.flatnonzero(change) + 1).tolist(), len(values)]
         for first, last in pairwise(edges):
             is_crossed = first > 0 and last < len(values) and change[first - 1] == change[last - 1]
+            uneven = min((time_s[last - 1] - time_s[first]) / UNEVEN_S, 1.0) if is_crossed else 1.0
             place = np.arange(last - first) / (last - first)
             apart = np.abs(place[:, None] - place)
-            drifting = 0.5 + np.outer(1.0 - place, 1.0 - place) + np.outer(place, place)
-            alike = 1.0 - 6.0 * apart * (1.0 - apart) if is_crossed else drifting
-            total[first:last, first:last] += size_m**2 / 12.0 * alike
+            sawtooth = 1.0 - 6.0 * apart * (1.0 - apart)
+            alike[first:last, first:last] = (1.0 - uneven) * sawtooth + uneven * _drifting(place)
+            crossed += is_crossed
+        if crossed < FEW_STEPS:
+            alike += _drifting(np.linspace(0.0, 1.0, len(values)))
+        total += size_m**2 / 12.0 * alike
     return total
+
+
+def _drifting(place: FloatArray) -> FloatArray:
+    """Covariance, over that of a uniform error, of one that drifts from anywhere to anywhere; place in [0, 1]."""
+    return np.asarray(0.5 + np.outer(1.0 - place, 1.0 - place) + np.outer(place, place))
 
 
 def _rounding_m(positions: Positions, runway: RunwayUsed, settings: LandingSettings) -> float:

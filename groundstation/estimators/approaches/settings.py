@@ -9,7 +9,6 @@ from typing import Literal
 
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.base.units import M_PER_FOOT, MPS_PER_KNOT
-from groundstation.estimators.known import STANDARD_CROSSING_HEIGHT_M, STANDARD_GLIDE_ANGLE_DEG
 
 Rounding = Literal["unknown", "nearest", "down"]
 
@@ -41,8 +40,8 @@ class LandingSettings:
 
     localizer_width_m: float = number(700.0 * M_PER_FOOT, 10.0, 1_000.0)  # ICAO 3.1.3.7.1: 210 m at the threshold
     localizer_distance_m: float = number(3_300.0, 500.0, 10_000.0)
-    glide_angle_deg: float = number(STANDARD_GLIDE_ANGLE_DEG, 1.0, 10.0)
-    threshold_crossing_height_m: float = number(STANDARD_CROSSING_HEIGHT_M, 0.0, 50.0)
+    glide_angle_deg: float = number(3.0, 1.0, 10.0)
+    threshold_crossing_height_m: float = number(15.0, 0.0, 50.0)
     aiming_point_m: float = number(300.0, 0.0, 2_000.0)
 
     gate_high_m: float = number(1_000.0 * M_PER_FOOT, 20.0, 2_000.0)  # FSF: in instrument conditions

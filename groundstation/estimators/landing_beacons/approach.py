@@ -98,9 +98,8 @@ def deviations(sampled: Sampled, beacons_m: FloatArray, runway: Runway, settings
     fix = solve_bearings(
         np.where(overhead, np.nan, sampled.bearings_deg), beacons_m, settings.bearing_sigma_deg
     )  # where a beacon is overhead nothing is found
-    glide_angle_deg, crossing_height_m = runway.glide_path
-    slope = float(np.tan(np.deg2rad(glide_angle_deg)))
-    glide = sampled.height_m - (crossing_height_m - fix.along_m * slope)
+    slope = float(np.tan(np.deg2rad(runway.glide_angle_deg)))
+    glide = sampled.height_m - (runway.threshold_crossing_height_m - fix.along_m * slope)
     along_sigma, right_sigma = (np.sqrt(fix.covariance[:, axis, axis]) for axis in (0, 1))
     return Deviations(fix, glide, right_sigma, along_sigma, np.hypot(settings.height_sigma_m, slope * along_sigma))
 

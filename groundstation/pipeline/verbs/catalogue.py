@@ -18,7 +18,16 @@ def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict
         When the log is missing or cannot be read.
     """
     if log is None:
-        return [*_analyses(), *_session_analyses(), *_formats(), *_scenarios(), *_sessions(), *_plans(), *_studies()]
+        return [
+            *_analyses(),
+            *_session_analyses(),
+            *_formats(),
+            *_scenarios(),
+            *_approaches(),
+            *_sessions(),
+            *_plans(),
+            *_studies(),
+        ]
     folder = log.parent if log.name == SUMMARY else log
     return _of_a_session(folder) if is_session(folder) else _with_answers(log, profile)
 
@@ -84,6 +93,15 @@ def _scenarios() -> list[dict[str, Any]]:
     return [
         {"kind": "scenario", "name": name, "title": load_scenario(name).title, "needs": "nothing"}
         for name in scenario_names()
+    ]
+
+
+def _approaches() -> list[dict[str, Any]]:
+    from groundstation.simulation.approach import approach_names, load_approach
+
+    return [
+        {"kind": "scenario", "name": name, "title": load_approach(name).title, "needs": "nothing"}
+        for name in approach_names()
     ]
 
 
