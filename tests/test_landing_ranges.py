@@ -7,7 +7,7 @@ import pytest
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.errors import SettingsError
-from groundstation.estimators.landing_ranges.answer import HONEST, TOUCHDOWN, WHITE, category_spans, range_landing
+from groundstation.estimators.landing_ranges.answer import category_spans, range_landing
 from groundstation.estimators.landing_ranges.filter import (
     covariance_along,
     filter_ranges,
@@ -25,6 +25,7 @@ from groundstation.estimators.landing_ranges.scenario import (
     StraightPath,
 )
 from groundstation.estimators.landing_ranges.trials import draw_errors, fly_trials
+from groundstation.results.landing_ranges import HONEST, TOUCHDOWN, WHITE
 
 PAIR = (GroundPoint("left", 0.0, -1000.0), GroundPoint("right", 0.0, 1000.0))
 THIRD = (*PAIR, GroundPoint("third", 100.0, 0.0))

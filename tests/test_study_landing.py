@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from groundstation.estimators.landing_ranges.answer import TOUCHDOWN, range_landing
-from groundstation.results.landing_ranges import RangeLanding
+from groundstation.estimators.landing_ranges.answer import range_landing
+from groundstation.estimators.landing_ranges.plan import LANDING_PLAN
+from groundstation.results.landing_ranges import TOUCHDOWN, RangeLanding
 from groundstation.studies import landing_cases
 from groundstation.studies.landing_bearings import bearing_spans, bearing_table
-from groundstation.studies.landing_cases import APPROACHES, CLAIMS, FLOWN, PUBLISHED, SIGMAS, approach, variations
+from groundstation.studies.landing_cases import CLAIMS, FLOWN, PUBLISHED, SIGMAS, approach, variations
 from groundstation.studies.landing_tables import (
     category_table,
     holds,
@@ -17,6 +18,7 @@ from groundstation.studies.landing_tables import (
     trial_table,
     variation_table,
 )
+from groundstation.studies.shipped_plans import plan_names
 
 
 @pytest.fixture(scope="module")
@@ -25,8 +27,8 @@ def answers() -> dict[str, RangeLanding]:
 
 
 def test_every_case_names_a_shipped_approach() -> None:
-    assert {*FLOWN, *PUBLISHED} <= set(APPROACHES.names())
-    assert all(approach(name).title for name in APPROACHES.names())
+    assert {*FLOWN, *PUBLISHED} <= set(plan_names(LANDING_PLAN))
+    assert all(approach(name).title for name in plan_names(LANDING_PLAN))
 
 
 def test_published_sigmas_are_found_within_a_factor_of_two(answers: dict[str, RangeLanding]) -> None:

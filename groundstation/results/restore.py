@@ -16,6 +16,7 @@ from groundstation.results.forecast import ForecastResult
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
 from groundstation.results.landing_beacons import BeaconLanding
+from groundstation.results.landing_ranges import RangeLanding
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
 from groundstation.results.magnetic_ground import GroundDeviation
@@ -26,7 +27,7 @@ ANSWER_TYPES: Mapping[str, type[Answer]] = MappingProxyType(
         kind.analysis: kind
         for kind in (
             *(HeadingResult, InertialResult, ForecastResult, Latencies, MagneticResult, GroundDeviation),
-            *(BeaconLanding, CooperativeResult, ControlPlan),
+            *(BeaconLanding, CooperativeResult, ControlPlan, RangeLanding),
         )
     }
 )
