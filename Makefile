@@ -48,7 +48,7 @@ fuzz: $(DEV) ## mutated logs through every reader for three minutes; FUZZ=10000:
 schemas: $(DEV) ## make the package's descriptor set from schemas/*.proto, schemas/summary.schema.json from the results
 	$(BIN)/python -m grpc_tools.protoc -Ischemas --include_imports \
 		--descriptor_set_out=groundstation/store/descriptors.binpb schemas/*.proto
-	$(BIN)/python -m groundstation.results.schema schemas/summary.schema.json
+	$(BIN)/python -m groundstation.pipeline.verbs.schema schemas/summary.schema.json
 
 bench: $(RUNTIME) ## benchmarks against peers, printed as ratios
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[bench]'

@@ -17,8 +17,8 @@ import numpy as np
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.ordering import corrected
 from groundstation.integrity.survey import survey
-from groundstation.pipeline.convert import convert_log
-from groundstation.pipeline.log import open_log
+from groundstation.pipeline.one_flight.convert import convert_log
+from groundstation.pipeline.one_flight.log import open_log
 from groundstation.readers.dataflash import read
 from groundstation.readers.dataflash.blocks import Scanner
 from groundstation.readers.source import Source

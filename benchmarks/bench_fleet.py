@@ -17,7 +17,7 @@ from pathlib import Path
 import psutil
 from distributed import LocalCluster
 
-from groundstation.pipeline.synthesis import simulate_to
+from groundstation.pipeline.verbs.synthesis import simulate_to
 
 COMMAND = [sys.executable, "-m", "groundstation"]
 FLIGHTS, DAMAGED_SHARE, AIRCRAFT = 500, 0.03, 5

@@ -21,8 +21,8 @@ import numpy as np
 from bench_ulog import data_messages
 
 from groundstation.integrity import ordering, survey  # noqa: F401 -- imported before the base is taken
-from groundstation.pipeline.convert import convert_log
-from groundstation.pipeline.log import open_log
+from groundstation.pipeline.one_flight.convert import convert_log
+from groundstation.pipeline.one_flight.log import open_log
 from groundstation.readers.dataflash.blocks import Scanner
 from groundstation.readers.source import Source
 from groundstation.readers.table_reader import TableReader  # noqa: F401

@@ -18,8 +18,8 @@ import numpy as np
 from pyulog import ULog
 
 from groundstation.base.records import Column, RecordBatch
-from groundstation.pipeline.convert import convert_log
-from groundstation.pipeline.log import open_log
+from groundstation.pipeline.one_flight.convert import convert_log
+from groundstation.pipeline.one_flight.log import open_log
 from groundstation.readers import registry
 
 DEFAULT_LOG = Path(__file__).parents[2] / "shared" / "data" / "ulog" / "Proto_FLT09_REENCODED_fixedwing.ulg"

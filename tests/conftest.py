@@ -12,9 +12,9 @@ import pytest
 from filelock import FileLock
 from rerun.experimental import ViewerClient
 
-from groundstation.pipeline.batch import run_many
-from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.outcome import Outcome
+from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports.drawing import sketching
 from tests.viewer_shots import NoViewerError, viewer
 

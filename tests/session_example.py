@@ -9,9 +9,9 @@ import numpy as np
 
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.convert import convert_log
-from groundstation.pipeline.flight import read_flight
-from groundstation.pipeline.log import open_log
+from groundstation.pipeline.one_flight.convert import convert_log
+from groundstation.pipeline.one_flight.flight import read_flight
+from groundstation.pipeline.one_flight.log import open_log
 from groundstation.simulation.session import SimulatedSession, simulate_session
 from groundstation.simulation.session_log import session_flights
 from groundstation.simulation.session_scenario import SessionScenario

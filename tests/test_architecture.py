@@ -29,6 +29,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     },
     "cli": {"base", "results", "chapters", "pipeline"},
 }
+PARTS_OF_THE_PIPELINE = ("one_flight", "many_flights", "verbs", "")  # each imports those before it; "": the Python API
 ONLY_ROOM_OF = {"mcap": "store", "google": "store", "foxglove_schemas_protobuf": "store", "rerun": "viewer"}
 
 
@@ -66,6 +67,17 @@ def test_room_imports_only_what_it_may(path: Path) -> None:
             assert other == room or other in MAY_IMPORT[room], f"{path.name}:{line}: {room} imports {name}"
         owner = ONLY_ROOM_OF.get(top)
         assert owner is None or owner == room, f"{path.name}:{line}: only {owner}/ imports {top}"
+
+
+@pytest.mark.parametrize("path", sorted((PACKAGE / "pipeline").rglob("*.py")), ids=lambda path: path.stem)
+def test_part_of_the_pipeline_imports_only_those_before_it(path: Path) -> None:
+    part = path.parent.name if path.parent.name != "pipeline" else ""
+    for name, line in imports_of(ast.parse(path.read_text(encoding="utf-8"))):
+        if name.startswith("groundstation.pipeline."):
+            parts = name.split(".")
+            other = parts[2] if parts[2] in PARTS_OF_THE_PIPELINE else ""
+            place = PARTS_OF_THE_PIPELINE.index
+            assert place(other) <= place(part), f"{path.name}:{line}: {part} imports {name}"
 
 
 def test_every_room_is_in_the_table() -> None:

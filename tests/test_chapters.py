@@ -280,7 +280,7 @@ def test_losses_are_a_table_and_remarks_are_not() -> None:
     assert Note("No damage was found in the log: nothing lost, nothing unreadable.", "good") in quality(BARE).parts
 
 
-def test_findings_stand_gravest_first() -> None:
+def test_findings_stand_most_severe_first() -> None:
     found = tuple(Finding(severity, f"a.{severity}", f"text of {severity}") for severity in ("info", "fail", "warn"))
     results = example(None, findings=found)
     rows = grid(findings(results), "Findings").rows

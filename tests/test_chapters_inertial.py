@@ -176,8 +176,8 @@ def with_share(share: float, *, raised: bool) -> dict[str, Any]:
     ("share", "raised", "tone", "verdict"),
     [
         (0.95, False, "good", "the filter is consistent"),
-        (0.80, False, "warn", "the filter is surer than it should be"),
-        (0.80, True, "warn", "the filter is surer than it should be"),
+        (0.80, False, "warn", "the filter is overconfident"),
+        (0.80, True, "warn", "the filter is overconfident"),
         (0.995, False, "warn", "the filter claims less than it knows"),
         (0.995, True, "plain", "innovations cannot show whether the filter is consistent"),
         (1.0, True, "plain", "innovations cannot show whether the filter is consistent"),

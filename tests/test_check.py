@@ -11,12 +11,12 @@ import pytest
 from typer.testing import CliRunner
 
 from groundstation.cli.main import app
-from groundstation.pipeline.batch import run_many
-from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.conversions import convert_many
-from groundstation.pipeline.outcome import Outcome
-from groundstation.results.files import load
+from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.verbs.conversions import convert_many
 from tests.dataflash_writer import DataFlash
+from tests.saved import load
 from tests.ulog_writer import ATTITUDE, BARO, UlogWriter
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"

@@ -16,7 +16,7 @@ HEAVY = (
     "cattrs",
     *("numpy", "pandas", "pyarrow", "numba", "scipy", "rerun", "matplotlib", "mcap", "google.protobuf"),
     *("jinja2", "typst"),
-    *("groundstation.pipeline.batch", "groundstation.readers", "groundstation.viewer"),
+    *("groundstation.pipeline.many_flights.batch", "groundstation.readers", "groundstation.viewer"),
 )
 
 

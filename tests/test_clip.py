@@ -13,14 +13,14 @@ from groundstation.base.errors import UsageError
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.base.units import NS_PER_S
 from groundstation.cli.main import app
-from groundstation.pipeline.batch import run_many
-from groundstation.pipeline.clip import Wanted, clip
-from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.convert import convert_log
-from groundstation.pipeline.log import open_log
-from groundstation.results.files import load
+from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.convert import convert_log
+from groundstation.pipeline.one_flight.log import open_log
+from groundstation.pipeline.verbs.clip import Wanted, clip
 from groundstation.store.reader import Part, read, read_info
 from tests.recording_contents import Contents
+from tests.saved import load
 from tests.test_store import joined
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"

@@ -19,9 +19,9 @@ from groundstation.chapters.quality import quality
 from groundstation.cli.check_table import text_of
 from groundstation.integrity import Survey, ledger_findings, survey
 from groundstation.integrity.clock_relation import ROLLOVER_S
-from groundstation.pipeline.check import check_many
-from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.conversions import convert_many
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.verbs.check import check_many
+from groundstation.pipeline.verbs.conversions import convert_many
 from groundstation.readers import registry
 from groundstation.simulation.faults import BackwardStep, ClockDrift, Dropout, Fault, ForwardStep, apply_faults
 from groundstation.simulation.flat_csv_writer import write_flat_csv

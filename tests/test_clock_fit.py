@@ -7,12 +7,13 @@ import pytest
 from numpy.typing import NDArray
 
 from groundstation.base.clock import Clock
+from groundstation.base.normal import NORMAL_95
 from groundstation.base.records import Column, LogHeader, RecordBatch
 from groundstation.base.serial import from_json, to_json_exactly
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity import ledger_findings, survey
-from groundstation.integrity.clock_fit import Z95, Fitted, fit_relation
+from groundstation.integrity.clock_fit import Fitted, fit_relation
 from groundstation.integrity.clock_references import MOST_SAMPLES
 from groundstation.integrity.clock_relation import ClockRelation, ClockSegment
 
@@ -77,7 +78,7 @@ def coverage(count: int, step_s: float, sigma_s: float, memory_s: float, drift_p
         breaks += len(found.breaks)
         drift, sigma = found.segments[0].drift_ppm, found.segments[0].drift_sigma_ppm
         assert drift is not None and sigma is not None
-        hits += abs(drift - drift_ppm) < Z95 * sigma
+        hits += abs(drift - drift_ppm) < NORMAL_95 * sigma
     return hits / RUNS, breaks
 
 
@@ -103,7 +104,7 @@ def test_a_change_of_rate_is_placed_within_its_error(change_ppm: float) -> None:
         sigma = np.hypot(*(segment.drift_sigma_ppm or 0.0 for segment in found.segments))
         changes.append((one.drift_change_ppm - change_ppm) / sigma)
     assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.5
-    assert np.mean(np.abs(changes) < Z95) > 0.85
+    assert np.mean(np.abs(changes) < NORMAL_95) > 0.85
 
 
 def test_steps_and_changes_of_rate_together() -> None:

@@ -16,18 +16,19 @@ from typer.testing import CliRunner
 
 from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.cli.main import app
-from groundstation.pipeline.alignment import align, events_of
-from groundstation.pipeline.clip import Wanted, clip
-from groundstation.pipeline.compare import compare, compare_to, deltas_of
-from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.flight import Job, run_flight
-from groundstation.pipeline.inputs import collect
+from groundstation.estimators.analyses import ANSWER_TYPES
+from groundstation.pipeline.many_flights.inputs import collect
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.flight import Job, run_flight
+from groundstation.pipeline.verbs.alignment import align, events_of
+from groundstation.pipeline.verbs.clip import Wanted, clip
+from groundstation.pipeline.verbs.compare import compare, compare_to, deltas_of
 from groundstation.reports.comparison import comparison_html
 from groundstation.reports.drawing import sketching
 from groundstation.results.answer import by_analysis
 from groundstation.results.comparison import Comparison, Delta
 from groundstation.results.figures import FigureData
-from groundstation.results.files import SavedFlight, load, save
+from groundstation.results.files import SavedFlight, save
 from groundstation.results.inertial import InertialResult, RealOutage
 from groundstation.results.manifest import Manifest
 from groundstation.results.summary import summary_of
@@ -35,6 +36,7 @@ from groundstation.simulation.samples import write_scenario
 from groundstation.viewer.comparison import write_comparison
 from tests.inertial_example import inertial_result
 from tests.recording_contents import Contents
+from tests.saved import load
 from tests.viewer_example import make_flight, make_results
 from tests.viewer_shots import colourful, pages, picture, settled
 
@@ -222,7 +224,7 @@ def lanes(**columns: Any) -> FigureData:
 
 def saved_with(figures: dict[str, FigureData], inertial: InertialResult | None = None) -> SavedFlight:
     document = summary_of(replace(make_results(make_flight()), answers=by_analysis(inertial), figures=()))
-    return SavedFlight(Path("x"), document, Manifest(), figures)
+    return SavedFlight(Path("x"), document, Manifest(), figures, ANSWER_TYPES)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 
 from groundstation.base.errors import SettingsError
 from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.pipeline.configuration import Configuration, Interval, load_configuration
+from groundstation.pipeline.one_flight.configuration import Configuration, Interval, load_configuration
 
 
 def written(folder: Path, name: str, text: str) -> Path:

@@ -11,10 +11,12 @@ from groundstation.estimators.cooperative.estimate import estimate_session, run_
 from groundstation.estimators.cooperative.events import HEIGHT, PEER, POINT, SATELLITE, Event, prepare
 from groundstation.estimators.cooperative.messages import Broadcast, decode, pairwise_bytes, report_bytes
 from groundstation.estimators.cooperative.observation import rows_of
-from groundstation.estimators.cooperative.settings import ALGORITHMS, CooperativeSettings, OdometryBelief
+from groundstation.estimators.cooperative.settings import ALGORITHMS, CameraBelief, CooperativeSettings, OdometryBelief
 from groundstation.estimators.cooperative.transition import discretise, local_dynamics
-from groundstation.estimators.cooperative.vehicles import InertialVehicle, Vehicle, WheeledVehicle
+from groundstation.estimators.cooperative.vehicles import InertialVehicle, Vehicle
+from groundstation.estimators.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.simulation.session import simulate_session
+from groundstation.simulation.session_scenario import load_session
 from groundstation.tables.session import NO_SLOT, DeadReckoning, GroundPoint, Heights, Odometry, Ranges, Session
 from tests.cooperative_example import GLOBAL, LOCAL, believed, full_nees, truth_of
 
@@ -64,7 +66,8 @@ def wheeled() -> WheeledVehicle:
     time_s = np.arange(5.0)
     track = Odometry("R", time_s, np.full(5, 0.4), np.full(5, 20.0), (1.0, 2.0), 30.0)
     belief = OdometryBelief(speed_scale=0.1, turn_scale=0.1)
-    return WheeledVehicle(track, CooperativeSettings(odometry=belief, range_bias_m=0.1))
+    camera = CameraBelief(range_scale=0.1, marker_bias_m=0.1, mount_deg=3.0, lag_s=0.1)
+    return WheeledVehicle(track, CooperativeSettings(odometry=belief, camera=camera, range_bias_m=0.1))
 
 
 @pytest.mark.parametrize("kind", [PEER, POINT, SATELLITE, HEIGHT, "bearing"])
@@ -101,7 +104,7 @@ def test_derivatives_against_central_differences(kind: str) -> None:
 
 def test_motion_of_a_wheeled_vehicle_against_central_differences() -> None:
     vehicle = wheeled()
-    x = np.array([1.0, 2.0, 0.5, 0.05, -0.03, 0.1])
+    x = np.array([1.0, 2.0, 0.5, 0.05, -0.03, 0.1, 0.02, 0.03, -0.01, 0.04])
     _, phi, noise = vehicle.step(x, 0.3, 3.6)
     assert np.linalg.eigvalsh(noise).min() > -1e-15
     for at in range(vehicle.size):
@@ -477,3 +480,14 @@ def test_wheeled_vehicles_and_bearings() -> None:
     track_found = run.tracks[0]
     assert np.interp(at[-1], track_found.time_s, track_found.position_m[:, 0]) == pytest.approx(north[-1], abs=0.02)
     assert np.interp(at[-1], track_found.time_s, track_found.position_m[:, 1]) == pytest.approx(east[-1], abs=0.02)
+
+
+def test_aircraft_in_line_keep_their_estimates_near_their_reckoning() -> None:
+    """Ranges say next to nothing across the line; both runs overflowed while the directions alone stood still."""
+    scenario = load_session("local-three-in-line")
+    settings = believed(scenario, gate_sigma=0.0)
+    for run in (6, 7):
+        simulated = simulate_session(scenario, 80_000, run)
+        found = run_algorithm(prepare(simulated.session, settings), settings, "centralised")
+        for track, truth in zip(found.tracks, simulated.truth, strict=True):
+            assert np.abs(track.state[:, :2] - truth.states[:, :2]).max() < 4.5 * scenario.errors.position_m

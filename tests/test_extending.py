@@ -1,13 +1,16 @@
-"""The recipe of docs/extending.md, carried out in a copy of the package: one folder and one line are enough."""
+"""The recipes of docs/extending.md, carried out in copies of the package: what they name is enough."""
 
 import json
 import os
 import re
 import shutil
+import struct
 import subprocess
 import sys
+import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,8 +18,12 @@ import pytest
 from tests.recording_contents import Contents
 
 ROOT = Path(__file__).parents[1]
-RECIPE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
-FILE_BLOCKS = re.compile(r"^`(groundstation/[\w/]+\.py)`\n\n```(python|diff)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+RECIPES = dict(
+    re.findall(r"^## ((?:An analysis|A tab|A signal|A reader))\n(.*?)(?=^## |\Z)", PAGE, re.MULTILINE | re.DOTALL)
+)
+FILE_BLOCKS = re.compile(r"^`([\w/]+\.(?:py|proto))`\n\n```(python|diff|proto)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+TOML_BLOCK = re.compile(r"^```toml\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LONGEST_S = 300
 
 
@@ -46,34 +53,68 @@ def groundstation(folder: Path, *arguments: str) -> subprocess.CompletedProcess[
     )
 
 
-def carry_out(folder: Path) -> None:
-    """Write the files of the recipe into a copy of the package, and change those that it changes."""
-    for name, kind, text in FILE_BLOCKS.findall(RECIPE):
+def carry_out(recipe: str, folder: Path) -> None:
+    """Write the files of a recipe into a copy of the package, and change those that it changes."""
+    blocks = FILE_BLOCKS.findall(RECIPES[recipe])
+    assert blocks, recipe
+    for name, kind, text in blocks:
         path = folder / name
         if kind == "diff":
             path.write_text(patched(path.read_text(encoding="utf-8"), text), encoding="utf-8")
             continue
-        path.parent.mkdir(exist_ok=True)
+        if not path.parent.exists():
+            path.parent.mkdir()
+            (path.parent / "__init__.py").write_text('"""An analysis of the recipe."""\n', encoding="utf-8")
         path.write_text(text, encoding="utf-8")
-        (path.parent / "__init__.py").write_text('"""An analysis of the recipe."""\n', encoding="utf-8")
 
 
 def patched(module: str, difference: str) -> str:
-    """A module with an import added and a line replaced, as a block of the recipe says."""
+    """A module with imports added and lines replaced, as a block of a recipe says."""
     signs = [(line[0], line[1:]) for line in difference.splitlines()]
-    (imported, *_), added = ([text for sign, text in signs if sign == "+"], signs[-1][1])
-    (removed,) = (text for sign, text in signs if sign == "-")
+    place = next(at for at, (sign, _) in enumerate(signs) if sign == "-")
+    imported = "".join(f"{text}\n" for _, text in signs[:place])
+    (removed,), added = ([text for sign, text in signs if sign == "-"], [text for _, text in signs[place + 1 :]])
     assert module.count(f"\n{removed}\n") == 1, f"not a line of the module: {removed}"
-    first = module.index("\nfrom groundstation.")
-    return f"{module[:first]}\n{imported}{module[first:]}".replace(f"\n{removed}\n", f"\n{added}\n")
+    if imported:
+        first = module.index("\nfrom groundstation.") + 1
+        module = f"{module[:first]}{imported}{module[first:]}"
+    return module.replace(f"\n{removed}\n", "\n{}\n".format("\n".join(added)))
+
+
+def copy_of_the_package(folder: Path) -> None:
+    for part in ("groundstation", "schemas"):
+        shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
+
+
+def rotor(folder: Path) -> None:
+    """Carry out the recipes of the signal and the reader in a copy of the package, and write three logs."""
+    carry_out("A signal", folder)
+    carry_out("A reader", folder)
+    schemas = [str(path.relative_to(folder)) for path in sorted((folder / "schemas").glob("*.proto"))]
+    command = [sys.executable, "-m", "grpc_tools.protoc", "-Ischemas", "--include_imports"]
+    out = "--descriptor_set_out=groundstation/store/descriptors.binpb"
+    subprocess.run([*command, out, *schemas], cwd=folder, check=True, capture_output=True)
+    (entry_points,) = TOML_BLOCK.findall(RECIPES["A reader"])
+    ((group, points),) = tomllib.loads(entry_points)["project"]["entry-points"].items()
+    about = folder / "rotor_log-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: rotor-log\nVersion: 1.0\n", encoding="utf-8")
+    lines = [f"[{group}]", *(f"{name} = {module}" for name, module in points.items())]
+    (about / "entry_points.txt").write_text("\n".join(lines), encoding="utf-8")
+    records = b"".join(struct.pack("<If", 100 * at, 300.0 + at % 3) for at in range(200))
+    (folder / "whole.rotor").write_bytes(b"ROTORLOG" + records)
+    (folder / "cut.rotor").write_bytes(b"ROTORLOG" + records[:-3])
+    rows = "".join(f"{0.1 * at:.1f},{5.0 if at != 7 else 500.0}\n" for at in range(200))
+    (folder / "rotor.csv").write_text("time_s,rotor.speed_hz\n" + rows, encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
 def scratch(tmp_path_factory: pytest.TempPathFactory) -> Scratch:
     folder = tmp_path_factory.mktemp("scratch")
-    shutil.copytree(ROOT / "groundstation", folder / "groundstation", ignore=shutil.ignore_patterns("__pycache__"))
-    carry_out(folder)
-    (settings,) = re.findall(r"^```toml\n(.*?)^```$", RECIPE, re.MULTILINE | re.DOTALL)
+    copy_of_the_package(folder)
+    carry_out("An analysis", folder)
+    rotor(folder)
+    (settings,) = TOML_BLOCK.findall(RECIPES["An analysis"])
     (folder / "c.toml").write_text(settings, encoding="utf-8")
     log = ROOT / "sample_logs" / "taxi-good.csv"
     run = groundstation(folder, "run", str(log), "-o", "out", "--no-pdf", "-j", "1", "--config", "c.toml")
@@ -136,3 +177,52 @@ def test_the_recording_has_its_tab(scratch: Scratch) -> None:
     values = contents.scalars("/gnss_noise/gnss_noise_speed/m_s")[1]
     rms = float(np.sqrt(np.nanmean(values**2)))
     assert rms == pytest.approx(float(str(answer_of(scratch)["speed_rms_mps"])), abs=0.05)
+
+
+def told(folder: Path, log: str, code: int) -> dict[str, Any]:
+    """What ``check --json`` says of the topic ``rotor``."""
+    checked = groundstation(folder, "check", log, "--json")
+    assert checked.returncode == code, checked.stderr
+    (one,) = json.loads(checked.stdout)
+    topic = one["ledger"]["topics"]["rotor"]
+    assert isinstance(topic, dict)
+    return topic
+
+
+def test_a_signal_is_read_from_a_table_and_its_range_is_checked(scratch: Scratch) -> None:
+    topic = told(scratch.folder, "rotor.csv", 0)
+    assert topic["rows"] == 200
+    assert topic["fields"]["speed_hz"]["out_of_range"] == 1
+
+
+def test_a_reader_is_found_by_the_content_and_what_is_cut_is_counted(scratch: Scratch) -> None:
+    whole, cut = told(scratch.folder, "whole.rotor", 0), told(scratch.folder, "cut.rotor", 3)
+    assert (whole["rows"], cut["rows"]) == (200, 199)
+    assert "rotor-log" in groundstation(scratch.folder, "list").stdout
+
+
+def test_records_of_a_reader_are_those_of_the_log(scratch: Scratch) -> None:
+    converted = groundstation(scratch.folder, "convert", "whole.rotor", "-o", "whole.mcap")
+    assert converted.returncode == 0, converted.stderr
+    program = "import groundstation as g; t = g.open('whole.mcap').tables['rotor']; print(*t.values('speed_hz')[:3])"
+    shown = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=scratch.folder,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=LONGEST_S,
+    )
+    assert shown.stdout.split() == [str(300.0 / 60.0), str(301.0 / 60.0), str(302.0 / 60.0)]
+
+
+def test_a_tab_of_its_own_takes_the_place_of_the_generic_one(scratch: Scratch) -> None:
+    generic = Contents(next(scratch.flight.glob("*.rrd"))).text("/gnss_noise/answer")
+    carry_out("A tab", scratch.folder)  # the last test: the copy has another tab from here on
+    (mcap,) = scratch.flight.glob("*.mcap")
+    run = scratch.groundstation("run", str(mcap), "-o", "own", "--no-pdf", "-j", "1", "--config", "c.toml")
+    assert run.returncode == 0, run.stderr
+    contents = Contents(next((scratch.folder / "own").glob("*/*.rrd")))
+    assert contents.text("/gnss_noise/answer") == generic
+    speed_mps = contents.scalars("/gnss_noise/speed")[1]
+    assert speed_mps.size and np.isfinite(speed_mps).all()

@@ -25,8 +25,8 @@ from groundstation.estimators.fleet.density import densities_of, histogram_of
 from groundstation.estimators.fleet.deviation import deviations
 from groundstation.estimators.fleet.moments import moments_of
 from groundstation.estimators.fleet.skill import SkillMerger, SkillOfFlight
-from groundstation.pipeline.fleet import gather
-from groundstation.pipeline.fleet_rows import flights_table
+from groundstation.pipeline.many_flights.fleet import gather
+from groundstation.pipeline.many_flights.fleet_rows import flights_table
 from groundstation.reports.fleet import densities
 from groundstation.reports.fleet_report import MOST_ROWS_ON_PAPER, PAGE, write_fleet_report
 from groundstation.results.figures import FigureData
@@ -281,7 +281,7 @@ def test_paper_lists_what_is_of_note_and_says_how_many_more(tmp_path: Path) -> N
     assert len(shown) == MOST_ROWS_ON_PAPER and "The first 60; 40 more in summary.html." in paper
     rejected = fleet.flights["flight_id"][fleet.flights["verdict"] == "reject"].tolist()
     quiet = fleet.flights["flight_id"][150]
-    assert all(flight_id in paper for flight_id in rejected) and quiet not in paper and "2 grave findings" in paper
+    assert all(flight_id in paper for flight_id in rejected) and quiet not in paper and "2 severe findings" in paper
     assert quiet in (tmp_path / PAGE).read_text(encoding="utf-8")
 
 

@@ -14,7 +14,7 @@ from groundstation.estimators.fleet.deviation import deviations
 from groundstation.estimators.fleet.moments import Moments, merged, moments_of
 from groundstation.estimators.fleet.outliers import find_outliers
 from groundstation.estimators.fleet.skill import SkillMerger, SkillOfFlight
-from groundstation.pipeline.fleet_rows import flights_table
+from groundstation.pipeline.many_flights.fleet_rows import flights_table
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import FLIGHT_COLUMNS
 

@@ -14,9 +14,9 @@ import pytest
 from groundstation.base.angles import wrap_180
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.convert import convert_log
-from groundstation.pipeline.flight import read_flight
-from groundstation.pipeline.log import open_log
+from groundstation.pipeline.one_flight.convert import convert_log
+from groundstation.pipeline.one_flight.flight import read_flight
+from groundstation.pipeline.one_flight.log import open_log
 from groundstation.results.heading import HeadingResult
 from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import Simulated, simulate
@@ -187,8 +187,8 @@ def test_tables_are_equal_within_the_formats_step(flights: dict[str, Flight], fo
 @pytest.mark.parametrize("form", sorted(ANSWER_DEG))
 def test_the_heading_error_is_the_same(flights: dict[str, Flight], form: str) -> None:
     from groundstation.estimators.heading.analysis import HEADING
-    from groundstation.pipeline.analyse import known_of, run_analyses
-    from groundstation.pipeline.configuration import Configuration
+    from groundstation.pipeline.one_flight.analyse import known_of, run_analyses
+    from groundstation.pipeline.one_flight.configuration import Configuration
 
     expected, found = (
         run_analyses((HEADING,), flights[name], known_of(flights[name], Configuration())).answers["heading"]

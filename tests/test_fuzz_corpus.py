@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from groundstation.base.records import Damage, RecordBatch
-from groundstation.pipeline.log import open_log
+from groundstation.pipeline.one_flight.log import open_log
 from tests.fuzz.bases import FORMATS, base_named, bases
 from tests.fuzz.mutation import KINDS, Mutant
 from tests.fuzz.trial import Case, Watch, edits_of, run_case, suffix_of, try_file

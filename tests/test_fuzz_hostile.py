@@ -15,10 +15,10 @@ from groundstation.base.clock import Clock
 from groundstation.base.errors import GroundstationError
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import Damage, RecordBatch
-from groundstation.pipeline.batch import run_many
-from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.convert import convert_log
-from groundstation.pipeline.log import open_log
+from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.convert import convert_log
+from groundstation.pipeline.one_flight.log import open_log
 from groundstation.readers import registry
 from groundstation.store.info import COPY_NAME, METADATA_NAME, StoreInfo
 from groundstation.store.reader import read_info

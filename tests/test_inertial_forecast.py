@@ -167,9 +167,9 @@ def test_held_velocity_and_raw_ins_are_what_they_say() -> None:
 
 @pytest.fixture(scope="module")
 def real_forecast(tmp_path_factory: pytest.TempPathFactory) -> ForecastResult:
-    from groundstation.pipeline.convert import convert_log
-    from groundstation.pipeline.flight import read_flight
-    from groundstation.pipeline.log import open_log
+    from groundstation.pipeline.one_flight.convert import convert_log
+    from groundstation.pipeline.one_flight.flight import read_flight
+    from groundstation.pipeline.one_flight.log import open_log
 
     path = real_log("inertial/gv_ff02.csv")
     mcap = Path(tmp_path_factory.mktemp("ff02")) / "flight.mcap"

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.inputs import collect
+from groundstation.pipeline.many_flights.inputs import collect
 
 
 def touched(path: Path) -> Path:

@@ -12,10 +12,10 @@ from groundstation.base.units import NS_PER_S
 from groundstation.integrity import LedgerCounts, ledger_findings, survey
 from groundstation.integrity.limits import thresholds_from
 from groundstation.integrity.stretches import Sampler
-from groundstation.pipeline.batch import run_many
-from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.log import open_log
-from groundstation.results.files import load
+from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.log import open_log
+from tests.saved import load
 from tests.test_formats_agree import as_dataflash, as_ulog
 
 Fields = Mapping[str, NDArray[np.float64]]

@@ -20,13 +20,13 @@ from groundstation.estimators.landing_beacons.geometry import (
     solve_bearings,
 )
 from groundstation.estimators.landing_beacons.settings import LandingBeaconsSettings
-from groundstation.pipeline.batch import run_many
-from groundstation.pipeline.configuration import load_configuration
-from groundstation.pipeline.synthesis import simulate_to
-from groundstation.results.files import load
+from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.one_flight.configuration import load_configuration
+from groundstation.pipeline.verbs.synthesis import simulate_to
 from groundstation.results.landing_beacons import BeaconLanding
 from groundstation.simulation.scenario import Scenario
 from tests.landing_example import BEACONS, approach_scenario, flown, known_of
+from tests.saved import load
 
 PLACES = np.array([(-one.before_threshold_m, one.right_m) for one in BEACONS])
 EXACT_M = 1e-3  # of a solution of exact bearings

@@ -108,7 +108,7 @@ def test_three_points_on_the_ground_leave_no_aircraft_below_it() -> None:
     assert np.abs(trials.error_m[:, -1, 2]).max() < 4.0 * trials.sigma_m[:, -1, 2].max()
 
 
-def test_correlated_ranges_taken_for_white_make_a_filter_too_sure() -> None:
+def test_correlated_ranges_taken_for_white_make_a_filter_overconfident() -> None:
     scenario = replace(FOUR, noise=CORRELATED, trials=6, seed=3)
     answer = range_landing(scenario)
     honest, white = ([row for row in answer.trials if row.filter == name][-1] for name in (HONEST, WHITE))

@@ -20,15 +20,16 @@ from groundstation.estimators.latency.analysis import LATENCY
 from groundstation.estimators.latency.estimate import estimate_latencies
 from groundstation.estimators.latency.settings import LatencySettings
 from groundstation.estimators.latency.windows import Series
-from groundstation.pipeline.analyse import Answered, known_of, run_analyses
-from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.one_flight.analyse import Answered, known_of, run_analyses
+from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results import latency as answers
-from groundstation.results.files import load, save
+from groundstation.results.files import save
 from groundstation.results.manifest import Manifest
 from groundstation.simulation.flight import simulate
 from groundstation.simulation.scenario import load_scenario
 from groundstation.tables.table import Flight, Table
 from tests.report_example import example
+from tests.saved import load
 from tests.schema_fields import SCHEMA, expect_fields
 from tests.simulated_flights import FLIGHT_LEGS, QUIET_GNSS, QUIET_INS, scenario
 

@@ -28,9 +28,9 @@ from groundstation.estimators.magnetic.before_lift_off import (
 from groundstation.estimators.magnetic.estimate import estimate_deviation
 from groundstation.estimators.magnetic.gyros import EARTH_DEG_PER_H, GyroDrift, gyro_drift
 from groundstation.estimators.magnetic.settings import MagneticSettings
-from groundstation.pipeline import configuration as configured
-from groundstation.pipeline.analyse import Given, analyse
-from groundstation.pipeline.configuration import Configuration
+from groundstation.pipeline.one_flight import configuration as configured
+from groundstation.pipeline.one_flight.analyse import Given, analyse
+from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.flight import Source
 from groundstation.results.heading import HeadingResult
 from groundstation.results.magnetic import Alignment, MagneticResult

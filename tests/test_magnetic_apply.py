@@ -24,15 +24,15 @@ from groundstation.base.records import Column
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.cli.main import app
 from groundstation.estimators.magnetic.corrected import CorrectedHeading, correct_heading
-from groundstation.pipeline.apply_deviation import APPLIED, NOT_APPLIED, Applied, apply_deviation
-from groundstation.pipeline.batch import plan_many, run_many
-from groundstation.pipeline.check import check_many
-from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.deviation_to_apply import Apply, asked_for
-from groundstation.pipeline.inputs import file_in
-from groundstation.pipeline.outcome import Outcome
-from groundstation.pipeline.publishing import report_again
-from groundstation.pipeline.remote import RemoteFolder
+from groundstation.pipeline.many_flights.batch import plan_many, run_many
+from groundstation.pipeline.many_flights.inputs import file_in
+from groundstation.pipeline.many_flights.publishing import report_again
+from groundstation.pipeline.many_flights.remote import RemoteFolder
+from groundstation.pipeline.one_flight.apply_deviation import APPLIED, NOT_APPLIED, Applied, apply_deviation
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.deviation_to_apply import Apply, asked_for
+from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.verbs.check import check_many
 from groundstation.reports.drawing import sketching
 from groundstation.reports.pdf import write_pdf
 from groundstation.reports.steer_card import MOST_ROWS, TEMPLATE, steer_card, write_exports
@@ -44,7 +44,7 @@ from groundstation.results.deviation import (
     deviation_from_csv,
     deviation_of,
 )
-from groundstation.results.files import SUMMARY, load, save
+from groundstation.results.files import SUMMARY, save
 from groundstation.results.flight import FlightResults
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import ADVISORY, CardRow, MagneticResult
@@ -59,6 +59,7 @@ from groundstation.tables.table import Flight, Table
 from groundstation.viewer.recording import write_recording
 from tests import magnetic_example
 from tests.recording_contents import Contents
+from tests.saved import load
 from tests.test_magnetic_run import analysed, figure_eight, simulated
 from tests.test_reports import HOSTILE
 

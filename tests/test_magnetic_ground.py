@@ -27,15 +27,15 @@ from groundstation.estimators.magnetic.analysis import MAGNETIC_GROUND
 from groundstation.estimators.magnetic.ground_fit import fit_curve
 from groundstation.estimators.magnetic.ground_runs import estimate_ground_deviation
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
-from groundstation.pipeline.analyse import Answered, Given, analyse, known_of, run_analyses
-from groundstation.pipeline.configuration import Configuration, load_configuration
-from groundstation.pipeline.convert import convert_log
-from groundstation.pipeline.flight import read_flight, sentence
-from groundstation.pipeline.log import open_log
+from groundstation.pipeline.one_flight.analyse import Answered, Given, analyse, known_of, run_analyses
+from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
+from groundstation.pipeline.one_flight.convert import convert_log
+from groundstation.pipeline.one_flight.flight import read_flight, sentence
+from groundstation.pipeline.one_flight.log import open_log
 from groundstation.reports.drawing import Drawing, sketching
 from groundstation.reports.figures import with_drawings
 from groundstation.results import magnetic_ground as answers
-from groundstation.results.files import load, save
+from groundstation.results.files import save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.magnetic import LETTERS
 from groundstation.results.magnetic_ground import GroundDeviation
@@ -45,6 +45,7 @@ from groundstation.tables.table import Flight, Table
 from groundstation.viewer.recording import write_recording
 from tests.real_logs import real_log
 from tests.recording_contents import Contents
+from tests.saved import load
 from tests.schema_fields import SCHEMA, expect_fields
 
 START_NS = iso_to_utc_ns("2026-05-09T08:00:00Z")[0]

@@ -17,14 +17,14 @@ from groundstation.estimators.inertial.analysis import INERTIAL
 from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.analysis import MAGNETIC
 from groundstation.estimators.magnetic.settings import MagneticSettings
-from groundstation.pipeline.analyse import Given, analyse, known_of, run_analyses
-from groundstation.pipeline.configuration import Configuration, load_configuration
-from groundstation.pipeline.convert import convert_log
-from groundstation.pipeline.flight import read_flight, sentence
-from groundstation.pipeline.log import open_log
+from groundstation.pipeline.one_flight.analyse import Given, analyse, known_of, run_analyses
+from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
+from groundstation.pipeline.one_flight.convert import convert_log
+from groundstation.pipeline.one_flight.flight import read_flight, sentence
+from groundstation.pipeline.one_flight.log import open_log
 from groundstation.reports.index import index_row
 from groundstation.results import magnetic as answers
-from groundstation.results.files import SavedFlight, load, save
+from groundstation.results.files import SavedFlight, save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.magnetic import LETTERS, MagneticResult
 from groundstation.results.manifest import Manifest
@@ -33,6 +33,7 @@ from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
 from groundstation.tables.table import Flight
 from tests.real_logs import real_log
+from tests.saved import load
 from tests.schema_fields import SCHEMA, expect_fields
 
 

@@ -17,15 +17,17 @@ import pytest
 
 import groundstation
 from groundstation.base.errors import GroundstationError, NotAssessableError, UnreadableLogError, UsageError
+from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.api import OpenLog, SavedRun
-from groundstation.pipeline.clip import Wanted, clip
+from groundstation.pipeline.verbs.clip import Wanted, clip
 from groundstation.reports import drawing
-from groundstation.results.files import SavedFlight, load, save
+from groundstation.results.files import SavedFlight, save
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import Manifest
 from groundstation.results.summary import summary_of
 from groundstation.viewer import inline
 from tests import inertial_example, report_example
+from tests.saved import load
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = ROOT / "sample_logs"
@@ -233,7 +235,7 @@ def test_a_summary_that_lacks_something_is_one_line(folder: Path) -> None:
         {"findings": [{"severity": "info"}]},
     ):
         with pytest.raises(UnreadableLogError, match="run the log again"):
-            assert SavedFlight(folder, {**saved.summary, **spoil}, Manifest(), {}).results
+            assert SavedFlight(folder, {**saved.summary, **spoil}, Manifest(), {}, ANSWER_TYPES).results
 
 
 def test_the_card_shows_no_markup_of_a_log(tmp_path: Path) -> None:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.pipeline.flight import PARTIAL_PREFIX, remove
-from groundstation.pipeline.outcome import Outcome
-from groundstation.pipeline.output import LocalOutput
-from groundstation.pipeline.placement import Placement
+from groundstation.pipeline.many_flights.output import LocalOutput
+from groundstation.pipeline.many_flights.placement import Placement
+from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX, remove
+from groundstation.pipeline.one_flight.outcome import Outcome
 
 ONE, OTHER = "1" * 64, "2" * 64
 FLIGHT = "20260504T060000Z_A12"

@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 from groundstation.cli.main import app
 from groundstation.estimators.analyses import ANSWER_TYPES, PLANS
 from groundstation.estimators.plan import Plan
-from groundstation.pipeline.inputs import flight_folders, plan_folders
-from groundstation.pipeline.plan import run_plan, shipped_scenarios
-from groundstation.pipeline.publishing import report_again
+from groundstation.pipeline.many_flights.inputs import flight_folders, plan_folders
+from groundstation.pipeline.many_flights.publishing import report_again
+from groundstation.pipeline.verbs.plan import run_plan, shipped_scenarios
 from groundstation.results.files import load, load_manifest
 from groundstation.studies.shipped_plans import load_plan, plan_names
 from tests.recording_contents import Contents

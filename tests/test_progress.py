@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from groundstation.cli.progress import listener
-from groundstation.pipeline.progress import Event
+from groundstation.pipeline.one_flight.progress import Event
 
 
 class Stream:

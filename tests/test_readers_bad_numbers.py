@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.flight import Job, run_flight
-from groundstation.results.files import load
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.flight import Job, run_flight
+from tests.saved import load
 
 SAMPLE = Path(__file__).parents[1] / "sample_logs" / "taxi-good.csv"
 SAMPLE_START = "2026-05-04T06:00:00Z"

@@ -114,7 +114,7 @@ def test_packed_unknown_content_is_named_by_what_it_is(tmp_path: Path) -> None:
 
 
 def test_a_log_that_is_read_twice_is_decompressed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from groundstation.pipeline import log
+    from groundstation.pipeline.one_flight import log
     from groundstation.readers import source
 
     calls: list[int] = []

@@ -24,6 +24,8 @@ FIELD_OF_UNIT = {
     "mps2": "ins.accel_x_mps2",
     "nt": "magnetometer.field_down_nt",
     "a": "electric.current_a",
+    "dots": "guidance.lateral_deviation_dots",
+    "mhz": "guidance.frequency_mhz",
     "": "gnss.hdop",
 }
 FACTORS = {
@@ -54,6 +56,9 @@ FACTORS = {
     "mgauss": 100.0,
     "a": 1.0,
     "ma": 1e-3,
+    "dots": 1.0,
+    "fsd": 2.0,
+    "mhz": 1.0,
     "": 1.0,
 }
 

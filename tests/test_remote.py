@@ -16,13 +16,13 @@ import pytest
 from distributed import Client
 
 from groundstation.base.errors import GroundstationError, UsageError
-from groundstation.pipeline.batch import plan_many, run_many
-from groundstation.pipeline.cluster import on_cluster
-from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.flight import Job
-from groundstation.pipeline.outcome import Outcome
-from groundstation.pipeline.progress import Event
-from groundstation.pipeline.remote import RemoteFolder, far_logs
+from groundstation.pipeline.many_flights.batch import plan_many, run_many
+from groundstation.pipeline.many_flights.cluster import on_cluster
+from groundstation.pipeline.many_flights.remote import RemoteFolder, far_logs
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.flight import Job
+from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.one_flight.progress import Event
 from groundstation.reports.drawing import sketching
 from tests.test_resume import SETTINGS, SHORT, assert_equal_runs, tell_and_sleep
 

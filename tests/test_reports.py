@@ -18,14 +18,15 @@ from groundstation.base.errors import UnreadableLogError
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import DamageEntry, Ledger, ThresholdsUsed, Truncation
 from groundstation.reports import drawing
-from groundstation.reports.flight_report import PDF, REPORT, flight_document, flight_report_html, write_flight_report
+from groundstation.reports.flight_report import PDF, REPORT, flight_document, flight_report_html
 from groundstation.results.answer import by_analysis
 from groundstation.results.figures import FigureData
-from groundstation.results.files import load, save
+from groundstation.results.files import save
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.heading import Gate, HeadingResult
 from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import MANIFEST, example, figure, heading_result
+from tests.saved import load, write_flight_report
 
 LARGEST_REPORT_BYTES = 1_500_000  # mailed and opened on old machines
 LARGEST_LONG_REPORT_BYTES = 2_500_000  # with the figures of INS errors and forecast
@@ -215,7 +216,7 @@ def test_equal_input_gives_equal_bytes_in_any_process(tmp_path: Path) -> None:
         (tmp_path / "manifest.json").read_text().replace("2031", "2044"), encoding="utf-8"
     )
     code = (
-        "import sys; from pathlib import Path; from groundstation.reports.flight_report import write_flight_report;"
+        "import sys; from pathlib import Path; from tests.saved import write_flight_report;"
         "write_flight_report(Path(sys.argv[1]))"
     )
     matplotlibrc = tmp_path / "matplotlibrc"

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.base.serial import to_json_exactly
-from groundstation.reports.flight_report import write_flight_report
 from groundstation.reports.index import COLUMNS, IndexRow, failed_row, index_row, write_index
-from groundstation.results.files import load, save
+from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
 from tests.report_example import MANIFEST, example, heading_result
+from tests.saved import load, write_flight_report
 
 
 def row_of(folder: Path, results: FlightResults) -> IndexRow:

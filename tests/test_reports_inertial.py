@@ -16,12 +16,13 @@ from groundstation.reports.figures import with_drawings
 from groundstation.reports.figures.forecast import classic
 from groundstation.reports.flight_report import flight_document
 from groundstation.results.figures import FigureData
-from groundstation.results.files import load, save
+from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.inertial import InertialResult
 from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import MANIFEST, example
+from tests.saved import load
 
 INERTIAL = (
     *("Position error of the INS", "Velocity error of the INS", "Platform tilt and gyro drift"),

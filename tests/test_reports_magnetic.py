@@ -15,12 +15,13 @@ from groundstation.reports.sections import flight_sections
 from groundstation.results.answer import by_analysis
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.figures import FigureData
-from groundstation.results.files import load, save
+from groundstation.results.files import save
 from groundstation.results.flight import FlightResults, NotAssessable
 from groundstation.results.heading import Gate
 from groundstation.results.magnetic import ADVISORY, MagneticResult
 from groundstation.results.manifest import Manifest
 from tests.report_example import example
+from tests.saved import load
 from tests.test_magnetic_run import figure_eight
 from tests.test_reports import Page, report
 

@@ -11,9 +11,10 @@ import pytest
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.serial import to_json
 from groundstation.results.figures import FigureData
-from groundstation.results.files import csv_text, json_text, load, save, write_text
+from groundstation.results.files import csv_text, json_text, save, write_text
 from groundstation.results.summary import digits_of, summary_of
 from tests.report_example import MANIFEST, example, figure, heading_result
+from tests.saved import load
 
 
 def test_saved_flight_loads_as_it_was(tmp_path: Path) -> None:

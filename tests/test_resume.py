@@ -16,12 +16,13 @@ import pytest
 from filelock import FileLock
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.batch import LOCK, _crew, plan_many, run_many
-from groundstation.pipeline.configuration import Configuration
-from groundstation.pipeline.flight import Job
-from groundstation.pipeline.outcome import Outcome
-from groundstation.pipeline.progress import Event, Listener, silent
-from groundstation.pipeline.workers import TASKS_PER_PROCESS, _teller, in_turn, side_by_side
+from groundstation.pipeline.many_flights.batch import _crew, plan_many, run_many
+from groundstation.pipeline.many_flights.out_folder import LOCK
+from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, _teller, in_turn, side_by_side
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.flight import Job
+from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 SHORT = SAMPLES / "taxi-short.csv"
@@ -212,9 +213,11 @@ def tell_and_sleep(job: Job, listen: Listener) -> Outcome:
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no /proc to look for processes")
 def test_workers_end_with_a_run_that_is_killed(tmp_path: Path) -> None:
     program = (
-        "import sys; from pathlib import Path; from groundstation.pipeline.configuration import Configuration;"
-        "from groundstation.pipeline.flight import Job; from groundstation.pipeline.progress import silent;"
-        "from groundstation.pipeline.workers import side_by_side; from tests.test_resume import tell_and_sleep;"
+        "import sys; from pathlib import Path; from tests.test_resume import tell_and_sleep;"
+        "from groundstation.pipeline.one_flight.configuration import Configuration;"
+        "from groundstation.pipeline.one_flight.flight import Job;"
+        "from groundstation.pipeline.one_flight.progress import silent;"
+        "from groundstation.pipeline.many_flights.workers import side_by_side;"
         "job = Job(Path('x'), Path(sys.argv[1]), Configuration());"
         "list(side_by_side([(0, job)], tell_and_sleep, workers=1, listen=silent))"
     )

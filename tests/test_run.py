@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from groundstation.pipeline.batch import run_many
-from groundstation.pipeline.configuration import Configuration, Interval
-from groundstation.pipeline.conversions import convert_many
-from groundstation.pipeline.flight import Job, run_flight
-from groundstation.pipeline.inputs import flight_folders
-from groundstation.pipeline.outcome import Outcome, worst_code
-from groundstation.pipeline.publishing import report_again
-from groundstation.results.files import load
+from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.inputs import flight_folders
+from groundstation.pipeline.many_flights.publishing import report_again
+from groundstation.pipeline.one_flight.configuration import Configuration, Interval
+from groundstation.pipeline.one_flight.flight import Job, run_flight
+from groundstation.pipeline.one_flight.outcome import Outcome, worst_code
+from groundstation.pipeline.verbs.conversions import convert_many
 from tests.real_logs import real_log
+from tests.saved import load
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 BYTE_IDENTICAL = ("summary.json", "report.html", "report.pdf", "tables")

@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.cli.main import app
-from groundstation.pipeline.serve import recordings_in, serve
+from groundstation.pipeline.verbs.serve import recordings_in, serve
 from groundstation.results.files import SUMMARY
 from groundstation.viewer.fleet import FLIGHTS_TEXT
 from groundstation.viewer.fleet_catalog import FLEET, FLIGHTS, Catalog, catalog_server, reachable
@@ -66,8 +66,8 @@ def client_of(url: str) -> CatalogClient:
 
 @contextmanager
 def served(out: Path, say: Callable[[str], None] = lambda _: None) -> Iterator[Catalog]:
-    flights, fleet = recordings_in(out, say)
-    with catalog_server(flights, fleet, host="127.0.0.1", port=0) as catalog:
+    flights, sessions, fleet = recordings_in(out, say)
+    with catalog_server(flights, fleet, host="127.0.0.1", port=0, sessions=sessions) as catalog:
         yield catalog
 
 

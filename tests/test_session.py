@@ -15,22 +15,22 @@ from groundstation.chapters.cooperative import TITLES, cooperative, is_session, 
 from groundstation.chapters.front import front
 from groundstation.chapters.parts import Facts, Figure, Grid, Mark, Note, Section
 from groundstation.cli.main import main
-from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.cooperative.analysis import COOPERATIVE, NIS_MAX, SessionKnown, innovations_of
 from groundstation.estimators.cooperative.estimate import estimate_session
 from groundstation.estimators.cooperative.settings import ALGORITHMS, CooperativeSettings, InsBelief
-from groundstation.pipeline.analyse import run_analyses
-from groundstation.pipeline.configuration import Configuration, load_configuration
-from groundstation.pipeline.inputs import flight_folders, session_folders
-from groundstation.pipeline.publishing import report_again
-from groundstation.pipeline.session import run_session
+from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
+from groundstation.pipeline.many_flights.publishing import report_again
+from groundstation.pipeline.one_flight.analyse import run_analyses
+from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
+from groundstation.pipeline.verbs.cooperative import run_session
 from groundstation.results.cooperative import CooperativeResult
-from groundstation.results.files import load, load_manifest
+from groundstation.results.files import load_manifest
 from groundstation.results.flight import FlightResults
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_log import write_session
 from tests.cooperative_example import believed, truth_of
 from tests.recording_contents import Contents
+from tests.saved import load
 from tests.session_example import SEED, SHORT, simulated
 
 IDENTITY = "20180305T120000Z_session_A-B-C"
@@ -70,7 +70,7 @@ def out(logs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def results(out: Path) -> FlightResults:
-    return load(out / IDENTITY, ANSWER_TYPES).results
+    return load(out / IDENTITY).results
 
 
 @pytest.fixture
@@ -142,7 +142,7 @@ def test_another_setting_runs_it_again_in_its_place(out: Path, logs: Path, tmp_p
     config.write_text("[cooperative]\noutput_step_s = 10.0\n[session]\nrange_sigma_m = 20.0\n")
     assert called("cooperative", *csvs(logs), "--config", config, "-o", copy, "-q", "--no-pdf") == 0
     assert [folder.name for folder in session_folders(copy)] == [IDENTITY]
-    found = load(copy / IDENTITY, ANSWER_TYPES).results
+    found = load(copy / IDENTITY).results
     answer = found.answer(CooperativeResult)
     assert answer is not None
     assert answer.settings["output_step_s"] == 10.0
@@ -189,7 +189,7 @@ def test_a_log_that_cannot_be_read_stops_no_other(logs: Path, tmp_path: Path) ->
     first, second, _ = csvs(logs)
     outcomes = run_session([first, second, bad], tmp_path / "out", Configuration(), with_pdf=False)
     assert [outcome.state for outcome in outcomes] == ["failed", "done"]
-    found = load(Path(outcomes[1].folder), ANSWER_TYPES).results
+    found = load(Path(outcomes[1].folder)).results
     assert found.metadata["aircraft"] == "A, B"
     codes = {(finding.code, finding.topic) for finding in found.findings}
     assert ("session.unknown_source", "link.C") in codes
@@ -201,7 +201,7 @@ def test_a_cut_log_loses_data_and_says_so(logs: Path, tmp_path: Path) -> None:
     cut.write_bytes(third.read_bytes()[:-20])
     (outcome,) = run_session([first, second, cut], tmp_path / "out", Configuration(), with_pdf=False)
     assert (outcome.state, outcome.code) == ("data_lost", 3)
-    found = load(Path(outcome.folder), ANSWER_TYPES).results
+    found = load(Path(outcome.folder)).results
     assert found.status == "degraded"
     assert [finding.place for finding in found.findings if finding.code == "session.lost_data"] == [third.name]
 
@@ -356,6 +356,29 @@ def test_the_recording_has_both_timelines_and_every_aircraft(contents: Contents)
     assert "/space/stations" in contents.fixed
 
 
+def test_ellipsoids_are_those_of_two_sigma(contents: Contents, results: FlightResults) -> None:
+    tracks = results.figure_with_rows("cooperative_tracks")
+    assert tracks is not None
+    rows = (tracks["algorithm"] == "centralised") & (tracks["vehicle"] == "B")
+    reckoned = tracks["sigma_up_m"][tracks["algorithm"] == "dead_reckoning"]
+    assert reckoned == pytest.approx(SHORT.errors.baro_m, rel=0.01), "the barometer's alone"
+    (batch,) = contents.batches["/space/B/ellipsoid"]
+    half_m, turn = (
+        np.array([row[0] for row in batch.column(f"Ellipsoids3D:{name}").to_pylist()])
+        for name in ("half_sizes", "quaternions")
+    )
+    assert half_m[:, 2] == pytest.approx(2.0 * tracks["sigma_up_m"][rows], rel=1e-5)
+    angle_rad = 2.0 * np.arctan2(turn[:, 2], turn[:, 3])  # of the first half axis, from east to north
+    first, second = half_m[:, 0] ** 2, half_m[:, 1] ** 2
+    east = first * np.cos(angle_rad) ** 2 + second * np.sin(angle_rad) ** 2
+    north = first * np.sin(angle_rad) ** 2 + second * np.cos(angle_rad) ** 2
+    both = (first - second) * np.sin(angle_rad) * np.cos(angle_rad)
+    assert east == pytest.approx(4.0 * tracks["sigma_east_m"][rows] ** 2, rel=1e-4)
+    assert north == pytest.approx(4.0 * tracks["sigma_north_m"][rows] ** 2, rel=1e-4)
+    expected = 4.0 * (tracks["correlation_north_east"] * tracks["sigma_north_m"] * tracks["sigma_east_m"])[rows]
+    assert both == pytest.approx(expected, rel=1e-3, abs=1e-3)
+
+
 def test_links_are_drawn_at_every_second_and_have_lanes(contents: Contents, answer: CooperativeResult) -> None:
     strips = contents.batches["/space/links"]
     rows = [len(row) for batch in strips for row in batch.column("LineStrips3D:strips").to_pylist()]
@@ -426,13 +449,31 @@ def test_ranges_that_contradict_the_stated_sigmas_are_a_warning(
     assert "sigma too small" in COOPERATIVE.sentence(found.answers)
 
 
+def test_a_station_a_little_off_is_named_by_its_ranges() -> None:
+    """Nearer than what the assembly takes for far: then it is the gate that finds it."""
+
+    def named(north_m: float) -> list[str]:
+        session = simulated(SHORT).session
+        first = session.points[0]
+        x, y, z = first.position_m
+        moved = replace(session, points=(replace(first, position_m=(x + north_m, y, z)), *session.points[1:]))
+        found = run_analyses((COOPERATIVE,), moved, SessionKnown(settings={"cooperative": believed(SHORT)}))
+        return [one.place for one in found.findings["cooperative"] if one.code == "cooperative.misplaced_station"]
+
+    assert named(0.0) == []
+    assert named(1000.0) == [simulated(SHORT).session.points[0].name]
+
+
 def test_run_into_the_same_folder_leaves_the_session_be(out: Path, tmp_path: Path) -> None:
     copy = tmp_path / "out"
     shutil.copytree(out, copy)
     log = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv"
     assert called("run", log, "-o", copy, "-q", "--no-pdf", "-j", "1") == 0
     rows = json.loads((copy / "index.json").read_text(encoding="utf-8"))["rows"]
-    assert [row["source"] for row in rows] == ["taxi-short.csv"]
+    assert [(row["kind"], row["source"]) for row in rows] == [
+        ("flight", "taxi-short.csv"),
+        ("session", "session of A, B, C"),
+    ]
     assert len(flight_folders(copy)) == 1
     assert [folder.name for folder in session_folders(copy)] == [IDENTITY]
     assert (copy / IDENTITY / "report.html").read_bytes() == (out / IDENTITY / "report.html").read_bytes()

@@ -14,8 +14,8 @@ from mcap.records import Header
 from mcap.stream_reader import StreamReader
 
 from groundstation.base.records import Column, Damage, RecordBatch
-from groundstation.pipeline.describe import describe
-from groundstation.pipeline.log import open_log
+from groundstation.pipeline.one_flight.log import open_log
+from groundstation.pipeline.verbs.describe import describe
 from groundstation.store.channel import CHUNK_SPAN_NS
 from groundstation.store.framing import MAGIC, to_bytes
 from groundstation.store.info import COPY_NAME, StoreInfo

@@ -8,8 +8,8 @@ import pytest
 
 from groundstation.base.errors import UsageError
 from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.pipeline.catalogue import catalogue
-from groundstation.pipeline.synthesis import STUDIES, study_to
+from groundstation.pipeline.verbs.catalogue import catalogue
+from groundstation.pipeline.verbs.synthesis import STUDIES, study_to
 from groundstation.results.figures import FigureData
 from groundstation.results.forecast import METHODS
 from groundstation.simulation.inertial_family import simulate_family

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from groundstation.cli.main import app
-from groundstation.pipeline.synthesis import STUDIES
+from groundstation.pipeline.verbs.synthesis import STUDIES
 from groundstation.simulation.scenario import scenario_names
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"

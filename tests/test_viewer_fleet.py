@@ -10,7 +10,7 @@ import pyarrow as pa
 import pytest
 from rerun.experimental import ViewerClient
 
-from groundstation.pipeline.fleet import gather
+from groundstation.pipeline.many_flights.fleet import gather
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import Densities, FleetResults, NotInFleet
 from groundstation.viewer.fleet import write_fleet_recording

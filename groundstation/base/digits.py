@@ -4,7 +4,9 @@ import math
 from collections.abc import Mapping
 from functools import cache
 
-# Decimals by unit suffix; by full name where a suffix is not enough. 6 where neither says anything.
+from groundstation.base.unit_names import UNITS
+
+# Decimals by full name, where the unit is not enough. 6 where neither says anything.
 DIGITS_BY_NAME: Mapping[str, int] = {
     "drift_deg_per_h": 2,
     "drift_sigma_deg_per_h": 2,
@@ -16,21 +18,7 @@ DIGITS_BY_NAME: Mapping[str, int] = {
     "value": 5,
     "reference_residual_arcmin": 2,
 }
-DIGITS_BY_UNIT: Mapping[str, int] = {
-    "deg": 4,
-    "arcmin": 2,
-    "mps": 4,
-    "m": 3,
-    "s": 3,
-    "min": 3,
-    "h": 4,
-    "hz": 4,
-    "arcsec": 3,
-    "dph": 6,
-    "dphph": 6,
-    "nmiph": 4,
-    "nt": 2,
-}
+HOURS_AND_MINUTES: Mapping[str, int] = {"min": 3, "h": 4}  # "min" is a unit after a length of time, else "at least"
 USUAL = 6
 
 
@@ -49,8 +37,9 @@ def digits_of(name: str) -> int:
         return DIGITS_BY_NAME[name]
     for part in reversed(name.split("_")):
         unit = part.rstrip("0123456789")
-        if unit in DIGITS_BY_UNIT:
-            return DIGITS_BY_UNIT[unit]
+        decimals = UNITS[unit].decimals if unit in UNITS else HOURS_AND_MINUTES.get(unit)
+        if decimals is not None:
+            return decimals
     return USUAL
 
 

@@ -60,7 +60,7 @@ class SettingsError(UsageError):
 
 @contextmanager
 def told_in_a_line(where: str) -> Iterator[None]:
-    """Tell what the machine refuses in one line, as everything else is told: of its file, where it is known."""
+    """Say in one line what the operating system refused, with the file where it is known."""
     try:
         yield
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Findings: what a user must know about a flight, with its place and how grave it is."""
+"""Findings: what a user must know about a flight, with its place and severity."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -35,7 +35,7 @@ class Finding:
 
 
 def worst(findings: "tuple[Finding, ...]") -> Severity | None:
-    """The gravest severity among findings, None when there are none.
+    """The highest severity among findings, None when there are none.
 
     Examples
     --------

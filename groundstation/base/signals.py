@@ -19,7 +19,7 @@ class Field:
     name : str
         ``quantity_..._unit``; no suffix means no unit.
     unit : str
-        As in the name: deg, m, mps, dps, mps2, nt, a, or empty.
+        As in the name: deg, m, mps, dps, mps2, nt, a, dots, mhz, or empty.
     kind : {'double', 'bool', 'text'}
     low, high : float
         Physical range; values outside are findings, not corrected.
@@ -69,7 +69,10 @@ _INS = (
     *(_double(f"accel_{axis}_mps2", "mps2", -1_000.0, 1_000.0) for axis in "xyz"),
     _text("mode"),
     _flag("valid"),
+    _double("ground_speed_mps", "mps", 0.0, 3_000.0),
 )
+# Protection levels by the satellite-based augmentation and by fault detection in the receiver.
+_PROTECTION = tuple((axis, by) for axis in ("horizontal", "vertical") for by in ("sbas", "fd"))
 
 # Topic kind -> its fields. `ins.1`, `ins.2`, `link.<peer>` are instances of a kind.
 TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
@@ -98,13 +101,28 @@ TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
         ),
         "magnetometer": tuple(_double(f"field_{axis}_nt", "nt", -1e6, 1e6) for axis in ("forward", "right", "down")),
         "electric": (_double("current_a", "a", -10_000.0, 10_000.0),),
-        "baro": (_double("pressure_altitude_m", "m", -1_000.0, 100_000.0),),
+        "baro": (
+            _double("pressure_altitude_m", "m", -1_000.0, 100_000.0),
+            _double("height_above_airfield_m", "m", -1_000.0, 100_000.0),
+        ),
         "air": (
             _double("true_airspeed_mps", "mps", 0.0, 2_000.0),
             _double("wind_north_mps", "mps", -200.0, 200.0),
             _double("wind_east_mps", "mps", -200.0, 200.0),
+            _double("indicated_airspeed_mps", "mps", 0.0, 2_000.0),
         ),
         "radio_altimeter": (_double("height_m", "m", -50.0, 10_000.0),),
+        "gnss_integrity": (
+            *(_double(f"{axis}_protection_{by}_m", "m", 0.0, 100_000.0) for axis, by in _PROTECTION),
+            *(_double(f"{axis}_alarm_limit_m", "m", 0.0, 100_000.0) for axis in ("horizontal", "vertical")),
+        ),
+        "guidance": (
+            _double("lateral_deviation_dots", "dots", -10.0, 10.0),
+            _double("vertical_deviation_dots", "dots", -10.0, 10.0),
+            _text("source"),
+            _double("frequency_mhz", "mhz", 0.0, 1_000.0),
+            _heading("course_magnetic_deg"),
+        ),
         "discrete": (_flag("weight_on_wheels"),),
         "event": (_text("name"),),
         "link": (

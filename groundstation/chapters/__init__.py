@@ -44,6 +44,12 @@ def chapters_of(results: FlightResults) -> tuple[Section, ...]:
     )
 
 
+def chapter_of(results: FlightResults, answer: Answer) -> Section:
+    """The chapter that tells an answer: its own, else the generic one."""
+    own = (one.build(results) for one in (*FLIGHT_CHAPTERS, *SESSION_CHAPTERS) if isinstance(answer, one.answers))
+    return next((section for section in own if section is not None), None) or generic(results, answer)
+
+
 def without_chapter(results: FlightResults) -> tuple[Answer, ...]:
     """The answers that no chapter of its own tells."""
     told = tuple(kind for chapter in (*FLIGHT_CHAPTERS, *SESSION_CHAPTERS, *PLAN_CHAPTERS) for kind in chapter.answers)

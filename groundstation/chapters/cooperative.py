@@ -1,6 +1,6 @@
 """Chapter: navigation between aircraft: which algorithm to trust, how good it is, and on what it rests."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from groundstation.chapters.assessed import reason_of, without_answer
 from groundstation.chapters.parts import Cell, Facts, Figure, Front, Grid, Head, Mark, Note, Part, Section
@@ -8,6 +8,7 @@ from groundstation.chapters.verdict import NOT_ASSESSABLE, sentence
 from groundstation.chapters.wording import any_value, clock, is_number, named_quantity, number, significant, words
 from groundstation.results.cooperative import AlgorithmRow, CooperativeResult, LinkRow
 from groundstation.results.figures import FigureData, flags, numbers, texts
+from groundstation.results.fleet import SessionRow
 from groundstation.results.flight import FlightResults
 
 TITLE = "Navigation between aircraft"
@@ -25,7 +26,7 @@ TITLES: Mapping[str, str] = {
     "pairwise": "Stored pairwise covariances",
 }
 REFERENCE = "dead_reckoning"
-MOST_LINKS = 40
+MOST_LINKS, MOST_NAMES = 40, 6
 ALGORITHM_HEADS = (
     *(Head("Algorithm"), Head("Update"), Head("2σ_r, worst at the end, m", True), Head("RMS error, m", True)),
     *(Head("RMS over the bound", True), Head("NEES (95 % limits)", True), Head("Consistent"), Head("Diverges")),
@@ -105,7 +106,7 @@ def title_of(algorithm: str) -> str:
     return TITLES.get(algorithm, words(algorithm))
 
 
-def state_of(row: AlgorithmRow) -> Mark:
+def state_of(row: AlgorithmRow | SessionRow) -> Mark:
     """What truth says of an algorithm, in a word."""
     if row.diverges is None or row.is_consistent is None:
         return Mark("unknown", "Not judged")
@@ -138,13 +139,24 @@ def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -
         figures.append(("Over the bound", number(best.bound_ratio, 2), "RMS error over that of Cramér and Rao"))
     figures.append(("Data link", number(best.bytes_per_slot, 0, "bytes"), "a slot, for this algorithm"))
     return Front(
-        f"Session of {', '.join(answer.vehicle_names)}",
+        f"Session of {names_or_count(answer.vehicle_names)}",
         pairs,
         verdict=state_of(best),
         headline=f"{title_of(best.algorithm)}: 2σ_r {number(best.two_sigma_r_m, 1, 'm')}",
         sentences=(_reason(answer, best),),
         figures=tuple(figures),
     )
+
+
+def names_or_count(names: Sequence[str]) -> str:
+    """Names of a few aircraft; of many how many they are.
+
+    Examples
+    --------
+    >>> names_or_count(["A", "B"]), names_or_count(["A"] * 20)
+    ('A, B', '20 aircraft')
+    """
+    return ", ".join(names) if len(names) <= MOST_NAMES else f"{len(names)} aircraft"
 
 
 def _headline(best: AlgorithmRow) -> str:

@@ -1,4 +1,4 @@
-"""Chapter: what a user must know about the flight, gravest first, and what could not be assessed."""
+"""Chapter: what a user must know about the flight, most severe first, and what could not be assessed."""
 
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Part, Section
 from groundstation.chapters.wording import number
@@ -18,7 +18,7 @@ def findings(results: FlightResults) -> Section:
     missing = not_assessable(results)
     if missing is not None:
         parts.append(missing)
-    return Section("findings", "Findings", "What was noticed about this log, gravest first.", parts)
+    return Section("findings", "Findings", "What was noticed about this log, the most severe first.", parts)
 
 
 def not_assessable(results: FlightResults) -> Grid | None:

@@ -17,7 +17,7 @@ FORECAST_MIN = 60.0  # the horizon the forecast is judged by at a glance
 HOUR_S = 3599.5  # rounds to an hour
 STATUS: dict[Status, Mark] = {
     "ok": Mark("good", "ok"),
-    "degraded": Mark("warn", "degraded: data were lost or a finding is grave"),
+    "degraded": Mark("warn", "degraded: data were lost"),
     "failed": Mark("bad", "failed: nothing could be computed"),
 }
 UNKNOWN_REASON = "the log does not hold what the method needs"

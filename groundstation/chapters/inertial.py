@@ -130,7 +130,7 @@ def _in_words(channels: Channels) -> str:
     told = " and ".join(f"{number(100.0 * share, 1, '%')} ({name})" for name, share in shares.items())
     text = f"{told} of the innovations lie inside their 95 % band"
     if min(shares.values()) < CONSISTENT[0]:
-        return f"{text}: the filter is surer than it should be."
+        return f"{text}: the filter is overconfident, its sigmas are too small."
     if _is_inflated(channels):
         return (
             "The GNSS noise was raised to cover slow errors, so innovations cannot show whether the filter is "

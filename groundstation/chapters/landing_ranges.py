@@ -139,7 +139,7 @@ def _trials(answer: RangeLanding) -> Grid | None:
 def _trial(row: TrialRow) -> tuple[Cell, ...]:
     state = Mark("good", "consistent") if row.is_consistent else Mark("warn", "not consistent")
     if row.nees > row.nees_high:
-        state = Mark("bad", "too sure")
+        state = Mark("bad", "overconfident")
     return (
         "taken for white" if row.filter == WHITE else "modelled",
         number(row.before_threshold_m, 0),

@@ -4,6 +4,8 @@ import math
 import re
 from typing import Any, TypeGuard
 
+from groundstation.base.unit_names import UNITS, split_unit
+
 ABSENT = "—"
 MINUS = "−"
 NARROW_SPACE = "\u202f"
@@ -151,35 +153,6 @@ def words(name: str) -> str:
     return clean(name).replace("_", " ").strip()
 
 
-UNIT_SIGNS = {  # a suffix that ends like a shorter one stands before it
-    "mps_per_sqrt_s": "m/s/√s",
-    "deg_per_sqrt_h": "°/√h",
-    "dphph_per_sqrt_h": "°/h²/√h",
-    "dph_per_sqrt_h": "°/h/√h",
-    "deg": "°",
-    "rad": "rad",
-    "arcmin": "′",
-    "arcsec": "arcsec",
-    "dphph": "°/h²",
-    "dph": "°/h",
-    "nmiph": "nmi/h",
-    "mps": "m/s",
-    "deg_per_h": "°/h",
-    "deg_per_s": "°/s",
-    "per_h": "/h",
-    "per_s": "/s",
-    "dps": "°/s",
-    "hz": "Hz",
-    "ppm": "ppm",
-    "percent": "%",
-    "ms": "ms",
-    "us": "µs",
-    "ns": "ns",
-    "s": "s",
-    "m": "m",
-}
-
-
 def named_quantity(name: str) -> tuple[str, str]:
     """Split a field name into words and the sign of its unit.
 
@@ -190,15 +163,13 @@ def named_quantity(name: str) -> tuple[str, str]:
     >>> named_quantity("walk_mps_per_sqrt_s"), named_quantity("drift_walk_dph_per_sqrt_h"), named_quantity("tilt_rad")
     (('walk', 'm/s/√s'), ('drift walk', '°/h/√h'), ('tilt', 'rad'))
     """
-    for suffix, sign in UNIT_SIGNS.items():
-        if name.endswith("_" + suffix):
-            return words(name[: -len(suffix) - 1]), sign
-    return words(name), ""
+    what, unit = split_unit(name)
+    return words(what), "" if unit is None else unit.sign
 
 
 def unit_sign(unit: str) -> str:
     """The sign a unit is printed with: ``deg`` becomes ``°``; what is unknown stays as it is."""
-    return UNIT_SIGNS.get(unit, unit)
+    return UNITS[unit].sign if unit in UNITS else unit
 
 
 def any_value(value: Any, unit: str = "") -> str:

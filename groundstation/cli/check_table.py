@@ -12,7 +12,7 @@ from groundstation.chapters.parts import Grid, Head
 from groundstation.chapters.terminal import columns, grid_text
 from groundstation.cli.printing import totals
 from groundstation.cli.text import as_json, printable
-from groundstation.pipeline.check import Checked
+from groundstation.pipeline.verbs.check import Checked
 
 MOST_LISTED = 8  # gaps or stretches of one topic; all are in the JSON
 

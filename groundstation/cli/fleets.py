@@ -18,7 +18,7 @@ def serve(
     verbose: Verbose = False,
 ) -> int | None:
     """Offer all recordings of a folder through Rerun's catalog server, until Ctrl-C."""
-    from groundstation.pipeline.serve import serve as offer
+    from groundstation.pipeline.verbs.serve import serve as offer
 
     offer(out, host=host, port=port, web=web, tell=typer.echo, say=say)
     return DONE

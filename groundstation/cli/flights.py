@@ -54,9 +54,9 @@ def clip(
     """Cut a part of a flight into a small MCAP, an input of every verb, and its recording."""
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.clip import Wanted
-    from groundstation.pipeline.clip import clip as cut
-    from groundstation.pipeline.configuration import load_configuration
+    from groundstation.pipeline.one_flight.configuration import load_configuration
+    from groundstation.pipeline.verbs.clip import Wanted
+    from groundstation.pipeline.verbs.clip import clip as cut
 
     with listener("none" if quiet else progress) as listen:
         outcome = cut(
@@ -96,8 +96,8 @@ def compare(
     """Compare two flights, or two runs of one flight: what differs, and both in one recording on one time axis."""
     from groundstation.base.serial import to_json
     from groundstation.cli import printing
-    from groundstation.pipeline.compare import compare as held_against
-    from groundstation.pipeline.compare import compare_to
+    from groundstation.pipeline.verbs.compare import compare as held_against
+    from groundstation.pipeline.verbs.compare import compare_to
 
     found = held_against(a, b, align)[0] if output is None else compare_to(a, b, output, align, force=force)
     if json:

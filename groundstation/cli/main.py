@@ -59,7 +59,7 @@ def info(
 ) -> int | None:
     """Tell what a log is: format, clock, span, topics with rows, rates and fields."""
     from groundstation.cli import printing
-    from groundstation.pipeline.describe import describe
+    from groundstation.pipeline.verbs.describe import describe
 
     description = describe(log, profile)
     typer.echo(printing.as_json(description.to_dict()) if json else printing.description(description))
@@ -73,7 +73,7 @@ def check(
     thresholds: ThresholdsFile = None,
     config: ConfigFile = None,
     profile: Profile = None,
-    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is this grave.")] = "none",
+    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 at a finding this severe or worse.")] = "none",
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
@@ -82,8 +82,8 @@ def check(
     """Print the integrity ledger: rates, coverage, gaps, losses and odd values of every topic. Writes nothing."""
     from groundstation.cli import check_table, printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.check import check_many
-    from groundstation.pipeline.configuration import load_configuration
+    from groundstation.pipeline.one_flight.configuration import load_configuration
+    from groundstation.pipeline.verbs.check import check_many
 
     configuration = load_configuration(config, profile=profile, thresholds=thresholds)
     with listener("none" if quiet else progress) as listen:
@@ -111,8 +111,8 @@ def convert(
     """Convert recorded logs to MCAP (protobuf channels, zstd, indexed); the clock is repaired, both times are kept."""
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.configuration import load_configuration
-    from groundstation.pipeline.conversions import convert_many
+    from groundstation.pipeline.one_flight.configuration import load_configuration
+    from groundstation.pipeline.verbs.conversions import convert_many
 
     configuration = load_configuration(config, profile=profile, thresholds=thresholds)
     with listener("none" if quiet else progress) as listen:
@@ -136,7 +136,7 @@ def run(
     scheduler: Annotated[
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
     ] = "",
-    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is this grave.")] = "none",
+    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 at a finding this severe or worse.")] = "none",
     apply: Annotated[
         str,
         typer.Option(
@@ -146,6 +146,15 @@ def run(
             metavar="own|PATH",
         ),
     ] = "",
+    stations: Annotated[
+        Path | None,
+        typer.Option(
+            "--stations",
+            help="Ground stations of the sessions found (TOML); left out: stations.toml beside the logs.",
+            metavar="FILE",
+            readable=False,
+        ),
+    ] = None,
     no_pdf: NoPdf = False,
     redo: Annotated[bool, typer.Option("--redo", help="Do again what an earlier run finished.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done; write nothing.")] = False,
@@ -157,12 +166,14 @@ def run(
 ) -> int | None:
     """Run everything the data allows: MCAP, heading correction, recording and report of each flight.
 
+    Flights of several aircraft that ranged to one another over a data link are then analysed as a session.
+
     An OUT of an earlier run is continued: what it finished with the same logs and settings is not done again.
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.batch import plan_many, run_many
-    from groundstation.pipeline.configuration import applying, load_configuration
+    from groundstation.pipeline.many_flights.batch import plan_many, run_many
+    from groundstation.pipeline.one_flight.configuration import applying, load_configuration
 
     configuration = applying(load_configuration(config, aircraft, site, intervals, profile, thresholds), apply)
     if dry_run:
@@ -180,6 +191,7 @@ def run(
             fail_on=fail_on,
             with_pdf=not no_pdf,
             redo=redo,
+            stations=stations,
             listen=listen,
         )
     printing.outcomes(outcomes, as_json_text=json, quiet=quiet, with_times=verbose)
@@ -197,7 +209,7 @@ def report(
 ) -> int | None:
     """Make the reports and the index again from the saved results, without the logs."""
     from groundstation.cli import printing
-    from groundstation.pipeline.publishing import report_again
+    from groundstation.pipeline.many_flights.publishing import report_again
 
     paths, problems = report_again(out, with_pdf=not no_pdf)
     tell_written(paths, as_json_text=json, quiet=quiet)
@@ -227,7 +239,7 @@ def view(
     verbose: Verbose = False,
 ) -> int | None:
     """Look at a flight in the Rerun viewer, native or in the browser."""
-    from groundstation.pipeline.view import look_at
+    from groundstation.pipeline.verbs.view import look_at
 
     look_at(flight, web=web, host=host, port=port, profile=profile, say=say)
     return DONE
@@ -245,7 +257,7 @@ def simulate(
     json: Json = False,
 ) -> int | None:
     """Simulate a flight as a flat CSV, with the truth beside it. `groundstation list` names the scenarios."""
-    from groundstation.pipeline.synthesis import simulate_to
+    from groundstation.pipeline.verbs.synthesis import simulate_to
 
     tell_written(simulate_to(scenario, output, seed=seed, force=force), as_json_text=json, quiet=quiet)
     return DONE
@@ -268,7 +280,7 @@ def study(
 ) -> int | None:
     """Monte Carlo behind the published figures, with ours beside them."""
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.synthesis import study_to
+    from groundstation.pipeline.verbs.synthesis import study_to
 
     with listener("none" if quiet else progress) as listen:
         text = study_to(name, output, runs=runs, seed=seed, force=force, listen=listen)
@@ -281,7 +293,10 @@ def study(
 @answers_with_exit_code
 def list_(
     log: Annotated[
-        Path | None, typer.Argument(help="A log: would each analysis run on it?", metavar="LOG", readable=False)
+        Path | None,
+        typer.Argument(
+            help="A log, flight folder or session: would each analysis run on it?", metavar="LOG", readable=False
+        ),
     ] = None,
     profile: Profile = None,
     json: Json = False,
@@ -289,7 +304,7 @@ def list_(
 ) -> int | None:
     """List the analyses and what each needs; with a LOG, whether each would run and why not."""
     from groundstation.cli import printing
-    from groundstation.pipeline.catalogue import catalogue
+    from groundstation.pipeline.verbs.catalogue import catalogue
 
     entries = catalogue(log, profile)
     typer.echo(printing.as_json(entries) if json else printing.catalogue(entries, log is not None))
@@ -301,7 +316,11 @@ def list_(
 def cooperative(
     logs: Annotated[
         list[Path],
-        typer.Argument(help="Logs, MCAPs or flight folders, one of each aircraft.", metavar="LOG", readable=False),
+        typer.Argument(
+            help="Logs, MCAPs or flight folders, one of each aircraft; or a session, to run it again.",
+            metavar="LOG",
+            readable=False,
+        ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.", metavar="OUT")],
     stations: Annotated[
@@ -310,7 +329,7 @@ def cooperative(
     ] = None,
     config: ConfigFile = None,
     profile: Profile = None,
-    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is this grave.")] = "none",
+    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 at a finding this severe or worse.")] = "none",
     no_pdf: NoPdf = False,
     force: Force = False,
     quiet: Quiet = False,
@@ -324,8 +343,8 @@ def cooperative(
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.configuration import load_configuration
-    from groundstation.pipeline.session import run_session
+    from groundstation.pipeline.one_flight.configuration import load_configuration
+    from groundstation.pipeline.verbs.cooperative import run_session
 
     configuration = load_configuration(config, profile=profile)
     with listener("none" if quiet else progress) as listen:

@@ -41,7 +41,7 @@ def session(
     scenario: Scenario = None,
     output: Output = None,
     listed: Listed = False,
-    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is this grave.")] = "none",
+    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 at a finding this severe or worse.")] = "none",
     no_pdf: NoPdf = False,
     force: Force = False,
     quiet: Quiet = False,
@@ -88,7 +88,7 @@ def _plan(
     from groundstation.chapters.terminal import columns
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.plan import run_plan, shipped_scenarios
+    from groundstation.pipeline.verbs.plan import run_plan, shipped_scenarios
 
     if listed:
         rows = [[one.name, one.title] for one in shipped_scenarios(kind)]

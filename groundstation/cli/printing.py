@@ -7,8 +7,8 @@ import typer
 
 from groundstation.chapters.terminal import columns
 from groundstation.cli.text import as_json, printable
-from groundstation.pipeline.describe import Description
-from groundstation.pipeline.outcome import Outcome, worst_code
+from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
+from groundstation.pipeline.verbs.describe import Description
 
 __all__ = ["as_json", "catalogue", "description", "outcomes", "worst_code"]
 
@@ -62,18 +62,26 @@ def outcomes(
 
 
 def totals(done: Sequence[Outcome]) -> str:
-    """Totals line: how many logs ended in which state.
+    """Totals line: how many logs, and sessions of several, ended in which state.
 
     Examples
     --------
     >>> totals([Outcome("a", "done", ""), Outcome("b", "failed", "x")])
     '2 logs: 1 done, 0 with data lost, 0 at the limit, 1 failed, 0 skipped'
+    >>> totals([Outcome("a", "done", ""), Outcome("a, b", "done", "", is_session=True)]).partition("; ")[2]
+    '1 session: 1 done, 0 with data lost, 0 at the limit, 0 failed'
     """
-    count = {state: sum(one.state == state for one in done) for state in _STATE_WORDS}
-    return f"{len(done)} logs: " + ", ".join(f"{count[state]} {word}" for state, word in _STATE_WORDS.items())
+    logs = _counted("log", [one for one in done if not one.is_session], list(_STATE_WORDS))
+    sessions = [one for one in done if one.is_session and one.state != "skipped"]
+    return "; ".join([logs, *([_counted("session", sessions, list(_STATE_WORDS)[:-1])] if sessions else [])])
 
 
-_STATE_WORDS = {
+def _counted(noun: str, done: Sequence[Outcome], states: Sequence[State]) -> str:
+    counts = ", ".join(f"{sum(one.state == state for one in done)} {_STATE_WORDS[state]}" for state in states)
+    return f"{len(done)} {noun}{'' if len(done) == 1 else 's'}: {counts}"
+
+
+_STATE_WORDS: Mapping[State, str] = {
     "done": "done",
     "data_lost": "with data lost",
     "limit_reached": "at the limit",
@@ -84,6 +92,7 @@ _STATE_WORDS = {
 
 def _plain(outcome: Outcome) -> dict[str, Any]:
     return {
+        **({"kind": "session"} if outcome.is_session else {}),
         "source": outcome.source,
         "state": outcome.state,
         "exit_code": outcome.code,

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Literal
 
-from groundstation.pipeline.progress import Event, Listener, silent
+from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
 
 @contextmanager

@@ -1,12 +1,12 @@
 """Integrity: the clock model of a log, its ledger of losses and oddities, and records in order of corrected time."""
 
+from groundstation.base.gaps import Gaps
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.clock_steps import ClockSettings, ClockStep
 from groundstation.integrity.ledger import FieldCounts, LedgerCounts, TopicCounts
 from groundstation.integrity.ledger_findings import ledger_findings
 from groundstation.integrity.limits import Thresholds, thresholds_from
 from groundstation.integrity.ordering import corrected
-from groundstation.integrity.rhythm import Gaps
 from groundstation.integrity.survey import Survey, survey
 
 __all__ = [

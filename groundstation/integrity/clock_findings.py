@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 
 from groundstation.base.findings import Finding, Severity
+from groundstation.base.normal import NORMAL_95
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import FIRST_NS, ClockModel
-from groundstation.integrity.clock_fit import Z95
 from groundstation.integrity.clock_relation import ClockRelation, Mistake
 from groundstation.integrity.clock_steps import ClockStep
 from groundstation.integrity.ledger import LedgerCounts
@@ -136,7 +136,7 @@ def _relation(relation: ClockRelation, clock: ClockModel, most_ppm: float) -> It
             yield Finding("info", "clock.relation_rate", text, place=place)
     for segment in relation.segments:
         drift, sigma = segment.drift_ppm, segment.drift_sigma_ppm
-        if drift is not None and sigma is not None and abs(drift) - Z95 * sigma > most_ppm:
+        if drift is not None and sigma is not None and abs(drift) - NORMAL_95 * sigma > most_ppm:
             pace = "fast" if drift > 0 else "slow"
             text = f"the recorder's clock is {pace} against {relation.name}: {relation.drift_text(segment)}"
             yield Finding("warn", "clock.drift", text, place=f"from {clock.text(segment.start_ns)}")

@@ -14,13 +14,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.normal import NORMAL_95
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock_relation import ClockBreak, ClockSegment
 
 FloatArray = NDArray[np.float64]
 
-Z95 = 1.96
 BLOCKS, LEAST_IN_BLOCK, FEWEST_BLOCKS = 32, 3, 4  # of a line
 SPLIT_BLOCKS, LEAST_IN_SPLIT_BLOCK, SIDE_BLOCKS = 96, 5, 6  # where a change of rate is looked for
 SPLIT_GAIN, SPLIT_RATIO = 16.0, 9.0  # what two lines must gain; both by Monte Carlo, tests/test_clock_fit.py
@@ -135,7 +135,7 @@ def _with_drift(segment: ClockSegment, line: _Line, observable_ppm: float) -> Cl
         return segment
     drift_ppm = 1e6 * (1.0 / (1.0 + line.slope) - 1.0)
     sigma_ppm = 1e6 * line.slope_sigma / (1.0 + line.slope) ** 2
-    is_observed = Z95 * sigma_ppm <= observable_ppm or abs(drift_ppm) > SIGNIFICANT * sigma_ppm
+    is_observed = NORMAL_95 * sigma_ppm <= observable_ppm or abs(drift_ppm) > SIGNIFICANT * sigma_ppm
     return replace(segment, drift_ppm=drift_ppm if is_observed else None, drift_sigma_ppm=sigma_ppm)
 
 
@@ -173,7 +173,7 @@ def _student(freedom: float) -> float:
 
     Source: Abramowitz and Stegun, Handbook of Mathematical Functions (1964), 26.7.5; at 2 degrees of freedom 5 % low.
     """
-    z, n = Z95, freedom
+    z, n = NORMAL_95, freedom
     second, third = 5 * z**5 + 16 * z**3 + 3 * z, 3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z
     return (z + (z**3 + z) / (4 * n) + second / (96 * n**2) + third / (384 * n**3)) / z
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from groundstation.base.gaps import Gaps
 from groundstation.base.ledger import (
     DamageEntry,
     Dropouts,
@@ -22,7 +23,7 @@ from groundstation.base.records import Damage, Int64Array, Remark
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.limits import Thresholds, shipped
-from groundstation.integrity.rhythm import Gaps, rhythm_of
+from groundstation.integrity.rhythm import rhythm_of
 from groundstation.integrity.sequence import Sequence
 from groundstation.integrity.spans import Dropout, Span, Timeline, skipped_bytes, spans_of, truncation
 from groundstation.integrity.stuck import Stuck

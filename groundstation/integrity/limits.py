@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache
@@ -95,7 +96,7 @@ class Thresholds:
     name : str
         Whose limits they are: ``"default"`` those that are shipped.
     ranges : mapping of topic kind to field to (low, high)
-        Physical ranges; a field that is not named keeps that of ``base.signals``.
+        Physical ranges; those of ``base.signals`` but for what the file states.
     """
 
     version: int
@@ -185,7 +186,7 @@ def _ranges(table: Any, where: str, key: str) -> dict[str, dict[str, Range]]:
     """The physical ranges of a file, checked."""
     if not isinstance(table, Mapping):
         raise SettingsError(f"{where}, key {key}", repr(table), "a table")
-    ranges: dict[str, dict[str, Range]] = {}
+    ranges = _ranges_of_signals()
     for kind, fields in table.items():
         if kind not in TOPICS or not isinstance(fields, Mapping):
             raise SettingsError(f"{where}, key {key}.{kind}", "a key that nothing reads", f"one of {', '.join(TOPICS)}")
@@ -195,6 +196,15 @@ def _ranges(table: Any, where: str, key: str) -> dict[str, dict[str, Range]]:
             if name not in known:
                 raise SettingsError(place, "a key that nothing reads", f"one of {', '.join(known)}")
             ranges.setdefault(kind, {})[name] = _range(ends, place)
+    return ranges
+
+
+def _ranges_of_signals() -> dict[str, dict[str, Range]]:
+    ranges: dict[str, dict[str, Range]] = {}
+    for kind, fields in TOPICS.items():
+        for one in fields:
+            if one.kind == "double" and not (math.isinf(one.low) and math.isinf(one.high)):
+                ranges.setdefault(kind, {})[one.name] = one.low, one.high
     return ranges
 
 

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from typing import Any
 
 import numpy as np
 
-from groundstation.base.records import Int64Array, frozen
+from groundstation.base.gaps import Gaps
+from groundstation.base.records import Int64Array
 from groundstation.base.signals import is_canonical
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock_steps import quantile
@@ -15,22 +15,6 @@ from groundstation.integrity.limits import GapLimits, RhythmLimits, Thresholds
 MOST_STEPS = 10_000  # of which a typical step is taken
 WHOLE = 0.2  # periods that a step may be off a whole number of them
 MOST_SKIPPED = 10.0  # periods: a longer step that is no gap explains nothing
-
-
-@dataclass(frozen=True)
-class Gaps:
-    """Gaps of one topic: last sample before each (corrected nanoseconds) and seconds to the next, shape (n,)."""
-
-    topic: str
-    start_ns: Int64Array
-    length_s: np.ndarray[Any, np.dtype[np.float64]]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "start_ns", frozen(self.start_ns))
-        object.__setattr__(self, "length_s", frozen(self.length_s))
-
-    def __len__(self) -> int:
-        return len(self.start_ns)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from groundstation.base.gaps import Gaps
 from groundstation.base.records import BoolArray, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import ClockModel, estimate_clock
@@ -20,7 +21,6 @@ from groundstation.integrity.ledger import LedgerCounts, TopicCounts, topic_ledg
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.integrity.ordering import joined_columns
 from groundstation.integrity.places import Kept, Places
-from groundstation.integrity.rhythm import Gaps
 from groundstation.integrity.thinning import Thinner
 
 

@@ -11,15 +11,15 @@ from groundstation.base.errors import GroundstationError, UsageError, told_in_a_
 from groundstation.base.ledger import Ledger
 from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.integrity.limits import Thresholds
-from groundstation.pipeline.analyse import analyse
-from groundstation.pipeline.configuration import SECTIONS, Configuration, load_configuration
-from groundstation.pipeline.convert import Converted, convert_log
-from groundstation.pipeline.describe import facts_of
-from groundstation.pipeline.flight import given_of, read_flight
-from groundstation.pipeline.identity import flight_id
-from groundstation.pipeline.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, file_in
-from groundstation.pipeline.log import Log, open_log
+from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, file_in
 from groundstation.pipeline.notebook import AnyPath, OpenFlight
+from groundstation.pipeline.one_flight.analyse import analyse
+from groundstation.pipeline.one_flight.configuration import SECTIONS, Configuration, load_configuration
+from groundstation.pipeline.one_flight.convert import Converted, convert_log
+from groundstation.pipeline.one_flight.flight import given_of, read_flight
+from groundstation.pipeline.one_flight.identity import flight_id
+from groundstation.pipeline.one_flight.log import Log, open_log
+from groundstation.pipeline.verbs.describe import facts_of
 from groundstation.results.files import SavedFlight, load
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.manifest import Manifest
@@ -86,7 +86,7 @@ def open_fleet(out: AnyPath) -> "pd.DataFrame":
     """
     import pandas as pd
 
-    from groundstation.pipeline.fleet import FLEET_PARQUET
+    from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET
 
     table = Path(out) / FLEET_PARQUET
     if not table.is_file():
@@ -106,7 +106,7 @@ def simulate(scenario: str, folder: AnyPath, *, seed: int | None = None) -> Path
     GroundstationError
         When there is no such scenario.
     """
-    from groundstation.pipeline.synthesis import simulate_to
+    from groundstation.pipeline.verbs.synthesis import simulate_to
 
     with told_in_a_line(str(folder)):
         return simulate_to(scenario, Path(folder), seed=seed, force=True)[0]
@@ -181,7 +181,7 @@ class OpenLog(OpenFlight):
         GroundstationError
             When ``out`` is something else's, or the log cannot be run.
         """
-        from groundstation.pipeline.batch import run_many
+        from groundstation.pipeline.many_flights.batch import run_many
 
         with told_in_a_line(str(out)):
             outcome = run_many([self._conversion.log.path], Path(out), self.configuration, jobs=1, force=force)[0]
@@ -194,7 +194,7 @@ class OpenLog(OpenFlight):
 
         manifest = Manifest(configuration=self.configuration.to_dict())
         figures = {figure.name: figure for figure in self.results.figures}
-        return SavedFlight(Path(), summary_of(self.results), manifest, figures)
+        return SavedFlight(Path(), summary_of(self.results), manifest, figures, ANSWER_TYPES)
 
 
 class SavedRun(OpenFlight):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from groundstation.base.clock import Clock
 from groundstation.base.errors import GroundstationError, NotAssessableError, UsageError, told_in_a_line
 from groundstation.base.ledger import Ledger
-from groundstation.pipeline.flight import sentence
+from groundstation.pipeline.one_flight.flight import sentence
 from groundstation.results.answer import A
 from groundstation.results.files import SavedFlight
 from groundstation.results.flight import FlightResults, Source

@@ -14,13 +14,13 @@ from typing import Any
 
 from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
 from groundstation.base.records import Item, RecordBatch, Remark
-from groundstation.readers import csv_profile, dataflash, flat_csv, magic, ulog
+from groundstation.readers import csv_profile, dataflash, flat_csv, flightdata_hdf5, magic, ulog
 from groundstation.readers.compressed import COMPRESSIONS
-from groundstation.readers.source import Claim, Source
+from groundstation.readers.source import Claim, Reader, Source
 
 ENTRY_POINT_GROUP = "groundstation.readers"
-_OF_TEXT: tuple[Any, ...] = (csv_profile, flat_csv)
-_BUILT_IN: tuple[Any, ...] = (dataflash, ulog, *_OF_TEXT)
+_OF_TEXT: tuple[Reader, ...] = (csv_profile, flat_csv)
+_BUILT_IN: tuple[Reader, ...] = (dataflash, ulog, flightdata_hdf5, *_OF_TEXT)
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,11 @@ class Format:
 
 
 @cache
-def _plug_ins() -> tuple[dict[str, Any], tuple[str, ...]]:
+def _plug_ins() -> tuple[dict[str, Reader], tuple[str, ...]]:
     """Third-party readers by name, and one line for each that could not be loaded."""
     from importlib.metadata import entry_points
 
-    readers: dict[str, Any] = {}
+    readers: dict[str, Reader] = {}
     failures: list[str] = []
     for entry in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda entry: entry.name):
         if entry.value.startswith("groundstation.readers."):
@@ -65,7 +65,7 @@ def _one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-def _readers() -> dict[str, Any]:
+def _readers() -> dict[str, Reader]:
     return {reader.NAME: reader for reader in _BUILT_IN} | _plug_ins()[0]
 
 
@@ -81,7 +81,7 @@ def formats() -> tuple[Format, ...]:
     return (*built_in, *added)
 
 
-def _summary(reader: Any) -> str:
+def _summary(reader: Reader) -> str:
     return next(iter((reader.__doc__ or "").strip().splitlines()), "")
 
 
@@ -125,7 +125,7 @@ def _of_the_source(source: Source) -> Iterator[Item]:
     yield from source.damages()
 
 
-def _guarded(reader: Any, claim: Claim, source: Source) -> Iterator[Item]:
+def _guarded(reader: Reader, claim: Claim, source: Source) -> Iterator[Item]:
     """Items of a stranger's reader; whatever it raises becomes one line."""
     try:
         yield from reader.read(source)

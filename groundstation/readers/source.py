@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, BinaryIO, Protocol, runtime_checkable
+from typing import BinaryIO, Protocol, runtime_checkable
 
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Item
@@ -136,5 +136,5 @@ class Reader(Protocol):
     def sniff(self, source: Source) -> Claim | None:
         """Say whether this reader can read the source; looks at ``source.head`` only."""
 
-    def read(self, source: Source, **options: Any) -> Iterator[Item]:
+    def read(self, source: Source) -> Iterator[Item]:
         """Yield the header, then batches, remarks and damages."""

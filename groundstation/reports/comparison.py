@@ -7,6 +7,7 @@ import numpy as np
 
 from groundstation.base.findings import Finding
 from groundstation.base.geodesy import north_east_m
+from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.findings import MARKS
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Part, Section
 from groundstation.chapters.wording import ABSENT, any_value, number, significant
@@ -20,7 +21,6 @@ from groundstation.results.files import SavedFlight
 from groundstation.results.forecast import ForecastResult
 
 A, B = d.INS, d.GNSS
-BAND = 1.96
 MOST = 3000  # points of a line
 NEAR_M = 200_000.0  # flights that begin no further apart share one map
 SHARED = (
@@ -33,8 +33,10 @@ LINES = (  # figure, column, column of the half width and what it is multiplied 
     ("overview", "heading_deg", None, "true heading, °", "INS heading"),
     ("heading_running", "mean_deg", ("honest_half_width_deg", 1.0), "heading error, °", "Heading error, running mean"),
     ("inertial_track", "ins_error_m", None, "radial error, m", "Radial error of the INS against GNSS"),
-    ("inertial_states", "north_position_m", ("north_position_sigma_m", BAND), "north, m", "North position error"),
-    ("inertial_states", "east_position_m", ("east_position_sigma_m", BAND), "east, m", "East position error"),
+    ("inertial_states", "north_position_m", ("north_position_sigma_m", NORMAL_95), "north, m", "North position error"),
+    ("inertial_states", "east_position_m", ("east_position_sigma_m", NORMAL_95), "east, m", "East position error"),
+    ("session_errors", "two_sigma_r_m", None, "m", "2σ_r as computed, worst aircraft"),
+    ("session_errors", "rms_error_m", None, "m", "Horizontal error against the truth, RMS of all aircraft"),
 )
 
 

@@ -15,7 +15,6 @@ from groundstation.reports.sections import flight_sections
 from groundstation.reports.steer_card import write_exports
 from groundstation.results.answer import Answer
 from groundstation.results.files import SavedFlight, load, write_text
-from groundstation.results.restore import ANSWER_TYPES
 
 REPORT = "report.html"
 PDF = "report.pdf"
@@ -32,9 +31,7 @@ class Written:
     problem: str = ""
 
 
-def write_flight_report(
-    folder: Path, answer_types: Mapping[str, type[Answer]] = ANSWER_TYPES, *, with_pdf: bool = True
-) -> Written:
+def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], *, with_pdf: bool = True) -> Written:
     """Write report.html and report.pdf into a flight folder; with a magnetic deviation its table and steer card too.
 
     Parameters

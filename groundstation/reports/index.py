@@ -1,4 +1,4 @@
-"""index.json and index.csv: one row per flight of a folder, and the logs that gave none with the reason."""
+"""index.json and index.csv: a row for each flight and session of a folder, and for each log that gave none."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
@@ -18,15 +18,16 @@ from groundstation.results.magnetic import MagneticResult
 from groundstation.results.summary import SCHEMA_VERSION
 
 INDEX_JSON, INDEX_CSV = "index.json", "index.csv"
-Kind = Literal["flight", "failed", "skipped"]
-KINDS: tuple[Kind, ...] = ("flight", "failed", "skipped")
+Kind = Literal["flight", "session", "failed", "skipped"]
+KINDS: tuple[Kind, ...] = ("flight", "session", "failed", "skipped")
 
 
 @dataclass(frozen=True, kw_only=True)
 class IndexRow:
-    """One flight, or a log that gave none: every row has all columns in this order, None where one does not apply.
+    """One flight or session, or a log that gave none: every row has all columns in this order, None where none applies.
 
     Answers stand under the names they have in summary.json, with the analysis before them where it is not the heading.
+    Of a session there are those of what it is and what was made of it: its answers are its own.
     """
 
     kind: Kind
@@ -90,8 +91,8 @@ class IndexRow:
 COLUMNS = tuple(column.name for column in fields(IndexRow))
 
 
-def index_row(saved: SavedFlight) -> IndexRow:
-    """Build the row of one flight from what it saved; links are relative to the folder of flights.
+def index_row(saved: SavedFlight, kind: Kind = "flight") -> IndexRow:
+    """Build the row of one flight or session from what it saved; links are relative to the folder of flights.
 
     A link is None when the flight folder lacks the file at the time of the call.
 
@@ -103,7 +104,7 @@ def index_row(saved: SavedFlight) -> IndexRow:
     results = saved.results
     severities = [finding.severity for finding in results.findings]
     return IndexRow(
-        kind="flight",
+        kind=kind,
         flight_id=results.flight_id,
         aircraft=results.metadata.get("aircraft", ""),
         flight=results.metadata.get("flight", ""),
@@ -211,7 +212,7 @@ def write_index(out: Path, rows: Iterable[IndexRow]) -> None:
     out : Path
         The folder that holds the flight folders.
     rows : iterable of IndexRow
-        From :func:`index_row` and :func:`failed_row`, in any order: they are written flights first, by flight id.
+        From :func:`index_row` and :func:`failed_row`, in any order: written flights first, then sessions, by id.
     """
     plain = [to_json_exactly(row) for row in sorted(rows, key=_place)]
     write_text(out / INDEX_JSON, json_text({"schema_version": SCHEMA_VERSION, "rows": plain}))

@@ -7,12 +7,12 @@ from typing import Any, Literal, TypeAlias, TypeGuard
 import numpy as np
 
 from groundstation.base.findings import Finding
+from groundstation.base.normal import NORMAL_95
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import NotAssessable
 
 Event = Literal["start", "first-movement", "lift-off", "outage", "utc"]
 Value: TypeAlias = float | str | bool | None
-NORMAL95 = 1.96
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Delta:
         """
         if self.delta is None or self.sigma is None or not math.isfinite(self.delta) or self.sigma <= 0.0:
             return None
-        return abs(self.delta) > NORMAL95 * self.sigma
+        return abs(self.delta) > NORMAL_95 * self.sigma
 
     @property
     def is_different(self) -> bool:

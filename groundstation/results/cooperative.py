@@ -126,7 +126,8 @@ class CooperativeResult(Answer):
         Every parameter as used.
     figures : tuple of FigureData
         ``cooperative_tracks`` (time_s, vehicle, algorithm, x_m, y_m, z_m in the frame of the session, sigma_north_m,
-        sigma_east_m, two_sigma_r_m, error_m, nees), ``cooperative_geometry`` (time_s, vehicle, sources, hdop, gdop,
+        sigma_east_m, sigma_up_m, NaN where height is no state, correlation_north_east, two_sigma_r_m, error_m, nees),
+        ``cooperative_geometry`` (time_s, vehicle, sources, hdop, gdop,
         determinant, eigenvalue, gram_determinant, bound_m), ``cooperative_map`` (time_s, algorithm, spectral_radius),
         ``cooperative_links`` (time_s, receiver, source, innovation, sigma, mark), ``cooperative_traffic`` (algorithm,
         vehicle, messages, bytes).

@@ -3,7 +3,7 @@
 import json
 import shutil
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from os import SEEK_END
 from pathlib import Path
@@ -19,7 +19,7 @@ from groundstation.results.document import SummaryDocument
 from groundstation.results.figures import FigureData, FigureSet
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import Manifest
-from groundstation.results.restore import ANSWER_TYPES, restored
+from groundstation.results.restore import restored
 from groundstation.results.summary import digits_of, summary_of
 
 Document = TypeVar("Document")
@@ -41,7 +41,7 @@ class SavedFlight:
     summary: Mapping[str, Any]
     manifest: Manifest
     figures: Mapping[str, FigureData]
-    answer_types: Mapping[str, type[Answer]] = field(default_factory=lambda: ANSWER_TYPES)
+    answer_types: Mapping[str, type[Answer]]
 
     @cached_property
     def results(self) -> FlightResults:
@@ -184,7 +184,7 @@ class _Figures(Mapping[str, FigureData]):
         return len(self._paths)
 
 
-def load(folder: Path, answer_types: Mapping[str, type[Answer]] = ANSWER_TYPES) -> SavedFlight:
+def load(folder: Path, answer_types: Mapping[str, type[Answer]]) -> SavedFlight:
     """Read a flight folder back; its figures are read when they are asked for.
 
     Parameters

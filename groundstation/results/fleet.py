@@ -43,7 +43,7 @@ FLIGHT_COLUMNS: tuple[FlightColumn, ...] = (
     FlightColumn("start_utc", "time", "first corrected time; missing for a log without absolute time"),
     FlightColumn("month", "category", "year and month of start_utc: 2026-05"),
     FlightColumn("duration_s", "number", "from the first sample of any topic to the last"),
-    FlightColumn("status", "category", "ok, degraded (data lost or a grave finding) or failed"),
+    FlightColumn("status", "category", "ok, degraded (data lost) or failed"),
     FlightColumn("has_lost_data", "flag", "the log is cut or damaged"),
     FlightColumn("verdict", "category", "of the heading correction: accept, reject, extend, undecided"),
     FlightColumn("verdict_reason", "text", "why, in words"),
@@ -309,6 +309,33 @@ class NotInFleet:
 
 
 @dataclass(frozen=True)
+class SessionRow:
+    """A session of several aircraft: the algorithm to trust, and what it is worth.
+
+    ``two_sigma_r_m`` is that of the worst aircraft at the end, as computed; ``reckoned_two_sigma_r_m`` that of dead
+    reckoning alone; ``rms_m``, ``is_consistent`` and ``diverges`` are None without a truth. ``reason`` says why there
+    is no answer. ``report`` and ``recording`` are files relative to the folder of flights, empty where there is none.
+    """
+
+    session_id: str
+    aircraft: str
+    start_utc_ns: int | None
+    duration_s: float
+    status: str
+    algorithm: str = ""
+    two_sigma_r_m: float | None = None
+    reckoned_two_sigma_r_m: float | None = None
+    rms_m: float | None = None
+    is_consistent: bool | None = None
+    diverges: bool | None = None
+    findings_fail: int = 0
+    findings_warn: int = 0
+    reason: str = ""
+    report: str = ""
+    recording: str = ""
+
+
+@dataclass(frozen=True)
 class FleetResults:
     """Everything the fleet report, fleet.rrd and notebooks show.
 
@@ -343,6 +370,8 @@ class FleetResults:
         Rates and limits the statistics keep to, by name: chance of a false change point per aircraft, and so on.
     deviations : tuple of DeviationRow
         By aircraft, then time.
+    sessions : tuple of SessionRow
+        By session id.
     """
 
     flights: FigureData
@@ -359,6 +388,7 @@ class FleetResults:
     not_in_fleet: tuple[NotInFleet, ...]
     stated: Mapping[str, float] = field(default_factory=dict)
     deviations: tuple[DeviationRow, ...] = ()
+    sessions: tuple[SessionRow, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stated", MappingProxyType(dict(self.stated)))

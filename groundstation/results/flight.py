@@ -50,7 +50,7 @@ class FlightResults(Tabular):
         First corrected time, UTC nanoseconds since 1970; None for a log without absolute time.
     duration_s : float
     status : {'ok', 'degraded', 'failed'}
-        degraded: data was lost or a finding is grave; failed: nothing could be computed.
+        degraded: data was lost; failed: a finding is a failure.
     completeness : mapping of topic to share of expected samples, 0 to 1
     ledger : Ledger
     clock : Clock

@@ -68,6 +68,8 @@ class Manifest:
     versions : mapping of package to version
     logs : tuple of LogOfSession
         Of a session; absent for a flight.
+    is_found : bool
+        Whether a run found the session among its flights, and may replace it; not what ``cooperative`` made.
     resume : Resume, optional
         Absent where no run made the folder.
     """
@@ -81,4 +83,5 @@ class Manifest:
     host: Host = field(default_factory=Host)
     versions: Mapping[str, str] = field(default_factory=dict)
     logs: tuple[LogOfSession, ...] = field(default=(), metadata=LEFT_OUT_WHEN_DEFAULT)
+    is_found: bool = field(default=False, metadata=LEFT_OUT_WHEN_DEFAULT)
     resume: Resume | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)

@@ -1,41 +1,17 @@
 """Saved answers as dataclasses again: what summary.json tells, rounded as it was written."""
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.serial import MismatchError, from_json, join
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.results.answer import A, Answer
-from groundstation.results.control import ControlPlan
-from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.document import SummaryDocument
 from groundstation.results.flight import FlightResults
-from groundstation.results.forecast import ForecastResult
-from groundstation.results.heading import HeadingResult
-from groundstation.results.inertial import InertialResult
-from groundstation.results.landing_beacons import BeaconLanding
-from groundstation.results.landing_ranges import RangeLanding
-from groundstation.results.latency import Latencies
-from groundstation.results.magnetic import MagneticResult
-from groundstation.results.magnetic_ground import GroundDeviation
-
-# The answers that a flight or a session may have, by the name of their analysis.
-ANSWER_TYPES: Mapping[str, type[Answer]] = MappingProxyType(
-    {
-        kind.analysis: kind
-        for kind in (
-            *(HeadingResult, InertialResult, ForecastResult, Latencies, MagneticResult, GroundDeviation),
-            *(BeaconLanding, CooperativeResult, ControlPlan, RangeLanding),
-        )
-    }
-)
 
 
-def restored(
-    summary: Mapping[str, Any], where: str, answer_types: Mapping[str, type[Answer]] = ANSWER_TYPES
-) -> FlightResults:
+def restored(summary: Mapping[str, Any], where: str, answer_types: Mapping[str, type[Answer]]) -> FlightResults:
     """Results of a flight as the run had them, but for the digits that summary.json leaves out.
 
     Parameters

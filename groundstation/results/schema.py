@@ -1,22 +1,19 @@
 """The JSON Schema of summary.json, made from the dataclasses that are written to it.
 
-``python -m groundstation.results.schema FILE`` writes it. What a type alone does not say stands in the metadata of a
+``make schemas`` writes it. What a type alone does not say stands in the metadata of a
 field (``one_of``, ``pattern``, ``keys``, ``items``: see :func:`_narrowed`) or follows from its name: shares lie within
 [0, 1], sigmas and lengths are not negative, whole numbers are counts.
 """
 
 import dataclasses
 import re
-import sys
 import types
 import typing
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from groundstation.base.serial import is_kept_apart
 from groundstation.results.document import SCHEMA_VERSION, SummaryDocument
-from groundstation.results.restore import ANSWER_TYPES
 
 TITLE = "summary.json of one flight"
 ABOUT = (
@@ -60,7 +57,7 @@ NAMES = {  # of definitions, where they are not that of the class
 Schema = dict[str, Any]
 
 
-def summary_schema(answer_types: Mapping[str, type] = ANSWER_TYPES) -> Schema:
+def summary_schema(answer_types: Mapping[str, type]) -> Schema:
     """The schema of summary.json.
 
     Parameters
@@ -216,12 +213,8 @@ def _told(cls: type) -> dict[str, str]:
     return told
 
 
-def schema_text() -> str:
+def schema_text(answer_types: Mapping[str, type]) -> str:
     """The schema as it is kept in schemas/."""
     from groundstation.results.files import json_text
 
-    return json_text(summary_schema())
-
-
-if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(schema_text(), encoding="utf-8")
+    return json_text(summary_schema(answer_types))

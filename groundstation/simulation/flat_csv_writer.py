@@ -14,7 +14,20 @@ from groundstation.tables.table import Flight, Table
 
 BLOCK_ROWS = 65_536
 NS_DIGITS = 9
-DEFAULT_DECIMALS = {"deg": 7, "m": 3, "mps": 4, "dps": 4, "mps2": 4, "nt": 1, "a": 3, "s": 9, "m2": 3, "": 2}
+DEFAULT_DECIMALS = {
+    "deg": 7,
+    "m": 3,
+    "mps": 4,
+    "dps": 4,
+    "mps2": 4,
+    "nt": 1,
+    "a": 3,
+    "s": 9,
+    "m2": 3,
+    "dots": 4,
+    "mhz": 3,
+    "": 2,
+}
 
 
 def write_flat_csv(

@@ -3,6 +3,7 @@
 import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, wrap_180
+from groundstation.base.normal import NORMAL_95
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.simulation.readings import Readings, quantised
@@ -30,7 +31,7 @@ def onboard_readings(trajectory: Trajectory, ins: Readings, gnss: Readings, sett
     count = np.cumsum(used, dtype=np.int64)
     mean = _running_mean(np.where(used, difference, 0.0), count)
     spread = _running_mean(np.where(used, difference**2, 0.0), count) - mean**2
-    precision = 1.96 * np.sqrt(np.maximum(spread, 0.0) / np.maximum(count - 1, 1))
+    precision = NORMAL_95 * np.sqrt(np.maximum(spread, 0.0) / np.maximum(count - 1, 1))
     of_mean = _running_mean(np.where(used, mean, 0.0), count)
     quality = np.sqrt(np.maximum(_running_mean(np.where(used, mean**2, 0.0), count) - of_mean**2, 0.0))
     over = cycle_ns >= entry_ns

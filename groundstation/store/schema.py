@@ -18,28 +18,14 @@ from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto
 from google.protobuf.descriptor_pool import DescriptorPool
 
 from groundstation.base.errors import GroundstationError
-from groundstation.base.signals import kind_of
+from groundstation.base.signals import TOPICS, kind_of
 
 DESCRIPTORS = Path(__file__).with_name("descriptors.binpb")
 PACKAGE = "groundstation"
 # Message of each canonical kind. `truth` has the fields of `ins`.
 MESSAGE_OF_KIND: Mapping[str, str] = {
-    "ins": "Ins",
-    "gnss": "Gnss",
-    "onboard": "Onboard",
-    "magnetometer": "Magnetometer",
-    "electric": "Electric",
-    "baro": "Baro",
-    "air": "Air",
-    "radio_altimeter": "RadioAltimeter",
-    "discrete": "Discrete",
-    "event": "Event",
-    "link": "Link",
-    "satellite": "Satellite",
-    "adf": "Adf",
-    "corrected_heading": "CorrectedHeading",
-    "truth": "Ins",
-}
+    kind: "".join(word.capitalize() for word in kind.split("_")) for kind in TOPICS if kind != "truth"
+} | {"truth": "Ins"}
 DEVICE_TIME, RECORD_INDEX = "device_time_ns", "record_index"
 FIRST_OWN_NUMBER = 3
 MAX_FIELDS = 10_000  # of a message that is read: working arrays grow with it

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from groundstation.base.normal import NORMAL_95
 from groundstation.results.figures import FigureData
 from groundstation.simulation.taxi import Family
 from groundstation.studies.heading_family import (
@@ -56,7 +57,7 @@ def published_table(outcomes: list[RunOutcome]) -> FigureData:
     accepted = np.array([run.verdict == "accept" for run in outcomes])
     error = np.abs([run.error_deg for run in outcomes]) * 60.0
     precise = np.array([run.precision_deg <= 0.05 for run in outcomes])
-    spread = np.array([run.precision_deg * np.sqrt(run.taxi_seconds * 10.0) / 1.96 for run in outcomes])
+    spread = np.array([run.precision_deg * np.sqrt(run.taxi_seconds * 10.0) / NORMAL_95 for run in outcomes])
     reached = [run.seconds_to_precision for run in outcomes if run.seconds_to_precision is not None]
     rows = [
         ("largest error of an accepted run, arcmin", 20.0, float(error[accepted].max()) if accepted.any() else np.nan),

@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.normal import NORMAL_95
 from groundstation.base.units import DEG_PER_RAD
-from groundstation.estimators.heading.recursion import NORMAL_95, run_recursion
+from groundstation.estimators.heading.recursion import run_recursion
 from groundstation.results.figures import FigureData
 from groundstation.simulation.processes import damped_oscillation, gauss_markov
 

@@ -16,7 +16,14 @@ from groundstation.tables.session import GroundPoint, SatelliteRanges, Session
 from groundstation.tables.session_clock import PlacedLog, place_logs
 from groundstation.tables.session_ranges import gather_ranges
 from groundstation.tables.session_settings import SessionSettings, Stations
-from groundstation.tables.session_tracks import InsRows, NoTrackError, aircraft_of, dead_reckoning, ins_rows, truth_of
+from groundstation.tables.session_tracks import (
+    InsRows,
+    NoTrackError,
+    aircraft_named,
+    dead_reckoning,
+    ins_rows,
+    truth_of,
+)
 from groundstation.tables.table import Flight
 
 LEAST_TOLD_S = 0.001  # a smaller offset of a clock is not worth a line
@@ -136,7 +143,7 @@ def _named(flights: Iterable[Flight]) -> _Members:
     """Flights by the name of their aircraft, sorted; of several of one aircraft the longest stays."""
     found: dict[str, list[Flight]] = {}
     for flight in flights:
-        found.setdefault(aircraft_of(flight), []).append(flight)
+        found.setdefault(aircraft_named(flight.metadata, flight.source_name), []).append(flight)
     members = _Members({})
     for name, same in sorted(found.items()):
         ordered = sorted(same, key=lambda one: (-one.duration_s, one.source_name))

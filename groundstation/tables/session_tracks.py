@@ -1,5 +1,6 @@
 """Dead reckoning and truth of one log in the frame and on the clock of its session."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,9 +26,9 @@ class NoTrackError(Exception):
     """A log without dead reckoning; the reason."""
 
 
-def aircraft_of(flight: Flight) -> str:
-    """Name of the aircraft: what the log says, else that of the file without its ending."""
-    return flight.metadata.get("aircraft", "").strip() or flight.source_name.rpartition(".")[0] or flight.source_name
+def aircraft_named(metadata: Mapping[str, str], source_name: str) -> str:
+    """Name of an aircraft: what the log says, else that of the file without its ending."""
+    return metadata.get("aircraft", "").strip() or source_name.rpartition(".")[0] or source_name
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.base.geodesy import north_east_m, on_earth
+from groundstation.base.normal import NORMAL_95
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.results.comparison import Comparison
 from groundstation.results.figures import FigureData
@@ -28,7 +29,6 @@ from groundstation.viewer.views import document, lanes, numbers, plot
 THIN, MARK = 1.0, 5.0
 WIDTHS = {"A": 3.5, "B": 1.5}  # where both agree, A is seen behind B
 MARGIN_DEG = 10.0  # beyond 0 and 360
-BAND = 1.96  # half width of a 95 % band in sigmas
 BAND_QUANTILES = (5.0, 95.0)  # the bands of the first samples may leave the picture
 MARGIN = 0.1
 NEAR_M = 200_000.0  # flights that begin no further apart share one plan
@@ -87,6 +87,7 @@ def send_comparison(
     halves = (Half("A", a, colours.INS), Half("B", b, colours.GNSS, comparison.alignment.offset_s))
     recorder.document("comparison", comparison_text(comparison))
     tabs = [_overview(recorder, halves), _heading(recorder, halves), _inertial(recorder, halves)]
+    tabs.append(_cooperative(recorder, halves))
     return send_layout(stream, [tab for tab in (*tabs, _forecast(recorder, halves)) if tab is not None])
 
 
@@ -233,7 +234,7 @@ def _inertial(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | Non
     for state, suffix, unit in (("position", "m", "m"), ("velocity", "mps", "m/s")):
         views = []
         for channel in ("north", "east"):
-            width = (f"{channel}_{state}_sigma_{suffix}", BAND)
+            width = (f"{channel}_{state}_sigma_{suffix}", NORMAL_95)
             title = f"{channel.capitalize()} {state} error, {unit}"
             column = f"{channel}_{state}_{suffix}"
             views.append(_overlay(recorder, halves, "inertial_states", column, title, half_width=width))
@@ -243,6 +244,14 @@ def _inertial(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | Non
     radial = _overlay(recorder, halves, "inertial_track", "ins_error_m", "Radial error of the INS against GNSS, m")
     contents: list[rrb.View | rrb.Container] = [*rows, *([] if radial is None else [radial])]
     return rrb.Vertical(contents=contents, name="INS errors") if contents else None
+
+
+def _cooperative(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | None:
+    """What two sessions computed of their errors, and what these were."""
+    computed = _overlay(recorder, halves, "session_errors", "two_sigma_r_m", "2σ_r as computed, worst aircraft, m")
+    error = _overlay(recorder, halves, "session_errors", "rms_error_m", "Horizontal error, RMS of all aircraft, m")
+    views = [one for one in (computed, error) if one is not None]
+    return rrb.Vertical(contents=views, name="Cooperative") if views else None
 
 
 def _forecast(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | None:

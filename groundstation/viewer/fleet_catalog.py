@@ -17,7 +17,7 @@ from groundstation.base.errors import GroundstationError
 from groundstation.viewer.fleet import FLEET, FLIGHTS_TEXT
 from groundstation.viewer.recording import open_stream
 
-FLIGHTS = "flights"
+FLIGHTS, SESSIONS = "flights", "sessions"
 VIEWS = "/view/"  # where a layout keeps its views
 LINKS_LAYER = "links"
 MOST_LAYOUTS = 16  # looked at, some 0.1 s each
@@ -34,6 +34,8 @@ class Catalog:
         Where clients and viewers find it: ``rerun+http://host:port``.
     flights : tuple of str
         Segment ids of the data set ``flights``: flight ids.
+    sessions : tuple of str
+        The same of ``sessions``, a data set of its own as its layout is: session ids.
     has_fleet : bool
         Whether there is a data set ``fleet``.
     refused : tuple of (Path, str)
@@ -42,13 +44,16 @@ class Catalog:
 
     url: str
     flights: tuple[str, ...]
+    sessions: tuple[str, ...]
     has_fleet: bool
     refused: tuple[tuple[Path, str], ...]
 
 
 @contextmanager
-def catalog_server(flights: Sequence[Path], fleet: Path | None, *, host: str, port: int) -> Iterator[Catalog]:
-    """Serve recordings until the context is left: the data set ``flights``, a segment each, and ``fleet``.
+def catalog_server(
+    flights: Sequence[Path], fleet: Path | None, *, host: str, port: int, sessions: Sequence[Path] = ()
+) -> Iterator[Catalog]:
+    """Serve recordings until the context is left: data sets ``flights``, ``sessions`` (where any are) and ``fleet``.
 
     Raises
     ------
@@ -64,18 +69,24 @@ def catalog_server(flights: Sequence[Path], fleet: Path | None, *, host: str, po
         # the public constructor asks for datafusion (43 MB), which listing and registering do not use
         client = CatalogClient._from_internal(CatalogClientInternal(server.url(), None, None))
         url = reachable(server.url())
-        dataset = client.create_dataset(FLIGHTS)
-        offered, refused = _register(dataset, flights)
+        segments: dict[str, tuple[str, ...]] = {SESSIONS: ()}
+        links: dict[str, str] = {}
+        refused: list[tuple[Path, str]] = []
+        for name, paths in {FLIGHTS: flights, **({SESSIONS: sessions} if sessions else {})}.items():
+            dataset = client.create_dataset(name)
+            offered, problems = _register(dataset, paths)
+            refused += problems
+            segments[name] = tuple(sorted(offered))
+            links |= {one: dataset.segment_url(one).replace(server.url(), url) for one in offered}
         has_fleet = False
         if fleet is not None:
-            links = {name: dataset.segment_url(name).replace(server.url(), url) for name in offered}
             dataset = client.create_dataset(FLEET)
-            segments, problems = _register(dataset, [fleet])
+            offered, problems = _register(dataset, [fleet])
             refused += problems
-            has_fleet = bool(segments)
+            has_fleet = bool(offered)
             if has_fleet:
                 _link(dataset, fleet, links, Path(folder) / "links.rrd")
-        yield Catalog(url, tuple(sorted(offered)), has_fleet, tuple(refused))
+        yield Catalog(url, segments[FLIGHTS], segments[SESSIONS], has_fleet, tuple(refused))
 
 
 def reachable(url: str) -> str:

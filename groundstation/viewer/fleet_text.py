@@ -7,6 +7,7 @@ import numpy as np
 
 from groundstation.base.records import Int64Array
 from groundstation.base.timescales import utc_ns_to_iso
+from groundstation.chapters.cooperative import title_of
 from groundstation.chapters.markdown import table
 from groundstation.results.fleet import AircraftRow, FleetResults
 from groundstation.viewer.fleet_recorder import FleetRecorder
@@ -84,7 +85,29 @@ def flights_text(recorder: FleetRecorder, fleet: FleetResults) -> str:
     if len(without):
         parts += [f"# {len(without)} without absolute time", "Not on the timeline `utc`, only on `flight_number`."]
         parts.append(_flights(recorder, fleet, without[:MOST_ROWS]))
+    if fleet.sessions:
+        parts += [f"# {len(fleet.sessions)} sessions of several aircraft", _sessions(fleet)]
     return "\n\n".join(parts)
+
+
+def _sessions(fleet: FleetResults) -> str:
+    lines = [
+        [
+            _linked(markdown_text(one.session_id), one.recording),
+            markdown_text(one.aircraft),
+            markdown_text(title_of(one.algorithm)) if one.algorithm else markdown_text(one.reason) or "–",
+            number(one.two_sigma_r_m, 1),
+            number(one.reckoned_two_sigma_r_m, 1),
+            number(one.rms_m, 1),
+        ]
+        for one in fleet.sessions[:MOST_ROWS]
+    ]
+    header = ["session", "aircraft", "algorithm to trust", "2σ_r, m", "of the INS alone, m", "RMS error, m"]
+    return table(header, lines)
+
+
+def _linked(name: str, recording: str) -> str:
+    return f"[{name}]({recording})" if SAFE_PATH.fullmatch(recording) else name
 
 
 def _flights(recorder: FleetRecorder, fleet: FleetResults, rows: Int64Array) -> str:
@@ -101,7 +124,7 @@ def _flights(recorder: FleetRecorder, fleet: FleetResults, rows: Int64Array) -> 
         lines.append(
             [
                 str(int(places[row])),
-                f"[{name}]({recording})" if SAFE_PATH.fullmatch(recording) else name,
+                _linked(name, recording),
                 markdown_text(str(flights["aircraft"][row])) or "–",
                 start,
                 error if error == "–" else f"{error} ± {number(float(sigmas[row]))}",

@@ -4,28 +4,10 @@ import re
 import unicodedata
 from collections.abc import Iterable
 
+from groundstation.base import unit_names
+
 MAX_LABEL_CHARACTERS = 80
 
-# Unit suffix of a field -> how people write it; two-part suffixes stand first.
-UNITS: dict[str, str] = {
-    "deg_per_h": "deg/h",
-    "per_deg": "1/deg",
-    "mps2": "m/s²",
-    "mps": "m/s",
-    "dps": "deg/s",
-    "deg": "deg",
-    "arcmin": "arcmin",
-    "arcsec": "arcsec",
-    "dphph": "deg/h per h",
-    "dph": "deg/h",
-    "nmiph": "nmi/h",
-    "nt": "nT",
-    "m2": "m²",
-    "m": "m",
-    "s": "s",
-    "a": "A",
-    "hz": "Hz",
-}
 # Words not written as they stand.
 WORDS: dict[str, str] = {
     "ins": "INS",
@@ -86,10 +68,8 @@ def split_unit(field: str) -> tuple[str, str]:
     >>> split_unit("velocity_north_mps"), split_unit("gdop"), split_unit("current_a")
     (('velocity_north', 'm/s'), ('gdop', ''), ('current', 'A'))
     """
-    for suffix, unit in UNITS.items():
-        if field.endswith("_" + suffix):
-            return field[: -len(suffix) - 1], unit
-    return field, ""
+    name, unit = unit_names.split_unit(field)
+    return name, "" if unit is None else unit.spelled
 
 
 def words(name: str) -> str:

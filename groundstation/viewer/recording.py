@@ -13,7 +13,7 @@ import rerun.blueprint as rrb
 import rerun_bindings
 
 from groundstation.base.errors import GroundstationError
-from groundstation.chapters import without_chapter
+from groundstation.results.answer import Answer
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight
 from groundstation.viewer.names import clean_text
@@ -32,6 +32,15 @@ from groundstation.viewer.tabs.raw import raw
 APPLICATION = "groundstation"
 DEFAULT_VIEWER_URL = "rerun+http://127.0.0.1:9876/proxy"
 DEFAULT_PORT = 9876
+# In order: a tab and the analyses whose answers it shows. An answer that none of them shows has the generic tab.
+ANSWER_TABS: tuple[tuple[Callable[[Recorder, FlightResults], rrb.Container | None], tuple[str, ...]], ...] = (
+    (heading, ("heading",)),
+    (inertial, ("inertial",)),
+    (forecast, ("forecast",)),
+    (magnetic, ("magnetic", "magnetic_ground")),
+    (landing_beacons, ("landing_beacons",)),
+)
+SHOWN_ELSEWHERE = ("latency",)  # in the tab on data quality
 CONNECT_SECONDS, FLUSH_SECONDS = 3.0, 60.0
 
 
@@ -118,16 +127,17 @@ def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResul
     tabs = (
         overview(recorder, results),
         quality(recorder, flight, results),
-        heading(recorder, results),
-        inertial(recorder, results),
-        forecast(recorder, results),
-        magnetic(recorder, results),
-        landing_beacons(recorder, results),
-        *(generic_tab(recorder, results, answer) for answer in without_chapter(results)),
+        *(tab(recorder, results) for tab, _ in ANSWER_TABS),
+        *(generic_tab(recorder, results, answer) for answer in _without_tab(results)),
         raw(recorder, flight, results),
         log(recorder, flight, results),
     )
     return send_layout(stream, [tab for tab in tabs if tab is not None])
+
+
+def _without_tab(results: FlightResults) -> list[Answer]:
+    shown = {*SHOWN_ELSEWHERE, *(name for _, names in ANSWER_TABS for name in names)}
+    return [answer for name, answer in results.answers.items() if name not in shown]
 
 
 def send_layout(

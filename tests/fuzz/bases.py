@@ -92,8 +92,8 @@ def dataflash() -> bytes:
 
 @cache
 def _converted(path: Path) -> bytes:
-    from groundstation.pipeline.convert import convert_log
-    from groundstation.pipeline.log import open_log
+    from groundstation.pipeline.one_flight.convert import convert_log
+    from groundstation.pipeline.one_flight.log import open_log
 
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "flight.mcap"

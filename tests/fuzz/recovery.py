@@ -141,7 +141,7 @@ def _g1000_s(cells: list[bytes]) -> int | None:
 
 
 def _items(path: Path) -> Iterator[RecordBatch]:
-    from groundstation.pipeline.log import open_log
+    from groundstation.pipeline.one_flight.log import open_log
 
     for item in open_log(path).items():
         if isinstance(item, RecordBatch):

@@ -94,8 +94,8 @@ def try_file(path: Path, folder: Path, *, is_deep: bool) -> str:
     Exception
         Anything but a GroundstationError is a crash found.
     """
-    from groundstation.pipeline.convert import convert_log
-    from groundstation.pipeline.log import open_log
+    from groundstation.pipeline.one_flight.convert import convert_log
+    from groundstation.pipeline.one_flight.log import open_log
 
     try:
         log = open_log(path)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 NIS_MAX = 1.5  # white innovations of LEAST_RANGES rows stay below it in all but one of 10 000 sessions
 LEAST_RANGES = 150
+LEAST_OF_A_STATION, GATED_SHARE, OTHERS_SHARE = 10, 0.2, 0.05
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ def _run(session: "Session", known: SessionKnown, settings: CooperativeSettings)
     from groundstation.estimators.cooperative.estimate import estimate_session
 
     answer, findings = estimate_session(session, settings=settings, truth=dict(known.truth))
-    return Found(answer, (*findings, *_too_sure(answer)))
+    return Found(answer, (*findings, *_misplaced(answer), *_too_sure(answer)))
 
 
 def innovations_of(answer: CooperativeResult) -> dict[str, float]:
@@ -70,6 +71,26 @@ def _too_sure(answer: CooperativeResult) -> tuple[Finding, ...]:
         for kind, nis in innovations_of(answer).items()
         if nis > NIS_MAX
     )
+
+
+def _misplaced(answer: CooperativeResult) -> tuple[Finding, ...]:
+    """A warning for a station whose ranges the default algorithm gates, where it takes those of the others.
+
+    With honest sigmas one range in 10^8 or fewer is beyond a gate of 6 sigma.
+    """
+    found = []
+    for name in answer.point_names:
+        mine = [link for link in answer.links if link.kind == "point" and link.source == name]
+        rest = [link for link in answer.links if link not in mine]
+        ranges, gated = sum(link.ranges for link in mine), sum(link.gated for link in mine)
+        others, others_gated = sum(link.ranges for link in rest), sum(link.gated for link in rest)
+        if ranges >= LEAST_OF_A_STATION and gated > GATED_SHARE * ranges and others_gated < OTHERS_SHARE * others:
+            text = (
+                f"{answer.default_algorithm} rejected {gated} of {ranges} ranges to station {name} and hardly any "
+                "other: its place in the stations file is not where the ranges put it"
+            )
+            found.append(Finding("warn", "cooperative.misplaced_station", text, f"link.{name}", name, gated))
+    return tuple(found)
 
 
 def _sentence(answers: Answers) -> str:

@@ -4,6 +4,14 @@ A vehicle's block is moved on when a measurement or an output asks for it: noise
 so that blocks may stand at different times. Vehicles that are not there yet keep their start. Ground points whose own
 position is uncertain are constant states. Dead reckoning is the same filter without measurements.
 
+A range between two aircraft is linearised, value and direction, about a reference place of each: its dead reckoning
+less an offset, at first 0. While the line between the estimates lies within ``KNOWN_WRONG_SIGMAS`` claimed sigmas of
+the reference line, across it, the reference stays: directions that follow the estimate tell of a turn of the whole
+group, which ranges inside it cannot see (first-estimates Jacobian: Huang, Mourikis and Roumeliotis, 2010). Beyond, the
+reference is known to be wrong and both its ends move to the estimate. A direction that stays while the value is taken
+at the estimate is no such filter: for aircraft in line its sign across the line may be the wrong one, and every update
+then drives the estimate further away.
+
 Source: Kalman, A new approach to linear filtering and prediction problems, 1960; sequential use of simultaneous
 measurements: Maybeck, Stochastic Models, Estimation, and Control, volume 1, 1979, section 5.6.
 """
@@ -25,6 +33,7 @@ from groundstation.estimators.kalman.kernels import add_noise, predict_covarianc
 
 PATIENCE = 30  # rejections of a vehicle in a row: then its clock has leapt
 LEAP_M = 1e5
+KNOWN_WRONG_SIGMAS = 3.0
 
 
 class _Joint:
@@ -46,6 +55,7 @@ class _Joint:
         for i, place in self.points.items():
             self.P[place, place] = prepared.session.points[i].position_sigma_m ** 2 * np.eye(2)
         self.times = [vehicle.first_s for vehicle in prepared.vehicles]
+        self.offsets_m = np.zeros((len(prepared.vehicles), 3))  # dead reckoning less reference place
         self._states, self._held = np.arange(total), np.zeros(0, dtype=np.int64)
         self._room, self._g, self._gain = np.zeros((total, total)), np.zeros(total), np.zeros(total)
         self._patterns = [_whole_block(place.start, size) for place, size in zip(self.slices, sizes, strict=True)]
@@ -78,7 +88,7 @@ class _Joint:
         elif event.kind == POINT and event.source in self.points:
             assert event.place_m is not None
             source_m = event.place_m - self.prepared.point_axes[event.source] @ self.x[self.points[event.source]]
-        about = self._line_of_reckoning(event) if self.about_reckoning else None
+        about = self._reference_line(event) if self.about_reckoning else None
         for row in rows_of(event, vehicles[event.receiver], here[0], source_m, clock_m, about):
             h = np.zeros(len(self.x))
             h[self.slices[event.receiver]] = row.receiver @ here[1]
@@ -89,15 +99,27 @@ class _Joint:
             found.append((row, h))
         return found
 
-    def _line_of_reckoning(self, event: Event) -> FloatArray | None:
-        """Line between two aircraft as their dead reckoning has it: it never jumps with the estimate."""
+    def _reference_line(self, event: Event) -> FloatArray | None:
+        """Line between two aircraft about which their range is linearised; its ends move when known to be wrong."""
         vehicles = self.prepared.vehicles
-        if event.kind != PEER or vehicles[event.receiver].clock < 0 or vehicles[event.source].clock < 0:
+        ends = (event.receiver, event.source)
+        if event.kind != PEER or any(vehicles[who].clock < 0 for who in ends):
             return None
-        ends = [
-            vehicles[who].place(np.zeros(vehicles[who].size), event.time_s)[0] for who in (event.receiver, event.source)
-        ]
-        return np.asarray(ends[0] - ends[1])
+        x = [self._at(who, event.time_s)[0] for who in ends]
+        (here, by_here), (there, by_there) = (
+            vehicles[who].place(state, event.time_s) for who, state in zip(ends, x, strict=True)
+        )
+        read = [here - by_here @ x[0], there - by_there @ x[1]]
+        line = read[0] - self.offsets_m[ends[0]] - read[1] + self.offsets_m[ends[1]]
+        away = here - there - line
+        across = away - line * float(line @ away) / float(line @ line)
+        derivative = np.zeros((3, len(self.x)))
+        derivative[:, self.slices[ends[0]]], derivative[:, self.slices[ends[1]]] = by_here, -by_there
+        shared = across @ derivative
+        if float(across @ across) ** 2 > KNOWN_WRONG_SIGMAS**2 * float(shared @ self.P @ shared):
+            self.offsets_m[ends[0]], self.offsets_m[ends[1]] = read[0] - here, read[1] - there
+            return np.asarray(here - there)
+        return np.asarray(line)
 
     def _at(self, who: int, at_s: float) -> tuple[FloatArray, FloatArray]:
         """State of a vehicle at a time not later than its own, and its derivative by the state it has."""

@@ -11,10 +11,11 @@ Four algorithms differ in what they make of a neighbour's estimate:
   is fused by covariance intersection. All that was ever broadcast counts as correlated, and so does all that is heard:
   others have heard it too. What gathers between two transmissions is independent. Consistent whatever the correlation.
 
+Who measures range and bearing of another tells it where it stands (sighting.py): each of the two learns from what one
+of them measured, under the same rule. Both then share the noise of the sensor: nothing of theirs is independent.
+
 Source: Skrypnik, Inter-aircraft navigation in air traffic management, 2010, chapters 3 and 4 (the first three);
-Schmidt, Application of state-space methods to navigation problems, 1966 (consider states); Julier and Uhlmann, General
-decentralized data fusion with covariance intersection, 2001 (split form); Li and Nashashibi, Cooperative multi-vehicle
-localization using split covariance intersection filter, 2013, equations 10 to 14.
+Schmidt, Application of state-space methods to navigation problems, 1966 (consider states); split_covariance.py.
 """
 
 from collections import deque
@@ -29,11 +30,12 @@ from groundstation.estimators.cooperative.events import HEIGHT, PEER, POINT, Eve
 from groundstation.estimators.cooperative.messages import Broadcast, decode
 from groundstation.estimators.cooperative.observation import Row, rows_of
 from groundstation.estimators.cooperative.settings import CooperativeSettings
+from groundstation.estimators.cooperative.sighting import Sighting, sighting_of
+from groundstation.estimators.cooperative.split_covariance import fuse
 from groundstation.estimators.cooperative.timeline import timeline
 from groundstation.estimators.cooperative.tracks import GATED, USED, AlgorithmRun, Recorder
 from groundstation.tables.session import NO_SLOT
 
-WEIGHTS = np.array([0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.995, 0.999])
 RANKED = ("ranked", "modified")
 
 
@@ -51,22 +53,43 @@ class Own:
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """A broadcast and, for the error map alone, the derivative and rows of its sender."""
+    """A broadcast, a square root of its covariance and, for the error map alone, derivative and rows of its sender."""
 
     message: Broadcast
+    root: FloatArray
     derivative: FloatArray
     map_rows: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """A measurement for one vehicle: its own with what the source broadcast, or where another has seen it."""
+
+    who: int
+    event: Event
+    heard: Heard | None
+    sighting: Sighting | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Used:
     """One row ready for an update: derivative by the state now, by the shared errors, and what its source brings."""
 
-    event: Event
+    offer: Offer
     row: Row
     h: FloatArray
     by_shared: FloatArray
-    heard: Heard | None
+
+    @property
+    def told(self) -> FloatArray:
+        """Derivative by the place and clock that its source told."""
+        return np.append(self.row.place, self.row.clock)
+
+    @property
+    def source(self) -> tuple[str, int]:
+        """Whose error it brings."""
+        event = self.offer.event
+        return event.kind, event.receiver if self.offer.sighting is not None else event.source
 
 
 class Decentralised:
@@ -130,32 +153,48 @@ class Decentralised:
         )
 
     def _use(self, events: tuple[Event, ...], at_s: float) -> None:
-        """One measurement, or all of a frame, receiver by receiver."""
-        heard = [self._listen(event) if event.kind == PEER else None for event in events]
-        for who in dict.fromkeys(event.receiver for event in events):
-            mine = [(event, h) for event, h in zip(events, heard, strict=True) if event.receiver == who]
-            mine = [(event, h) for event, h in mine if self._is_used(event, h)]
-            if not mine:
-                continue
+        """One measurement, or all of a frame, vehicle by vehicle; what is told is what was known before."""
+        offers = [Offer(event.receiver, event, self._listen(event) if event.kind == PEER else None) for event in events]
+        offers = [offer for offer in offers if self._is_used(offer)]
+        offers += [told for event in events if event.kind == PEER and (told := self._tell(event)) is not None]
+        for who in dict.fromkeys(offer.who for offer in offers):
             self._own[who] = self._moved(who, self._own[who], at_s)
-            rows = [used for event, h in mine for used in self._rows(who, event, h)]
-            rows = [used for used in rows if self._passes(who, used)]
-            if rows and self._algorithm == "split_intersection":
+            pieces = [self._rows(offer) for offer in offers if offer.who == who]
+            pieces = [rows for rows in pieces if rows and self._passes(who, rows)]
+            if self._algorithm == "split_intersection":
                 about = self._own[who].x
-                for used in rows:
-                    self._own[who] = self._split_update(self._own[who], used, about)
-            elif rows:
-                self._own[who] = self._update(self._own[who], rows)
+                for rows in pieces:
+                    self._own[who] = self._split_update(self._own[who], rows, about)
+            elif pieces:
+                self._own[who] = self._update(self._own[who], [used for rows in pieces for used in rows])
 
-    def _is_used(self, event: Event, heard: Heard | None) -> bool:
+    def _may_use(self, who: int, source: int) -> bool:
+        """Whether the rule of the algorithm lets a vehicle use what another tells."""
+        return self._algorithm not in RANKED or self._prepared.ranks[source] < self._prepared.ranks[who]
+
+    def _is_used(self, offer: Offer) -> bool:
+        event = offer.event
         if event.kind != PEER:
             return True
-        if self._algorithm in RANKED and self._prepared.ranks[event.source] >= self._prepared.ranks[event.receiver]:
+        if not self._may_use(event.receiver, event.source):
             self.recorder.counts["unused"] += 1
             return False
-        if heard is None:
+        if offer.heard is None:
             self.recorder.counts["lost"] += 1
-        return heard is not None
+        return offer.heard is not None
+
+    def _tell(self, event: Event) -> Offer | None:
+        """Where the receiver of a range with a bearing saw its source, as a message to it."""
+        observer = event.receiver
+        if not np.isfinite(event.bearing_rad) or not self._may_use(event.source, observer):
+            return None
+        own = self._moved(observer, self._own[observer], event.time_s)
+        sighting = sighting_of(event, self._prepared.vehicles[observer], own.x)
+        if sighting is None:
+            return None
+        told = np.concatenate([sighting.derivative, np.zeros((1, len(own.x)))])
+        heard = self._send(observer, event.slot, sighting.place_m, 0.0, own, told)
+        return Offer(event.source, event, heard, sighting)
 
     def _listen(self, event: Event) -> Heard | None:
         """What the source of a range told in its slot: its knowledge of some slots ago, at the time of transmission."""
@@ -175,62 +214,84 @@ class Decentralised:
         if vehicle.clock >= 0:
             clock[vehicle.clock] = 1.0
         told = np.concatenate([derivative, clock[None]])
-        algorithm = self._algorithm
-        message = Broadcast(
-            event.source,
-            self._prepared.ranks[event.source],
-            max(event.slot, 0),
-            place,
-            float(clock @ own.x),
-            None if algorithm == "neighbour_exact" else told @ own.P @ told.T,
-            told @ own.shared if algorithm == "modified" else None,
-        )
-        sent = message.encode()
-        self.recorder.sent(event.source, len(sent))
-        mine = self._own[event.source]
-        self._own[event.source] = replace(mine, independent=np.zeros_like(mine.independent))  # all may be known now
-        heard = Heard(decode(sent, algorithm), told, own.map_rows)
+        heard = self._send(event.source, event.slot, place, float(clock @ own.x), own, told)
         if event.slot != NO_SLOT:
             self._heard[key] = heard
         return heard
 
-    def _rows(self, who: int, event: Event, heard: Heard | None) -> list[Used]:
-        """Linearised measurements of an event, referred to the receiver's state now."""
+    def _send(self, who: int, slot: int, place_m: FloatArray, clock_m: float, own: Own, told: FloatArray) -> Heard:
+        """A message as it arrives; ``told`` is the derivative of place and clock by the sender's state ``own``."""
+        algorithm = self._algorithm
+        message = Broadcast(
+            who,
+            self._prepared.ranks[who],
+            max(slot, 0),
+            place_m,
+            clock_m,
+            None if algorithm == "neighbour_exact" else told @ own.P @ told.T,
+            told @ own.shared if algorithm == "modified" else None,
+        )
+        sent = message.encode()
+        self.recorder.sent(who, len(sent))
+        mine = self._own[who]
+        self._own[who] = replace(mine, independent=np.zeros_like(mine.independent))  # all may be known now
+        heard = decode(sent, algorithm)
+        return Heard(heard, _root(heard.covariance), told, own.map_rows)
+
+    def _rows(self, offer: Offer) -> list[Used]:
+        """Linearised measurements of an offer, referred to the vehicle's state now."""
+        who, event, heard = offer.who, offer.event, offer.heard
         own, vehicle = self._own[who], self._prepared.vehicles[who]
         x, back = own.x, np.eye(vehicle.size)
         if abs(event.time_s - own.time_s) > 1e-12:
             x, back, _ = vehicle.step(own.x, own.time_s, event.time_s)
-        source_m = None if heard is None else heard.message.place_m
-        clock_m = 0.0 if heard is None else heard.message.clock_m
+        if offer.sighting is not None and heard is not None:
+            rows = offer.sighting.rows(vehicle, x, event.time_s, heard.message.place_m)
+        else:
+            source_m = None if heard is None else heard.message.place_m
+            rows = rows_of(event, vehicle, x, source_m, 0.0 if heard is None else heard.message.clock_m)
         found = []
-        for row in rows_of(event, vehicle, x, source_m, clock_m):
+        for row in rows:
             by_shared = np.zeros(len(self._Pc))
             if event.kind == POINT and event.source in self._uncertain:
                 at = 2 * self._uncertain.index(event.source)
                 by_shared[at : at + 2] = -row.place @ self._prepared.point_axes[event.source]
-            found.append(Used(event, row, row.receiver @ back, by_shared, heard))
+            found.append(Used(offer, row, row.receiver @ back, by_shared))
         if not found:
             self.recorder.counts["lost"] += 1
         return found
 
-    def _noise(self, used: Used) -> tuple[float, float]:
-        """Variance that is the measurement's own, and that its source brings with it."""
-        brought = 0.0
-        if used.heard is not None and used.heard.message.covariance is not None:
-            told = np.append(used.row.place, used.row.clock)
-            brought = float(told @ used.heard.message.covariance @ told)
-        elif self._algorithm != "neighbour_exact":
-            brought = float(used.by_shared @ self._Pc @ used.by_shared)
-        return used.row.variance, max(brought, 0.0)
+    def _brought(self, rows: list[Used]) -> FloatArray:
+        """Covariance of what the sources bring with them: errors of one source are common to all its rows."""
+        brought, parts = np.zeros((len(rows), len(rows))), []
+        for i, used in enumerate(rows):
+            heard = used.offer.heard
+            if heard is not None:
+                parts.append(used.told @ heard.root)
+                for j in range(i + 1):
+                    if rows[j].source == used.source:
+                        brought[i, j] = brought[j, i] = float(parts[i] @ parts[j])
+            else:
+                parts.append(np.zeros(0))
+                if self._algorithm != "neighbour_exact":
+                    brought[i, i] = float(used.by_shared @ self._Pc @ used.by_shared)
+        return brought
 
-    def _passes(self, who: int, used: Used) -> bool:
-        """Whether the innovation is inside the gate; counts, and opens the clock after many rejections."""
+    def _passes(self, who: int, rows: list[Used]) -> bool:
+        """Whether all rows of a measurement are inside the gate; counts, opens the clock after many rejections."""
         own, vehicle = self._own[who], self._prepared.vehicles[who]
-        total = float(used.h @ own.P @ used.h) + sum(self._noise(used))
-        passes = self._settings.gate_sigma <= 0.0 or used.row.innovation**2 <= self._settings.gate_sigma**2 * total
-        self.recorder.judge(used.event, used.row.innovation, total, USED if passes else GATED)
+        offer, brought = rows[0].offer, np.diag(self._brought(rows))
+        passes = True
+        for used, noise in zip(rows, brought.tolist(), strict=True):
+            total = float(used.h @ own.P @ used.h) + used.row.variance + noise
+            fits = self._settings.gate_sigma <= 0.0 or used.row.innovation**2 <= self._settings.gate_sigma**2 * total
+            passes = passes and fits
+            if offer.sighting is None:
+                self.recorder.judge(offer.event, used.row.innovation, total, USED if passes else GATED)
+            if not passes:
+                break  # the bearing of a wrong range is another object's
         self._rejected[who] = 0 if passes else self._rejected[who] + 1
-        if self._rejected[who] >= PATIENCE and vehicle.clock >= 0 and used.event.kind != HEIGHT:
+        if self._rejected[who] >= PATIENCE and vehicle.clock >= 0 and offer.event.kind != HEIGHT:
             self._rejected[who] = 0
             self.recorder.counts["clock_leaps"] += 1
             P = own.P.copy()
@@ -243,12 +304,12 @@ class Decentralised:
         """Kalman update with the noise of the algorithm; shared errors are considered, not estimated."""
         H = np.array([used.h for used in rows])
         Hc = np.array([used.by_shared for used in rows])
-        R = np.diag([sum(self._noise(used)) for used in rows])
+        R = np.diag([used.row.variance for used in rows]) + self._brought(rows)
         shared, told = own.shared, np.zeros_like(Hc)
         if self._algorithm == "modified":
             for number, used in enumerate(rows):
-                if used.heard is not None and used.heard.message.shared is not None:
-                    told[number] = np.append(used.row.place, used.row.clock) @ used.heard.message.shared
+                if used.offer.heard is not None and used.offer.heard.message.shared is not None:
+                    told[number] = used.told @ used.offer.heard.message.shared
             R = R + self._through_what_they_share(rows, told)
         cross = shared @ Hc.T if self._algorithm == "modified" else np.zeros((len(own.x), len(rows)))
         S = H @ own.P @ H.T + H @ cross + cross.T @ H.T + R
@@ -263,64 +324,40 @@ class Decentralised:
         """Covariance of the noise of different neighbours (and points) through the uncertain ground points."""
         through = told + np.array([used.by_shared for used in rows]) @ self._Pc
         between = through @ self._inverse_Pc @ through.T if len(self._Pc) else np.zeros((len(rows), len(rows)))
-        sources = [(used.event.kind, used.event.source) for used in rows]
-        for i, one in enumerate(sources):
-            for j, two in enumerate(sources):
-                if one == two and i != j and one[0] == PEER:  # two rows of one neighbour share all its error
-                    a, b = (np.append(rows[k].row.place, rows[k].row.clock) for k in (i, j))
-                    heard = rows[i].heard
-                    if heard is not None and heard.message.covariance is not None:
-                        between[i, j] = float(a @ heard.message.covariance @ b)
-        np.fill_diagonal(between, 0.0)
+        for i, one in enumerate(rows):
+            for j, two in enumerate(rows):
+                if i == j or (one.source == two.source and one.source[0] == PEER):  # in what they bring
+                    between[i, j] = 0.0
         return between
 
-    def _split_update(self, own: Own, used: Used, about: FloatArray) -> Own:
-        """Split covariance intersection with one scalar measurement; the weight that leaves the least position error.
-
-        ``about`` is the state that the measurement was linearised about.
-        """
-        independent_noise, dependent_noise = self._noise(used)
-        h, dependent = used.h, own.P - own.independent
-        weight = 1.0
-        if dependent_noise > 0.0:
-            weight = self._best_weight(h, dependent, own.independent, dependent_noise, independent_noise)
-        if weight == 0.0:
-            return own  # every weight leaves a larger position error than none
-        P1 = dependent / weight + own.independent
-        noise = independent_noise + (dependent_noise / (1.0 - weight) if dependent_noise > 0.0 else 0.0)
-        S = float(h @ P1 @ h) + noise
-        gain = P1 @ h / S
-        P = P1 - np.outer(gain, gain) * S
-        kept = np.eye(len(own.x)) - np.outer(gain, h)
-        independent = kept @ own.independent @ kept.T + np.outer(gain, gain) * independent_noise
-        innovation = used.row.innovation - float(h @ (own.x - about))
-        rows = self._mixed(own, gain[:, None], h[None], [used])
-        return Own(own.time_s, own.x + gain * innovation, P, independent, own.shared, rows)
-
-    @staticmethod
-    def _best_weight(
-        h: FloatArray, dependent: FloatArray, independent: FloatArray, dependent_noise: float, independent_noise: float
-    ) -> float:
-        by_dependent, by_independent = dependent @ h, independent @ h
-        horizontal = by_dependent[:2, None] / WEIGHTS + by_independent[:2, None]
-        S = (h @ by_dependent) / WEIGHTS + h @ by_independent + dependent_noise / (1.0 - WEIGHTS) + independent_noise
-        trace = (dependent[0, 0] + dependent[1, 1]) / WEIGHTS + independent[0, 0] + independent[1, 1]
-        left = trace - (horizontal**2).sum(axis=0) / S
-        best = int(np.argmin(left))
-        now = dependent[0, 0] + dependent[1, 1] + independent[0, 0] + independent[1, 1]
-        return float(WEIGHTS[best]) if left[best] < now else 0.0
+    def _split_update(self, own: Own, rows: list[Used], about: FloatArray) -> Own:
+        """Split covariance intersection with the rows of one measurement, linearised about the state ``about``."""
+        H, sensor = np.array([used.h for used in rows]), np.diag([used.row.variance for used in rows])
+        fused = fuse(own.P, own.independent, H, sensor, self._brought(rows))
+        if fused is None:
+            return own
+        innovation = np.array([used.row.innovation for used in rows]) - H @ (own.x - about)
+        is_common = any(used.offer.sighting is not None for used in rows)  # its noise is in the observer's state too
+        independent = np.zeros_like(fused.independent) if is_common else fused.independent
+        mixed = self._mixed(own, fused.gain, H, rows)
+        return Own(own.time_s, own.x + fused.gain @ innovation, fused.P, independent, own.shared, mixed)
 
     @staticmethod
     def _mixed(own: Own, gain: FloatArray, H: FloatArray, rows: list[Used]) -> FloatArray:
         """Rows of the error map after an update."""
         others: list[Other | None] = []
         for used in rows:
-            if used.heard is None:
-                others.append(None)
-            else:
-                told = np.append(used.row.place, used.row.clock) @ used.heard.derivative
-                others.append((told, used.heard.map_rows))
+            heard = used.offer.heard
+            others.append(None if heard is None else (used.told @ heard.derivative, heard.map_rows))
         return corrected_rows(own.map_rows, gain, H, others)
+
+
+def _root(covariance: FloatArray | None) -> FloatArray:
+    """Symmetric square root; zero without a covariance. Rounding to 4-byte numbers may leave an eigenvalue below 0."""
+    if covariance is None:
+        return np.zeros((4, 4))
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
 
 
 def run_decentralised(prepared: Prepared, settings: CooperativeSettings, algorithm: str) -> AlgorithmRun:

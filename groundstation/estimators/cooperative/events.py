@@ -9,8 +9,9 @@ from groundstation.base.ecef import ecef_from_n, geodetic_deg_m
 from groundstation.base.findings import Finding
 from groundstation.base.records import BoolArray
 from groundstation.estimators.cooperative.settings import CooperativeSettings
-from groundstation.estimators.cooperative.vehicles import Vehicle, vehicle_of
-from groundstation.tables.session import NO_SLOT, DeadReckoning, Odometry, Session
+from groundstation.estimators.cooperative.vehicles import InertialVehicle, Vehicle
+from groundstation.estimators.cooperative.wheeled_vehicle import WheeledVehicle
+from groundstation.tables.session import NO_SLOT, DeadReckoning, Odometry, Ranges, Session
 
 PEER, POINT, SATELLITE, HEIGHT = "peer", "point", "satellite", "height"
 LOWEST_RANK = 1_000_000
@@ -95,7 +96,12 @@ def prepare(session: Session, settings: CooperativeSettings) -> Prepared:
     """
     findings: list[Finding] = []
     tracks = [kept for kept in (_clean(track, findings) for track in session.vehicles) if kept is not None]
-    vehicles = tuple(vehicle_of(track, session.frame, settings) for track in tracks)
+    vehicles = tuple(
+        WheeledVehicle(track, settings)
+        if isinstance(track, Odometry)
+        else InertialVehicle(track, session.frame, settings)
+        for track in tracks
+    )
     places = {vehicle.name: index for index, vehicle in enumerate(vehicles)}
     points = {point.name: index for index, point in enumerate(session.points)}
     events = [
@@ -192,6 +198,8 @@ def _link_events(
                 count=count,
             )
         )
+    as_white = _as_white(table, settings)
+    stated = (table.sigma_m**2 + (settings.range_share * table.pseudorange_m) ** 2) * as_white
     usable = known & np.isfinite(table.time_s) & ((is_number & ~negative & ~absurd) | has_bearing)
     events, away = [], 0
     for row in np.flatnonzero(usable).tolist():
@@ -201,7 +209,7 @@ def _link_events(
         if not _is_there(vehicles, receiver, time_s) or (is_peer and not _is_there(vehicles, places[source], time_s)):
             away += 1
             continue
-        variance = float(table.sigma_m[row]) ** 2 + (settings.extra_range_sigma_m**2 if is_peer else 0.0)
+        variance = float(stated[row]) + (settings.extra_range_sigma_m**2 if is_peer else 0.0)
         is_good = bool(is_number[row] and not negative[row] and not absurd[row])
         events.append(
             Event(
@@ -214,12 +222,30 @@ def _link_events(
                 int(table.slot[row]),
                 None if is_peer else np.array(session.points[points[source]].position_m),
                 float(bearing[row]) if has_bearing[row] else float("nan"),
-                float(bearing_sigma[row]) ** 2,
+                float(bearing_sigma[row] ** 2 * as_white[row]),
                 table.is_two_way,
             )
         )
     _count_away(findings, away, "link rows")
     return events
+
+
+def _as_white(table: Ranges, settings: CooperativeSettings) -> FloatArray:
+    """Factor of the variance of each row, so that what repeats itself weighs no more than it tells.
+
+    A share c of the variance decays with the time t: readings every dt seconds are worth white ones of the variance
+    times 1 - c + c coth(dt / 2 t) (the spectral density at frequency 0 of a first-order Gauss-Markov sequence).
+    """
+    share, time_s = settings.correlated_share, settings.correlation_s
+    if share <= 0.0:
+        return np.ones(len(table))
+    since_s, latest = np.full(len(table), np.inf), dict[tuple[str, str], float]()
+    for row, (at_s, receiver, source) in enumerate(
+        zip(table.time_s.tolist(), table.receiver.tolist(), table.source.tolist(), strict=True)
+    ):
+        since_s[row] = at_s - latest.get((receiver, source), -np.inf)
+        latest[receiver, source] = at_s
+    return np.asarray(1.0 - share + share / np.tanh(np.clip(since_s / time_s, 0.01, 100.0) / 2.0))
 
 
 def _count_away(findings: list[Finding], away: int, what: str) -> None:

@@ -35,6 +35,8 @@ def tracks_figure(runs: Sequence[tuple[AlgorithmRun, Sequence[Judgement | None]]
                 "z_m": track.position_m[:, 2],
                 "sigma_north_m": np.sqrt(track.covariance[:, 0, 0]),
                 "sigma_east_m": np.sqrt(track.covariance[:, 1, 1]),
+                "sigma_up_m": track.sigma_up_m,
+                "correlation_north_east": track.correlation,
                 "two_sigma_r_m": track.two_sigma_r_m,
                 "error_m": error,
                 "nees": nothing if judgement is None else judgement.nees,
@@ -42,7 +44,8 @@ def tracks_figure(runs: Sequence[tuple[AlgorithmRun, Sequence[Judgement | None]]
             for name, values in columns.items():
                 parts.setdefault(name, []).append(values)
     joined = {name: np.concatenate(values) for name, values in parts.items()}
-    return FigureData("cooperative_tracks", joined, {name: 3 for name in joined if name.endswith("_m")})
+    digits = {name: 3 for name in joined if name.endswith("_m")} | {"correlation_north_east": 4}
+    return FigureData("cooperative_tracks", joined, digits)
 
 
 def geometry_figure(geometry: Sequence[Geometry], bound: AlgorithmRun) -> FigureData:

@@ -6,8 +6,8 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import EARTH_RATE_RADPS
-from groundstation.estimators.cooperative.events import HEIGHT, POINT, SATELLITE, Event
-from groundstation.estimators.cooperative.vehicles import Vehicle
+from groundstation.estimators.cooperative.events import HEIGHT, PEER, POINT, SATELLITE, Event
+from groundstation.estimators.cooperative.vehicles import Vehicle, View
 
 LIGHT_MPS = 299_792_458.0
 NEAREST_M = 1e-3  # a source on top of the receiver has no direction
@@ -67,14 +67,13 @@ def rows_of(
     source_clock_m : float
         Clock offset of a peer; 0 else.
     about_m : ndarray, shape (3,), optional
-        Line from the source to the receiver whose direction is the derivative of the range; None: that of the estimate.
+        Line from the source to the receiver about which the range is linearised; None: that of the estimate.
 
     Returns
     -------
     list of Row
         Range, then bearing, as far as the event has them.
     """
-    place, derivative = vehicle.place(x, event.time_s)
     if event.kind == HEIGHT:
         h = np.zeros(vehicle.size)
         h[vehicle.height] = -1.0
@@ -82,16 +81,21 @@ def rows_of(
         return [Row(event.value_m - predicted, h, np.zeros(3), 0.0, event.variance_m2)]
     source = event.place_m if source_m is None else source_m
     assert source is not None
-    line = place - source
+    view = vehicle.view(x, event.time_s)
+    line = view.place_m - source
     distance = float(np.sqrt(line @ line))
     if distance < NEAREST_M:
         return []
     rows = []
     if np.isfinite(event.value_m):
-        direction = line / distance if about_m is None else about_m / float(np.sqrt(about_m @ about_m))
-        rows.append(_range_row(event, vehicle, x, place, derivative, source, source_clock_m, direction, distance))
+        direction = line / distance
+        if about_m is not None:
+            distance = float(np.sqrt(about_m @ about_m))
+            direction = about_m / distance
+            distance += float(direction @ (line - about_m))
+        rows.append(_range_row(event, vehicle, x, view, source, source_clock_m, direction, distance))
     if np.isfinite(event.bearing_rad):
-        rows.append(_bearing_row(event, vehicle, x, derivative, -line))
+        rows.append(_bearing_row(event, view, -line))
     return rows
 
 
@@ -99,26 +103,28 @@ def _range_row(
     event: Event,
     vehicle: Vehicle,
     x: FloatArray,
-    place: FloatArray,
-    derivative: FloatArray,
+    view: View,
     source: FloatArray,
     source_clock_m: float,
     direction: FloatArray,
     distance: float,
 ) -> Row:
     if event.kind == SATELLITE:
-        direction, distance = _while_the_earth_turns(place, source, distance)
+        direction, distance = _while_the_earth_turns(view.place_m, source, distance)
     predicted = distance
-    h = direction @ derivative
-    clock, by_clock = vehicle.receiver_clock if event.kind == SATELLITE else vehicle.clock, 0.0
+    h = direction @ view.derivative
+    by_source, by_clock = -direction, 0.0
+    clock = vehicle.receiver_clock if event.kind == SATELLITE else vehicle.clock
     if clock >= 0 and not event.is_two_way:
         predicted += float(x[clock]) - source_clock_m
         h[clock] += 1.0
         by_clock = 0.0 if event.kind in (POINT, SATELLITE) else -1.0
-    if vehicle.bias >= 0 and event.kind != SATELLITE:
-        predicted += float(x[vehicle.bias])
-        h[vehicle.bias] += 1.0
-    return Row(event.value_m - predicted, h, -direction, by_clock, event.variance_m2)
+    if event.kind != SATELLITE:
+        error, by_error, scale = vehicle.range_error(x, distance, is_peer=event.kind == PEER)
+        predicted += error
+        h = (1.0 + scale) * h + by_error if scale else h + by_error
+        by_source = (1.0 + scale) * by_source
+    return Row(event.value_m - predicted, h, by_source, by_clock, event.variance_m2)
 
 
 def _while_the_earth_turns(place: FloatArray, source: FloatArray, distance: float) -> tuple[FloatArray, float]:
@@ -133,13 +139,12 @@ def _while_the_earth_turns(place: FloatArray, source: FloatArray, distance: floa
     return line / distance, distance
 
 
-def _bearing_row(event: Event, vehicle: Vehicle, x: FloatArray, derivative: FloatArray, line: FloatArray) -> Row:
-    """Bearing from the nose: direction to the source less heading; line leads from the receiver to the source."""
+def _bearing_row(event: Event, view: View, line: FloatArray) -> Row:
+    """Bearing off the sensor's heading: direction to the source less it; line leads from the sensor to the source."""
     north, east = float(line[0]), float(line[1])
     square = north * north + east * east
     by_line = np.array([-east, north, 0.0]) / square
-    h = -by_line @ derivative
-    h[vehicle.heading] -= 1.0
-    innovation = event.bearing_rad - (np.arctan2(east, north) - float(x[vehicle.heading]))
+    h = -by_line @ view.derivative - view.by_heading
+    innovation = event.bearing_rad - (np.arctan2(east, north) - view.heading_rad)
     wrapped = float((innovation + np.pi) % (2.0 * np.pi) - np.pi)
     return Row(wrapped, h, by_line, 0.0, event.bearing_variance_rad2)

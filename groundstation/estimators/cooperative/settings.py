@@ -65,6 +65,30 @@ class OdometryBelief:
 
 
 @dataclass(frozen=True)
+class CameraBelief:
+    """Sigmas of what a wheeled vehicle's camera adds to ranges and bearings; a state each where above 0.
+
+    Parameters
+    ----------
+    range_scale : float
+    marker_bias_m : float
+        Of ranges to vehicles, beside the range bias of all.
+    mount_deg : float
+        Angle from the nose to the optical axis.
+    lag_s : float
+        How much later than it was taken a measurement is stamped.
+    """
+
+    range_scale: float = number(0.0, 0.0, 1.0)
+    marker_bias_m: float = number(0.0, 0.0)
+    mount_deg: float = number(0.0, 0.0, 180.0)
+    lag_s: float = number(0.0, 0.0, 10.0)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+@dataclass(frozen=True)
 class CooperativeSettings:
     """How the cooperative filters work.
 
@@ -73,9 +97,8 @@ class CooperativeSettings:
     update : {'sequential', 'simultaneous'}
         Every measurement at its own time with its own linearisation, or all of one frame together.
     derivatives : {'estimate', 'reckoning'}
-        Where the centralised filter takes the direction of a range between two aircraft: at its estimate, or at their
-        dead reckoning. Directions that jump with the estimate tell of a turn of the whole group, which ranges between
-        its members cannot see (first-estimates Jacobian: Huang, Mourikis and Roumeliotis, 2010).
+        Where the centralised filter linearises a range between two aircraft: at its estimate, or at their dead
+        reckoning for as long as the estimate lies within three sigmas of it (see ``centralised``).
     frame_s : float
         Length of a frame, for simultaneous updates and for the modified algorithm.
     gate_sigma : float
@@ -91,6 +114,10 @@ class CooperativeSettings:
         Length of the stretches whose joint error map is judged.
     extra_range_sigma_m : float
         Added to the stated sigma of peer ranges, in squares: what the stated one leaves out.
+    range_share : float
+        Likewise of all ranges over the link, in proportion to the range.
+    correlated_share, correlation_s : float
+        Share of the variance of ranges and bearings that stays while a pair measures again, and for how long.
     """
 
     update: Update = "sequential"
@@ -104,8 +131,12 @@ class CooperativeSettings:
     output_step_s: float = number(1.0, 0.01)
     map_window_s: float = number(10.0, 0.1)
     extra_range_sigma_m: float = number(0.0, 0.0)
+    range_share: float = number(0.0, 0.0, 1.0)
+    correlated_share: float = number(0.0, 0.0, 1.0)
+    correlation_s: float = number(5.0, 0.01)
     ins: InsBelief = field(default_factory=InsBelief)
     odometry: OdometryBelief = field(default_factory=OdometryBelief)
+    camera: CameraBelief = field(default_factory=CameraBelief)
 
     def __post_init__(self) -> None:
         check_ranges(self)

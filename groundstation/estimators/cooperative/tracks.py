@@ -25,6 +25,8 @@ class Track:
         Estimated, frame of the session.
     state : ndarray, shape (n, m)
     covariance : ndarray, shape (n, m, m)
+    height : int
+        Place of the height in the state; -1 where there is none.
     """
 
     name: str
@@ -32,6 +34,7 @@ class Track:
     position_m: FloatArray
     state: FloatArray
     covariance: FloatArray
+    height: int = -1
 
     def __post_init__(self) -> None:
         for name in ("time_s", "position_m", "state", "covariance"):
@@ -46,6 +49,20 @@ class Track:
     def two_sigma_r_m(self) -> FloatArray:
         """Twice sqrt(sx^2 + sy^2), shape (n,)."""
         return 2.0 * np.sqrt(self.covariance[:, 0, 0] + self.covariance[:, 1, 1])
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Of the errors north and east, shape (n,); 0 where one is exact."""
+        product = np.sqrt(self.covariance[:, 0, 0] * self.covariance[:, 1, 1])
+        both = self.covariance[:, 0, 1]
+        return np.asarray(np.divide(both, product, out=np.zeros(len(both)), where=product > 0.0))
+
+    @property
+    def sigma_up_m(self) -> FloatArray:
+        """Of the height, shape (n,); NaN for a vehicle whose height is no state."""
+        if self.height < 0:
+            return np.full(len(self.time_s), np.nan)
+        return np.sqrt(self.covariance[:, self.height, self.height])
 
 
 @dataclass(frozen=True)
@@ -133,6 +150,7 @@ class Recorder:
                     np.array([row[1] for row in rows]).reshape(n, 3),
                     np.array([row[2] for row in rows]).reshape(n, m),
                     np.array([row[3] for row in rows]).reshape(n, m, m),
+                    vehicle.height,
                 )
             )
         return AlgorithmRun(

@@ -1,10 +1,11 @@
 """Error states of one vehicle: start, transition, and where its antenna is.
 
 Two kinds share one interface. An aircraft's state is the error of its INS, barometer and clocks, counted off its dead
-reckoning: corrected = reading - estimated error. A wheeled vehicle's state is its place and heading themselves, with
-the scale errors of its odometry.
+reckoning: corrected = reading - estimated error. A wheeled vehicle's state is its place and heading themselves
+(wheeled_vehicle.py).
 """
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol
 
@@ -14,12 +15,34 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
 from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.estimators.cooperative.transition import discretise, global_dynamics, local_dynamics
-from groundstation.tables.session import DeadReckoning, Frame, Odometry
+from groundstation.tables.session import DeadReckoning, Frame
 
 RAD_PER_ARCSEC = float(np.deg2rad(1.0 / 3600.0))
 GRAVITY_MPS2 = 9.7803253359, 0.00193185265241, 0.00669437999  # Somigliana, WGS-84 (NIMA TR8350.2)
 SAME_TIME_S = 1e-9
 Step = tuple[FloatArray, FloatArray, FloatArray]
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """Where the sensor of a vehicle was and looked when it took a measurement.
+
+    Parameters
+    ----------
+    place_m : ndarray, shape (3,)
+        Frame of the session.
+    derivative : ndarray, shape (3, n)
+        By the state.
+    heading_rad : float
+        Of the sensor; NaN for one that takes no bearings.
+    by_heading : ndarray, shape (n,)
+        Derivative of the heading by the state.
+    """
+
+    place_m: FloatArray
+    derivative: FloatArray
+    heading_rad: float
+    by_heading: FloatArray
 
 
 class Vehicle(Protocol):
@@ -51,6 +74,12 @@ class Vehicle(Protocol):
 
     def place(self, x: FloatArray, at_s: float) -> tuple[FloatArray, FloatArray]:
         """Position of the antenna in the frame of the session, and its derivative by the state, shape (3, n)."""
+
+    def view(self, x: FloatArray, at_s: float) -> View:
+        """Place and heading of the sensor of a measurement stamped ``at_s``."""
+
+    def range_error(self, x: FloatArray, distance_m: float, *, is_peer: bool) -> tuple[float, FloatArray, float]:
+        """Error of a range to a peer or point, its derivative by the state, shape (n,), and by the distance."""
 
     def height_m(self, at_s: float) -> float:
         """Height as dead reckoning has it."""
@@ -119,6 +148,19 @@ class InertialVehicle:
             self._places[at_s] = self._reading(at_s)
         reading, derivative = self._places[at_s]
         return reading + derivative @ x, derivative
+
+    def view(self, x: FloatArray, at_s: float) -> View:
+        """That of the antenna."""
+        place, derivative = self.place(x, at_s)
+        return View(place, derivative, float("nan"), np.zeros(self.size))
+
+    def range_error(self, x: FloatArray, distance_m: float, *, is_peer: bool) -> tuple[float, FloatArray, float]:
+        """Bias of the receiver."""
+        h = np.zeros(self.size)
+        if self.bias < 0:
+            return 0.0, h, 0.0
+        h[self.bias] = 1.0
+        return float(x[self.bias]), h, 0.0
 
     def height_m(self, at_s: float) -> float:
         """Barometric height; meaningful in a local frame."""
@@ -230,113 +272,3 @@ def _specific_force(latitude_deg: float, height_m: float, velocity: FloatArray, 
     w_d = -2.0 * EARTH_RATE_RADPS * sine - east * sine / cosine / normal
     coriolis = [w_e * down - w_d * east, w_d * north - w_n * down, w_n * east - w_e * north - gravity]
     return np.asarray(change + np.array(coriolis))
-
-
-class WheeledVehicle:
-    """A ground vehicle with odometry: north, east, heading, and scale errors of speed and turn where believed."""
-
-    clock: int = -1
-    receiver_clock: int = -1
-    height: int = -1
-    heading: int = 2
-
-    def __init__(self, track: Odometry, settings: CooperativeSettings) -> None:
-        self.name, self._track, self._settings = track.name, track, settings
-        self.first_s, self.last_s = float(track.time_s[0]), float(track.time_s[-1])
-        belief = settings.odometry
-        self.states: tuple[str, ...] = ("north_m", "east_m", "heading_rad")
-        self._speed_scale = self._turn_scale = self.bias = -1
-        if belief.speed_scale > 0.0:
-            self._speed_scale, self.states = len(self.states), (*self.states, "speed_scale")
-        if belief.turn_scale > 0.0:
-            self._turn_scale, self.states = len(self.states), (*self.states, "turn_scale")
-        if settings.range_bias_m > 0.0:
-            self.bias, self.states = len(self.states), (*self.states, "range_bias_m")
-
-    @property
-    def size(self) -> int:
-        """Number of states."""
-        return len(self.states)
-
-    def start(self) -> tuple[FloatArray, FloatArray]:
-        """Where the table says it stood."""
-        belief = self._settings.odometry
-        x = np.zeros(self.size)
-        x[:3] = [*self._track.position_m, np.deg2rad(self._track.heading_deg)]
-        sigma = np.zeros(self.size)
-        sigma[:3] = [belief.position_m, belief.position_m, np.deg2rad(belief.heading_deg)]
-        for at, value in (
-            (self._speed_scale, belief.speed_scale),
-            (self._turn_scale, belief.turn_scale),
-            (self.bias, self._settings.range_bias_m),
-        ):
-            if at >= 0:
-                sigma[at] = value
-        return x, np.diag(np.square(sigma))
-
-    def step(self, x: FloatArray, from_s: float, to_s: float) -> Step:
-        """Integrate odometry, each reading held until the next; derivative by the state with it."""
-        track, n = self._track, self.size
-        early, late = min(from_s, to_s), max(from_s, to_s)
-        first = max(int(np.searchsorted(track.time_s, early + SAME_TIME_S)) - 1, 0)
-        last = max(int(np.searchsorted(track.time_s, late - SAME_TIME_S)) - 1, first)
-        edges = [early, *track.time_s[first + 1 : last + 1].tolist(), late]
-        epochs = list(range(first, first + len(edges) - 1))
-        if to_s < from_s:  # back in time, for measurements that are used together
-            edges, epochs = edges[::-1], epochs[::-1]
-        x, transition, noise = x.copy(), np.eye(n), np.zeros((n, n))
-        for epoch, (one, two) in zip(epochs, pairwise(edges), strict=True):
-            x, phi, q = self._short_step(x, epoch, two - one)
-            transition, noise = phi @ transition, phi @ noise @ phi.T + q
-        return x, transition, noise
-
-    def _short_step(self, x: FloatArray, epoch: int, step_s: float) -> Step:
-        belief, n = self._settings.odometry, self.size
-        speed, turn = float(self._track.speed_mps[epoch]), float(np.deg2rad(self._track.turn_rate_dps[epoch]))
-        speed_factor = 1.0 - x[self._speed_scale] if self._speed_scale >= 0 else 1.0
-        turn_factor = 1.0 - x[self._turn_scale] if self._turn_scale >= 0 else 1.0
-        way, turned = speed * speed_factor * step_s, turn * turn_factor * step_s
-        middle = x[2] + 0.5 * turned
-        cosine, sine = np.cos(middle), np.sin(middle)
-        moved = x.copy()
-        moved[0], moved[1], moved[2] = x[0] + way * cosine, x[1] + way * sine, x[2] + turned
-        phi = np.eye(n)
-        phi[0, 2], phi[1, 2] = -way * sine, way * cosine
-        if self._speed_scale >= 0:
-            phi[0, self._speed_scale], phi[1, self._speed_scale] = -speed * step_s * cosine, -speed * step_s * sine
-        if self._turn_scale >= 0:
-            half = -0.5 * turn * step_s
-            phi[0, self._turn_scale], phi[1, self._turn_scale] = -way * sine * half, way * cosine * half
-            phi[2, self._turn_scale] = -turn * step_s
-        size = abs(step_s)
-        is_moving = speed != 0.0 or turn != 0.0
-        along = (belief.along_m_per_sqrt_s**2 if is_moving else 0.0) * size + belief.slip_m_per_sqrt_m**2 * abs(way)
-        across = belief.slip_m_per_sqrt_m**2 * abs(way)
-        q = np.zeros((n, n))
-        q[0, 0] = along * cosine**2 + across * sine**2
-        q[1, 1] = along * sine**2 + across * cosine**2
-        q[0, 1] = q[1, 0] = (along - across) * sine * cosine
-        q[2, 2] = np.deg2rad(belief.turn_deg_per_sqrt_s) ** 2 * size if is_moving else 0.0
-        for at, value in ((self._speed_scale, belief.speed_scale), (self._turn_scale, belief.turn_scale)):
-            if at >= 0:
-                q[at, at] = 2.0 * value**2 / belief.scale_s * size
-        if self.bias >= 0:
-            q[self.bias, self.bias] = 2.0 * self._settings.range_bias_m**2 / self._settings.range_bias_s * size
-        return moved, phi, q
-
-    def place(self, x: FloatArray, at_s: float) -> tuple[FloatArray, FloatArray]:
-        """The first two states."""
-        derivative = np.zeros((3, self.size))
-        derivative[0, 0] = derivative[1, 1] = 1.0
-        return np.array([x[0], x[1], 0.0]), derivative
-
-    def height_m(self, at_s: float) -> float:
-        """On the floor."""
-        return 0.0
-
-
-def vehicle_of(track: DeadReckoning | Odometry, frame: Frame, settings: CooperativeSettings) -> Vehicle:
-    """The model of a vehicle's own navigation."""
-    if isinstance(track, Odometry):
-        return WheeledVehicle(track, settings)
-    return InertialVehicle(track, frame, settings)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import unwrap
+from groundstation.base.normal import NORMAL_95
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.estimators.heading.lines import fitted_lines, window_bounds
 from groundstation.estimators.heading.samples import Samples
@@ -129,5 +130,5 @@ def variance_ratio(used: Samples, standstill: Standstill | None, line_s: float) 
         return None
     ratio = float(np.var(difference)) / expected
     spread = np.hypot(_variance_log_sigma(difference), sway2 / expected * _variance_log_sigma(residual))
-    low, high = ratio * np.exp(-1.96 * spread), ratio * np.exp(1.96 * spread)
+    low, high = ratio * np.exp(-NORMAL_95 * spread), ratio * np.exp(NORMAL_95 * spread)
     return VarianceRatio(ratio, float(low), float(high), float(np.sqrt(track2)), float(np.sqrt(sway2)))

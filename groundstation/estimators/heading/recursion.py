@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from groundstation.base.normal import NORMAL_95
 
-NORMAL_95 = 1.96
+FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -148,7 +148,7 @@ def _remarks(rows: Sequence[TrialRow]) -> list[str]:
     if wrong:
         places = ", ".join(f"{row.before_threshold_m:.0f} m" for row in wrong)
         remarks.append(
-            f"The filter is over-confident at {places} before the threshold: heights far from any point are badly "
+            f"The filter is overconfident at {places} before the threshold: heights far from any point are badly "
             "known and ranges are curved over their uncertainty."
         )
     white = [row for row in rows if row.filter == WHITE]

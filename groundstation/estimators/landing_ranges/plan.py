@@ -22,7 +22,9 @@ def _findings(answer: RangeLanding) -> tuple[Finding, ...]:
     if wrong:
         places = ", ".join(f"{row.before_threshold_m:.0f}" for row in wrong)
         text = f"errors of {answer.trial_count} simulated approaches exceed the computed sigmas {places} m before the "
-        found.append(Finding("warn", "landing_ranges.too_sure", f"{text}threshold: geometry too weak for the filter"))
+        found.append(
+            Finding("warn", "landing_ranges.overconfident", f"{text}threshold: geometry too weak for the filter")
+        )
     if not answer.at(TOUCHDOWN).category:
         found.append(Finding("info", "landing_ranges.no_category", "no category's accuracy is met at touchdown"))
     return tuple(found)

@@ -5,23 +5,23 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from groundstation.base.signals import field_of
-from groundstation.base.units import DEG_PER_RAD, NT_PER_GAUSS
+from groundstation.base.units import CONVERSIONS, DEG_PER_RAD, NT_PER_GAUSS
 from groundstation.readers.dataflash.definitions import Definition, Units
 
+# Unit of FMTU -> unit of a profile.
+_NAMES = {
+    **dict.fromkeys(("deg", "degheading", "deglatitude", "deglongitude"), "deg"),
+    "rad": "rad",
+    "deg/s": "dps",
+    "rad/s": "radps",
+    "m": "m",
+    "m/s": "mps",
+    "m/s/s": "mps2",
+    "Gauss": "gauss",
+    "A": "a",
+}
 # Unit of FMTU -> unit of a canonical field and factor.
-_FACTORS: Mapping[str, tuple[str, float]] = MappingProxyType(
-    {
-        **dict.fromkeys(("deg", "degheading", "deglatitude", "deglongitude"), ("deg", 1.0)),
-        "rad": ("deg", DEG_PER_RAD),
-        "deg/s": ("dps", 1.0),
-        "rad/s": ("dps", DEG_PER_RAD),
-        "m": ("m", 1.0),
-        "m/s": ("mps", 1.0),
-        "m/s/s": ("mps2", 1.0),
-        "Gauss": ("nt", NT_PER_GAUSS),
-        "A": ("a", 1.0),
-    }
-)
+_FACTORS = {name: CONVERSIONS[unit] for name, unit in _NAMES.items()}
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.local_frame import plane_through
+from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.cooperative import REFERENCE, title_of, trusted
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
@@ -41,11 +42,12 @@ def session_map(results: FlightResults) -> Drawing | None:
     answer, data, algorithm = found
     rows = texts(data, "algorithm") == algorithm
     place, vehicle = _places(data)[rows], texts(data, "vehicle")[rows]
-    north_m, east_m = (2.0 * numbers(data, f"sigma_{axis}_m")[rows] for axis in ("north", "east"))
+    ellipses = _ellipses(data, rows)
     origin = plane_through(place) if answer.frame == "ecef" else None
     plane = place if origin is None else origin.from_ecef_m(place)
     stations = results.figure_with_rows("session_points")
-    larger = _magnified(plane, north_m, east_m)
+    larger = _magnified(plane, ellipses)
+    when = "at the end" if _is_crowd(answer) else f"at {ELLIPSES} times"
 
     def paint(figure: Any) -> None:
         axes = d.place(figure, 18, 12, 174, 104)
@@ -53,12 +55,14 @@ def session_map(results: FlightResults) -> Drawing | None:
             mine = np.flatnonzero(vehicle == name)
             if not len(mine):
                 continue
-            d.line(axes, plane[mine, 1] / M_PER_KM, plane[mine, 0] / M_PER_KM, colour, 1.2, label=d.label(name, 12))
-            d.dots(axes, plane[mine[:1], 1] / M_PER_KM, plane[mine[:1], 0] / M_PER_KM, colour, 4.0)
-            for row in mine[d.thin(len(mine), ELLIPSES)]:
-                east = (plane[row, 1] + larger * east_m[row] * np.cos(ROUND)) / M_PER_KM
-                north = (plane[row, 0] + larger * north_m[row] * np.sin(ROUND)) / M_PER_KM
-                d.line(axes, east, north, colour, 0.6)
+            north, east = plane[mine, 0] / M_PER_KM, plane[mine, 1] / M_PER_KM
+            d.line(axes, east, north, colour, 1.2, label=d.label(name, 12))
+            d.dots(axes, east[:1], north[:1], colour, 4.0)
+            for row in mine[-1:] if _is_crowd(answer) else mine[d.thin(len(mine), ELLIPSES)]:
+                drawn = (plane[row, :2] + larger * ellipses[row]) / M_PER_KM
+                d.line(axes, drawn[:, 1], drawn[:, 0], colour, 0.6)
+            if _is_crowd(answer):
+                d.beside(axes, east[0], north[0], d.label(name, 12), colour, axes.transData, "center")
         if stations is not None:
             points = _places(stations) if origin is None else origin.from_ecef_m(_places(stations))
             axes.plot(points[:, 1] / M_PER_KM, points[:, 0] / M_PER_KM, "^", color=d.INK, markersize=4.0)
@@ -68,19 +72,30 @@ def session_map(results: FlightResults) -> Drawing | None:
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_xlabel("east, km")
         axes.set_ylabel("north, km")
-        d.legend_above(axes, 10)
+        if not _is_crowd(answer):
+            d.legend_above(axes, 10)
 
     size = f", drawn {larger} times their size" if larger > 1 else ""
     caption = (
-        f"Tracks from above, {title_of(algorithm)}; the dot is where each begins. Ellipses: 2σ north and east, at "
-        f"{ELLIPSES} times of each track{size}." + (" Triangles: ground stations." if stations is not None else "")
+        f"Tracks from above, {title_of(algorithm)}; the dot is where each begins. 2σ ellipses "
+        f"{when} of each track{size}." + (" Triangles: ground stations." if stations is not None else "")
     )
     return Drawing("Map", caption, "Tracks of the aircraft.", d.draw("cooperative-map", 112, paint), _numbers(results))
 
 
-def _magnified(plane: FloatArray, north_m: FloatArray, east_m: FloatArray) -> int:
+def _ellipses(data: FigureData, rows: NDArray[np.bool_]) -> FloatArray:
+    """2 sigma ellipses about the origin, north and east, shape (n, 49, 2); upright where no correlation is saved."""
+    north, east = (numbers(data, f"sigma_{axis}_m")[rows] for axis in ("north", "east"))
+    correlation = np.nan_to_num(numbers(data, "correlation_north_east")[rows])
+    across = np.sqrt(np.clip(1.0 - correlation**2, 0.0, None))
+    drawn_north = north[:, None] * np.cos(ROUND)
+    drawn_east = east[:, None] * (correlation[:, None] * np.cos(ROUND) + across[:, None] * np.sin(ROUND))
+    return 2.0 * np.stack([drawn_north, drawn_east], axis=2)
+
+
+def _magnified(plane: FloatArray, ellipses: FloatArray) -> int:
     """How many times larger ellipses are drawn so that they can be seen: 1, or 2, 5, 10 ... times."""
-    half = float(np.nanmedian(np.hypot(north_m, east_m)))
+    half = float(np.nanmedian(np.hypot(*np.moveaxis(ellipses, 2, 0))))
     side = float(np.nanmax(np.nanmax(plane[:, :2], axis=0) - np.nanmin(plane[:, :2], axis=0)))
     wanted = SEEN_SHARE * side / half if half > 0.0 else 1.0
     return max((step for step in MAGNIFIED if step <= wanted), default=1)
@@ -89,6 +104,11 @@ def _magnified(plane: FloatArray, north_m: FloatArray, east_m: FloatArray) -> in
 def _numbers(results: FlightResults) -> tuple[str, ...]:
     names = ("cooperative_tracks", "session_points")
     return tuple(name for name in names if results.figure_with_rows(name) is not None)
+
+
+def _is_crowd(answer: CooperativeResult) -> bool:
+    """Whether there are more aircraft than colours: lines are then not told apart by them."""
+    return len(answer.vehicle_names) > len(d.SERIES)
 
 
 def _colours(answer: CooperativeResult) -> list[str]:
@@ -101,7 +121,7 @@ def errors(results: FlightResults) -> Drawing | None:
     if found is None:
         return None
     answer, data, algorithm = found
-    shown = answer.vehicle_names[:MOST_PANELS]
+    shown = _largest(answer, algorithm)
     vehicle, of = texts(data, "vehicle"), texts(data, "algorithm")
     time_s, error, bound = (numbers(data, name) for name in ("time_s", "error_m", "two_sigma_r_m"))
     lines = (len(shown) + 1) // 2
@@ -126,15 +146,32 @@ def errors(results: FlightResults) -> Drawing | None:
     caption = (
         f"Horizontal error against the truth, where a log holds one, and the computed 2σ_r (shaded) of "
         f"{title_of(algorithm)}; grey: that of dead reckoning alone, where it fits in."
-        + (f" {more} more aircraft in the table." if more else "")
+        + (f" The {len(shown)} with the largest 2σ_r at the end; {more} more in the table." if more else "")
     )
     alt = "Horizontal error and 2 sigma of each aircraft with time."
     return Drawing("Error against 2σ_r", caption, alt, d.draw("cooperative-errors", height, paint), _numbers(results))
 
 
+def _largest(answer: CooperativeResult, algorithm: str) -> list[str]:
+    """The aircraft that have a panel, in their order: of very many those with the largest 2 sigma_r at the end."""
+    rows = [row for row in answer.vehicles if row.algorithm == algorithm]
+    kept = {row.vehicle for row in sorted(rows, key=lambda row: -row.two_sigma_r_m)[:MOST_PANELS]}
+    return [name for name in answer.vehicle_names if name in kept]
+
+
 def _ceiling(*series: FloatArray) -> float:
     known = d.finite(*series)
     return 1.15 * float(known.max()) if known.size and known.max() > 0.0 else 1.0
+
+
+def _styles(answer: CooperativeResult) -> dict[str, tuple[str, str]]:
+    """Colour and label of the line of each aircraft; of a crowd the one of the poorest geometry stands out, last."""
+    names = answer.vehicle_names
+    if not _is_crowd(answer) or not answer.geometry:
+        return {name: (colour, d.label(name, 12)) for name, colour in zip(names, _colours(answer), strict=True)}
+    worst = min(answer.geometry, key=lambda row: row.determinant_median).vehicle
+    others = {name: (d.FAINT, "") for name in names if name != worst}
+    return {**others, worst: (d.LIMIT, f"{d.label(worst, 12)}, least median det(H'H)")}
 
 
 def geometry(results: FlightResults) -> Drawing | None:
@@ -145,16 +182,17 @@ def geometry(results: FlightResults) -> Drawing | None:
     vehicle, time_s = texts(data, "vehicle"), numbers(data, "time_s")
     measures = (("hdop", "HDOP"), ("determinant", "det(H'H)"), ("eigenvalue", "least eigenvalue"))
     columns = [one for one in measures if np.isfinite(numbers(data, one[0])).any()]
+    styles = _styles(answer)
     height = 42.0 * len(columns) + 12.0
 
     def paint(figure: Any) -> None:
         for number, (column, title) in enumerate(columns):
             top = height - 8 - 42 * number
             axes = d.place(figure, 18, top - 34, 174, top)
-            for name, colour in zip(answer.vehicle_names, _colours(answer), strict=True):
+            for name, (colour, told) in styles.items():
                 mine = vehicle == name
                 when, values = d.broken_at_gaps(time_s[mine], numbers(data, column)[mine])
-                d.line(axes, when, values, colour, 1.0, label=d.label(name, 12))
+                d.line(axes, when, values, colour, 1.0 if told else 0.5, label=told or None)
             axes.set_ylabel(title)
             known = d.finite(numbers(data, column))
             if column == "hdop" and known.size and known.max() > 20.0 * np.median(known):
@@ -167,6 +205,7 @@ def geometry(results: FlightResults) -> Drawing | None:
     caption = (
         "Geometry of the sources that each aircraft hears in a frame: dilution, and determinant and least eigenvalue "
         "of H'H, horizontal directions alone; a line ends where an aircraft hears nothing."
+        + (" Grey: the other aircraft, numbers in the table." if _is_crowd(answer) else "")
     )
     svg = d.draw("cooperative-geometry", height, paint)
     return Drawing("Geometry", caption, "Geometry measures with time.", svg, ("cooperative_geometry",))
@@ -185,22 +224,24 @@ def links(results: FlightResults) -> Drawing | None:
 
     def paint(figure: Any) -> None:
         axes = d.place(figure, 18, 12, 174, 56)
-        for name, colour in zip(answer.vehicle_names, _colours(answer), strict=True):
+        if _is_crowd(answer):
+            d.dots(axes, time_s[mark > 0], np.clip(normal[mark > 0], -ceiling, ceiling), d.INS, label="used")
+        for name, colour in () if _is_crowd(answer) else zip(answer.vehicle_names, _colours(answer), strict=True):
             mine = (receiver == name) & (mark > 0)
             d.dots(axes, time_s[mine], np.clip(normal[mine], -ceiling, ceiling), colour, label=d.label(name, 12))
         gated = mark <= 0
         if gated.any():
             d.dots(axes, time_s[gated], np.clip(normal[gated], -ceiling, ceiling), d.LIMIT, 3.0, label="gated")
-        d.limit_line(axes, 1.96, "95 %")
-        d.limit_line(axes, -1.96, "")
+        d.limit_line(axes, NORMAL_95, "95 %")
+        d.limit_line(axes, -NORMAL_95, "")
         axes.set_ylim(-1.05 * ceiling, 1.05 * ceiling)
         axes.set_ylabel("residual over its sigma")
         d.time_axis(axes, float(time_s.min()), float(time_s.max()))
         d.legend_above(axes, 10)
 
     caption = (
-        f"Residuals of the ranges over their computed sigma, {title_of(answer.default_algorithm)}, by receiver; what "
-        f"is beyond {ceiling:.0f} is drawn at the edge."
+        f"Residuals of the ranges over their computed sigma, {title_of(answer.default_algorithm)}"
+        f"{'' if _is_crowd(answer) else ', by receiver'}; what is beyond {ceiling:.0f} is drawn at the edge."
     )
     svg = d.draw("cooperative-links", 66, paint)
     return Drawing("Residuals of the links", caption, "Residuals of the ranges with time.", svg, ("cooperative_links",))

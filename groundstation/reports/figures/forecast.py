@@ -85,7 +85,7 @@ def calibration(results: FlightResults) -> Drawing | None:
 
     caption = (
         "Left: how many errors the claimed bands held; on the dashed lines they are honest, below too narrow. Right: "
-        "squared error over claimed variance; above the shaded limits the forecast is surer than it may be. "
+        "squared error over claimed variance; above the shaded limits the forecast is overconfident. "
         f"Hollow: fewer than {FEWEST_STARTS} independent starts, not to be judged."
     )
     alt = "Coverage of the claimed bands and NEES by horizon."

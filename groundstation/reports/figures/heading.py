@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.wording import clock, interval, is_number, number
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
@@ -11,7 +12,6 @@ from groundstation.results.figures import FigureData, flags, numbers, texts
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult, TaxiSegment
 
-NORMAL_95 = 1.96  # half width of the 95 % interval of a normal distribution, in sigmas
 TAXI_SPEED_MARGIN = 1.6  # the take-off run leaves the figure, or the taxi would be a line at its foot
 SLOWEST_TRACK_MPS = 1.0  # below it the direction of motion is noise and is not drawn
 

@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.normal import NORMAL_95
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
 from groundstation.results.figures import FigureData, flags, numbers
 from groundstation.results.flight import FlightResults
 
 CHANNELS = ("north", "east")
-BAND = 1.96  # half width of a 95 % band in sigmas
 BAND_QUANTILES = (10.0, 90.0)  # the band of the first minutes and of long outages may leave the axis
 SUFFIXES = {"position": "m", "velocity": "mps", "tilt": "arcsec", "drift": "dph"}
 UNITS = {"position": "m", "velocity": "m/s", "tilt": "arcsec", "drift": "°/h"}
@@ -85,7 +85,7 @@ def _paint_state(axes: Any, data: FigureData, channel: str, name: str) -> None:
     column = f"{channel}_{name}_{SUFFIXES[name]}"
     time, estimate = numbers(data, "time_s"), numbers(data, column)
     measured, smoothed = numbers(data, f"measured_{column}"), numbers(data, f"smoothed_{column}")
-    half = BAND * numbers(data, f"{channel}_{name}_sigma_{SUFFIXES[name]}")
+    half = NORMAL_95 * numbers(data, f"{channel}_{name}_sigma_{SUFFIXES[name]}")
     keep = d.thin(len(time), MOST)
     if np.isfinite(half).any():
         low, high = (estimate - half)[keep], (estimate + half)[keep]
@@ -176,7 +176,7 @@ def innovations(results: FlightResults) -> Drawing | None:
             axes = d.place(figure, 18, bottom, 174, bottom + 28)
             values = numbers(data, f"{channel}_normalised_innovation")
             d.dots(axes, numbers(data, "time_s"), values, d.INS, 1.6, MOST_DOTS, zorder=2)
-            for limit, text in ((BAND, "+1.96"), (-BAND, "−1.96")):
+            for limit, text in ((NORMAL_95, "+1.96"), (-NORMAL_95, "−1.96")):
                 d.limit_line(axes, limit, text)
             axes.set_ylim(*_symmetric(values))
             axes.set_ylabel(f"{channel} innovation, σ")
@@ -193,7 +193,7 @@ def innovations(results: FlightResults) -> Drawing | None:
 
 
 def _symmetric(values: NDArray[np.float64]) -> tuple[float, float]:
-    largest = float(np.abs(d.finite(values)).max(initial=1.3 * BAND))
+    largest = float(np.abs(d.finite(values)).max(initial=1.3 * NORMAL_95))
     return -1.1 * min(largest, 8.0), 1.1 * min(largest, 8.0)
 
 

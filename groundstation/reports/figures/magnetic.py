@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.geodesy import north_east_m
+from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
@@ -14,7 +15,6 @@ from groundstation.results.magnetic import METHOD_TITLES, MagneticResult
 
 METHOD_COLOURS = dict(zip(METHOD_TITLES, (d.INS, d.USED, "#cc79a7"), strict=True))
 RIGHT, LEFT = d.GNSS, d.INS
-BAND = 1.96  # half width of a 95 % band in sigmas
 MARGIN_S = 20.0  # flight shown before and after the figure
 
 
@@ -37,7 +37,7 @@ def deviation(results: FlightResults) -> Drawing | None:
             bins, values = numbers(table, "magnetic_heading_deg"), numbers(table, "deviation_deg")
             d.dots(axes, bins, values, d.UNUSED, 3.0, label="table, bins of 1°")
         for name, title in METHOD_TITLES.items():
-            value, half = numbers(curves, f"deviation_{name}_deg"), BAND * numbers(curves, f"sigma_{name}_deg")
+            value, half = numbers(curves, f"deviation_{name}_deg"), NORMAL_95 * numbers(curves, f"sigma_{name}_deg")
             if not np.isfinite(value).any():
                 continue
             colour = METHOD_COLOURS[name]

@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.base.normal import NORMAL_95
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
 from groundstation.results.figures import flags, numbers
 from groundstation.results.flight import FlightResults
 from groundstation.results.magnetic_ground import GroundDeviation
 
-BAND = 1.96  # half width of a 95 % band in sigmas
 LEAST_SPAN_DEG = 2.0  # of the error axis
 
 
@@ -22,7 +22,7 @@ def ground_runs(results: FlightResults) -> Drawing | None:
         return None
     heading = np.array([run.magnetic_heading_deg for run in used])
     error = np.array([run.error_deg for run in used], dtype=np.float64)
-    half = BAND * np.array([run.sigma_deg for run in used], dtype=np.float64)  # NaN where it is not known
+    half = NORMAL_95 * np.array([run.sigma_deg for run in used], dtype=np.float64)  # NaN where it is not known
     curve = results.figure_with_rows("magnetic_ground_curve")
     epochs = results.figure_with_rows("magnetic_ground_epochs")
     low, high = float(np.nanmin(error - half)), float(np.nanmax(error + half))
@@ -36,7 +36,7 @@ def ground_runs(results: FlightResults) -> Drawing | None:
             d.dots(axes, x, y, d.UNUSED, 2.4, 2500, label="epochs")
         if curve is not None and np.isfinite(numbers(curve, "error_deg")).any():
             x, y = numbers(curve, "magnetic_heading_deg"), numbers(curve, "error_deg")
-            band = BAND * numbers(curve, "sigma_deg")
+            band = NORMAL_95 * numbers(curve, "sigma_deg")
             axes.fill_between(x, y - band, y + band, color=d.USED, alpha=0.15, linewidth=0)
             d.line(axes, x, y, d.USED, 1.2, label="A to E")
         bars: dict[str, Any] = {"color": d.INS, "markersize": 3.5, "elinewidth": 1.1, "capsize": 2.5, "zorder": 4}

@@ -3,11 +3,22 @@
 from collections.abc import Callable
 
 from groundstation.chapters.parts import Section
-from groundstation.reports.fleet import aircraft, calibration, densities, deviation, flights, rest, skill, trend
+from groundstation.reports.fleet import (
+    aircraft,
+    calibration,
+    densities,
+    deviation,
+    flights,
+    rest,
+    sessions,
+    skill,
+    trend,
+)
 from groundstation.results.fleet import FleetResults
 
 CHAPTERS: tuple[Callable[[FleetResults], Section | None], ...] = (
     flights.build,
+    sessions.build,
     densities.build,
     aircraft.heading,
     trend.build,

@@ -73,6 +73,11 @@ def day(time: np.datetime64) -> str:
     return ABSENT if np.isnat(time) else str(time.astype("datetime64[D]"))
 
 
+def minute(time: np.datetime64) -> str:
+    """A time to the minute: 2026-05-04 06:00; an em dash where it is missing."""
+    return ABSENT if np.isnat(time) else str(time.astype("datetime64[m]")).replace("T", " ")
+
+
 def plural(count: int, one: str, many: str = "") -> str:
     """A count with its noun.
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Section, Tone
 from groundstation.chapters.verdict import VERDICTS
-from groundstation.chapters.wording import ABSENT, clean, number, typeset
-from groundstation.reports.fleet.common import aircraft_name, bounded, plural, title_of
+from groundstation.chapters.wording import clean, number, typeset
+from groundstation.reports.fleet.common import aircraft_name, bounded, minute, plural, title_of
 from groundstation.results.fleet import FleetResults
 
 KEY = "flights"
@@ -41,7 +41,7 @@ def lines(fleet: FleetResults) -> list[FlightLine]:
     """Every flight in the order of the fleet."""
     noted = remarks_of(fleet)
     columns = {name: values.tolist() for name, values in fleet.flights.columns.items() if name != "start_utc"}
-    columns["start"] = [_minute(time) for time in fleet.flights["start_utc"]]
+    columns["start"] = [minute(time) for time in fleet.flights["start_utc"]]
     rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
     return [_line(row, noted.get(row["flight_id"], ())) for row in rows]
 
@@ -58,10 +58,6 @@ def _line(row: dict[str, Any], remarks: Sequence[Mark]) -> FlightLine:
     return FlightLine(row["report"], cells, remarks, [*links, ("folder", row["flight_id"] + "/")])
 
 
-def _minute(time: np.datetime64) -> str:
-    return ABSENT if np.isnat(time) else str(time.astype("datetime64[m]")).replace("T", " ")
-
-
 def verdict_mark(verdict: str) -> Mark:
     """A verdict as it stands in a cell."""
     mark = VERDICTS.get(verdict) or Mark("unknown", clean(verdict) or "not assessable")
@@ -69,7 +65,7 @@ def verdict_mark(verdict: str) -> Mark:
 
 
 def remarks_of(fleet: FleetResults) -> dict[str, list[Mark]]:
-    """What is out of the ordinary about flights, by flight id, gravest first."""
+    """What is out of the ordinary about flights, by flight id, the most severe first."""
     found: dict[str, list[Mark]] = {}
 
     def note(flight_id: Any, tone: Tone, text: str) -> None:
@@ -89,14 +85,14 @@ def remarks_of(fleet: FleetResults) -> dict[str, list[Mark]]:
     for change in fleet.change_points:
         note(change.flight_id, "warn", f"new level from here: {title_of(change.quantity)}")
     for row in np.flatnonzero(flights["findings_fail"] > 0):
-        note(flights["flight_id"][row], "warn", plural(int(flights["findings_fail"][row]), "grave finding"))
+        note(flights["flight_id"][row], "warn", plural(int(flights["findings_fail"][row]), "severe finding"))
     for row in np.flatnonzero(flights["has_lost_data"]):
         note(flights["flight_id"][row], "plain", "data lost")
     return found
 
 
 def build(fleet: FleetResults) -> Section:
-    """Build the chapter as paper has it: the flights of note first, the gravest of them on top."""
+    """Build the chapter as paper has it: the flights of note first, the most severe on top."""
     if not len(fleet):
         return Section(KEY, "Flights", LEAD, (Note("No log gave a flight.", "unknown"),))
     every = sorted(lines(fleet), key=_gravity)
@@ -106,7 +102,7 @@ def build(fleet: FleetResults) -> Section:
     rows = [(*(line.cells[place] for place in shown), _joined(line.remarks)) for line in every]
     caption = (
         f"First what is of note, {number(noted, 0)} of {plural(len(fleet), 'flight')}: failed, rejected, outliers, "
-        "outside the limits, the first of a new level, or with grave findings."
+        "outside the limits, the first of a new level, or with severe findings."
     )
     return Section(KEY, "Flights", LEAD, (Grid("Flights", heads, rows, caption),))
 

@@ -29,6 +29,7 @@ def build(fleet: FleetResults) -> Front:
         ("Aircraft", _names(named)),
         ("Span", _span(fleet)),
         ("Verdicts", _verdicts(fleet)),
+        *((("Sessions", f"{number(len(fleet.sessions), 0)} of several aircraft"),) if fleet.sessions else ()),
         ("Logs without a flight", _without_flight(fleet)),
     )
     verdict, headline = _attention(fleet)

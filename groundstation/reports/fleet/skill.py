@@ -143,7 +143,7 @@ def _flights(fleet: FleetResults) -> Drawing:
 
     caption = (
         f"Left: the shipped method on every flight after {horizon:g} min without GNSS. Right: share of the errors of "
-        "all starts inside the band that the forecast claims; below the dashed line it is surer than it may be."
+        "all starts inside the band that the forecast claims; below the dashed line it is overconfident."
     )
     alt = "Forecast error of every flight over time, and coverage of the forecast's band by horizon."
     return Drawing("Flights and coverage", caption, alt, d.draw("fleet-skill", 62, paint))

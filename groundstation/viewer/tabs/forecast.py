@@ -4,6 +4,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from groundstation.base.normal import NORMAL_95
 from groundstation.base.timescales import duration_text
 from groundstation.chapters.forecast import forecast as chapter
 from groundstation.chapters.markdown import markdown
@@ -17,7 +18,6 @@ from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray
 from groundstation.viewer.views import document, figure_of, numbers, plot
 
-BAND = 1.96  # half width of a 95 % band in sigmas
 THIN, BOLD = 0.8, 1.8
 MARGIN = 1.08
 FAN_HEIGHT, GROWTH_HEIGHT = 140.0, 115.0
@@ -67,7 +67,7 @@ def _fan(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     views: list[rrb.View] = []
     for channel in ("north", "east"):
         expected, actual = numbers(fan, f"{channel}_m"), numbers(fan, f"actual_{channel}_m")
-        half = BAND * numbers(fan, f"{channel}_sigma_m")
+        half = NORMAL_95 * numbers(fan, f"{channel}_sigma_m")
         size = _largest(expected, actual, np.abs(expected) + half)
         axis = Axis(f"{channel.capitalize()} error, m,", -size, size)
         chart = Chart(recorder, f"forecast/fan_{channel}", x, axis, FAN_HEIGHT)

@@ -3,7 +3,8 @@
 import numpy as np
 import rerun.blueprint as rrb
 
-from groundstation.chapters.generic import columns_by_unit, figures_over_time, generic, quantity, titled
+from groundstation.chapters import chapter_of
+from groundstation.chapters.generic import columns_by_unit, figures_over_time, quantity, titled
 from groundstation.chapters.markdown import markdown
 from groundstation.results.answer import Answer
 from groundstation.results.figures import numbers
@@ -17,7 +18,7 @@ from groundstation.viewer.views import document, plot
 
 def generic_tab(recorder: Recorder, results: FlightResults, answer: Answer) -> rrb.Container:
     """Log the tab of any answer."""
-    section, path = generic(results, answer), answer.analysis
+    section, path = chapter_of(results, answer), answer.analysis
     recorder.document(f"{path}/answer", markdown(section))
     text = document("What was found", f"{path}/answer")
     plots = [view for name in figures_over_time(results, path) for view in _plots(recorder, results, path, name)]

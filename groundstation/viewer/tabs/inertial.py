@@ -3,6 +3,7 @@
 import numpy as np
 import rerun.blueprint as rrb
 
+from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.inertial import inertial as chapter
 from groundstation.chapters.markdown import markdown
 from groundstation.results.figures import FigureData
@@ -14,7 +15,6 @@ from groundstation.viewer.series import FloatArray, gap_after, runs
 from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
 
 CHANNELS = ("north", "east")
-BAND = 1.96  # half width of a 95 % band in sigmas
 THIN, BOLD, DOT = 1.0, 2.0, 1.6
 MARGIN = 0.12
 BAND_QUANTILES = (10.0, 90.0)  # the band of the first minutes and of long outages may leave the picture
@@ -96,7 +96,7 @@ def _state(
     band: list[FloatArray] = []
     sigma = f"{channel}_{name}_sigma_{suffix}"
     if sigma in states.columns:
-        half = BAND * numbers(states, sigma)
+        half = NORMAL_95 * numbers(states, sigma)
         band = [estimate + half, estimate - half]
         series += band
         lines += [Line(f"estimate ± 1.96 σ, {unit}", colours.HONEST, THIN)] * 2
@@ -128,11 +128,11 @@ def _innovation(recorder: Recorder, states: FigureData, channel: str) -> rrb.Vie
     time_ns, values = recorder.time_ns(numbers(states, "time_s")), numbers(states, column)
     known = np.isfinite(values)
     recorder.dots(f"{path}/a_samples", time_ns[known], values[known], Line("innovation / σ", colours.SAMPLES, DOT))
-    ends = np.array([[BAND, -BAND], [BAND, -BAND]])
+    ends = np.array([[NORMAL_95, -NORMAL_95], [NORMAL_95, -NORMAL_95]])
     lines = [Line("± 1.96", colours.LIMIT, THIN)] * 2
     recorder.lines(f"{path}/b_limits", time_ns[[0, -1]], ends, lines)
-    largest = float(np.abs(values[known]).max(initial=BAND))
-    high = min(max(1.1 * largest, 2.0 * BAND), 8.0)
+    largest = float(np.abs(values[known]).max(initial=NORMAL_95))
+    high = min(max(1.1 * largest, 2.0 * NORMAL_95), 8.0)
     title = f"{channel.capitalize()} normalised innovation (95 % inside ± 1.96)"
     return plot(title, path, axis_range=(-high, high), legend=False)
 

@@ -3,6 +3,7 @@
 import numpy as np
 import rerun.blueprint as rrb
 
+from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.magnetic import magnetic as chapter
 from groundstation.chapters.markdown import markdown
 from groundstation.results.flight import FlightResults
@@ -15,7 +16,6 @@ from groundstation.viewer.series import FloatArray, gap_after
 from groundstation.viewer.tabs.magnetic_field import eight, sphere
 from groundstation.viewer.views import document, figure_of, numbers, plot
 
-BAND = 1.96  # half width of a 95 % band in sigmas
 THIN, BOLD, DOT = 1.0, 2.0, 1.6
 SHADES = dict(zip(METHOD_TITLES, (colours.INS, colours.ANSWER, colours.HONEST), strict=True))
 MARGIN = 0.08
@@ -71,7 +71,7 @@ def _deviation(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
         value, sigma = (numbers(figure, column) for column in columns)
         if np.isfinite(value).any():
             shade = SHADES[name]
-            curves += [(value + sign * BAND * sigma, Line("", shade, THIN)) for sign in (1.0, -1.0)]
+            curves += [(value + sign * NORMAL_95 * sigma, Line("", shade, THIN)) for sign in (1.0, -1.0)]
             curves.append((value, Line(title, shade, BOLD)))
     heading = numbers(figure, "magnetic_heading_deg")
     return _chart(recorder, "magnetic/deviation", "Deviation to be added, deg", heading, curves)
@@ -101,7 +101,7 @@ def _ground_runs(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     for run in runs:
         if run.error_deg is None or run.sigma_deg is None:
             continue
-        ends = run.error_deg + BAND * run.sigma_deg * np.array([-1.0, 1.0])
+        ends = run.error_deg + NORMAL_95 * run.sigma_deg * np.array([-1.0, 1.0])
         middle = run.magnetic_heading_deg + DOT * np.array([-1.0, 1.0])
         bar = np.full(2, run.magnetic_heading_deg)
         curves += [(bar, ends, Line("", colours.INS, THIN)), (middle, np.full(2, run.error_deg), RUN)]

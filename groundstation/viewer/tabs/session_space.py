@@ -6,6 +6,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from groundstation.base.ellipse import principal_axes
 from groundstation.base.local_frame import LocalFrame, plane_through
 from groundstation.base.records import Int64Array
 from groundstation.chapters.cooperative import trusted
@@ -21,18 +22,19 @@ from groundstation.viewer.series import FloatArray
 from groundstation.viewer.views import figure_of, numbers
 
 MARK, TRAIL, LINK = 5.0, 1.0, 1.2  # radii in points of the screen
-LEVEL_SHARE = 0.05  # height of an ellipsoid: the answer has horizontal sigmas alone
+FLAT_M = 0.01  # half height of an ellipsoid where the height is not known: a disc
+SIGMAS = "sigma_north_m", "sigma_east_m", "correlation_north_east", "sigma_up_m"
 FRAME_S = 1.0  # links of one such step are drawn together
 MOST_STRIPS = 60_000
 STEPS: tuple[tuple[float, Colour], ...] = ((1.0, colours.ANSWER), (2.0, colours.PAPER), (3.0, colours.OVER_LIMIT))
-VIEW_NAME = "East, north, up; ellipsoids 2σ; links: residual below 1σ green, 2σ yellow, 3σ orange, else red"
+VIEW_NAME = "East, north, up; true 2σ ellipsoids; links: residual below 1σ green, 2σ yellow, 3σ orange, else red"
 
 
 def space(
     recorder: Recorder, answer: CooperativeResult, points: Sequence[GroundPoint], results: FlightResults
 ) -> list[rrb.View]:
     """Log the aircraft, their tracks, the ground points and the links; the view, none without a position."""
-    tracks = figure_of(results, "cooperative_tracks", "time_s", "vehicle", "algorithm", "x_m", "y_m", "z_m")
+    tracks = figure_of(results, "cooperative_tracks", "time_s", "vehicle", "algorithm", "x_m", "y_m", "z_m", *SIGMAS)
     if tracks is None:
         return []
     rows = tracks["algorithm"].astype(np.str_) == trusted(answer).algorithm
@@ -84,11 +86,32 @@ def _aircraft(
     recorder.static(f"{path}/now", mark)
     where = place.astype(np.float32)
     recorder.stream.send_columns(f"{path}/now", indexes, rr.Points3D.columns(positions=where))
-    north, east = (2.0 * numbers(tracks, f"sigma_{axis}_m")[rows] for axis in ("north", "east"))
-    half = np.nan_to_num(np.column_stack([east, north, LEVEL_SHARE * 0.5 * (east + north)]))
+    half_m, turn = ellipsoids(*(numbers(tracks, name)[rows] for name in SIGMAS))
     recorder.static(f"{path}/ellipsoid", rr.Ellipsoids3D.from_fields(colors=[(*shade[:3], 90)], fill_mode="solid"))
-    columns = rr.Ellipsoids3D.columns(half_sizes=half.astype(np.float32), centers=where)
+    columns = rr.Ellipsoids3D.columns(half_sizes=half_m.astype(np.float32), centers=where, quaternions=turn)
     recorder.stream.send_columns(f"{path}/ellipsoid", indexes, columns)
+
+
+def ellipsoids(
+    north_m: FloatArray, east_m: FloatArray, correlation: FloatArray, up_m: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Half axes of 2 sigma ellipsoids, shape (n, 3), and their turn from axes east, north, up, shape (n, 4), x y z w.
+
+    The errors of height and place are taken as independent. Without a sigma up an ellipsoid is a disc.
+
+    Examples
+    --------
+    >>> one = (np.array([value]) for value in (1.0, 3.0, 0.0, 5.0))
+    >>> half_m, turn = ellipsoids(*one)
+    >>> half_m.tolist(), turn.round(6).tolist()
+    ([[6.0, 2.0, 10.0]], [[0.0, 0.0, 0.0, 1.0]])
+    """
+    major, minor, azimuth_deg = principal_axes(north_m, east_m, correlation)
+    half_m = 2.0 * np.column_stack([major, minor, np.where(np.isfinite(up_m), up_m, 0.5 * FLAT_M)])
+    half_turn_rad = np.deg2rad(0.5 * (90.0 - azimuth_deg))  # the first axis shows east before it is turned
+    nothing = np.zeros(len(major))
+    turn = np.column_stack([nothing, nothing, np.sin(half_turn_rad), np.cos(half_turn_rad)])
+    return np.nan_to_num(half_m), np.nan_to_num(turn)
 
 
 def _links(

@@ -1,0 +1,24 @@
+"""Gaps in the times of one topic."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from groundstation.base.records import Int64Array, frozen
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """Gaps of one topic: last sample before each (corrected nanoseconds) and seconds to the next, shape (n,)."""
+
+    topic: str
+    start_ns: Int64Array
+    length_s: np.ndarray[Any, np.dtype[np.float64]]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start_ns", frozen(self.start_ns))
+        object.__setattr__(self, "length_s", frozen(self.length_s))
+
+    def __len__(self) -> int:
+        return len(self.start_ns)

@@ -1,0 +1,72 @@
+"""How units are written and rounded: the suffix of a name, the sign in text, plain letters, decimals. One table."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+
+class UnitName(NamedTuple):
+    """A unit as text prints it (``sign``), as labels without special signs spell it, and decimals of its numbers."""
+
+    sign: str
+    plain: str = ""
+    decimals: int | None = None
+
+    @property
+    def spelled(self) -> str:
+        """Plain letters."""
+        return self.plain or self.sign
+
+
+# By suffix of a name. A suffix that ends like a shorter one stands before it.
+UNITS: Mapping[str, UnitName] = MappingProxyType(
+    {
+        "mps_per_sqrt_s": UnitName("m/s/√s"),
+        "deg_per_sqrt_h": UnitName("°/√h", "deg/√h"),
+        "dphph_per_sqrt_h": UnitName("°/h²/√h", "deg/h²/√h"),
+        "dph_per_sqrt_h": UnitName("°/h/√h", "deg/h/√h"),
+        "deg_per_h": UnitName("°/h", "deg/h"),
+        "deg_per_s": UnitName("°/s", "deg/s"),
+        "nt_per_a": UnitName("nT/A"),
+        "per_deg": UnitName("1/°", "1/deg"),
+        "per_h": UnitName("/h"),
+        "per_s": UnitName("/s"),
+        "deg": UnitName("°", "deg", 4),
+        "rad": UnitName("rad"),
+        "arcmin": UnitName("′", "arcmin", 2),
+        "arcsec": UnitName("arcsec", decimals=3),
+        "dphph": UnitName("°/h²", "deg/h per h", 6),
+        "dph": UnitName("°/h", "deg/h", 6),
+        "nmiph": UnitName("nmi/h", decimals=4),
+        "mps2": UnitName("m/s²"),
+        "mps": UnitName("m/s", decimals=4),
+        "dps": UnitName("°/s", "deg/s"),
+        "mhz": UnitName("MHz"),
+        "hz": UnitName("Hz", decimals=4),
+        "dots": UnitName("dots"),
+        "ppm": UnitName("ppm"),
+        "percent": UnitName("%"),
+        "nt": UnitName("nT", decimals=2),
+        "m2": UnitName("m²"),
+        "ms": UnitName("ms"),
+        "us": UnitName("µs"),
+        "ns": UnitName("ns"),
+        "s": UnitName("s", decimals=3),
+        "m": UnitName("m", decimals=3),
+        "a": UnitName("A"),
+    }
+)
+
+
+def split_unit(name: str) -> tuple[str, UnitName | None]:
+    """A name without its unit, and the unit; None where it has none.
+
+    Examples
+    --------
+    >>> split_unit("velocity_north_mps"), split_unit("gdop")
+    (('velocity_north', UnitName(sign='m/s', plain='', decimals=4)), ('gdop', None))
+    """
+    for suffix, unit in UNITS.items():
+        if name.endswith("_" + suffix):
+            return name[: -len(suffix) - 1], unit
+    return name, None

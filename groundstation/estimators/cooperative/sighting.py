@@ -1,0 +1,60 @@
+"""A vehicle that measures range and bearing of another tells it where it stands: a fix in the plane.
+
+Along the line of sight the fix is as good as the range, across it as the bearing; the error of the observer's own place
+and heading is in both. Without it a vehicle would learn only from what it measures itself.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray
+from groundstation.estimators.cooperative.events import PEER, Event
+from groundstation.estimators.cooperative.observation import NEAREST_M, Row
+from groundstation.estimators.cooperative.vehicles import Vehicle
+
+
+class Sighting(NamedTuple):
+    """Where an observer saw another.
+
+    ``place_m`` (3,) with its derivative by the observer's state, (3, n); the line of sight as a unit vector; variances
+    of the sensor along and across it.
+    """
+
+    place_m: FloatArray
+    derivative: FloatArray
+    line: FloatArray
+    along_m2: float
+    across_m2: float
+
+    def rows(self, seen: Vehicle, x: FloatArray, at_s: float, told_m: FloatArray) -> list[Row]:
+        """The fix as two scalar measurements of the one that was seen; ``told_m`` is the place as it arrived."""
+        place, derivative = seen.place(x, at_s)
+        across = np.array([-self.line[1], self.line[0], 0.0])
+        return [
+            Row(float(axis @ (told_m - place)), axis @ derivative, -axis, 0.0, variance)
+            for axis, variance in ((self.line, self.along_m2), (across, self.across_m2))
+        ]
+
+
+def sighting_of(event: Event, observer: Vehicle, x: FloatArray) -> Sighting | None:
+    """The fix that an observer with state ``x`` at the time of the event can tell; None without range and bearing."""
+    view = observer.view(x, event.time_s)
+    if event.kind != PEER or not np.isfinite([event.value_m, event.bearing_rad, view.heading_rad]).all():
+        return None
+    error, _, scale = observer.range_error(x, 0.0, is_peer=True)
+    distance = (event.value_m - error) / (1.0 + scale)
+    if distance < NEAREST_M:
+        return None
+    by_distance = -observer.range_error(x, distance, is_peer=True)[1] / (1.0 + scale)
+    direction = view.heading_rad + event.bearing_rad
+    line = np.array([np.cos(direction), np.sin(direction), 0.0])
+    across = np.array([-line[1], line[0], 0.0])
+    derivative = view.derivative + np.outer(line, by_distance) + distance * np.outer(across, view.by_heading)
+    return Sighting(
+        view.place_m + distance * line,
+        derivative,
+        line,
+        event.variance_m2 / (1.0 + scale) ** 2,
+        distance**2 * event.bearing_variance_rad2,
+    )

@@ -1,0 +1,252 @@
+"""Arrays of the overview and data-quality figures: the flight thinned, its phases and states, GNSS, the ledger."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.gaps import Gaps
+from groundstation.base.ledger import Ledger
+from groundstation.base.records import Int64Array
+from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
+from groundstation.results.figures import FigureData
+from groundstation.tables.phases import Phases
+from groundstation.tables.table import Flight, Table
+from groundstation.tables.wheels import contact_of
+
+MAX_OVERVIEW_ROWS = 4000
+GAP_PERIODS = 5.0
+LARGEST_QUIET_GAP_S = 3.0
+NEAR_NS = 1_000_000_000  # a value this near in time stands for a row that lacks it
+MODE = "mode "  # what the names of events that change the flight mode begin with
+
+
+def first_of_kind(flight: Flight, kind: str, *fields: str) -> str | None:
+    """First topic of a kind that has all the fields, None when there is none."""
+    found = topics_of_kind(kind, flight.topics())
+    return next((topic for topic in found if flight[topic].has(*fields)), None)
+
+
+def runs_of(states: NDArray[np.str_], time_s: NDArray[np.float64], end_s: float) -> FigureData:
+    """Run-length form of a state per sample: ``start_s``, ``end_s``, ``state``; each run lasts until the next one."""
+    change = np.flatnonzero(np.r_[True, states[1:] != states[:-1]]) if len(states) else np.array([], dtype=int)
+    starts = time_s[change]
+    return FigureData(
+        "gnss_lanes",
+        {"start_s": starts, "end_s": np.r_[starts[1:], end_s] if len(starts) else starts, "state": states[change]},
+        {"start_s": 2, "end_s": 2},
+    )
+
+
+def gnss_lanes(flight: Flight, geometry_limit: float) -> FigureData | None:
+    """State of GNSS over the flight: good, geometry above the limit, integrity lost, no geometry factor, no GNSS."""
+    topic = first_of_kind(flight, "gnss", "velocity_north_mps") or first_of_kind(flight, "gnss", "latitude_deg")
+    if topic is None:
+        return None
+    table = flight[topic]
+    time_s = flight.time_s(topic)
+    name = next((factor for factor in ("gdop", "pdop", "hdop") if table.has(factor)), None)
+    states = np.full(len(table), "good" if name else "no geometry factor", dtype="U24")
+    if name:
+        factor = table.values(name)
+        states[~np.isfinite(factor)] = "no geometry factor"
+        states[factor > geometry_limit] = f"{name} > {geometry_limit:g}"
+    if table.has("integrity_ok"):
+        states[table.values("integrity_ok") == 0.0] = "integrity lost"
+    step_s = np.diff(time_s)
+    if len(step_s):
+        limit_s = max(GAP_PERIODS * float(np.median(step_s)), LARGEST_QUIET_GAP_S)
+        after = np.flatnonzero(step_s > limit_s)
+        at = after + 1
+        states, time_s = np.insert(states, at, "no GNSS"), np.insert(time_s, at, time_s[after])
+    lanes = runs_of(states, time_s, flight.duration_s)
+    if time_s.size and time_s[-1] < flight.duration_s - LARGEST_QUIET_GAP_S:
+        start, end, state = (np.asarray(lanes[key]) for key in ("start_s", "end_s", "state"))
+        end = np.r_[end[:-1], time_s[-1], flight.duration_s]
+        start, state = np.r_[start, time_s[-1]], np.r_[state, np.array(["no GNSS"])]
+        lanes = FigureData(lanes.name, {"start_s": start, "end_s": end, "state": state}, lanes.digits)
+    return lanes
+
+
+def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_topic: str | None) -> FigureData | None:
+    """Thinned flight for the map and profiles, on the times of GNSS (of INS where there is no GNSS), NaN at gaps."""
+    gnss = first_of_kind(flight, "gnss", "latitude_deg", "longitude_deg")
+    base = gnss or first_of_kind(flight, "ins", "latitude_deg", "longitude_deg") or ins_topic
+    if base is None or not len(flight[base]):
+        return None
+    every = flight[base]
+    rows = np.arange(len(every)) if base == gnss else _rows_with_motion(every)
+    keep = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MAX_OVERVIEW_ROWS)).round().astype(int))
+    time_ns = every.time_ns[rows[keep]]
+    columns = {
+        "time_s": flight.seconds(time_ns),
+        "latitude_deg": every.values("latitude_deg")[rows[keep]],
+        "longitude_deg": every.values("longitude_deg")[rows[keep]],
+        "altitude_m": _at(every, _altitude(every), rows[keep]),
+        "ground_speed_mps": _at(every, ground_speed(every), rows[keep]),
+        "heading_deg": _nearest_heading(flight, time_ns, true_heading_deg, ins_topic),
+        "track_deg": _at(every, _track(every), rows[keep]),
+    }
+    baro = first_of_kind(flight, "baro", "pressure_altitude_m")
+    if baro is not None and not np.isfinite(columns["altitude_m"]).any():
+        pressure_altitude = flight[baro].values("pressure_altitude_m")
+        columns["pressure_altitude_m"] = _nearest(flight[baro].time_ns, pressure_altitude, time_ns)
+    columns = _break_at_gaps(columns, flight.duration_s / MAX_OVERVIEW_ROWS)
+    digits = {"time_s": 2, "latitude_deg": 7, "longitude_deg": 7, "altitude_m": 1, "ground_speed_mps": 2}
+    return FigureData("overview", columns, {**digits, "heading_deg": 2, "track_deg": 2, "pressure_altitude_m": 1})
+
+
+def _rows_with_motion(table: Table) -> NDArray[np.intp]:
+    """Rows to draw: with a position, else with a velocity, else all. A row may have the fields of one source alone."""
+    for names in (("latitude_deg", "longitude_deg"), ("velocity_north_mps", "velocity_east_mps")):
+        if table.has(*names):
+            return np.flatnonzero(table.columns[names[0]].mask & table.columns[names[1]].mask)
+    return np.arange(len(table))
+
+
+def _at(table: Table, values: NDArray[np.float64], rows: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Values of rows; where not one of these rows has any, they come from another source: the nearest in time."""
+    own = values[rows]
+    return own if np.isfinite(own).any() else _nearest(table.time_ns, values, table.time_ns[rows])
+
+
+def ground_speed(table: Table) -> NDArray[np.float64]:
+    """Ground speed, metres per second, shape (n,): from the velocities, else as logged."""
+    if table.has("velocity_north_mps", "velocity_east_mps"):
+        return np.asarray(np.hypot(table.values("velocity_north_mps"), table.values("velocity_east_mps")))
+    return table.values("ground_speed_mps")
+
+
+def _altitude(table: Table) -> NDArray[np.float64]:
+    name = "altitude_msl_m" if table.has("altitude_msl_m") else "altitude_ellipsoid_m"
+    return table.values(name)
+
+
+def _track(table: Table) -> NDArray[np.float64]:
+    from groundstation.base.angles import direction_of
+
+    if not table.has("velocity_north_mps", "velocity_east_mps"):
+        return table.values("track_deg")
+    north, east = table.values("velocity_north_mps"), table.values("velocity_east_mps")
+    return np.where(np.hypot(north, east) > 1.0, direction_of(north, east), np.nan)
+
+
+def _nearest_heading(
+    flight: Flight, time_ns: Int64Array, true_heading_deg: NDArray[np.float64] | None, ins_topic: str | None
+) -> NDArray[np.float64]:
+    if true_heading_deg is None or ins_topic is None:
+        return np.full(len(time_ns), np.nan)
+    return _nearest(flight[ins_topic].time_ns, true_heading_deg, time_ns)
+
+
+def _nearest(times_ns: Int64Array, values: NDArray[np.float64], wanted_ns: Int64Array) -> NDArray[np.float64]:
+    """The known value nearest in time to each wanted time, NaN where none is near."""
+    known = np.flatnonzero(np.isfinite(values))
+    if not known.size:
+        return np.full(len(wanted_ns), np.nan)
+    times_ns, values = times_ns[known], values[known]
+    right = np.clip(np.searchsorted(times_ns, wanted_ns), 0, len(times_ns) - 1)
+    left = np.maximum(right - 1, 0)
+    nearest = np.where(np.abs(wanted_ns - times_ns[left]) < np.abs(times_ns[right] - wanted_ns), left, right)
+    return np.where(np.abs(times_ns[nearest] - wanted_ns) <= NEAR_NS, values[nearest], np.nan)
+
+
+def _break_at_gaps(columns: dict[str, NDArray[np.float64]], thinned_step_s: float) -> dict[str, NDArray[np.float64]]:
+    """Insert a row of NaN wherever time stands still for longer than thinning explains."""
+    step_s = np.diff(columns["time_s"])
+    if not len(step_s):
+        return columns
+    limit_s = max(GAP_PERIODS * float(np.median(step_s)), 2.0 * thinned_step_s, LARGEST_QUIET_GAP_S)
+    after = np.flatnonzero(step_s > limit_s)
+    broken = {name: np.insert(values, after + 1, np.nan) for name, values in columns.items() if name != "time_s"}
+    middle = columns["time_s"][after] + 0.5 * step_s[after]
+    return {"time_s": np.insert(columns["time_s"], after + 1, middle), **broken}
+
+
+def phase_figure(phases: Phases) -> FigureData:
+    """Phases of the flight as figure data."""
+    columns: dict[str, NDArray[Any]] = {"start_s": phases.start_s, "end_s": phases.end_s, "phase": phases.phase}
+    return FigureData("phases", columns, {"start_s": 1, "end_s": 1})
+
+
+def state_lanes(flight: Flight) -> FigureData | None:
+    """What the log says of flight mode, arming and ground contact: spans, ``lane``, ``start_s``, ``end_s``, ``state``.
+
+    Mode and arming are read off the events (``mode LOITER``, ``armed``, ``disarmed``), each holds until the next one.
+    The lane of ground contact is named after its source, a landed flag or weight on wheels.
+    """
+    events = [flight[topic] for topic in topics_of_kind("event", flight.topics()) if flight[topic].has("name")]
+    time_ns = np.concatenate([np.zeros(0, dtype=np.int64), *(table.time_ns for table in events)])
+    names = np.concatenate([np.zeros(0, dtype="U1"), *(table.text("name") for table in events)])
+    order = np.argsort(time_ns, kind="stable")
+    told = [
+        (when, name)
+        for when, row in zip(time_ns[order], names[order], strict=True)
+        for name in row.split(EVENT_SEPARATOR)
+    ]
+    time_ns, names = (
+        np.array([when for when, _ in told], dtype=np.int64),
+        np.array([name for _, name in told], dtype="U"),
+    )
+    is_mode, is_arming = np.char.startswith(names, MODE), np.isin(names, ("armed", "disarmed"))
+    lanes = [
+        ("mode", time_ns[is_mode], np.array([name.removeprefix(MODE) for name in names[is_mode].tolist()], dtype="U")),
+        ("arming", time_ns[is_arming], names[is_arming]),
+    ]
+    contact = contact_of(flight)
+    if contact is not None:
+        states = np.where(contact.on_ground, "on the ground", "in the air")
+        lanes.append((contact.name.partition(" (")[0], contact.time_ns, states))
+    spans = [(lane, runs_of(states, flight.seconds(times), flight.duration_s)) for lane, times, states in lanes]
+    if not any(len(runs) for _, runs in spans):
+        return None
+    columns: dict[str, NDArray[Any]] = {"lane": np.array([lane for lane, runs in spans for _ in range(len(runs))])}
+    for key in ("start_s", "end_s", "state"):
+        columns[key] = np.concatenate([runs[key] for _, runs in spans if len(runs)])
+    return FigureData("state_lanes", columns, {"start_s": 2, "end_s": 2})
+
+
+def ledger_figures(flight: Flight, ledger: Ledger, gaps_of: Mapping[str, Gaps]) -> tuple[FigureData, ...]:
+    """The ledger's topics and gaps as figure data, times in flight seconds."""
+    names = [topic for topic in flight.topics() if topic in ledger.topics]
+    topics = [ledger.topics[name] for name in names]
+    columns: dict[str, NDArray[Any]] = {"topic": np.array(names, dtype=np.str_)}
+    columns["rows"] = _counts(one.rows for one in topics)
+    columns["duplicates"] = _counts(one.duplicates for one in topics)
+    columns["backward_steps"] = _counts(one.backward_steps for one in topics)
+    columns["stray_rows"] = _counts(one.stray_rows for one in topics)
+    columns["nominal_rate_hz"] = _numbers(one.nominal_rate_hz for one in topics)
+    columns["actual_rate_hz"] = _numbers(one.actual_rate_hz for one in topics)
+    columns["coverage"] = _numbers(one.coverage for one in topics)
+    columns["gaps"] = _counts(one.gaps.count for one in topics)
+    columns["longest_gap_s"] = _numbers(one.gaps.longest_s for one in topics)
+    columns["dropped_rows"] = _counts(_dropped(ledger, name) for name in names)
+    columns["lost_by_counter"] = _counts(one.missing for one in topics)
+    columns["out_of_range"] = _counts(one.out_of_range for one in topics)
+    columns["stuck"] = _counts(one.stuck for one in topics)
+    columns["first_s"] = np.array([flight.time_s(name)[0] for name in names])
+    columns["last_s"] = np.array([flight.time_s(name)[-1] for name in names])
+    digits = {"coverage": 4, "nominal_rate_hz": 3, "actual_rate_hz": 3, "longest_gap_s": 2, "first_s": 2, "last_s": 2}
+    return FigureData("ledger", columns, digits), _gap_figure(flight, [gaps_of[name] for name in names])
+
+
+def _gap_figure(flight: Flight, found: list[Gaps]) -> FigureData:
+    columns: dict[str, NDArray[Any]] = {
+        "topic": np.array([gaps.topic for gaps in found for _ in range(len(gaps))], dtype=np.str_),
+        "start_s": np.concatenate([np.zeros(0), *(flight.seconds(gaps.start_ns) for gaps in found)]),
+        "length_s": np.concatenate([np.zeros(0), *(gaps.length_s for gaps in found)]),
+    }
+    return FigureData("gaps", columns, {"start_s": 2, "length_s": 2})
+
+
+def _dropped(ledger: Ledger, topic: str) -> int:
+    return sum(one.count for one in ledger.damages if one.topic == topic and one.kind == "dropped_rows")
+
+
+def _counts(values: Iterable[int]) -> NDArray[np.int64]:
+    return np.array(list(values), dtype=np.int64)
+
+
+def _numbers(values: Iterable[float | None]) -> NDArray[np.float64]:
+    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)

@@ -1,0 +1,260 @@
+"""Several logs: each in its turn, several at once or on a cluster, one bad log never stopping the others."""
+
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import replace
+from functools import partial
+from pathlib import Path, PurePath
+
+from groundstation.base.errors import UsageError
+from groundstation.pipeline.many_flights.found_sessions import Asked, find_sessions, run_sessions
+from groundstation.pipeline.many_flights.inputs import collect, flight_folders, is_ours, session_folders
+from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
+from groundstation.pipeline.many_flights.output import LocalOutput, RemoteOutput
+from groundstation.pipeline.many_flights.placement import Placement
+from groundstation.pipeline.many_flights.publishing import FLEET_FILES, write_beside, write_index_of
+from groundstation.pipeline.many_flights.remote import far_logs, is_remote
+from groundstation.pipeline.many_flights.remote_runs import RemoteJob, run_remote
+from groundstation.pipeline.many_flights.session import load_stations
+from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJob, Crew, cores, in_turn, side_by_side
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.flight import Job, run_flight
+from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.pipeline.one_flight.resume import Finished, finished_flights
+
+PLANS: Mapping[str, str] = {
+    "everything": "to run",
+    "analysis": "to analyse again: a setting changed, or a file is missing; the MCAP stays",
+    "reports": "to report again",
+    "nothing": "finished, nothing to do",
+}
+
+
+def run_many(
+    paths: Sequence[Path | str],
+    out: Path | str,
+    configuration: Configuration,
+    *,
+    jobs: int = 0,
+    scheduler: str = "",
+    force: bool = False,
+    fail_on: str = "none",
+    with_pdf: bool = True,
+    redo: bool = False,
+    stations: Path | None = None,
+    listen: Listener = silent,
+) -> tuple[Outcome, ...]:
+    """Run logs and folders of logs into ``out``, then the sessions among the flights; the index lists all of them.
+
+    What an earlier run finished, with the same logs and settings, is not done again unless ``redo`` is set. Interrupted
+    or killed, it keeps what was finished.
+
+    Parameters
+    ----------
+    paths, out
+        Paths, or URLs that fsspec reaches (``s3://bucket/logs``).
+    jobs : int
+        Processes on this machine; 0: one per core.
+    scheduler : str
+        Address of a Dask scheduler, whose workers do the work; they see local paths as this machine does.
+    stations : Path, optional
+        TOML file with the ground stations of the sessions; left out: stations.toml beside the logs of each.
+
+    Returns
+    -------
+    tuple of Outcome
+        One per log, in the stable order of the inputs, then one per session.
+
+    Raises
+    ------
+    UsageError
+        When an input is missing, there is nothing to run, a setting is wrong, ``out`` is something else's, another run
+        is writing into it, or there is no such scheduler.
+    """
+    ground = None if stations is None else load_stations(stations)
+    inputs = _inputs(paths, out, configuration)
+    crew = _crew(scheduler, jobs or cores(), len(inputs), listen)
+    make = partial(Job, configuration=configuration, fail_on=fail_on, with_pdf=with_pdf)
+    listen(Event("begin", total=len(inputs)))
+    asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo)
+    if any(is_remote(str(place)) for place in (out, *paths)):
+        remote = [RemoteJob(make(Path(), Path(), is_named=named), log, str(out), redo) for log, named in inputs]
+        return _run_remote(remote, asked, crew, force, listen)
+    near = [make(Path(log), Path(out), is_named=named) for log, named in inputs]
+    return _run_here(near, asked, crew, force, listen)
+
+
+def _run_here(work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen: Listener) -> tuple[Outcome, ...]:
+    out = asked.out
+    refuse_foreign(out, force)
+    with alone_in(out):
+        prepare(out)
+        known = {} if asked.redo else finished_flights(flight_folders(out))
+        placement = Placement(LocalOutput(out), [job.log for job in work])
+
+        def left() -> Iterator[tuple[int, Job]]:
+            for number, job, twin in _with_steps(work, known):
+                if twin is None:
+                    yield number, job
+                else:
+                    placement.put_twin(number, Outcome(job.log, "skipped", ""), twin)
+                    listen(Event("end", job.name, "same content as another log"))
+
+        def suffixed(number: int) -> Job:
+            return replace(work[number], add_suffix=True)
+
+        _run_into(placement, out, left(), run_flight, suffixed, crew, listen)
+        sessions = _run_sessions(placement, asked, crew, listen)
+        outcomes = (*placement.outcomes(), *sessions)
+        return (*outcomes, *write_beside(out, outcomes, with_pdf=asked.with_pdf))
+
+
+def _run_sessions(placement: Placement, asked: Asked, crew: Crew, listen: Listener) -> tuple[Outcome, ...]:
+    """Run the sessions among the flights that are in place; interrupted, the index at least is written."""
+    flights = placement.outcomes()
+    try:
+        found = find_sessions(asked, {one.flight_id for one in flights if one.flight_id})
+        if found.jobs:
+            listen(Event("begin", total=len(flights) + len(found.jobs)))
+        return run_sessions(found, crew, listen)
+    except BaseException:
+        write_index_of(asked.out, flights)
+        raise
+
+
+def _run_remote(
+    work: Sequence[RemoteJob], asked: Asked, crew: Crew, force: bool, listen: Listener
+) -> tuple[Outcome, ...]:
+    def suffixed(number: int) -> RemoteJob:
+        return replace(work[number], job=replace(work[number].job, add_suffix=True), redo=True)
+
+    with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
+        copy = Path(folder)
+        output = RemoteOutput(work[0].out, copy)
+        output.refuse_foreign(force=force)
+        output.copy_all()
+        placement = Placement(output, [one.log for one in work])
+        is_whole = False
+        try:
+            _run_into(placement, copy, enumerate(work), run_remote, suffixed, crew, listen)
+            sessions = _run_remote_sessions(placement, output, asked, listen)
+            outcomes = (*placement.outcomes(), *sessions)
+            problems = write_beside(copy, outcomes, with_pdf=asked.with_pdf)
+            is_whole = True
+        finally:
+            output.publish(FLEET_FILES, is_whole=is_whole)
+        return (*outcomes, *problems)
+
+
+def _run_remote_sessions(
+    placement: Placement, output: RemoteOutput, asked: Asked, listen: Listener
+) -> tuple[Outcome, ...]:
+    """Run the sessions in the copy of an OUT elsewhere, in this process, where the MCAPs are fetched to."""
+    before = session_folders(output.root)
+    here = replace(asked, out=output.root, mcap_in=output.mcap_in)
+    outcomes = _run_sessions(placement, here, partial(in_turn, listen=listen), listen)
+    sent = []
+    for outcome in outcomes:
+        if outcome.folder:
+            output.send_session(outcome.flight_id)
+        sent.append(replace(outcome, folder=outcome.flight_id))
+    for folder in before:
+        if not folder.exists():
+            output.discard(folder.name)
+    return tuple(sent)
+
+
+def _run_into(
+    placement: Placement,
+    out: Path,
+    tasks: Iterable[tuple[int, AnyJob]],
+    run: Callable[[AnyJob, Listener], Outcome],
+    suffixed: Callable[[int], AnyJob],
+    crew: Crew,
+    listen: Listener,
+) -> None:
+    """Carry out jobs and put their flights into place; interrupted, the index at least is written."""
+    try:
+        with closing(crew(tasks, run)) as ended:  # closed at once when something is wrong here: its processes end
+            for number, outcome in ended:
+                listen(Event("end", PurePath(outcome.source).name, outcome.text))
+                placement.put(number, outcome)
+        clashing = placement.clashing()
+        if clashing:
+            with closing(crew(((number, suffixed(number)) for number in clashing), run)) as ended:
+                for number, outcome in ended:
+                    placement.put_again(number, outcome)
+        placement.sweep()
+    except BaseException:
+        write_index_of(out, placement.outcomes())
+        raise
+
+
+def _crew(scheduler: str, workers: int, logs: int, listen: Listener) -> Crew:
+    """Who does the work: a cluster, processes, or this process alone, where there is little."""
+    if scheduler:
+        from groundstation.pipeline.many_flights.cluster import on_cluster
+
+        return partial(on_cluster, scheduler=scheduler)
+    if min(workers, logs) <= 1 and logs <= TASKS_PER_PROCESS:
+        return partial(in_turn, listen=listen)
+    return partial(side_by_side, workers=min(workers, logs), listen=listen)
+
+
+def plan_many(
+    paths: Sequence[Path | str],
+    out: Path | str,
+    configuration: Configuration,
+    *,
+    with_pdf: bool = True,
+    redo: bool = False,
+) -> tuple[Outcome, ...]:
+    """Say what :func:`run_many` would do of each log; nothing is written.
+
+    Raises
+    ------
+    UsageError
+        As :func:`run_many`, and for logs or results elsewhere, which would have to be fetched first.
+    """
+    if any(is_remote(str(place)) for place in (out, *paths)):
+        raise UsageError("--dry-run", "logs or results elsewhere", "local ones")
+    inputs, out = _inputs(paths, out, configuration), Path(out)
+    refuse_foreign(out, force=True)
+    known = {} if redo or not out.is_dir() else finished_flights(flight_folders(out))
+    work = [Job(Path(log), out, configuration, is_named=named, with_pdf=with_pdf) for log, named in inputs]
+    outcomes = []
+    for _number, job, twin in _with_steps(work, known):
+        text = PLANS[job.step] if twin is None else f"same content as {work[twin].log}, listed once"
+        flight_id = job.finished.flight_id if job.finished else ""
+        outcomes.append(Outcome(job.log, "done", text, flight_id=flight_id))
+    return tuple(outcomes)
+
+
+def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configuration) -> tuple[tuple[str, bool], ...]:
+    """Logs by path or URL, in a stable order, each with whether the user named it."""
+    near = [Path(path) for path in paths if not is_remote(str(path))]
+    found = {log: named for path in paths if is_remote(str(path)) for log, named in far_logs(str(path))}
+    found |= {str(one.path): one.is_named for one in collect(near, None if is_remote(str(out)) else Path(out))}
+    if not found:
+        hint = "what groundstation made is no input" if any(path.is_dir() and is_ours(path) for path in near) else ""
+        raise UsageError(", ".join(map(str, paths)), "no log in it", "", hint)
+    return tuple(sorted(found.items()))
+
+
+def _with_steps(jobs: Sequence[Job], known: Mapping[str, Finished]) -> Iterator[tuple[int, Job, int | None]]:
+    """Jobs by number, with what is to be done of each, and the number of an earlier one with the same finished log."""
+    first: dict[str, int] = {}
+    for number, job in enumerate(jobs):
+        planned = _with_step(job, known) if known else job
+        kept = first.setdefault(planned.finished.sha256, number) if planned.finished else number
+        yield number, planned, kept if kept != number else None
+
+
+def _with_step(job: Job, known: Mapping[str, Finished]) -> Job:
+    asked = job.asked()
+    if asked is None or asked[0] not in known:
+        return job
+    sha256, keys = asked
+    return job.going_on(known[sha256], keys)

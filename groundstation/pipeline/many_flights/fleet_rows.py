@@ -1,0 +1,204 @@
+"""What one flight adds to the fleet: its row, its checks, its forecast skill, its samples; from what it saved."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import wrap_180
+from groundstation.base.records import MAX_TEXT_CHARACTERS
+from groundstation.base.units import ARCMIN_PER_DEG
+from groundstation.chapters.cooperative import REFERENCE, trusted
+from groundstation.estimators.fleet.density import SampleHistogram, histogram_of
+from groundstation.estimators.fleet.moments import Moments, moments_of
+from groundstation.estimators.fleet.skill import SkillOfFlight
+from groundstation.estimators.heading.figures import IN_PAUSE
+from groundstation.estimators.heading.references import REFERENCE_SIGMA_DEG, logged_reference
+from groundstation.reports.index import index_row, reasons_of
+from groundstation.results.cooperative import CooperativeResult
+from groundstation.results.figures import FigureData, flags, numbers, texts
+from groundstation.results.files import SavedFlight, utf8_text
+from groundstation.results.fleet import FLIGHT_COLUMNS, Kind, SessionRow
+from groundstation.results.forecast import ForecastResult
+from groundstation.results.heading import HeadingResult
+
+FloatArray = NDArray[np.float64]
+NORMAL_95 = 1.959964
+LARGEST = 1e15  # no figure of a flight is larger: what is comes from a file that is damaged
+LATEST_NS = 7_000_000_000_000_000_000  # 2191: times of samples must fit beside the start
+
+
+@dataclass(frozen=True)
+class Check:
+    """Something independent of the estimate beside it: residual, the sigma claimed for it, inside 95 % or not."""
+
+    quantity: str
+    residual_deg: float
+    sigma_deg: float
+    is_inside: bool
+
+
+@dataclass(frozen=True)
+class HeadingSamples:
+    """The heading samples of a flight, without the rows that only break lines; ``error_deg`` is NaN below walking pace.
+
+    ``moments`` and ``histogram`` are of the used ones, about the flight's estimate, so that none is cut at 180 deg.
+    """
+
+    columns: Mapping[str, NDArray[Any]]
+    moments: Moments
+    histogram: SampleHistogram
+
+
+def to_number(value: Any) -> float:
+    """A JSON value as a float; NaN when it is no finite number, or an absurd one.
+
+    Examples
+    --------
+    >>> to_number(3), to_number("3"), to_number(True), to_number(None), to_number(10**400)
+    (3.0, nan, nan, nan, nan)
+    """
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return math.nan
+    return float(value) if abs(value) <= LARGEST else math.nan
+
+
+def flight_row(saved: SavedFlight, samples: HeadingSamples | None) -> dict[str, Any]:
+    """Build the row of a flight: a value for every one of :data:`FLIGHT_COLUMNS`, of the type its kind has."""
+    results = saved.results
+    start, heading = results.start_utc_ns, results.answer(HeadingResult)
+    start = start if start is not None and abs(start) < LATEST_NS else None
+    moments = samples.moments if samples is not None else Moments()
+    standstill = heading.standstill if heading else None
+    found: dict[str, Any] = vars(index_row(saved)) | {
+        "flight_id": saved.folder.name,
+        "start_utc": start,
+        "month": "" if start is None else str(np.datetime64(start, "ns").astype("datetime64[M]")),
+        "has_lost_data": results.ledger.loses_data,
+        "not_assessable": "; ".join(reasons_of(results)),
+        "standstill_speed_of_mean_mps": standstill.speed_of_mean_mps if standstill else None,
+    }
+    if heading is not None:
+        found |= {
+            "paper_error_deg": heading.paper_error_deg,
+            "drift_sigma_deg_per_h": heading.drift_sigma_deg_per_h,
+            "lever_arm_m": heading.lever_arm_m,
+            "time_offset_s": heading.time_offset_s,
+            "parking_sigma_deg": heading.parking_sigma_deg,
+        }
+    if moments.count:
+        found |= {"samples": moments.count, "sample_mean_deg": moments.mean, "sample_m2_deg2": moments.m2}
+    return {column.name: _typed(column.kind, found.get(column.name)) for column in FLIGHT_COLUMNS}
+
+
+def _typed(kind: Kind, value: Any) -> Any:
+    if kind in ("number", "count"):
+        return to_number(value)
+    if kind in ("flag", "time"):
+        return value
+    return "" if value is None else utf8_text(value)[:MAX_TEXT_CHARACTERS]
+
+
+def flights_table(columns: Mapping[str, Sequence[Any]]) -> FigureData:
+    """Turn lists of typed values into the table of flights."""
+    return FigureData("flights", {one.name: _column(one.kind, columns[one.name]) for one in FLIGHT_COLUMNS}, {})
+
+
+def _column(kind: Kind, values: Sequence[Any]) -> NDArray[Any]:
+    if kind == "time":
+        stamps = [np.datetime64("NaT", "ns") if value is None else np.datetime64(value, "ns") for value in values]
+        return np.array(stamps, dtype="datetime64[ns]")
+    return np.array(values, dtype={"number": np.float64, "count": np.float64, "flag": np.bool_}.get(kind, np.str_))
+
+
+def heading_samples(saved: SavedFlight) -> HeadingSamples | None:
+    """The heading samples a flight saved, None when it has none.
+
+    Raises
+    ------
+    UnreadableLogError
+        When their file is broken.
+    """
+    figure = saved.figure("heading_samples")
+    if figure is None:
+        return None
+    is_epoch = texts(figure, "gate") != IN_PAUSE
+    difference, used = numbers(figure, "difference_deg")[is_epoch], flags(figure, "used")[is_epoch]
+    heading = saved.results.answer(HeadingResult)
+    centre = float(np.nan_to_num(wrap_180(to_number(heading.error_deg if heading else None))))
+    about_estimate = centre + wrap_180(difference[used] - centre)
+    names = ("time_s", "segment", "heading_deg", "track_deg", "ground_speed_mps", "weight")
+    columns = {name: numbers(figure, name)[is_epoch] for name in names}
+    columns |= {"error_deg": difference, "used": used, "gate": texts(figure, "gate")[is_epoch]}
+    return HeadingSamples(columns, moments_of(about_estimate), histogram_of(about_estimate))
+
+
+def session_row(saved: SavedFlight) -> SessionRow:
+    """Build the row of a session: what its report says on top."""
+    results, indexed = saved.results, index_row(saved, "session")
+    row = SessionRow(
+        saved.folder.name,
+        indexed.aircraft or "",
+        results.start_utc_ns,
+        to_number(results.duration_s),
+        results.status,
+        findings_fail=indexed.findings_fail or 0,
+        findings_warn=indexed.findings_warn or 0,
+        reason="; ".join(reasons_of(results)),
+        report=indexed.report or "",
+        recording=indexed.recording or "",
+    )
+    answer = results.answer(CooperativeResult)
+    if answer is None or not answer.algorithms:
+        return row
+    best, reckoned = trusted(answer), next((one for one in answer.algorithms if one.algorithm == REFERENCE), None)
+    return replace(
+        row,
+        algorithm=best.algorithm,
+        two_sigma_r_m=best.two_sigma_r_m,
+        reckoned_two_sigma_r_m=reckoned.two_sigma_r_m if reckoned else None,
+        rms_m=best.rms_m,
+        is_consistent=best.is_consistent,
+        diverges=best.diverges,
+    )
+
+
+def checks_of(saved: SavedFlight) -> list[Check]:
+    """Everything independent that the flight's heading was compared with."""
+    heading = saved.results.answer(HeadingResult)
+    if heading is None:
+        return []
+    found = [_reference_check(heading, saved.results.metadata)]
+    found += [_check("runway", runway.difference_deg, runway.sigma_deg) for runway in heading.runway]
+    if heading.onboard is not None:
+        found.append(_check("onboard", heading.onboard.difference_error_deg, heading.standard_error_deg))
+    return [check for check in found if check is not None]
+
+
+def _reference_check(heading: HeadingResult, metadata: Mapping[str, str]) -> Check | None:
+    reference, residual = logged_reference(metadata), heading.reference_residual_arcmin
+    sigma = math.hypot(to_number(heading.parking_sigma_deg), reference.sigma_deg if reference else REFERENCE_SIGMA_DEG)
+    return _check("reference", None if residual is None else residual / ARCMIN_PER_DEG, sigma)
+
+
+def _check(quantity: str, residual: float | None, sigma: float) -> Check | None:
+    residual_deg, sigma_deg = to_number(residual), to_number(sigma)
+    if math.isnan(residual_deg) or not sigma_deg > 0.0:
+        return None
+    return Check(quantity, residual_deg, sigma_deg, abs(residual_deg) <= NORMAL_95 * sigma_deg)
+
+
+def skill_of(saved: SavedFlight) -> tuple[str, list[SkillOfFlight]]:
+    """The shipped method of a flight and its rows of forecast skill."""
+    forecast = saved.results.answer(ForecastResult)
+    if forecast is None:
+        return "", []
+    rows = [
+        SkillOfFlight(row.method, row.horizon_min, row.starts, row.rms_m, to_number(row.coverage95))
+        for row in forecast.skill
+        if row.starts >= 1 and math.isfinite(to_number(row.horizon_min) + to_number(row.rms_m))
+    ]
+    return forecast.default_method, rows

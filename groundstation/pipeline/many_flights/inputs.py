@@ -1,0 +1,126 @@
+"""Which files a run takes: named files, and logs found in folders; nothing that groundstation itself made."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from groundstation.base.errors import UsageError
+from groundstation.pipeline.one_flight.deviation_to_apply import CORRECTED
+from groundstation.reports.index import INDEX_CSV, INDEX_JSON
+from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY
+
+FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, STUDY_MARK = MANIFEST, INDEX_JSON, ".groundstation-study"
+SESSION_MARK = f"{ARRAYS}/session_clocks.parquet"  # of a session of several aircraft, which is no flight
+PLAN_MARK = "plan.toml"  # the scenario of a plan, which is no flight
+COMPARISON_MARKS = "compare.html", "compare.csv"
+COMPARISON_RECORDING = "compare.rrd"
+
+
+@dataclass(frozen=True)
+class Input:
+    """A file to process. ``is_named``: the user named it, so that failing to recognise it is an error."""
+
+    path: Path
+    is_named: bool
+
+
+def collect(paths: Sequence[Path], out: Path | None = None) -> tuple[Input, ...]:
+    """List the files that ``paths`` (files or folders, recursive) stand for, in a stable order, each once.
+
+    OUT and folders that groundstation made (they hold its manifest or index) are never inputs of a folder walk; nor
+    are hidden files.
+
+    Raises
+    ------
+    UsageError
+        When a path does not exist.
+    """
+    found: dict[Path, Input] = {}
+    for path in paths:
+        if not path.exists():
+            raise UsageError(str(path), "no such file or folder")
+        if path.is_dir():
+            for file in _walk(path, out.resolve() if out else None):
+                found.setdefault(file.resolve(), Input(file, is_named=file.is_dir()))
+        else:
+            found[path.resolve()] = Input(path, is_named=True)
+    return tuple(sorted(found.values(), key=lambda item: str(item.path)))
+
+
+def is_ours(folder: Path) -> bool:
+    """Whether groundstation made the folder: a flight folder or an OUT."""
+    names = {FLIGHT_FOLDER_MARK, SUMMARY}, {OUT_FOLDER_MARK, INDEX_CSV}, {STUDY_MARK}, set(COMPARISON_MARKS)
+    try:
+        return any(all((folder / name).is_file() for name in marks) for marks in names)
+    except OSError:
+        return False
+
+
+def is_session(folder: Path) -> bool:
+    """Whether a folder is that of a session of several aircraft."""
+    return (folder / SESSION_MARK).is_file()
+
+
+def no_log(folder: Path) -> UsageError:
+    """Why a folder is not the log that a verb takes."""
+    if is_session(folder):
+        return UsageError(str(folder), "a session of several aircraft", "a log", "manifest.json in it names its logs")
+    return UsageError(str(folder), "a folder", "a log", "`run` takes folders")
+
+
+def file_in(folder: Path, ending: str, *others: str) -> Path:
+    """The file with an ending in a folder that ``run`` made: that of its name, of ``others``, or the only one.
+
+    Raises
+    ------
+    UsageError
+        When there is none, or several of other names.
+    """
+    named = (folder / name for name in (f"{folder.resolve().name}{ending}", *others))
+    found = [path for path in named if path.is_file()][:1] or [
+        path for path in sorted(folder.glob(f"*{ending}")) if not path.name.endswith(CORRECTED)
+    ]
+    if not found and is_session(folder):
+        raise no_log(folder)
+    if len(found) != 1:
+        what = f"{len(found)} files *{ending}"
+        raise UsageError(str(folder), what, "a flight folder that `run` made", f"name the {ending}")
+    return found[0]
+
+
+def flight_folders(out: Path) -> list[Path]:
+    """Flight folders in an OUT, in the order of their names."""
+    marks = SESSION_MARK, PLAN_MARK
+    return [folder for folder in _finished_folders(out) if not any((folder / mark).is_file() for mark in marks)]
+
+
+def session_folders(out: Path) -> list[Path]:
+    """Session folders in an OUT, in the order of their names."""
+    return [folder for folder in _finished_folders(out) if is_session(folder)]
+
+
+def plan_folders(out: Path) -> list[Path]:
+    """Folders of plans in an OUT, in the order of their names."""
+    return [folder for folder in _finished_folders(out) if (folder / PLAN_MARK).is_file()]
+
+
+def _finished_folders(out: Path) -> list[Path]:
+    return sorted(folder for folder in out.iterdir() if folder.name[0] != "." and (folder / SUMMARY).is_file())
+
+
+def _walk(folder: Path, out: Path | None) -> list[Path]:
+    if folder.resolve() == out or is_ours(folder):
+        return []
+    files: list[Path] = []
+    try:
+        entries = sorted(folder.iterdir())
+    except OSError:
+        return [folder]  # it fails in its turn, with its name, and stops nothing else
+    for entry in entries:
+        if entry.name.startswith("."):
+            continue
+        if entry.is_dir() and not entry.is_symlink():
+            files += _walk(entry, out)
+        elif entry.is_file():
+            files.append(entry)
+    return files

@@ -1,0 +1,49 @@
+"""The folder that results go into: whether it is ours, who else writes into it, what a killed run left in it."""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from groundstation.base.errors import UsageError
+from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, is_ours
+from groundstation.pipeline.many_flights.publishing import write_index_of
+from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX
+
+LOCK = ".lock"
+
+
+def refuse_foreign(out: Path, force: bool) -> None:
+    """Refuse to write results into what another made, or into a flight folder."""
+    if out.exists() and not out.is_dir():
+        raise UsageError(str(out), "a file", "a folder for the results")
+    if out.is_dir() and any(one.name != LOCK for one in out.iterdir()) and not is_ours(out) and not force:
+        raise UsageError(str(out), "a folder that groundstation did not make", "a new or own folder", "-f uses it")
+    if (out / FLIGHT_FOLDER_MARK).exists():
+        raise UsageError(str(out), "a flight folder", "a folder that holds flight folders", "name another -o")
+
+
+@contextmanager
+def alone_in(out: Path) -> Iterator[None]:
+    """Keep other runs out of a folder; the system takes the lock off a run that is killed."""
+    from filelock import FileLock, Timeout
+
+    out.mkdir(parents=True, exist_ok=True)
+    lock = FileLock(out / LOCK, timeout=0)
+    try:
+        lock.acquire()
+    except Timeout as error:
+        raise UsageError(str(out), "another run is writing into it", "", "wait for it, or name another -o") from error
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def prepare(out: Path) -> None:
+    """Clear away what a killed run left, and mark the folder as ours."""
+    for left_over in out.iterdir():
+        if left_over.name.startswith(PARTIAL_PREFIX):  # of a run that is no more: this one is alone in here
+            shutil.rmtree(left_over, ignore_errors=True)
+    if not (out / OUT_FOLDER_MARK).exists():
+        write_index_of(out, ())  # from now on the folder is known for ours, whatever happens to the run

@@ -1,0 +1,174 @@
+"""Where the flights of a run finally stand: a folder here, or one elsewhere with a small copy of it here."""
+
+import shutil
+import uuid
+from collections.abc import Collection, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Protocol
+
+from groundstation.base.errors import UsageError
+from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, SESSION_MARK
+from groundstation.pipeline.many_flights.remote import RemoteFolder
+from groundstation.pipeline.many_flights.remote_runs import BY_LOG, STAGING, array_files
+from groundstation.pipeline.one_flight.flight import is_made, place, remove
+from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.reports.flight_report import PDF, REPORT
+from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY
+
+FLEET_ARRAYS = ("heading_samples",)  # of a flight's arrays, what the fleet is made from
+
+
+class Output(Protocol):
+    """Takes finished flights in.
+
+    Attributes
+    ----------
+    root : Path
+        A folder on this machine with what index and fleet are made from: the flight folders, or what of them it takes.
+    """
+
+    root: Path
+
+    def has_in_place(self, outcome: Outcome) -> bool:
+        """Whether the flight stands where it shall."""
+
+    def place(self, outcome: Outcome) -> str:
+        """Move a finished flight to its place, which is told."""
+
+    def discard(self, folder: str) -> None:
+        """Throw a flight folder away; what somebody else put into one that is in place stays."""
+
+
+class LocalOutput:
+    """A folder on this machine."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+
+    def has_in_place(self, outcome: Outcome) -> bool:
+        """Whether the flight stands where it shall."""
+        return Path(outcome.folder) == self.root / outcome.flight_id
+
+    def place(self, outcome: Outcome) -> str:
+        """Move a finished flight to its place, which is told."""
+        target = self.root / outcome.flight_id
+        place(Path(outcome.folder), target)
+        return str(target)
+
+    def discard(self, folder: str) -> None:
+        """Throw a flight folder away; what somebody else put into one that is in place stays."""
+        if Path(folder).name.startswith("."):
+            shutil.rmtree(folder, ignore_errors=True)
+        else:
+            remove(self.root / Path(folder).name)
+
+
+class RemoteOutput:
+    """An OUT elsewhere; its copy here holds documents and what the fleet is made from, and other files by name alone.
+
+    Parameters
+    ----------
+    url : str
+    root : Path
+        Folder for the copy.
+    """
+
+    def __init__(self, url: str, root: Path) -> None:
+        self.root = root
+        self._out = RemoteFolder(url)
+
+    def refuse_foreign(self, *, force: bool) -> None:
+        """Raise UsageError when something else is in the folder."""
+        names = self._out.names()
+        if FLIGHT_FOLDER_MARK in names:
+            raise UsageError(self._out.url, "a flight folder", "a folder that holds flight folders", "name another -o")
+        if names and OUT_FOLDER_MARK not in names and BY_LOG not in names and not force:
+            raise UsageError(
+                self._out.url, "a folder that groundstation did not make", "a new or own folder", "-f uses it"
+            )
+
+    def copy_all(self) -> None:
+        """Make the copy of what is there already."""
+        index = self._out.read(OUT_FOLDER_MARK)
+        if index is not None:
+            (self.root / OUT_FOLDER_MARK).write_bytes(index)
+        for name in self._out.names():
+            if not name.startswith(".") and "." not in name:
+                self._copy(name)
+
+    def _copy(self, flight_id: str) -> None:
+        folder = self.root / flight_id
+        shutil.rmtree(folder, ignore_errors=True)
+        names = self._out.names(flight_id)
+        if not {MANIFEST, SUMMARY} <= set(names):
+            return
+        folder.mkdir()
+        (folder / ARRAYS).mkdir()
+        for name in names:
+            if "." in name and name != ARRAYS:
+                (folder / name).touch()
+        there = array_files(self._out, flight_id)
+        wanted = {f"{ARRAYS}/{name}.parquet" for name in FLEET_ARRAYS}
+        kept = there if SESSION_MARK in there else [name for name in there if name in wanted]
+        for name in (SUMMARY, MANIFEST, *kept):
+            self._out.fetch(f"{flight_id}/{name}", folder / name)
+
+    def has_in_place(self, outcome: Outcome) -> bool:
+        """Whether the flight stands where it shall."""
+        return outcome.folder == outcome.flight_id
+
+    def place(self, outcome: Outcome) -> str:
+        """Move a finished flight to its place, which is told."""
+        self._out.replace(outcome.folder, outcome.flight_id, partial(is_made, identity=outcome.flight_id))
+        self._out.write(f"{BY_LOG}/{outcome.sha256}", outcome.flight_id.encode())
+        self._copy(outcome.flight_id)
+        return outcome.flight_id
+
+    def mcap_in(self, folder: Path) -> Path:
+        """The MCAP of a flight of the copy, fetched when it is first asked for."""
+        mcap = folder / f"{folder.name}.mcap"
+        if not mcap.is_file() or not mcap.stat().st_size:
+            self._out.fetch(f"{folder.name}/{mcap.name}", mcap)
+        return mcap
+
+    def send_session(self, session_id: str) -> None:
+        """Send what was made of a session of the copy; files that stand there by name alone are there already."""
+        folder = self.root / session_id
+        if (folder / f"{session_id}.rrd").stat().st_size:
+            staged = f"{STAGING}/{session_id}-{uuid.uuid4().hex[:8]}"
+            self._out.send(folder, staged)
+            self._out.replace(staged, session_id, partial(is_made, identity=session_id))
+            return
+        for name in (REPORT, PDF, MANIFEST):
+            if (folder / name).is_file() and (content := (folder / name).read_bytes()):
+                self._out.write(f"{session_id}/{name}", content)
+
+    def discard(self, folder: str) -> None:
+        """Throw a flight folder away; what somebody else put into one that is in place stays."""
+        if folder.startswith("."):
+            self._out.remove(folder)
+        else:
+            self._out.remove_where(folder, partial(is_made, identity=folder))
+            shutil.rmtree(self.root / folder, ignore_errors=True)
+
+    def publish(self, names: Sequence[str], *, is_whole: bool) -> None:
+        """Send files and folders of the copy that stand beside the flight folders; clear what is left of staging.
+
+        What a run that came to its end did not make is removed there too.
+        """
+        for name in names:
+            path = self.root / name
+            if path.is_dir():
+                self._out.send(path, name)
+                there = {one.relative_to(path).as_posix() for one in path.rglob("*")}
+                self._out.remove_where(name, partial(_is_missing, there))
+            elif path.is_file():
+                self._out.write(name, path.read_bytes())
+            elif is_whole:
+                self._out.remove(name)
+        self._out.remove(STAGING)
+
+
+def _is_missing(there: Collection[str], name: str) -> bool:
+    return name not in there

@@ -1,0 +1,138 @@
+"""Where finished flights are put, one after the other, so that a run that is killed keeps what it had finished."""
+
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from groundstation.base.errors import GroundstationError
+from groundstation.pipeline.many_flights.inputs import flight_folders
+from groundstation.pipeline.many_flights.output import Output
+from groundstation.pipeline.many_flights.remote import is_remote
+from groundstation.pipeline.one_flight.identity import plain_id
+from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.results.files import MANIFEST
+
+
+@dataclass(frozen=True)
+class _Origin:
+    """Which log a flight folder came from: where it was, and the digest of its content."""
+
+    path: str
+    sha256: str
+
+
+class Placement:
+    """Puts finished flights into place at once.
+
+    Two flights of one id get the digests of their logs into their names; as that is known only when the second one
+    is finished, they are run again at the end. Of logs with the same content the first in the list is kept, whichever
+    was finished first. At the end flights of these logs under ids that they have no longer, from other settings or
+    another version, are removed, and so is what an older version of a log gave for the same flight.
+
+    Parameters
+    ----------
+    output : Output
+    names : sequence of str
+        The logs as the user would type them.
+    """
+
+    def __init__(self, output: Output, names: Sequence[str]) -> None:
+        self._output, self._names = output, names
+        self._outcomes: dict[int, Outcome] = {}
+        self._kept: dict[str, int] = {}  # content -> number of the log that is kept
+        self._owner: dict[str, str] = {}  # flight id -> content
+        self._clashes: set[str] = set()
+
+    def put(self, number: int, outcome: Outcome) -> None:
+        """Take a finished log over."""
+        if not outcome.flight_id:
+            self._outcomes[number] = outcome
+            return
+        twin = self._kept.get(outcome.sha256)
+        if twin is not None and twin < number:
+            self.put_twin(number, outcome, twin)
+            return
+        self._kept[outcome.sha256] = number
+        self._outcomes[number] = self._placed(outcome)
+        if twin is not None:
+            self.put_twin(twin, self._outcomes[twin], number)
+
+    def put_twin(self, number: int, outcome: Outcome, kept: int) -> None:
+        """Take over a log whose content is that of the log with the number ``kept``."""
+        if outcome.folder and not self._output.has_in_place(outcome):
+            self._output.discard(outcome.folder)
+        text = f"{Path(outcome.source).name}: same content as {self._names[kept]}, listed once"
+        self._outcomes[number] = Outcome(outcome.source, "skipped", text, sha256=outcome.sha256)
+
+    def _placed(self, outcome: Outcome) -> Outcome:
+        identity, plain = outcome.flight_id, plain_id(outcome.flight_id, outcome.sha256)
+        owner = self._owner.setdefault(plain, outcome.sha256)
+        is_taken = owner != outcome.sha256 or self._is_of_another_log(identity, outcome)
+        was_taken = plain != identity  # in an earlier run
+        if is_taken or (not was_taken and (self._output.root / f"{plain}_{outcome.sha256[:8]}").exists()):
+            self._clashes.add(plain)
+            if not was_taken:
+                return outcome
+        return outcome if self._output.has_in_place(outcome) else self._put_in_place(outcome)
+
+    def _put_in_place(self, outcome: Outcome) -> Outcome:
+        try:
+            return replace(outcome, folder=self._output.place(outcome))
+        except GroundstationError as error:
+            reason = str(error)
+        except OSError as error:
+            reason = f"{outcome.flight_id}: cannot be put into place ({error.strerror or error})"
+        with suppress(OSError, GroundstationError):
+            self._output.discard(outcome.folder)
+        return Outcome(outcome.source, "failed", reason, sha256=outcome.sha256, times_s=outcome.times_s)
+
+    def clashing(self) -> tuple[int, ...]:
+        """Numbers of the logs, once all are put, that must be run again with their digests in their names."""
+        return tuple(number for number, outcome in sorted(self._outcomes.items()) if outcome.flight_id in self._clashes)
+
+    def put_again(self, number: int, outcome: Outcome) -> None:
+        """Take over what was run again; if that failed, what stood in place stays."""
+        former = self._outcomes[number]
+        if not self._output.has_in_place(former):
+            self._output.discard(former.folder)
+        self._outcomes[number] = self._put_in_place(outcome) if outcome.flight_id else outcome
+
+    def sweep(self) -> None:
+        """Remove flights of these logs that stand under another id, and those of older versions of the logs."""
+        flights = [outcome for outcome in self._outcomes.values() if outcome.flight_id]
+        now = {outcome.sha256: outcome.flight_id for outcome in flights}
+        versions = {(_place_of(outcome), plain_id(outcome.flight_id, outcome.sha256)) for outcome in flights}
+        for folder in flight_folders(self._output.root):
+            origin = _origin_of(folder)
+            if origin is None or now.get(origin.sha256) == folder.name:
+                continue
+            if origin.sha256 in now or (origin.path, plain_id(folder.name, origin.sha256)) in versions:
+                with suppress(OSError, GroundstationError):  # the next run tries again
+                    self._output.discard(folder.name)
+
+    def outcomes(self) -> tuple[Outcome, ...]:
+        """What became of the logs put so far, in the order of the inputs."""
+        return tuple(outcome for _, outcome in sorted(self._outcomes.items()))
+
+    def _is_of_another_log(self, flight_id: str, outcome: Outcome) -> bool:
+        """Whether a flight folder came from another log than an earlier version of this one."""
+        origin = _origin_of(self._output.root / flight_id)
+        if origin is None or origin.sha256 == outcome.sha256:
+            return False
+        return origin.path != _place_of(outcome)
+
+
+def _place_of(outcome: Outcome) -> str:
+    """Where the log is, as manifests tell it."""
+    return outcome.source if is_remote(outcome.source) else str(Path(outcome.source).absolute())
+
+
+def _origin_of(folder: Path) -> _Origin | None:
+    """None for a folder that is not whole."""
+    try:
+        source = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["source"]
+        return _Origin(str(source["path"]), str(source["sha256"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

@@ -1,0 +1,125 @@
+"""What stands beside the flight folders of an OUT: the index and what the flights say together."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
+from groundstation.estimators.analyses import ANSWER_TYPES
+from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET, write_fleet
+from groundstation.pipeline.many_flights.fleet_samples import SAMPLES
+from groundstation.pipeline.many_flights.inputs import (
+    FLIGHT_FOLDER_MARK,
+    OUT_FOLDER_MARK,
+    flight_folders,
+    is_ours,
+    plan_folders,
+    session_folders,
+)
+from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
+from groundstation.reports.fleet_report import write_fleet_report
+from groundstation.reports.index import INDEX_CSV, INDEX_JSON, IndexRow, Kind
+
+FLEET_RECORDING, FLEET_PDF = "fleet.rrd", str(Path(FLEET_PAGE).with_suffix(".pdf"))
+FLEET_FILES = (INDEX_JSON, INDEX_CSV, FLEET_PARQUET, SAMPLES, FLEET_RECORDING, FLEET_PAGE, FLEET_PDF)
+
+
+def write_beside(
+    out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[IndexRow] = (), *, with_pdf: bool = True
+) -> tuple[Outcome, ...]:
+    """Write everything that stands beside the flight folders; returns what could not be written or read."""
+    from groundstation.viewer.fleet import write_fleet_recording
+
+    problems = list(write_index_of(out, outcomes, kept_rows))
+    fleet, unwritten = write_fleet(out)
+    problems += unwritten
+    try:
+        with told_in_a_line(str(out)):
+            problem = write_fleet_report(out, fleet, with_pdf=with_pdf).problem
+            write_fleet_recording(out / FLEET_RECORDING, fleet)
+    except GroundstationError as error:  # the flights are done, and told of in any case
+        problems.append(Outcome(str(out), "failed", str(error)))
+    else:
+        problems += [Outcome(str(out), "skipped", f"{out}: {problem}")] if problem else []
+    return tuple(problems)
+
+
+def write_index_of(out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[IndexRow] = ()) -> tuple[Outcome, ...]:
+    """Write index.json and index.csv: every flight and session in ``out``, and the logs of this run that gave none.
+
+    Returns what could not be listed: folders that cannot be read, an index that cannot be written.
+    """
+    from groundstation.reports.index import failed_row, index_row, write_index
+    from groundstation.results.files import load
+
+    problems: list[Outcome] = []
+    rows = list(kept_rows)
+    listed: tuple[tuple[Kind, list[Path]], ...] = (("flight", flight_folders(out)), ("session", session_folders(out)))
+    for kind, folder in ((kind, folder) for kind, folders in listed for folder in folders):
+        try:
+            rows.append(index_row(load(folder, ANSWER_TYPES), kind))
+        except GroundstationError as error:
+            problems.append(Outcome(str(folder), "failed", str(error)))
+    without_flight = [one for one in outcomes if not one.flight_id and not (one.is_session and one.state == "skipped")]
+    rows += [failed_row(one.source, one.state, one.text) for one in (*without_flight, *problems)]
+    try:
+        write_index(out, rows)
+    except OSError as error:
+        problems.append(Outcome(str(out), "failed", f"{out}: the index cannot be written ({error.strerror or error})"))
+    return tuple(problems)
+
+
+def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple[Outcome, ...]]:
+    """Make reports and index of an OUT (or the report of one flight folder) again from the saved results.
+
+    Returns
+    -------
+    list of Path, tuple of Outcome
+        What was written, and the flight folders that could not be read or have no PDF though one was asked for.
+
+    Raises
+    ------
+    UsageError
+        When the folder is not one that ``run`` made.
+    """
+    from groundstation.reports.flight_report import write_flight_report
+
+    is_flight = (out / FLIGHT_FOLDER_MARK).is_file()
+    if not is_flight and (not out.is_dir() or not (is_ours(out) or flight_folders(out))):
+        raise UsageError(str(out), "no results", "a folder that `run` made")
+    paths: list[Path] = []
+    problems: list[Outcome] = []
+    for folder in [out] if is_flight else [*flight_folders(out), *session_folders(out), *plan_folders(out)]:
+        try:
+            with told_in_a_line(str(folder)):
+                written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf)
+        except GroundstationError as error:
+            if is_flight:
+                raise
+            problems.append(Outcome(str(folder), "failed", str(error)))
+            continue
+        paths += written.paths
+        if written.problem:
+            problems.append(Outcome(str(folder), "done", f"{folder.name}: {written.problem}"))
+    if is_flight:
+        return paths, tuple(problems)
+    told = {one.source for one in problems}
+    unread = [
+        one for one in write_beside(out, (), rows_without_flight(out), with_pdf=with_pdf) if one.source not in told
+    ]
+    return [*paths, *(out / name for name in FLEET_FILES if (out / name).exists())], (*problems, *unread)
+
+
+def rows_without_flight(out: Path) -> list[IndexRow]:
+    """Rows of the logs that gave no flight, from the index as it stands: nothing else remembers them."""
+    import json
+
+    from groundstation.base.serial import MismatchError, from_json
+
+    try:
+        listed = json.loads((out / OUT_FOLDER_MARK).read_text(encoding="utf-8"))["rows"]
+        rows = [from_json(IndexRow, row) for row in listed]
+    except (OSError, ValueError, KeyError, TypeError, MismatchError):
+        return []
+    folders = {str(folder) for folder in (*flight_folders(out), *session_folders(out))}
+    return [row for row in rows if row.kind in ("failed", "skipped") and row.source not in folders]

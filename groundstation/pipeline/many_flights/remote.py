@@ -1,0 +1,170 @@
+"""Places elsewhere, in a bucket or on a server: folders named by URL, reached through fsspec."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+
+from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK
+
+
+def is_remote(place: str) -> bool:
+    """Whether a place is named by URL.
+
+    Examples
+    --------
+    >>> is_remote("s3://flights/2026"), is_remote("flights/2026")
+    (True, False)
+    """
+    return "://" in place
+
+
+class RemoteFolder:
+    """A folder named by URL.
+
+    Parameters
+    ----------
+    url : str
+        ``s3://bucket/folder``, ``file:///folder``; whatever fsspec has a package for.
+
+    Raises
+    ------
+    UsageError
+        When nothing reaches such a place.
+    """
+
+    def __init__(self, url: str) -> None:
+        try:
+            from fsspec.core import url_to_fs
+        except ImportError as error:
+            raise UsageError(url, "no package fsspec", "", "pip install 'groundstation[cluster]'") from error
+        self.url = url.rstrip("/")
+        try:
+            self._fs, root = url_to_fs(self.url, use_listings_cache=False)
+        except (ImportError, ValueError) as error:
+            raise UsageError(url, str(error), "a URL that fsspec reaches") from error
+        self._root = root.rstrip("/")
+
+    def _path(self, name: str) -> str:
+        return f"{self._root}/{name}" if name else self._root
+
+    @contextmanager
+    def _told(self, name: str) -> Iterator[None]:
+        """Tell in one line what the network, the server or the rights are in the way of."""
+        try:
+            yield
+        except GroundstationError:
+            raise
+        except Exception as error:  # every store has errors of its own
+            reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+            raise GroundstationError(f"{self.url}/{name}".rstrip("/"), reason) from error
+
+    def names(self, name: str = "") -> list[str]:
+        """Names of what is in a folder, sorted; none where there is no folder."""
+        with self._told(name):
+            try:
+                listed = self._fs.ls(self._path(name), detail=False)
+            except FileNotFoundError:
+                return []
+            return sorted({PurePosixPath(path).name for path in listed} - {PurePosixPath(self._path(name)).name, ""})
+
+    def files(self) -> list[str]:
+        """All files below, by their path from here, sorted; none where there is nothing."""
+        with self._told(""):
+            found = self._fs.find(self._root)
+            return sorted(str(PurePosixPath(path).relative_to(self._root)) for path in found)
+
+    def is_file(self) -> bool:
+        """Whether the URL names a file."""
+        with self._told(""):
+            return bool(self._fs.isfile(self._root))
+
+    def read(self, name: str) -> bytes | None:
+        """Content of a file, None where there is none."""
+        with self._told(name):
+            try:
+                return bytes(self._fs.cat_file(self._path(name)))
+            except FileNotFoundError:
+                return None
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a small file."""
+        with self._told(name):
+            self._make_parent(name)
+            self._fs.pipe_file(self._path(name), content)
+
+    def fetch(self, name: str, target: Path) -> None:
+        """Copy a file from there."""
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with self._told(name):
+            self._fs.get_file(self._path(name), str(target))
+
+    def send(self, folder: Path, name: str = "", *, last: str = FLIGHT_FOLDER_MARK) -> None:
+        """Copy all files of a folder here to one there, one of them last."""
+        paths = sorted(path for path in folder.rglob("*") if path.is_file())
+        for path in sorted(paths, key=lambda path: path == folder / last):
+            target = "/".join(part for part in (name, path.relative_to(folder).as_posix()) if part)
+            with self._told(target):
+                self._make_parent(target)
+                self._fs.put_file(str(path), self._path(target))
+
+    def replace(
+        self, source: str, target: str, is_old: Callable[[str], bool], *, last: str = FLIGHT_FOLDER_MARK
+    ) -> None:
+        """Put the files of a folder in the place of old ones of another, one of them last; the source is gone then."""
+        with self._told(target):
+            old = self._relative(target)
+            if last in old:
+                self._fs.rm_file(self._path(f"{target}/{last}"))  # from now on the old folder is not whole
+            new = self._relative(source)
+            for name in sorted(new, key=lambda name: name == last):
+                self._make_parent(f"{target}/{name}")
+                self._fs.cp_file(self._path(f"{source}/{name}"), self._path(f"{target}/{name}"))
+            for name in filter(is_old, set(old) - set(new)):
+                self._fs.rm_file(self._path(f"{target}/{name}"))
+        self.remove(source)
+
+    def remove_where(self, name: str, is_old: Callable[[str], bool], *, first: str = FLIGHT_FOLDER_MARK) -> None:
+        """Remove the old files of a folder, one of them first."""
+        with self._told(name):
+            for one in sorted(filter(is_old, self._relative(name)), key=lambda one: one != first):
+                self._fs.rm_file(self._path(f"{name}/{one}"))
+
+    def _relative(self, name: str) -> list[str]:
+        root = self._path(name)
+        return [str(PurePosixPath(path).relative_to(root)) for path in self._fs.find(root)]
+
+    def _make_parent(self, name: str) -> None:
+        if "file" in self._fs.protocol:  # buckets have no folders
+            Path(self._path(name)).parent.mkdir(parents=True, exist_ok=True)
+
+    def remove(self, name: str) -> None:
+        """Remove a file or a folder, if it is there."""
+        with self._told(name):
+            try:
+                self._fs.rm(self._path(name), recursive=True)
+            except FileNotFoundError:
+                return
+
+
+def far_logs(url: str) -> list[tuple[str, bool]]:
+    """Logs at a URL, a file or a folder with all below it, each with whether the user named it.
+
+    Raises
+    ------
+    UsageError
+        When nothing is there.
+    """
+    folder = RemoteFolder(url)
+    if folder.is_file():
+        return [(url, True)]
+    paths = [PurePosixPath(name) for name in folder.files()]
+    if not paths:
+        raise UsageError(url, "no such file or folder")
+    ours = {path.parent for path in paths if path.name in (FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK)}
+    return [(f"{folder.url}/{path}", False) for path in paths if not _is_left_out(path, ours)]
+
+
+def _is_left_out(path: PurePosixPath, ours: set[PurePosixPath]) -> bool:
+    """Whether a file is hidden, or lies in a folder that groundstation made."""
+    return any(part.startswith(".") for part in path.parts) or not ours.isdisjoint(path.parents)

@@ -1,0 +1,119 @@
+"""Runs of logs that lie elsewhere, or whose results do.
+
+A log is fetched, run and its flight folder sent to a staging place by the process that runs it; the process that leads
+the run moves it into place. A rename is not atomic in a bucket: the manifest, which marks a whole folder, goes last.
+"""
+
+import tempfile
+import uuid
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+
+from groundstation.base.errors import GroundstationError
+from groundstation.pipeline.many_flights.remote import RemoteFolder, is_remote
+from groundstation.pipeline.one_flight.flight import Job, run_flight
+from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.one_flight.progress import Listener, silent
+from groundstation.pipeline.one_flight.resume import Finished, finished
+from groundstation.reports.flight_report import PDF
+from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
+from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY
+
+STAGING, BY_LOG = ".staging", ".logs"  # in an OUT elsewhere: what is on its way; flight ids by digest of the log
+
+
+@dataclass(frozen=True)
+class RemoteJob:
+    """A job whose log or results lie elsewhere.
+
+    ``log`` and ``out`` are URLs or paths; with ``redo`` nothing counts as finished.
+    """
+
+    job: Job
+    log: str
+    out: str
+    redo: bool = False
+
+    @property
+    def name(self) -> str:
+        """Name of its log."""
+        return PurePosixPath(self.log).name
+
+
+def run_remote(remote: RemoteJob, listen: Listener = silent) -> Outcome:
+    """Fetch a log, run it and send its flight folder to staging.
+
+    Returns
+    -------
+    Outcome
+        With ``folder`` the name of the staging folder in OUT, or that of the flight where nothing was to do.
+    """
+    try:
+        with tempfile.TemporaryDirectory(prefix="groundstation-") as scratch:
+            outcome = _run_in(Path(scratch), remote, listen)
+    except GroundstationError as error:
+        outcome = Outcome(remote.log, "failed", str(error))
+    except OSError as error:
+        outcome = Outcome(remote.log, "failed", f"{remote.name}: {error.strerror or error}")
+    return outcome
+
+
+def _run_in(scratch: Path, remote: RemoteJob, listen: Listener) -> Outcome:
+    out = RemoteFolder(remote.out)
+    path = Path(remote.log)
+    if is_remote(remote.log):
+        parent, _, _name = remote.log.rpartition("/")
+        path = scratch / "log" / remote.name
+        RemoteFolder(parent).fetch(remote.name, path)
+    job = replace(remote.job, path=path, out=scratch / "out", url=remote.log if is_remote(remote.log) else "")
+    if not remote.redo:
+        job = _planned(job, out, scratch / "finished")
+    outcome = run_flight(job, listen)
+    if not outcome.flight_id:
+        return outcome
+    if job.step == "nothing":
+        return replace(outcome, folder=outcome.flight_id)
+    if job.step == "reports" and job.finished is not None:
+        out.send(job.finished.folder, outcome.flight_id)
+        for name in (PDF, DEVIATION_CSV, STEER_CARD):
+            if not (job.finished.folder / name).exists():
+                out.remove(f"{outcome.flight_id}/{name}")
+        return replace(outcome, folder=outcome.flight_id)
+    staged = f"{STAGING}/{outcome.sha256}-{uuid.uuid4().hex[:8]}"
+    out.send(Path(outcome.folder), staged)
+    return replace(outcome, folder=staged)
+
+
+def _planned(job: Job, out: RemoteFolder, scratch: Path) -> Job:
+    """The job with what has to be done of it; what it needs of a finished flight is fetched."""
+    asked = job.asked()
+    if asked is None:
+        return job
+    sha256, keys = asked
+    flight_id = (out.read(f"{BY_LOG}/{sha256}") or b"").decode()
+    found = _fetched(out, flight_id, scratch) if flight_id else None
+    if found is None or found.sha256 != sha256:
+        return job
+    planned = job.going_on(found, keys)
+    if planned.step == "analysis":
+        out.fetch(f"{flight_id}/{found.mcap.name}", found.mcap)
+    elif planned.step == "reports":
+        for name in array_files(out, flight_id):
+            out.fetch(f"{flight_id}/{name}", found.folder / name)
+    return planned
+
+
+def array_files(out: RemoteFolder, flight_id: str) -> list[str]:
+    """Files of a flight that hold the arrays behind its figures."""
+    return [f"{ARRAYS}/{name}" for name in out.names(f"{flight_id}/{ARRAYS}")]
+
+
+def _fetched(out: RemoteFolder, flight_id: str, scratch: Path) -> Finished | None:
+    """What a flight elsewhere remembers, its two documents fetched; None when it is not whole."""
+    folder, files = scratch / flight_id, out.names(flight_id)
+    if not {MANIFEST, SUMMARY} <= set(files):
+        return None
+    for name in (SUMMARY, MANIFEST):
+        out.fetch(f"{flight_id}/{name}", folder / name)
+    found = finished(folder)
+    return replace(found, files=frozenset(files)) if found else None

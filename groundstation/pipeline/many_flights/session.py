@@ -1,0 +1,341 @@
+"""One session from beginning to end: MCAPs of its logs, answers, recording and report in a folder of its own."""
+
+import hashlib
+import json
+import platform
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from groundstation.base.clock import Clock
+from groundstation.base.errors import GroundstationError, NotAssessableError
+from groundstation.base.findings import Finding, worst
+from groundstation.base.ledger import Ledger
+from groundstation.base.records import RecordBatch
+from groundstation.base.signals import kind_of
+from groundstation.base.toml_settings import settings_from
+from groundstation.base.version import __version__
+from groundstation.chapters.cooperative import names_or_count
+from groundstation.estimators.analyses import ANSWER_TYPES, SESSION_ANALYSES
+from groundstation.estimators.cooperative.analysis import SessionKnown
+from groundstation.pipeline.many_flights.inputs import session_folders
+from groundstation.pipeline.many_flights.session_figures import session_figures
+from groundstation.pipeline.one_flight.analyse import run_analyses
+from groundstation.pipeline.one_flight.configuration import SESSION_TABLES, Configuration, read_toml
+from groundstation.pipeline.one_flight.convert import convert_log
+from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX, Stopwatch, place, state_of
+from groundstation.pipeline.one_flight.identity import MAX_PART_CHARACTERS, flight_id, safe_part
+from groundstation.pipeline.one_flight.log import Log
+from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
+from groundstation.pipeline.one_flight.progress import Listener, silent
+from groundstation.pipeline.one_flight.resume import versions
+from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
+from groundstation.results.files import MANIFEST, load_document, load_manifest, save, save_manifest
+from groundstation.results.flight import FlightResults, Source
+from groundstation.results.manifest import Host, Keys, LogOfSession, Manifest, Resume, SourceOfRun
+from groundstation.tables.assemble import flight_from_batches
+from groundstation.tables.session_assemble import AssembledSession, session_from_flights
+from groundstation.tables.session_settings import Stations
+from groundstation.tables.table import Flight
+
+if TYPE_CHECKING:
+    from groundstation.store.info import StoreInfo
+
+KINDS = frozenset(("ins", "baro", "link", "satellite", "truth"))  # of topics that a session reads
+MCAPS = "mcap"  # folder of those that the session converted itself
+
+
+@dataclass(frozen=True)
+class SessionJob:
+    """One session to run.
+
+    Parameters
+    ----------
+    logs : tuple of Log
+        Those that a reader claims, in the order of their digests.
+    stations : Stations
+    out : Path
+    configuration : Configuration
+    fail_on : str
+    with_pdf : bool
+    redo : bool
+        Whether it is run though a session with equal keys is finished.
+    is_found : bool
+        Whether a run found it among its flights; it then leaves what the verb ``cooperative`` made of these logs.
+    notes : tuple of Finding
+        What is known of it before its logs are read.
+    """
+
+    logs: tuple[Log, ...]
+    stations: Stations
+    out: Path
+    configuration: Configuration
+    fail_on: str = "none"
+    with_pdf: bool = True
+    redo: bool = False
+    is_found: bool = False
+    notes: tuple[Finding, ...] = ()
+
+    @property
+    def log(self) -> str:
+        """Its logs as the user would type them."""
+        return self.name
+
+    @property
+    def name(self) -> str:
+        """Names of its logs."""
+        return ", ".join(sorted(log.source.name for log in self.logs))
+
+    @property
+    def sha256(self) -> str:
+        """Digest over those of the logs, whatever their order."""
+        return hashlib.sha256("\n".join(sorted(log.source.sha256 for log in self.logs)).encode()).hexdigest()
+
+    def keys(self) -> Keys:
+        """Equal keys, equal results: logs, stations, settings and versions go in."""
+        logs = [asdict(log.source) for log in self.logs]
+        tables = dict(self.configuration.tables)
+        thresholds = tables.get("thresholds", {})
+        used = {name: tables.get(name, {}) for name in SESSION_TABLES}
+        conversion = _digest(logs, thresholds, self.configuration.profile, dict(versions()), platform.python_version())
+        analysis = _digest(conversion, asdict(self.stations), used, [asdict(note) for note in self.notes])
+        return Keys(conversion, analysis, _digest(analysis, self.with_pdf))
+
+
+def _digest(*parts: object) -> str:
+    return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def load_stations(path: Path | None) -> Stations:
+    """Ground stations from a TOML file; none without one.
+
+    Raises
+    ------
+    SettingsError
+        For a file that cannot be read, an unknown key or a value out of range, naming file and key.
+    """
+    return Stations() if path is None else settings_from(Stations, read_toml(path), str(path))
+
+
+def run_one(job: SessionJob, listen: Listener = silent) -> Outcome:
+    """Run a session into its place; of one that is finished only the reports that are missing are made.
+
+    What cannot be computed is an outcome with the reason, never an exception.
+    """
+    watch = Stopwatch(listen, job.name)
+    partial: Path | None = None
+    try:
+        if (finished := _finished(job, watch)) is not None:
+            return finished
+        partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=job.out))
+        partial.chmod(0o755)  # mkdtemp's folders are private
+        return _run_into(partial, job, watch)
+    except Exception as error:
+        reason, trace = reason_of(job.name, error)
+        is_wanted = not (job.is_found and isinstance(error, NotAssessableError))
+        return _outcome(job, "failed" if is_wanted else "skipped", reason, None, watch, trace)
+    finally:
+        if partial is not None:
+            shutil.rmtree(partial, ignore_errors=True)
+
+
+def _outcome(
+    job: SessionJob, state: State, text: str, folder: Path | None, watch: Stopwatch, trace: str = ""
+) -> Outcome:
+    name, place = (folder.name, str(folder)) if folder else ("", "")
+    return Outcome(job.name, state, text, name, place, job.sha256, watch.times_s, trace, is_session=True)
+
+
+def sessions_of(out: Path) -> Iterator[tuple[Path, Manifest]]:
+    """Whole sessions of a folder, each with its manifest."""
+    for folder in session_folders(out):
+        try:
+            yield folder, load_manifest(folder)
+        except GroundstationError:
+            continue
+
+
+def _finished(job: SessionJob, watch: Stopwatch) -> Outcome | None:
+    """The outcome of a session that is finished, its reports made again where they are missing; None without one."""
+    keys = job.keys()
+    for folder, manifest in sessions_of(job.out):
+        resume = manifest.resume
+        if resume is None or manifest.source.sha256 != job.sha256:
+            continue
+        is_of_the_verb = job.is_found and not manifest.is_found
+        is_whole = (folder / f"{folder.name}.rrd").is_file() and resume.keys.analysis == keys.analysis
+        if not is_of_the_verb and (job.redo or not is_whole):
+            continue
+        problem, wanted = "", (REPORT, PDF) if job.with_pdf else (REPORT,)
+        is_told = is_of_the_verb or resume.keys.reports == keys.reports
+        if not is_told or not all((folder / name).is_file() for name in wanted):
+            with watch.stage("reporting"):
+                problem = write_flight_report(folder, ANSWER_TYPES, with_pdf=job.with_pdf).problem
+            save_manifest(folder, replace(manifest, resume=replace(resume, keys=keys)))
+        state = state_of(worst(load_document(folder).findings), resume.has_lost_data, job.fail_on)
+        return _outcome(job, state, "; ".join(filter(None, (resume.text, problem))), folder, watch)
+    return None
+
+
+def _run_into(partial: Path, job: SessionJob, watch: Stopwatch) -> Outcome:
+    from groundstation.viewer.session import write_session_recording
+
+    with watch.stage("converting"):
+        flights, logs, damaged = _flights(partial, job)
+    with watch.stage("assembling"):
+        settings = job.configuration.settings.session
+        assembled = session_from_flights(flights, job.stations, settings=settings)
+        if not assembled.session.vehicles:
+            reasons = "; ".join(finding.text for finding in assembled.findings)
+            raise NotAssessableError(job.name, f"no aircraft with dead reckoning ({reasons})")
+    with watch.stage("estimating"):
+        results = _results(job, assembled, flights, damaged)
+    with watch.stage("saving"):
+        text = _sentence(results)
+        resume = Resume(job.keys(), text, bool(damaged))
+        save(partial, results, _manifest(job, results, logs, resume))
+    with watch.stage("recording"):
+        write_session_recording(partial / f"{results.flight_id}.rrd", assembled, results)
+    with watch.stage("reporting"):
+        problem = write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf).problem
+    target = job.out / results.flight_id
+    shutil.rmtree(target / MCAPS, ignore_errors=True)
+    place(partial, target)
+    state = state_of(worst(results.findings), bool(damaged), job.fail_on)
+    return _outcome(job, state, "; ".join(filter(None, (text, problem))), target, watch)
+
+
+def _flights(partial: Path, job: SessionJob) -> tuple[list[Flight], tuple[LogOfSession, ...], list[Finding]]:
+    """What a session reads of each log; a log that is no MCAP gets one beside the session's results."""
+    from groundstation.store.reader import read_info
+
+    flights, logs, damaged = [], [], []
+    for log in job.logs:
+        mcap, source = log.path, log.source
+        if log.is_store:
+            info = read_info(mcap)
+            has_lost = any(entry.get("loses_data") for entry in info.damages)
+        else:
+            (partial / MCAPS).mkdir(exist_ok=True)
+            mcap = partial / MCAPS / f"{safe_part(log.path.stem) or 'log'}.mcap"
+            if mcap.exists():  # of another folder
+                mcap = mcap.with_stem(f"{mcap.stem}_{source.sha256[:8]}")
+            converted = convert_log(log, mcap, job.configuration.settings.thresholds)
+            info, has_lost = converted.info, converted.has_lost_data
+        if has_lost:
+            text = f"{source.name} lost data; `groundstation check` tells what"
+            damaged.append(Finding("warn", "session.lost_data", text, place=source.name))
+        flights.append(_read(mcap, info))
+        where = _seen_from_a_folder_in(job.out, mcap) if log.is_store else str(mcap.relative_to(partial))
+        path = where if log.is_store else str(log.path.absolute())
+        logs.append(LogOfSession(path, source.name, source.sha256, source.size_bytes, source.reader, where))
+    return flights, tuple(logs), damaged
+
+
+def _seen_from_a_folder_in(out: Path, mcap: Path) -> str:
+    """Path of an MCAP: from a folder in OUT where it is in OUT, which may be moved as a whole; else from the root."""
+    if not mcap.resolve().is_relative_to(out.resolve()):
+        return str(mcap.absolute())
+    return str(Path("..") / mcap.resolve().relative_to(out.resolve()))
+
+
+def _read(mcap: Path, info: "StoreInfo") -> Flight:
+    from groundstation.store.reader import read
+
+    batches = (item for item in read(mcap) if isinstance(item, RecordBatch) and kind_of(item.topic) in KINDS)
+    return flight_from_batches(batches, metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name)
+
+
+def _results(
+    job: SessionJob, assembled: AssembledSession, flights: Sequence[Flight], damaged: Sequence[Finding]
+) -> FlightResults:
+    known = SessionKnown(assembled.truth, job.configuration.settings.analyses)
+    found = run_analyses(SESSION_ANALYSES, assembled.session, known)
+    findings = [*damaged, *job.notes, *_assumed(job), *assembled.findings]
+    for analysis in SESSION_ANALYSES:
+        findings += found.findings.get(analysis.name, ())
+    names = assembled.session.names
+    start_utc_ns = assembled.start_ns if assembled.has_utc else None
+    identity = flight_id(start_utc_ns, {"aircraft": "session", "flight": joined_names(names)}, job.sha256)
+    title = f"session of {names_or_count(names)}"
+    size = sum(log.source.size_bytes for log in job.logs)
+    told = sorted({flight.metadata.get("flight", "") for flight in flights} - {""})
+    return FlightResults(
+        flight_id=_free(job, identity),
+        source=Source(title, job.sha256, size, f"groundstation cooperative, {len(job.logs)} logs"),
+        metadata={"aircraft": ", ".join(names), "flight": ", ".join(told)},
+        start_utc_ns=start_utc_ns,
+        duration_s=assembled.duration_s,
+        status="failed" if any(one.severity == "fail" for one in findings) else "degraded" if damaged else "ok",
+        ledger=Ledger(),
+        clock=Clock(),
+        findings=tuple(findings),
+        not_assessable=found.not_assessable,
+        answers=found.answers,
+        figures=(*session_figures(assembled), *(one for answer in found.answers.values() for one in answer.figures)),
+    )
+
+
+def _assumed(job: SessionJob) -> Iterator[Finding]:
+    """What the session takes for granted because nobody set it."""
+    tables, settings = job.configuration.tables, job.configuration.settings.session
+    shipped = {"session": f"sigma of a range, {settings.range_sigma_m:g} m", "cooperative": "sigmas of the INS"}
+    told = [what for table, what in shipped.items() if not tables.get(table)]
+    if told:
+        text = f"shipped values, as no settings state them: {', '.join(told)}; the computed sigmas rest on these"
+        yield Finding("info", "session.assumed_sigmas", text)
+    if job.stations == Stations():
+        text = "no ground stations and no origin: worked on the globe, 13 states an aircraft"
+        yield Finding("info", "session.no_stations", text)
+
+
+def _free(job: SessionJob, identity: str) -> str:
+    """The id, with the digest where other logs gave a folder of that name; a run replaces what a run found."""
+    target = job.out / identity
+    if not (target / MANIFEST).is_file():
+        return identity
+    try:
+        there = load_manifest(target)
+        is_mine = there.source.sha256 == job.sha256 or (job.is_found and there.is_found)
+    except GroundstationError:
+        is_mine = True
+    return identity if is_mine else f"{identity}_{job.sha256[:8]}"
+
+
+def joined_names(names: Sequence[str]) -> str:
+    """Names of the aircraft of a session as a part of its id; of very many the first, and how many more.
+
+    Examples
+    --------
+    >>> joined_names(["A", "B", "C"]), joined_names([f"RA-{number:05d}" for number in range(20)])
+    ('A-B-C', 'RA-00000-and-19-others')
+    """
+    joined = "-".join(names)
+    return joined if len(joined) <= MAX_PART_CHARACTERS else f"{names[0]}-and-{len(names) - 1}-others"
+
+
+def _sentence(results: FlightResults) -> str:
+    found = [text for analysis in SESSION_ANALYSES if (text := analysis.sentence(results.answers))]
+    reasons = "; ".join(f"{entry.analysis}: {entry.reason}" for entry in results.not_assessable)
+    return "; ".join(found) or f"not assessable: {reasons}"
+
+
+def _manifest(job: SessionJob, results: FlightResults, logs: tuple[LogOfSession, ...], resume: Resume) -> Manifest:
+    source = results.source
+    return Manifest(
+        groundstation=__version__,
+        flight_id=results.flight_id,
+        made_utc=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        source=SourceOfRun("", source.name, source.sha256, source.size_bytes, source.reader),
+        configuration=job.configuration.to_dict() | {"stations": asdict(job.stations)},
+        host=Host(platform.platform(), platform.machine(), sys.version.split()[0]),
+        versions=versions(),
+        logs=logs,
+        is_found=job.is_found,
+        resume=resume,
+    )

@@ -1,0 +1,1 @@
+"""One flight: from a log to MCAP, answers, recording and report."""

@@ -1,0 +1,210 @@
+"""Tables of one flight in, all its answers out: everything the data allows, and the reason for what it does not."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.clock import Clock
+from groundstation.base.errors import NotAssessableError, SettingsError
+from groundstation.base.findings import Finding, Severity
+from groundstation.base.gaps import Gaps
+from groundstation.base.ledger import Ledger
+from groundstation.estimators import overview
+from groundstation.estimators.analyses import FLIGHT_ANALYSES
+from groundstation.estimators.analysis import Analysis, in_order_of_need
+from groundstation.estimators.damage import damage_finding
+from groundstation.estimators.heading.settings import HeadingSettings
+from groundstation.estimators.known import Interval, Known
+from groundstation.integrity.ledger import gaps_of
+from groundstation.pipeline.one_flight import configuration as configured
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.intervals import seconds_of
+from groundstation.results.answer import Answers, answer_of
+from groundstation.results.chosen import chosen_intervals
+from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
+from groundstation.results.heading import HeadingResult
+from groundstation.tables.phases import flight_phases
+from groundstation.tables.table import Flight
+
+INFO: Severity = "info"
+WARN: Severity = "warn"
+
+
+@dataclass(frozen=True)
+class Given:
+    """What is known of a flight before anything is estimated."""
+
+    flight_id: str
+    source: Source
+    ledger: Ledger
+    clock: Clock
+    findings: tuple[Finding, ...]
+    has_lost_data: bool
+
+
+@dataclass(frozen=True)
+class Answered:
+    """What the analyses of a flight gave: answers and findings by analysis, and why some gave nothing.
+
+    ``reasons`` has an entry for every analysis without an answer; ``not_assessable`` leaves out those that only lack
+    the answer of another.
+    """
+
+    answers: Answers
+    findings: Mapping[str, tuple[Finding, ...]]
+    reasons: Mapping[str, str]
+    not_assessable: tuple[NotAssessable, ...]
+
+
+def analyse(flight: Flight, given: Given, configuration: Configuration) -> FlightResults:
+    """Compute everything the data of a flight allows.
+
+    Returns
+    -------
+    FlightResults
+        Analyses that could not run stand in ``not_assessable`` with their reasons.
+    """
+    known = known_of(flight, configuration)
+    found = run_analyses(FLIGHT_ANALYSES, flight, known)
+    thresholds = configuration.settings.thresholds
+    gaps = {name: gaps_of(name, flight[name].time_ns, thresholds=thresholds) for name in flight.topics()}
+    findings = list(given.findings)
+    for analysis in FLIGHT_ANALYSES:
+        findings += found.findings.get(analysis.name, ())
+        findings += _on_damage(analysis, flight, given, found.answers, gaps)
+    figures = [*_general_figures(flight, given, known, found.answers, gaps)]
+    for answer in found.answers.values():
+        figures += answer.figures
+    return FlightResults(
+        flight_id=given.flight_id,
+        source=given.source,
+        metadata=flight.metadata,
+        start_utc_ns=flight.start_ns if flight.has_utc else None,
+        duration_s=flight.duration_s,
+        status=_status(given, findings),
+        completeness=given.ledger.completeness,
+        ledger=given.ledger,
+        clock=given.clock,
+        findings=tuple(findings),
+        not_assessable=found.not_assessable,
+        answers=found.answers,
+        figures=tuple(figures),
+        chosen=chosen_intervals(configuration.to_dict()),
+    )
+
+
+def known_of(flight: Flight, configuration: Configuration) -> Known:
+    """What the analyses may use besides the tables of a flight: phases, and all that the user says of it."""
+    settings = configuration.settings
+    known = Known(
+        phases=flight_phases(flight),
+        aircraft=settings.aircraft,
+        site=settings.site,
+        settings=settings.analyses,
+    )
+    try:
+        return replace(known, intervals=_intervals(flight, configuration))
+    except SettingsError as error:  # intervals in UTC for a flight without it: this flight's trouble alone
+        return replace(known, intervals_problem=error)
+
+
+def run_analyses(analyses: tuple[Analysis, ...], data: Any, known: Any) -> Answered:
+    """Run analyses on a flight or a session, each behind those it builds on; what lacks data gives its reason.
+
+    Parameters
+    ----------
+    analyses : tuple of Analysis
+    data : Flight
+        What they analyse; for analyses of a session, the session.
+    known : Known
+        ``answers`` and ``workings`` are filled as the analyses run.
+    """
+    answers: dict[str, Any] = dict(known.answers)
+    workings: dict[str, Any] = {}
+    findings: dict[str, tuple[Finding, ...]] = {}
+    reasons: dict[str, NotAssessable] = {}
+    for analysis in in_order_of_need(analyses):
+        missing = next((name for name in analysis.requires if name not in answers), None)
+        if missing is not None:
+            reasons[analysis.name] = reasons.get(missing) or NotAssessable(missing, f"{missing} did not run")
+            continue
+        so_far = replace(known, answers=answers, workings=workings)
+        try:
+            found = analysis.run(data, so_far, known.settings[analysis.settings_table])
+        except NotAssessableError as error:
+            reason, severity = str(error).removeprefix(f"{analysis.name}: "), INFO
+        except SettingsError as error:
+            reason, severity = str(error), WARN
+        else:
+            answers[analysis.name], workings[analysis.name] = found.answer, found.workings
+            findings[analysis.name] = found.findings
+            continue
+        reasons[analysis.name] = NotAssessable(analysis.name, reason)
+        if analysis.is_expected(data, so_far):
+            text = f"{analysis.subject} not assessable: {reason}"
+            findings[analysis.name] = (Finding(severity, f"{analysis.name}.not_assessable", text),)
+    names = [analysis.name for analysis in analyses]
+    return Answered(
+        {name: answers[name] for name in names if name in answers},
+        findings,
+        {name: reasons[name].reason for name in names if name in reasons},
+        tuple(reasons[name] for name in names if name in reasons and reasons[name].analysis == name),
+    )
+
+
+def _on_damage(
+    analysis: Analysis, flight: Flight, given: Given, answers: Answers, gaps: Mapping[str, Gaps]
+) -> tuple[Finding, ...]:
+    """The finding on damage among the samples that an answer rests on."""
+    answer = answers.get(analysis.name)
+    use = None if answer is None else analysis.rests_on(flight, answer)
+    if use is None:
+        return ()
+    found = damage_finding(f"{analysis.name}.damaged_span", analysis.subject, use, given.ledger, flight, gaps)
+    return (found,) if found else ()
+
+
+def _intervals(flight: Flight, configuration: Configuration) -> tuple[Interval, ...]:
+    uses: tuple[tuple[Literal["exclude", "force"], tuple[configured.Interval, ...]], ...] = (
+        ("exclude", configuration.exclude),
+        ("force", configuration.force),
+    )
+    return tuple(Interval(start_s, end_s, use) for use, listed in uses for start_s, end_s in seconds_of(flight, listed))
+
+
+def _status(given: Given, findings: list[Finding]) -> Status:
+    if any(finding.severity == "fail" for finding in findings):
+        return "failed"
+    return "degraded" if given.has_lost_data else "ok"
+
+
+def _general_figures(
+    flight: Flight, given: Given, known: Known, answers: Answers, gaps: Mapping[str, Gaps]
+) -> tuple[FigureData, ...]:
+    true_heading_deg, ins_topic = _heading_for_overview(flight, answers)
+    general = (
+        overview.overview(flight, true_heading_deg, ins_topic),
+        overview.phase_figure(known.phases),
+        overview.gnss_lanes(flight, known.settings_of(HeadingSettings).geometry_max),
+        overview.state_lanes(flight),
+        *overview.ledger_figures(flight, given.ledger, gaps),
+    )
+    return tuple(figure for figure in general if figure is not None)
+
+
+def _heading_for_overview(flight: Flight, answers: Answers) -> tuple[NDArray[np.float64] | None, str | None]:
+    from groundstation.tables.headings import true_heading
+
+    heading = answer_of(answers, HeadingResult)
+    topic = heading.ins_topic if heading else overview.first_of_kind(flight, "ins", "true_heading_deg")
+    topic = topic or overview.first_of_kind(flight, "ins", "magnetic_heading_deg")
+    if topic is None:
+        return None, None
+    try:
+        return true_heading(flight, topic).values_deg, topic
+    except NotAssessableError:
+        return None, None

@@ -1,0 +1,258 @@
+"""``run --apply``: a deviation of the magnetic heading, the flight's own or another's, added to the log."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.findings import Finding, Severity
+from groundstation.base.ledger import Ledger
+from groundstation.base.records import MAX_BATCH_ROWS, Column, RecordBatch
+from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.integrity.limits import Thresholds
+from groundstation.pipeline.one_flight.convert import census_of, recounted
+from groundstation.pipeline.one_flight.deviation_to_apply import CORRECTED, Apply
+from groundstation.results.deviation import (
+    Deviation,
+    deviation_of,
+)
+from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults
+from groundstation.results.heading import HeadingResult
+from groundstation.results.inertial import InertialResult
+from groundstation.results.latency import Latencies
+from groundstation.results.magnetic import MagneticResult
+from groundstation.tables.table import Flight
+
+if TYPE_CHECKING:
+    from groundstation.estimators.magnetic.corrected import CorrectedHeading
+    from groundstation.pipeline.one_flight.configuration import UserSettings
+    from groundstation.store.info import StoreInfo
+
+TOPIC = "corrected_heading"
+APPLIED, NOT_APPLIED = "magnetic.applied", "magnetic.not_applied"
+MOST_DRAWN = 20_000
+
+
+@dataclass(frozen=True)
+class Applied:
+    """What became of it: the results with their findings, and the corrected heading where there is one."""
+
+    results: FlightResults
+    deviation: Deviation | None = None
+    corrected: "CorrectedHeading | None" = None
+
+
+def corrected_name(flight_id: str) -> str:
+    """Name of the MCAP with the corrected heading, beside the flight's own."""
+    return f"{flight_id}{CORRECTED}"
+
+
+def apply_deviation(flight: Flight, results: FlightResults, asked: Apply | None, settings: "UserSettings") -> Applied:
+    """Add a deviation to the magnetic heading of a flight; a finding tells what was done, or why nothing was.
+
+    Parameters
+    ----------
+    flight : Flight
+    results : FlightResults
+        All answers of the flight: its own deviation, latencies, kind and error of the INS.
+    asked : Apply, optional
+        None: nothing is done.
+    settings : UserSettings
+
+    Returns
+    -------
+    Applied
+        ``results`` with the findings and, where it was applied, the figure ``corrected_heading``.
+    """
+    from groundstation.estimators.magnetic.corrected import correct_heading
+
+    if asked is None:
+        return Applied(results)
+    is_own = asked.deviation is None
+    deviation = asked.deviation or _own(results)
+    if deviation is None:
+        return _not_applied(results, "this flight has none of its own", "info")
+    whose = "the flight's own deviation" if is_own else f"the deviation of {deviation.title}"
+    if deviation.verdict == "reject":
+        why = f" ({deviation.verdict_reason})" if deviation.verdict_reason else ""
+        return _not_applied(results, f"{whose} is rejected{why}", "warn")
+    try:
+        corrected = correct_heading(
+            flight, deviation, settings=settings.of(MagneticSettings), latencies=results.answer(Latencies)
+        )
+    except NotAssessableError as error:
+        return _not_applied(results, str(error).removeprefix("magnetic: "), "info")
+    findings = [_told(corrected, deviation, whose)]
+    if not is_own:
+        findings += [*_other_aircraft(results, deviation), *_judged(flight, results, corrected, settings)]
+    figures = (*results.figures, _figure(flight, corrected))
+    return Applied(replace(results, findings=(*results.findings, *findings), figures=figures), deviation, corrected)
+
+
+def _own(results: FlightResults) -> Deviation | None:
+    found = results.answer(MagneticResult)
+    return deviation_of(found, results.flight_id, results.metadata.get("aircraft", "")) if found else None
+
+
+def _not_applied(results: FlightResults, reason: str, severity: Severity) -> Applied:
+    finding = Finding(severity, NOT_APPLIED, f"no magnetic deviation applied: {reason}")
+    return Applied(replace(results, findings=(*results.findings, finding)))
+
+
+def _told(corrected: "CorrectedHeading", deviation: Deviation, whose: str) -> Finding:
+    from groundstation.base.signals import kind_of
+
+    how = {"iron": "its iron", "table": "its table", "coefficients": "its coefficients A to E"}[corrected.way]
+    parts = [f"{whose} ({deviation.method}, {deviation.verdict}) applied to {corrected.topic} by {how}"]
+    parts.append(f"{len(corrected)} headings")
+    if kind_of(corrected.topic) == "ins" and deviation.magnetometer_topic:
+        parts.append(f"it was found for {deviation.magnetometer_topic}: right only where that is the same sensor")
+    if corrected.lacks_current:
+        parts.append("it depends on a current that this log lacks, taken for that of its figures")
+    if not corrected.model:
+        parts.append("no true heading: no declination for want of date or position")
+    return Finding("info", APPLIED, "; ".join(parts), corrected.topic)
+
+
+def _other_aircraft(results: FlightResults, deviation: Deviation) -> list[Finding]:
+    mine = results.metadata.get("aircraft", "")
+    if not mine or not deviation.aircraft or mine == deviation.aircraft:
+        return []
+    text = f"the deviation of {deviation.aircraft} was applied to {mine}: each aircraft has its own"
+    return [Finding("warn", "magnetic.other_aircraft", text)]
+
+
+def _judged(
+    flight: Flight, results: FlightResults, corrected: "CorrectedHeading", settings: "UserSettings"
+) -> list[Finding]:
+    """Whether the heading is nearer to that of the flight's own INS than before."""
+    from groundstation.estimators.magnetic.corrected import judge
+    from groundstation.tables.phases import flight_phases
+
+    inertial = results.answer(InertialResult)
+    found = judge(
+        flight,
+        corrected,
+        flight_phases(flight),
+        kinds={inertial.ins_topic: inertial.kind} if inertial else {},
+        ins_error_deg=_ins_error_deg(results, corrected.ins_topic),
+        aircraft=settings.aircraft,
+        settings=settings.of(MagneticSettings),
+    )
+    if found is None:
+        return []
+    residual, count = found
+    text = (
+        f"magnetic heading minus INS true heading less declination in level flight: {residual.before:.2f} deg RMS "
+        f"before, {residual.after:.2f} after the deviation was applied ({count} headings of {corrected.topic})"
+    )
+    if residual.after <= residual.before:
+        return [Finding("info", "magnetic.applied_better", text, corrected.topic)]
+    return [Finding("warn", "magnetic.applied_worse", f"{text}: it does not fit this flight", corrected.topic)]
+
+
+def _ins_error_deg(results: FlightResults, ins_topic: str) -> float:
+    """Error of the INS heading where it is known: at the figure, or as taxi shows it."""
+    magnetic, heading = results.answer(MagneticResult), results.answer(HeadingResult)
+    if magnetic is not None and magnetic.ins_topic == ins_topic:
+        return magnetic.alignment.error_deg
+    if heading is None or heading.ins_topic != ins_topic or heading.verdict == "reject":
+        return 0.0
+    return heading.error_deg if np.isfinite(heading.error_deg) else 0.0
+
+
+def _figure(flight: Flight, corrected: "CorrectedHeading") -> FigureData:
+    from groundstation.estimators.magnetic.corrected import thinned
+
+    drawn = thinned(corrected, MOST_DRAWN)
+    columns = {"time_s": flight.seconds(drawn.at_ns), **_fields(drawn)}
+    return FigureData(TOPIC, columns, dict.fromkeys(columns, 4))
+
+
+def _fields(corrected: "CorrectedHeading") -> dict[str, np.ndarray]:
+    return {
+        "magnetic_heading_deg": corrected.magnetic_heading_deg,
+        "uncorrected_magnetic_heading_deg": corrected.uncorrected_deg,
+        "deviation_deg": corrected.deviation_deg,
+        "true_heading_deg": corrected.true_heading_deg,
+    }
+
+
+def write_corrected(target: Path, info: "StoreInfo", flight: Flight, applied: Applied, thresholds: Thresholds) -> None:
+    """Write the corrected heading as an MCAP on the clock of the flight's own; nothing where nothing was applied.
+
+    Log times and device times are those of the samples it comes from, so that a viewer opens both files together.
+
+    Parameters
+    ----------
+    target : Path
+    info : StoreInfo
+        Facts of the flight's MCAP: its clock and metadata are taken over, and whose deviation it is added.
+    thresholds : Thresholds
+        Limits of the ledger.
+    """
+    from groundstation.store.writer import StoreWriter
+
+    corrected, deviation = applied.corrected, applied.deviation
+    if corrected is None or deviation is None:
+        return
+    batch = _batch(flight, corrected)
+    # Neither name nor digest of the log: this is a log of its own, and no twin of the one it comes from.
+    facts = replace(
+        info,
+        source_name=target.name,
+        source_sha256="",
+        start_ns=int(flight[corrected.topic].time_ns[corrected.rows[0]]),
+        metadata={**info.metadata, **_origin(corrected, deviation)},
+        ledger=Ledger(),
+        findings=(),
+        remarks=(),
+        damages=(),
+    )
+    census = census_of(facts, thresholds)
+    with StoreWriter(target, facts) as writer:
+        for start in range(0, len(batch), MAX_BATCH_ROWS):
+            part = batch.take(slice(start, start + MAX_BATCH_ROWS))
+            writer.write(part)
+            census.add(part)
+        writer.info = recounted(facts, [], census)
+
+
+def _batch(flight: Flight, corrected: "CorrectedHeading") -> RecordBatch:
+    table = flight[corrected.topic]
+    time_ns = table.time_ns[corrected.rows]
+    columns = {name: Column(values, _present(values)) for name, values in _fields(corrected).items()}
+    return RecordBatch(
+        TOPIC,
+        table.record_index[corrected.rows],
+        table.device_time_ns.take(corrected.rows),
+        {name: column for name, column in columns.items() if column.mask.any()},
+        time_ns,
+        None if np.array_equal(time_ns, corrected.at_ns) else corrected.at_ns,
+    )
+
+
+def _present(values: np.ndarray) -> np.ndarray | None:
+    known = np.isfinite(values)
+    return None if known.all() else known
+
+
+def _origin(corrected: "CorrectedHeading", deviation: Deviation) -> dict[str, str]:
+    """Whose deviation, by which method, added to what."""
+    told = {
+        "deviation.flight": deviation.flight_id,
+        "deviation.aircraft": deviation.aircraft,
+        "deviation.method": deviation.method,
+        "deviation.verdict": deviation.verdict,
+        "deviation.verdict_reason": deviation.verdict_reason,
+        "deviation.applied_by": corrected.way,
+        "deviation.applied_to": corrected.topic,
+        "deviation.ins": corrected.ins_topic,
+        "deviation.sense": "magnetic heading = uncorrected magnetic heading + deviation, east positive",
+    }
+    if corrected.model:
+        told[f"derived.{TOPIC}.true_heading_deg"] = f"magnetic heading + declination of {corrected.model}"
+    return {name: text for name, text in told.items() if text}

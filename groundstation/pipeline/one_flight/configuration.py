@@ -1,0 +1,231 @@
+"""What the user sets: estimator settings, aircraft and site files, intervals left out or forced. Strictly checked."""
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from pathlib import Path
+from typing import Any, TypeVar
+
+from groundstation.base.errors import SettingsError
+from groundstation.base.toml_settings import settings_from
+from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
+from groundstation.estimators.known import AircraftData, SiteData
+from groundstation.integrity.limits import Thresholds, thresholds_from
+from groundstation.pipeline.one_flight.deviation_to_apply import Apply, asked_for
+from groundstation.tables.session_settings import SessionSettings
+
+S = TypeVar("S")
+FLIGHT_TABLES = tuple(dict.fromkeys(analysis.settings_table for analysis in FLIGHT_ANALYSES))
+SESSION_TABLES = (*(analysis.settings_table for analysis in SESSION_ANALYSES), "session")
+TABLES = (*FLIGHT_TABLES, *SESSION_TABLES, "aircraft", "site", "thresholds")
+SECTIONS = (*TABLES, "exclude", "force")
+Settings = Path | Mapping[str, Any]  # a TOML file, or its content
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Part of a flight that the user excludes or forces; ends as written: flight seconds, +mm:ss or ISO UTC."""
+
+    start: str
+    end: str
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class UserSettings:
+    """What the user set, as the dataclasses that are worked with: shipped values where nothing is set.
+
+    ``analyses`` holds the settings of every analysis by the name of their table.
+    """
+
+    analyses: Mapping[str, Any]
+    aircraft: AircraftData
+    site: SiteData
+    thresholds: Thresholds
+    session: SessionSettings
+
+    def of(self, kind: type[S]) -> S:
+        """The settings of that type."""
+        return next(found for found in self.analyses.values() if isinstance(found, kind))
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Everything a user may set for a run. Parsed once, when it is made; worker processes get the values.
+
+    Parameters
+    ----------
+    tables : mapping
+        The TOML tables as written, by name: those of the analyses, ``aircraft``, ``site`` and ``thresholds``.
+    exclude, force : tuple of Interval
+    profile : str, optional
+        Path of the layout of logs that no reader knows.
+    files : mapping
+        The file that a table was read from, for messages.
+    apply : Apply, optional
+        The deviation to add to the magnetic heading.
+
+    Raises
+    ------
+    SettingsError
+        For an unknown key or a value that cannot be used, naming file and key.
+    """
+
+    tables: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    exclude: tuple[Interval, ...] = ()
+    force: tuple[Interval, ...] = ()
+    profile: str | None = None
+    files: Mapping[str, str] = field(default_factory=dict)
+    apply: Apply | None = None
+    settings: UserSettings = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "settings", self._parsed())
+
+    def _parsed(self) -> UserSettings:
+        types = {analysis.settings_table: analysis.settings for analysis in (*FLIGHT_ANALYSES, *SESSION_ANALYSES)}
+        settings = UserSettings(
+            {name: self._table(name, kind) for name, kind in types.items()},
+            self._table("aircraft", AircraftData),
+            self._table("site", SiteData),
+            thresholds_from(self.tables.get("thresholds", {}), self._file_of("thresholds"), "thresholds"),
+            self._table("session", SessionSettings),
+        )
+        for analysis in FLIGHT_ANALYSES:
+            analysis.check(settings.analyses[analysis.settings_table], settings.aircraft)
+        return settings
+
+    def _table(self, name: str, kind: type[S]) -> S:
+        return settings_from(kind, self.tables.get(name, {}), self._file_of(name), name)
+
+    def _file_of(self, table: str) -> str:
+        return self.files.get(table, "settings")
+
+    @property
+    def profile_path(self) -> Path | None:
+        """The profile as a path."""
+        return Path(self.profile) if self.profile else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for the manifest and the MCAP; only what the user set."""
+        document: dict[str, Any] = {name: dict(self.tables[name]) for name in TABLES if self.tables.get(name)}
+        for name in ("exclude", "force"):
+            intervals = [{"from": part.start, "to": part.end, "reason": part.reason} for part in getattr(self, name)]
+            if intervals:
+                document[name] = intervals
+        if self.profile:
+            document["profile"] = Path(self.profile).name
+        if self.apply:
+            document["apply"] = self.apply.to_dict()
+        return document
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Raises
+    ------
+    SettingsError
+        When the file cannot be read or is not TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise SettingsError(str(path), error.strerror or "cannot be opened", "a readable TOML file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise SettingsError(str(path), f"not TOML ({error})", "a TOML file", "see docs/configuration.md") from error
+
+
+def load_configuration(
+    config: Settings | None = None,
+    aircraft: Settings | None = None,
+    site: Settings | None = None,
+    intervals: Settings | None = None,
+    profile: Path | None = None,
+    thresholds: Settings | None = None,
+) -> Configuration:
+    """Put the user's settings, files or what would stand in them, into one configuration.
+
+    What is given for a section wins over that section of ``config``.
+
+    Raises
+    ------
+    SettingsError
+        For an unreadable file, an unknown section, or a value of the wrong kind, naming file and key.
+    """
+    document = _content(config) if config else {}
+    _refuse_unknown(document, SECTIONS, _name(config))
+    own = {"aircraft": aircraft, "site": site, "thresholds": thresholds}
+    files = {name: own.get(name) or config for name in TABLES}
+    for name, path in own.items():
+        if path:
+            document[name] = _content(path)
+    if intervals:
+        listed = _content(intervals)
+        _refuse_unknown(listed, ("exclude", "force"), _name(intervals))
+        document.update(listed)
+    for name in TABLES:
+        if not isinstance(document.get(name, {}), Mapping):
+            raise SettingsError(f"{_name(config)}, {name}", repr(document[name]), f"a table [{name}]")
+    return Configuration(
+        {name: document[name] for name in TABLES if name in document},
+        exclude=_intervals(document.get("exclude", []), f"{_name(intervals or config)}, exclude"),
+        force=_intervals(document.get("force", []), f"{_name(intervals or config)}, force"),
+        profile=str(profile) if profile else None,
+        files={name: str(path) for name, path in files.items() if isinstance(path, Path)},
+    )
+
+
+def applying(configuration: Configuration, apply: str) -> Configuration:
+    """The configuration with a deviation to add to the magnetic heading; as it is where ``apply`` is empty.
+
+    ``apply`` is ``own``, or names a flight folder, its summary.json or a deviation.csv.
+
+    Raises
+    ------
+    UsageError
+        When it names nothing that holds a deviation.
+    """
+    if not apply:
+        return configuration
+    return replace(configuration, apply=asked_for(apply))
+
+
+def _content(settings: Settings) -> dict[str, Any]:
+    return read_toml(settings) if isinstance(settings, Path) else dict(settings)
+
+
+def _name(settings: Settings | None) -> str:
+    return str(settings) if isinstance(settings, Path) else "settings"
+
+
+def _refuse_unknown(document: Mapping[str, Any], known: Iterable[str], where: str) -> None:
+    unknown = sorted(set(document) - set(known))
+    if unknown:
+        raise SettingsError(where, f"unknown key {unknown[0]!r}", "one of " + ", ".join(sorted(known)))
+
+
+def _intervals(listed: Any, where: str) -> tuple[Interval, ...]:
+    if not isinstance(listed, list) or not all(isinstance(part, dict) for part in listed):
+        raise SettingsError(where, repr(listed), "tables such as [[exclude]] with from and to")
+    for part in listed:
+        _refuse_unknown(part, ("from", "to", "reason"), where)
+        if not {"from", "to"} <= set(part):
+            raise SettingsError(where, repr(part), "from and to: flight seconds, +mm:ss or ISO UTC")
+    return tuple(
+        Interval(_time(part["from"], where), _time(part["to"], where), str(part.get("reason", ""))) for part in listed
+    )
+
+
+def _time(value: Any, where: str) -> str:
+    """A time as text; what cannot be one in any flight is refused before the work begins."""
+    from groundstation.pipeline.one_flight.intervals import flight_seconds
+
+    if isinstance(value, bool) or not isinstance(value, int | float | str | datetime):
+        raise SettingsError(where, repr(value), "flight seconds, +mm:ss or ISO UTC")
+    try:
+        flight_seconds(str(value), 0, True)
+    except SettingsError as error:
+        raise SettingsError(where, repr(str(value)), "flight seconds, +mm:ss or ISO UTC") from error
+    return str(value)

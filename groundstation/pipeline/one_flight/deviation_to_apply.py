@@ -1,0 +1,88 @@
+"""What ``run --apply`` asks for: the deviation of another flight, or the flight's own."""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from groundstation.base.errors import UsageError
+from groundstation.results.deviation import (
+    DEVIATION_CSV,
+    Deviation,
+    deviation_from_csv,
+    deviation_from_summary,
+)
+from groundstation.results.files import SUMMARY
+
+OWN = "own"
+CORRECTED = ".corrected.mcap"  # end of the name of what stands beside a flight's MCAP, and is none
+MOST_BYTES = 64 << 20  # a summary of a long log with many damaged spans has some
+EXPECTED = f"{OWN}, a flight folder, its {SUMMARY} or a {DEVIATION_CSV}"
+
+
+@dataclass(frozen=True)
+class Apply:
+    """What ``--apply`` asks for; plain values, so that it travels to worker processes.
+
+    ``deviation`` is None where it is to be the flight's own; ``sha256`` is of the file that another's was read from.
+    """
+
+    deviation: Deviation | None = None
+    sha256: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for the manifest: whose it is."""
+        if self.deviation is None:
+            return {"from": OWN}
+        return {"from": self.deviation.flight_id, "sha256": self.sha256}
+
+
+def asked_for(text: str) -> Apply | None:
+    """What stands behind ``--apply``; None where it is empty.
+
+    Raises
+    ------
+    UsageError
+        When it names nothing that holds a deviation.
+    """
+    if not text:
+        return None
+    if text == OWN:
+        return Apply()
+    path = Path(text)
+    file = path / SUMMARY if path.is_dir() else path
+    content = _content(file, text)
+    if file.suffix.lower() == ".json":
+        found = deviation_from_summary(_document(content, file), str(file))
+    elif file.suffix.lower() == ".csv":
+        found = deviation_from_csv(_text(content, file), str(file))
+    else:
+        raise UsageError(text, "a file of another kind", EXPECTED)
+    return Apply(found, hashlib.sha256(content).hexdigest())
+
+
+def _content(file: Path, text: str) -> bytes:
+    if not file.is_file():
+        found = f"a folder without {SUMMARY}" if Path(text).is_dir() else "no such file or folder"
+        raise UsageError(text, found, EXPECTED)
+    try:
+        if file.stat().st_size > MOST_BYTES:
+            raise UsageError(str(file), f"a file of more than {MOST_BYTES >> 20} MB", EXPECTED)
+        return file.read_bytes()
+    except OSError as error:
+        raise UsageError(str(file), error.strerror or "cannot be read", EXPECTED) from error
+
+
+def _text(content: bytes, file: Path) -> str:
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise UsageError(str(file), "text that is not UTF-8", EXPECTED) from error
+
+
+def _document(content: bytes, file: Path) -> dict[str, Any]:
+    try:
+        return dict(json.loads(_text(content, file)))
+    except (TypeError, ValueError, RecursionError) as error:
+        raise UsageError(str(file), "no JSON object", EXPECTED) from error

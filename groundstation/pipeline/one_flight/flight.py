@@ -1,0 +1,288 @@
+"""One log from beginning to end: MCAP, answers, recording and report in a folder of its own."""
+
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePosixPath
+
+from groundstation.base.errors import UnclaimedLogError, UnreadableLogError
+from groundstation.base.findings import SEVERITIES, Severity, worst
+from groundstation.base.records import RecordBatch
+from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES
+from groundstation.pipeline.one_flight.analyse import Given, analyse
+from groundstation.pipeline.one_flight.apply_deviation import apply_deviation, corrected_name, write_corrected
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.convert import Converted, convert_log
+from groundstation.pipeline.one_flight.identity import flight_id, sha256_of
+from groundstation.pipeline.one_flight.log import Log, open_log
+from groundstation.pipeline.one_flight.manifest import manifest_of
+from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
+from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.pipeline.one_flight.resume import Finished, Keys, Step, keys_of, remember_reports
+from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
+from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
+from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY, TABLES
+from groundstation.results.flight import FlightResults
+from groundstation.results.manifest import Resume
+from groundstation.tables.table import Flight
+
+PARTIAL_PREFIX = ".partial-"
+
+
+@dataclass
+class Stopwatch:
+    """Seconds spent by stage."""
+
+    listen: Listener = silent
+    name: str = ""
+    times_s: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, text: str) -> Iterator[None]:
+        """Time a stage and tell the listener that it began."""
+        self.listen(Event("stage", self.name, text))
+        started = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.times_s[text] = self.times_s.get(text, 0.0) + time.perf_counter() - started
+
+
+@dataclass(frozen=True)
+class Job:
+    """One log to run; plain values, so that it travels to a worker process.
+
+    ``add_suffix``: two flights of one id get ``_<sha8>`` of their logs; ``step`` is what has to be done, with what the
+    flight that is ``finished`` has for the rest; ``url`` is where the log is, if ``path`` is but a copy of it.
+    """
+
+    path: Path
+    out: Path
+    configuration: Configuration
+    fail_on: str = "none"
+    is_named: bool = True
+    add_suffix: bool = False
+    with_pdf: bool = True
+    step: Step = "everything"
+    finished: Finished | None = None
+    url: str = ""
+
+    @property
+    def log(self) -> str:
+        """Its log as the user would type it."""
+        return self.url or str(self.path)
+
+    @property
+    def name(self) -> str:
+        """Name of its log."""
+        return self.path.name
+
+    def asked(self) -> tuple[str, Keys] | None:
+        """Digest of its log and the keys of what is asked for; None when only its run can tell what is wrong."""
+        try:
+            source = open_log(self.path, self.configuration.profile_path).source
+            return source.sha256, keys_of(source, self.configuration, with_pdf=self.with_pdf)
+        except Exception:
+            return None
+
+    def going_on(self, finished: Finished, keys: Keys) -> "Job":
+        """The job with what is left to do of it, its flight being finished."""
+        step = finished.step(keys, with_pdf=self.with_pdf)
+        return replace(self, step=step, finished=finished, add_suffix=step == "analysis" and finished.has_suffix)
+
+
+def run_flight(job: Job, listen: Listener = silent) -> Outcome:
+    """Run one log into a partial folder in ``out``; the caller moves it into place (see :func:`place`).
+
+    A log that cannot be read or computed gives an outcome with the reason, never an exception: one bad log never
+    stops the others.
+    """
+    watch = Stopwatch(listen, job.path.name)
+    sha256 = ""
+    partial: Path | None = None
+    try:
+        if job.finished is not None and job.step in ("nothing", "reports"):
+            return _run_reports(job, job.finished, watch)
+        version = _version(job.path)
+        log = open_log(job.path, job.configuration.profile_path)
+        sha256 = log.source.sha256
+        job.out.mkdir(parents=True, exist_ok=True)
+        partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=job.out))
+        partial.chmod(0o755)  # mkdtemp's folders are private
+        return _run(log, version, job, partial, watch)
+    except UnclaimedLogError as error:
+        return Outcome(job.log, "failed" if job.is_named else "skipped", str(error))
+    except Exception as error:
+        reason, trace = reason_of(job.name, error)
+    if partial is not None:
+        shutil.rmtree(partial, ignore_errors=True)
+    return Outcome(job.log, "failed", reason, sha256=sha256, times_s=watch.times_s, trace=trace)
+
+
+def _version(path: Path) -> tuple[int, int]:
+    """What tells that a file was written to: time and size."""
+    found = path.stat()
+    return found.st_mtime_ns, found.st_size
+
+
+def _require_unchanged(log: Log, version: tuple[int, int]) -> None:
+    """Refuse a log that was written to while it was read: the digest is not of what was converted."""
+    if _version(log.path) != version and (log.is_store or sha256_of(log.path) != log.source.sha256):
+        raise UnreadableLogError(log.path.name, "changed while it was read", "", "run it again once it is complete")
+
+
+def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Stopwatch) -> Outcome:
+    from groundstation.results.files import save
+    from groundstation.viewer.recording import write_recording
+
+    mcap = partial / "flight.mcap"
+    if job.step == "analysis" and job.finished is not None:
+        converted = _taken_over(job.finished.mcap, mcap)
+    else:
+        with watch.stage("converting"):
+            converted = convert_log(log, mcap, job.configuration.settings.thresholds)
+        _require_unchanged(log, version)
+    with watch.stage("reading the MCAP"):
+        flight = read_flight(mcap, converted)
+    start_utc_ns = flight.start_ns if flight.has_utc else None
+    identity = flight_id(start_utc_ns, flight.metadata, log.source.sha256)
+    if job.add_suffix and start_utc_ns is not None:  # NOTIME ids hold the digest already
+        identity += f"_{log.source.sha256[:8]}"
+    with watch.stage("estimating"):
+        results = analyse(flight, given_of(log, converted, identity), job.configuration)
+        applied = apply_deviation(flight, results, job.configuration.apply, job.configuration.settings)
+        results = applied.results
+    with watch.stage("saving"):
+        corrected = partial / corrected_name(identity)
+        write_corrected(corrected, converted.info, flight, applied, job.configuration.settings.thresholds)
+        mcap.rename(partial / f"{identity}.mcap")
+        text = sentence(results)
+        keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf)
+        resume = Resume(keys, text, converted.has_lost_data)
+        save(partial, results, manifest_of(log, job.url, results, job.configuration, resume))
+    with watch.stage("recording"):
+        write_recording(partial / f"{identity}.rrd", flight, results)
+    with watch.stage("reporting"):
+        written = write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf)
+    return Outcome(
+        job.log,
+        state_of(worst(results.findings), converted.has_lost_data, job.fail_on),
+        "; ".join(filter(None, (text, written.problem))),
+        flight_id=identity,
+        folder=str(partial),
+        sha256=log.source.sha256,
+        times_s=watch.times_s,
+    )
+
+
+def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
+    """The outcome of a flight that is finished, its reports made again where that is asked for."""
+    problem = ""
+    if job.step == "reports":
+        with watch.stage("reporting"):
+            problem = write_flight_report(finished.folder, ANSWER_TYPES, with_pdf=job.with_pdf).problem
+            remember_reports(finished, with_pdf=job.with_pdf)
+    return Outcome(
+        job.log,
+        state_of(finished.gravest, finished.has_lost_data, job.fail_on),
+        "; ".join(filter(None, (finished.text, problem))),
+        flight_id=finished.flight_id,
+        folder=str(finished.folder),
+        sha256=finished.sha256,
+        times_s=watch.times_s,
+    )
+
+
+def _taken_over(mcap: Path, target: Path) -> Converted:
+    """The MCAP of a finished flight, as if it had just been converted."""
+    from groundstation.store.reader import read_info
+
+    try:
+        os.link(mcap, target)
+    except OSError:  # no links here, or another file system
+        shutil.copyfile(mcap, target)
+    info = read_info(target)
+    return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages))
+
+
+def given_of(log: Log, converted: Converted, identity: str) -> Given:
+    """What is known of a converted log before anything is estimated."""
+    info = converted.info
+    return Given(identity, log.source, info.ledger, info.clock, converted.findings, converted.has_lost_data)
+
+
+def read_flight(mcap: Path, converted: Converted) -> Flight:
+    """Tables of an MCAP that was just written."""
+    from groundstation.store.reader import read
+    from groundstation.tables.assemble import flight_from_batches
+
+    info = converted.info
+    batches = (item for item in read(mcap) if isinstance(item, RecordBatch))
+    return flight_from_batches(batches, metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name)
+
+
+def state_of(gravest: Severity | None, has_lost_data: bool, fail_on: str) -> State:
+    """State of a run from its worst finding and whether data was lost."""
+    if fail_on in SEVERITIES and gravest and SEVERITIES.index(gravest) >= SEVERITIES.index(fail_on):
+        return "limit_reached"
+    return "data_lost" if has_lost_data else "done"
+
+
+def sentence(results: FlightResults) -> str:
+    """What was found, in one line."""
+    found = [text for analysis in FLIGHT_ANALYSES if (text := analysis.sentence(results.answers))]
+    if found:
+        return "; ".join(found)
+    reasons = "; ".join(f"{entry.analysis}: {entry.reason}" for entry in results.not_assessable)
+    return f"not assessable: {reasons or 'no analysis applies'}"
+
+
+def is_made(name: str, identity: str) -> bool:
+    """Whether a run makes that file of a flight folder; anything else in it is somebody's own.
+
+    Examples
+    --------
+    >>> is_made("tables/heading.csv", "NOTIME_abababab"), is_made("notes.txt", "NOTIME_abababab")
+    (True, False)
+    """
+    made = SUMMARY, MANIFEST, ARRAYS, TABLES, REPORT, f"{identity}.mcap", f"{identity}.rrd", *optional_files(identity)
+    return PurePosixPath(name).parts[0] in made
+
+
+def optional_files(identity: str) -> tuple[str, ...]:
+    """Files of a flight folder that not every run makes: those of an earlier one would tell of other results."""
+    return PDF, DEVIATION_CSV, STEER_CARD, corrected_name(identity)
+
+
+def remove(folder: Path) -> None:
+    """Remove a flight folder; where something else is in it, what a run made of it, its marks first."""
+    if all(is_made(entry.name, folder.name) for entry in folder.iterdir()):
+        shutil.rmtree(folder.rename(folder.with_name(f"{PARTIAL_PREFIX}{folder.name}")))  # a kill leaves no part of it
+        return
+    for name in (SUMMARY, MANIFEST):
+        (folder / name).unlink(missing_ok=True)
+    for entry in folder.iterdir():
+        if is_made(entry.name, folder.name):
+            shutil.rmtree(entry) if entry.is_dir() and not entry.is_symlink() else entry.unlink()
+
+
+def place(partial: Path, target: Path) -> None:
+    """Move a finished flight folder into place; of a folder that is there, only what a run makes is replaced."""
+    if not target.exists():
+        partial.rename(target)
+        return
+    (target / MANIFEST).unlink(missing_ok=True)  # the mark of a whole folder goes first and comes back last
+    for name in optional_files(target.name):
+        (target / name).unlink(missing_ok=True)
+    for entry in sorted(partial.iterdir(), key=lambda path: path.name == MANIFEST):
+        old = target / entry.name
+        if old.is_dir() and not old.is_symlink():
+            shutil.rmtree(old)
+        else:
+            old.unlink(missing_ok=True)
+        entry.rename(old)
+    partial.rmdir()

@@ -1,0 +1,129 @@
+"""One way to open whatever a user names: a recorded log, or an MCAP that groundstation wrote."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from groundstation.base.errors import GroundstationError, UnreadableLogError
+from groundstation.base.records import Item, RecordBatch
+from groundstation.pipeline.one_flight.identity import sha256_of
+from groundstation.results.flight import Source
+
+if TYPE_CHECKING:
+    from groundstation.readers.source import Source as LogFile
+
+REPLAY_LIMIT_BYTES = 96 << 20  # an hour of CSV at 100 Hz is kept; the peak of a conversion has this part in it
+
+
+@dataclass(frozen=True)
+class Log:
+    """A log that a reader (or the store) claims.
+
+    ``is_store``: an MCAP that groundstation wrote; its records carry corrected time already.
+    """
+
+    path: Path
+    source: Source
+    is_store: bool
+    profile: Path | None = None
+
+    def items(self) -> Iterator[Item]:
+        """Read the log from its beginning, in bounded batches."""
+        if self.is_store:
+            from groundstation.store.reader import read
+
+            return read(self.path)
+        from groundstation.readers.registry import read as read_log
+
+        return read_log(self._file, self.profile)
+
+    def replay(self) -> "Replay":
+        """The items for two passes; of a file that is larger than what may be kept, nothing is."""
+        return Replay(self.items, REPLAY_LIMIT_BYTES if self.source.size_bytes <= REPLAY_LIMIT_BYTES else 0)
+
+    @cached_property
+    def _file(self) -> "LogFile":
+        """The file as readers see it: a compressed one is decompressed once, however often it is read."""
+        from groundstation.readers.source import Source as LogFile
+
+        return LogFile(self.path)
+
+
+def open_log(path: Path, profile: Path | None = None) -> Log:
+    """Find out who can read a file.
+
+    Raises
+    ------
+    UnreadableLogError
+        When no reader claims it, or it is an MCAP of another program.
+    """
+    from groundstation.readers.registry import identify
+    from groundstation.store.reader import read_info
+
+    if not path.is_file():
+        raise UnreadableLogError(str(path), "no regular file", "a recorded log")
+    size = path.stat().st_size
+    if _is_store(path, profile):
+        info = read_info(path)  # the flight is that of the log, whichever of the two is run
+        name, sha256 = info.source_name or path.name, info.source_sha256 or sha256_of(path)
+        return Log(path, Source(name, sha256, size, f"groundstation-mcap of {info.reader}"), True, profile)
+    claim = identify(path, profile)
+    return Log(path, Source(path.name, sha256_of(path), size, claim.title), False, profile)
+
+
+def _is_store(path: Path, profile: Path | None) -> bool:
+    """Whether the store reads a file: an MCAP of ours, unless another log has but a part of one spliced into it."""
+    from groundstation.readers.registry import identify
+    from groundstation.store.recognition import is_groundstation_mcap, is_mostly_mcap
+
+    if not is_groundstation_mcap(path):
+        return False
+    if is_mostly_mcap(path):
+        return True
+    try:
+        identify(path, profile)
+    except GroundstationError:
+        return True
+    return False
+
+
+class Replay:
+    """Items of a log that are wanted twice: kept while they are small, read again when they are not.
+
+    Examples
+    --------
+    >>> from groundstation.base.records import Remark
+    >>> replay = Replay(lambda: iter([Remark("a", "b")]))
+    >>> [item.code for item in replay], [item.code for item in replay]
+    (['a'], ['a'])
+    """
+
+    def __init__(self, read: Callable[[], Iterator[Item]], limit_bytes: int = REPLAY_LIMIT_BYTES) -> None:
+        self._read = read
+        self._limit_bytes = limit_bytes
+        self._kept: list[Item] | None = None
+
+    def __iter__(self) -> Iterator[Item]:
+        if self._kept is not None:
+            yield from self._kept
+            return
+        kept: list[Item] | None = []
+        size = 0
+        for item in self._read():
+            size += _size_bytes(item)
+            if size > self._limit_bytes:
+                kept = None  # it is read again: the peak does not grow with the log
+            if kept is not None:
+                kept.append(item)
+            yield item
+        self._kept = kept
+
+
+def _size_bytes(item: Item) -> int:
+    if not isinstance(item, RecordBatch):
+        return 200
+    columns = (item.device_time_ns, *item.columns.values())
+    present = sum(len(item) for column in columns if column.present is not None)
+    return item.record_index.nbytes + present + sum(column.values.nbytes for column in columns)

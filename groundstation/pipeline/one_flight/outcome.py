@@ -1,0 +1,75 @@
+"""What became of one log of a run, for the totals line, the index and the exit code."""
+
+import traceback
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from groundstation.base.errors import GroundstationError
+
+State = Literal["done", "data_lost", "limit_reached", "failed", "skipped"]
+EXIT_CODE: Mapping[State, int] = {"done": 0, "skipped": 0, "data_lost": 3, "limit_reached": 4, "failed": 1}
+WORST_FIRST = (1, 4, 3, 0)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one log, or of a session of several.
+
+    Parameters
+    ----------
+    source : str
+        Path of the log as the user would type it.
+    state : {'done', 'data_lost', 'limit_reached', 'failed', 'skipped'}
+    text : str
+        One line for people: the verdict, or the reason of a failure.
+    flight_id, folder : str
+        Empty when there is none.
+    times_s : mapping
+        Seconds spent, by stage.
+    trace : str
+        Where an internal error came from; shown on request.
+    is_session : bool
+        Whether it is of a session: ``source`` are then the names of its logs, and ``flight_id`` is that of the session.
+    """
+
+    source: str
+    state: State
+    text: str
+    flight_id: str = ""
+    folder: str = ""
+    sha256: str = ""
+    times_s: Mapping[str, float] = field(default_factory=dict)
+    trace: str = ""
+    is_session: bool = False
+
+    @property
+    def code(self) -> int:
+        """Exit code of this log alone."""
+        return EXIT_CODE[self.state]
+
+
+def reason_of(name: str, error: Exception) -> tuple[str, str]:
+    """Why a log failed, in one line, and where an error that is ours to mend came from (empty for the others)."""
+    if isinstance(error, GroundstationError):
+        return str(error), ""
+    if isinstance(error, OSError):
+        file = f"{Path(error.filename).name}: " if error.filename and Path(error.filename).name != name else ""
+        return f"{name}: {file}{error.strerror or error}", ""
+    if isinstance(error, MemoryError):
+        return f"{name}: not enough memory", ""
+    trace = "".join(traceback.format_exception(error))
+    return f"{name}: internal error ({type(error).__name__}: {error}); please report it", trace
+
+
+def worst_code(outcomes: "tuple[Outcome, ...]") -> int:
+    """Exit code of several logs: the worst wins, in the order 1, 4, 3, 0.
+
+    Examples
+    --------
+    >>> worst_code((Outcome("a", "data_lost", ""), Outcome("b", "limit_reached", ""), Outcome("c", "done", "")))
+    4
+    """
+    codes = {outcome.code for outcome in outcomes}
+    return next((code for code in WORST_FIRST if code in codes), 0)

@@ -1,0 +1,179 @@
+"""What a run need not do again. A flight's manifest keeps a key for each stage; equal keys, equal results.
+
+A key is a digest of everything that goes into a stage: the content of the log and of its profile, the settings that the
+stage reads, and the versions. The conversion reads the thresholds, the analysis everything else that a user sets, the
+reports whether there is a PDF.
+"""
+
+import hashlib
+import json
+import platform
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from importlib import metadata as installed
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal
+
+from groundstation.base.errors import GroundstationError
+from groundstation.base.findings import Severity, worst
+from groundstation.base.version import __version__
+from groundstation.pipeline.one_flight.apply_deviation import APPLIED, corrected_name
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.identity import plain_id
+from groundstation.reports.flight_report import PDF, REPORT
+from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
+from groundstation.results.document import SummaryDocument
+from groundstation.results.files import load_document, load_manifest, save_manifest
+from groundstation.results.flight import Source
+from groundstation.results.manifest import Keys as Keys
+from groundstation.results.manifest import Manifest
+
+Step = Literal["everything", "analysis", "reports", "nothing"]  # what has to be done for a log
+PACKAGES = (
+    *("mcap", "numpy", "pandas", "numba", "scipy", "pyarrow", "rerun-sdk"),
+    *("protobuf", "matplotlib", "typst", "pygeomag", "ppigrf"),
+)
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A flight folder that is whole.
+
+    Parameters
+    ----------
+    folder : Path
+    files : frozenset of str
+        Names of what is in it.
+    flight_id, sha256 : str
+        ``sha256`` of the log that the flight came from.
+    keys : Keys
+    text : str
+        What was found, in one line.
+    has_lost_data : bool
+    gravest : {'info', 'warn', 'fail'} or None
+        Severity of its gravest finding.
+    has_deviation, has_applied : bool
+        Whether a magnetic deviation was found, and whether one was added to the log: there are files of both.
+    """
+
+    folder: Path
+    files: frozenset[str]
+    flight_id: str
+    sha256: str
+    keys: Keys
+    text: str
+    has_lost_data: bool
+    gravest: Severity | None
+    has_deviation: bool = False
+    has_applied: bool = False
+
+    @property
+    def mcap(self) -> Path:
+        """Its store file."""
+        return self.folder / f"{self.flight_id}.mcap"
+
+    @property
+    def has_suffix(self) -> bool:
+        """Whether the digest of the log was put into the id, because another flight had the same."""
+        return plain_id(self.flight_id, self.sha256) != self.flight_id
+
+    def step(self, keys: Keys, *, with_pdf: bool) -> Step:
+        """What has to be done for the results to be those of ``keys``; a file that somebody took away is made again."""
+        if keys.conversion != self.keys.conversion or self.mcap.name not in self.files:
+            return "everything"
+        analysed = {f"{self.flight_id}.rrd", *([corrected_name(self.flight_id)] if self.has_applied else [])}
+        if keys.analysis != self.keys.analysis or not analysed <= self.files:
+            return "analysis"
+        wanted = {REPORT, *([DEVIATION_CSV] if self.has_deviation else [])}
+        if with_pdf:
+            wanted |= {PDF, *([STEER_CARD] if self.has_deviation else [])}
+        return "nothing" if keys.reports == self.keys.reports and wanted <= self.files else "reports"
+
+
+@cache
+def versions() -> Mapping[str, str]:
+    """Versions of what results depend on."""
+    return MappingProxyType({"groundstation": __version__, **{name: _version(name) for name in PACKAGES}})
+
+
+def _version(package: str) -> str:
+    try:
+        return installed.version(package)
+    except installed.PackageNotFoundError:
+        return ""
+
+
+def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool) -> Keys:
+    """Keys of the run of a log: its name counts too, as it stands in the results.
+
+    Raises
+    ------
+    GroundstationError
+        When the profile cannot be read.
+    """
+    tables = dict(configuration.tables)
+    thresholds = tables.pop("thresholds", {})
+    conversion = _digest(
+        asdict(source), _profile_of(configuration), thresholds, dict(versions()), platform.python_version()
+    )
+    intervals = [[asdict(part) for part in listed] for listed in (configuration.exclude, configuration.force)]
+    apply = None if configuration.apply is None else asdict(configuration.apply)
+    analysis = _digest(conversion, tables, intervals, apply)
+    return Keys(conversion, analysis, _digest(analysis, with_pdf))
+
+
+def _digest(*parts: Any) -> str:
+    return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def _profile_of(configuration: Configuration) -> str:
+    if not configuration.profile:
+        return ""
+    try:
+        return hashlib.sha256(Path(configuration.profile).read_bytes()).hexdigest()
+    except OSError as error:
+        raise GroundstationError(configuration.profile, error.strerror or "cannot be read", "a profile") from error
+
+
+def remember_reports(flight: "Finished", *, with_pdf: bool) -> None:
+    """Take down that the reports of a finished flight were made again."""
+    manifest = load_manifest(flight.folder)
+    if manifest.resume is not None:
+        keys = replace(manifest.resume.keys, reports=_digest(flight.keys.analysis, with_pdf))
+        save_manifest(flight.folder, replace(manifest, resume=replace(manifest.resume, keys=keys)))
+
+
+def finished_flights(folders: Iterable[Path]) -> dict[str, Finished]:
+    """Whole flights among flight folders, by the digest of the log they came from."""
+    found = (finished(folder) for folder in folders)
+    return {one.sha256: one for one in found if one is not None}
+
+
+def finished(folder: Path) -> Finished | None:
+    """What a flight folder remembers; None when it is not whole, or was not made by such a run."""
+    try:
+        manifest, summary = load_manifest(folder), load_document(folder)
+        files = frozenset(path.name for path in folder.iterdir())
+    except (OSError, GroundstationError):
+        return None
+    return _finished(folder, files, manifest, summary)
+
+
+def _finished(folder: Path, files: frozenset[str], manifest: Manifest, summary: SummaryDocument) -> Finished | None:
+    resume = manifest.resume
+    if resume is None:
+        return None
+    return Finished(
+        folder,
+        files,
+        folder.name,
+        manifest.source.sha256,
+        resume.keys,
+        resume.text,
+        resume.has_lost_data,
+        worst(summary.findings),
+        bool(summary.results.get("magnetic")),
+        any(finding.code == APPLIED for finding in summary.findings),
+    )

@@ -1,0 +1,1 @@
+"""What single verbs do beside running flights."""

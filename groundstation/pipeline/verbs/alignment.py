@@ -1,0 +1,93 @@
+"""Events by which the clocks of two saved flights are aligned, read off their saved results."""
+
+import math
+from typing import get_args
+
+from groundstation.base.errors import UsageError
+from groundstation.base.timescales import duration_text
+from groundstation.base.units import NS_PER_S
+from groundstation.pipeline.verbs.clip import zero_s
+from groundstation.results.comparison import Alignment, Event
+from groundstation.results.figures import numbers, texts
+from groundstation.results.files import SavedFlight
+from groundstation.results.inertial import InertialResult
+
+EVENTS: tuple[Event, ...] = get_args(Event)
+AT_REST, UNKNOWN, AIRBORNE = "standstill", "unknown", "airborne"
+NO_GNSS = "no GNSS"
+
+
+def align(a: SavedFlight, b: SavedFlight, event: Event | None, *, is_same_log: bool) -> Alignment:
+    """Align two flights on an event that both have.
+
+    Parameters
+    ----------
+    a, b : SavedFlight
+    event : str, optional
+        Left out: UTC for two runs of one log (its start where it has no UTC), else the first movement where both show
+        it, else the start.
+
+    Raises
+    ------
+    UsageError
+        When one of the flights does not have the event.
+    """
+    if event is None:
+        event = _default(a, b, is_same_log)
+    if event == "utc":
+        start_a_ns, start_b_ns = (saved.results.start_utc_ns for saved in (a, b))
+        if start_a_ns is None or start_b_ns is None:
+            raise _missing(a if start_a_ns is None else b, event)
+        return Alignment(event, 0.0, (start_a_ns - start_b_ns) / NS_PER_S)
+    moments = []
+    for saved in (a, b):
+        found = events_of(saved)
+        if event not in found:
+            raise _missing(saved, event)
+        moments.append(found[event])
+    if event == "start" and is_same_log:  # a part of a flight begins where it was cut
+        moments = [-zero_s(saved.results.metadata) for saved in (a, b)]
+    return Alignment(event, moments[0], moments[1])
+
+
+def events_of(saved: SavedFlight) -> dict[Event, float]:
+    """Events of a flight that others can be aligned on, in flight seconds; ``utc`` is no moment and not among them.
+
+    The first movement follows a standstill and the lift-off something else than an unknown phase: a log that begins
+    later shows neither. An outage is the first interval without GNSS.
+    """
+    found: dict[Event, float] = {"start": 0.0}
+    phases = saved.figure("phases")
+    if phases is not None:
+        start_s, names = numbers(phases, "start_s").tolist(), texts(phases, "phase").tolist()
+        moving = next((row for row, name in enumerate(names) if name not in (AT_REST, UNKNOWN)), 0)
+        if moving and names[moving - 1] == AT_REST and math.isfinite(start_s[moving]):
+            found["first-movement"] = start_s[moving]
+        flying = names.index(AIRBORNE) if AIRBORNE in names else 0
+        if flying and names[flying - 1] != UNKNOWN and math.isfinite(start_s[flying]):
+            found["lift-off"] = start_s[flying]
+    outage_s = _first_outage_s(saved)
+    if outage_s is not None:
+        found["outage"] = outage_s
+    return found
+
+
+def _first_outage_s(saved: SavedFlight) -> float | None:
+    inertial = saved.results.answer(InertialResult)
+    starts = [one.start_s for one in inertial.outages if one.missing in ("gnss", "both")] if inertial else []
+    lanes = saved.figure("gnss_lanes")
+    if lanes is not None:
+        starts += numbers(lanes, "start_s")[texts(lanes, "state") == NO_GNSS].tolist()
+    return min((start for start in starts if math.isfinite(start)), default=None)
+
+
+def _default(a: SavedFlight, b: SavedFlight, is_same_log: bool) -> Event:
+    if is_same_log:
+        return "start" if None in (a.results.start_utc_ns, b.results.start_utc_ns) else "utc"
+    return "first-movement" if all("first-movement" in events_of(saved) for saved in (a, b)) else "start"
+
+
+def _missing(saved: SavedFlight, event: Event) -> UsageError:
+    has = [f"{name} (+{duration_text(moment)})" for name, moment in events_of(saved).items()]
+    has += ["utc"] if saved.results.start_utc_ns is not None else []
+    return UsageError(saved.folder.name, f"no {event}", f"one of {', '.join(has)}", "choose another --align")

@@ -1,0 +1,105 @@
+"""``list``: the analyses, what each needs, and whether a log has it."""
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
+from groundstation.pipeline.many_flights.inputs import file_in, is_session
+from groundstation.results.files import SUMMARY, load_document
+
+
+def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict[str, Any]]:
+    """List analyses, formats, scenarios and studies; with a log, whether each analysis would run on it and why not.
+
+    Raises
+    ------
+    UsageError, UnreadableLogError
+        When the log is missing or cannot be read.
+    """
+    if log is None:
+        return [*_analyses(), *_session_analyses(), *_formats(), *_scenarios(), *_sessions(), *_studies()]
+    folder = log.parent if log.name == SUMMARY else log
+    return _of_a_session(folder) if is_session(folder) else _with_answers(log, profile)
+
+
+def _analyses() -> list[dict[str, Any]]:
+    return [
+        {"kind": "analysis", "name": analysis.name, "title": analysis.title, "needs": analysis.needs}
+        for analysis in FLIGHT_ANALYSES
+    ]
+
+
+def _session_analyses() -> list[dict[str, Any]]:
+    return [
+        {"kind": "analysis", "name": analysis.name, "title": analysis.title, "needs": analysis.needs}
+        for analysis in SESSION_ANALYSES
+    ]
+
+
+def _of_a_session(folder: Path) -> list[dict[str, Any]]:
+    """The analyses of a session, each with whether it ran and the reason why not."""
+    found = load_document(folder)
+    reasons = {entry.analysis: entry.reason for entry in found.not_assessable}
+    return [
+        {**entry, "would_run": entry["name"] in found.results, "reason": reasons.get(entry["name"], "")}
+        for entry in _session_analyses()
+    ]
+
+
+def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
+    """The analyses, each with whether it would run on a log and the reason why not."""
+    from groundstation.base.errors import UsageError
+    from groundstation.pipeline.one_flight.analyse import known_of, run_analyses
+    from groundstation.pipeline.one_flight.configuration import Configuration
+    from groundstation.pipeline.one_flight.convert import convert_log
+    from groundstation.pipeline.one_flight.flight import read_flight
+    from groundstation.pipeline.one_flight.log import open_log
+
+    if not path.exists():
+        raise UsageError(str(path), "no such file")
+    path = file_in(path, ".mcap") if path.is_dir() else path
+    with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
+        mcap = Path(folder) / "flight.mcap"
+        flight = read_flight(mcap, convert_log(open_log(path, profile), mcap))
+    found = run_analyses(FLIGHT_ANALYSES, flight, known_of(flight, Configuration()))
+    return [
+        {**entry, "would_run": entry["name"] in found.answers, "reason": found.reasons.get(entry["name"], "")}
+        for entry in _analyses()
+    ]
+
+
+def _formats() -> list[dict[str, Any]]:
+    from groundstation.readers import registry
+
+    return [
+        {"kind": "format", "name": entry.name, "title": entry.summary, "needs": f"{entry.origin}, found by content"}
+        for entry in registry.formats()
+    ]
+
+
+def _scenarios() -> list[dict[str, Any]]:
+    from groundstation.simulation.scenario import load_scenario, scenario_names
+
+    return [
+        {"kind": "scenario", "name": name, "title": load_scenario(name).title, "needs": "nothing"}
+        for name in scenario_names()
+    ]
+
+
+def _sessions() -> list[dict[str, Any]]:
+    from groundstation.simulation.session_scenario import load_session, session_names
+
+    return [
+        {"kind": "session", "name": name, "title": load_session(name).title, "needs": "nothing"}
+        for name in session_names()
+    ]
+
+
+def _studies() -> list[dict[str, Any]]:
+    from groundstation.pipeline.verbs.synthesis import STUDIES
+
+    return [
+        {"kind": "study", "name": name, "title": f"study: {title}", "needs": "nothing"}
+        for name, title in STUDIES.items()
+    ]

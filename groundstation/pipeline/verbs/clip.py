@@ -1,0 +1,292 @@
+"""``clip``: a part of a flight as an MCAP of its own and, beside it, its recording."""
+
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from groundstation.base.errors import SettingsError, UnreadableLogError, UsageError, told_in_a_line
+from groundstation.base.ledger import DamagedSpan, Ledger
+from groundstation.base.records import Damage, RecordBatch
+from groundstation.base.timescales import utc_ns_to_iso
+from groundstation.base.units import NS_PER_S
+from groundstation.integrity.limits import Thresholds
+from groundstation.pipeline.many_flights.inputs import file_in
+from groundstation.pipeline.one_flight.analyse import analyse
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.convert import Converted, census_of, convert_log, recounted
+from groundstation.pipeline.one_flight.flight import given_of, read_flight
+from groundstation.pipeline.one_flight.identity import flight_id
+from groundstation.pipeline.one_flight.intervals import flight_seconds
+from groundstation.pipeline.one_flight.log import Log, open_log
+from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.pipeline.verbs.describe import facts_of
+from groundstation.results.flight import Source
+
+if TYPE_CHECKING:
+    from groundstation.store.info import StoreInfo
+    from groundstation.store.reader import Part
+
+FARTHEST_S = 1e9  # a time further from the flight than this, 32 years, selects the same as one this far
+CUT_FROM, CUT_SHA256, ZERO = "clip.source", "clip.source_sha256", "clip.zero_s"
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What to cut out of a flight.
+
+    Parameters
+    ----------
+    start, end : str, optional
+        From ``start`` on and before ``end``: flight seconds, +mm:ss or ISO UTC; None: the flight's own end.
+    topics : tuple of str
+        Names or patterns (``*``, ``?``, ``[...]``); none: all topics.
+    """
+
+    start: str | None = None
+    end: str | None = None
+    topics: tuple[str, ...] = ()
+
+    @property
+    def span(self) -> str:
+        """The range in words."""
+        return f"{self.start or 'the start'} to {self.end or 'the end'}"
+
+    def wants(self, topic: str) -> bool:
+        """Whether a topic is to be kept.
+
+        Examples
+        --------
+        >>> Wanted(topics=("ins*",)).wants("ins.2"), Wanted(topics=("ins",)).wants("ins.2"), Wanted().wants("x")
+        (True, False, True)
+        """
+        return not self.topics or any(fnmatchcase(topic, pattern) for pattern in self.topics)
+
+
+def clip(
+    path: Path,
+    target: Path,
+    wanted: Wanted,
+    *,
+    configuration: Configuration | None = None,
+    with_recording: bool = True,
+    force: bool = False,
+    listen: Listener = silent,
+) -> Outcome:
+    """Write a part of a flight to ``target`` (.mcap) and, beside it, its recording (.rrd).
+
+    Device times, record indices and the clock's model stay as they are; the ledger is counted anew. What stands in
+    the metadata as ``clip.*`` is told in docs/compare.md.
+
+    Parameters
+    ----------
+    path : Path
+        An MCAP that groundstation wrote, a log, or a flight folder.
+
+    Raises
+    ------
+    UsageError
+        When the part is empty or lies outside the flight, or a file is there already and ``force`` is not given.
+    UnreadableLogError
+        When the flight cannot be read, or nothing is left of the part.
+    """
+    settings = configuration or Configuration()
+    limits = settings.settings.thresholds
+    source = file_in(path, ".mcap") if path.is_dir() else path
+    _expect_free(source, target, with_recording, force)
+    log = open_log(source, settings.profile_path)
+    listen(Event("begin", total=1))
+    listen(Event("stage", path.name, "cutting"))
+    with told_in_a_line(str(target)):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with _as_mcap(log, target.parent, limits) as mcap:
+            done = _cut(log, mcap, target, wanted, limits)
+    if with_recording:
+        listen(Event("stage", path.name, "recording"))
+        _record(target, done, settings)
+    text = f"-> {target} ({_told(done.info)}, {target.stat().st_size / 1e6:.2f} MB)"
+    listen(Event("end", path.name, text))
+    return Outcome(str(path), "data_lost" if done.has_lost_data else "done", text, folder=str(target))
+
+
+def _expect_free(source: Path, target: Path, with_recording: bool, force: bool) -> None:
+    """Refuse a target that is no .mcap, is the source, or would overwrite without ``force``."""
+    if not source.exists():
+        raise UsageError(str(source), "no such file or folder")
+    if target.suffix != ".mcap" or target.is_dir():
+        raise UsageError(str(target), "a folder" if target.is_dir() else "another name", "a file such as part.mcap")
+    for file in (target, target.with_suffix(".rrd")) if with_recording else (target,):
+        if file.exists() and (not force or file.resolve() == source.resolve()):
+            raise UsageError(str(file), "a file that exists", "a new name", "-f overwrites it")
+
+
+@contextmanager
+def _as_mcap(log: Log, folder: Path, limits: Thresholds) -> Iterator[Path]:
+    """The log's MCAP: itself, or one that is gone afterwards."""
+    if log.is_store:
+        yield log.path
+        return
+    with tempfile.TemporaryDirectory(prefix=".partial-", dir=folder) as temporary:
+        whole = Path(temporary) / "whole.mcap"
+        convert_log(log, whole, limits)
+        yield whole
+
+
+def _cut(log: Log, mcap: Path, target: Path, wanted: Wanted, limits: Thresholds) -> Converted:
+    from groundstation.store.reader import Part, read, read_info
+    from groundstation.store.writer import StoreWriter
+
+    info = read_info(mcap)
+    zero_ns = _zero_ns(mcap, info)
+    start_ns, end_ns = _span_ns(wanted, zero_ns, info.has_utc)
+    part = Part(start_ns, end_ns, wanted.wants)
+    census, damages = census_of(info, limits), list[Damage]()
+    first_ns: int | None = None
+    with StoreWriter(target, info) as writer:
+        for item in read(mcap, part):
+            if isinstance(item, RecordBatch):
+                assert item.time_ns is not None
+                time_ns = int(item.time_ns[0])
+                first_ns = time_ns if first_ns is None else min(first_ns, time_ns)
+                writer.write(item)
+                census.add(item)
+            elif isinstance(item, Damage):
+                damages.append(item)
+        if first_ns is None and damages:
+            raise UnreadableLogError(log.path.name, f"no intact record from {wanted.span}", "", damages[0].what)
+        if first_ns is None:
+            raise _nothing_in(log, info, wanted)
+        inside = _inside(info, zero_ns, first_ns, part)
+        metadata = {**info.metadata, **_origin(log.source, info, zero_ns, first_ns, part, wanted)}
+        # Neither name nor digest of the log: the part is a log of its own, and two parts of one log are no twins.
+        cut = replace(inside, source_name=target.name, source_sha256="", start_ns=first_ns, metadata=metadata)
+        info = writer.info = recounted(cut, damages, census)
+    return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages))
+
+
+def _zero_ns(mcap: Path, info: "StoreInfo") -> int:
+    """Corrected time of flight time zero; where the file lost it, of the first record that is left."""
+    from groundstation.store.reader import read
+
+    if info.start_ns is not None:
+        return info.start_ns
+    times = (item.time_ns for item in read(mcap) if isinstance(item, RecordBatch))
+    return min((int(time_ns[0]) for time_ns in times if time_ns is not None), default=0)
+
+
+def _span_ns(wanted: Wanted, zero_ns: int, has_utc: bool) -> tuple[int, int]:
+    ends = [-FARTHEST_S, FARTHEST_S + 1.0]
+    for number, text in enumerate((wanted.start, wanted.end)):
+        if text is not None:
+            ends[number] = min(max(flight_seconds(text, zero_ns, has_utc), -FARTHEST_S), FARTHEST_S)
+    if ends[1] <= ends[0]:
+        raise SettingsError("range", wanted.span, "an end after its start")
+    start_ns, end_ns = (zero_ns + round(seconds * NS_PER_S) for seconds in ends)
+    return max(start_ns, 0), max(end_ns, 0)
+
+
+def _nothing_in(log: Log, info: "StoreInfo", wanted: Wanted) -> UsageError:
+    """Why a part is empty: no topic is wanted, or the flight has no record of them then."""
+    topics = info.ledger.topics
+    if topics and not any(wanted.wants(topic) for topic in topics):
+        asked = ", ".join(map(repr, wanted.topics))
+        return UsageError(log.path.name, f"no topic {asked}", f"some of {', '.join(topics)}")
+    expected = ""
+    if topics:
+        first, last = (facts_of(log, {}, info.ledger)[f"{end} sample"] for end in ("first", "last"))
+        expected = f"a part of {first} to {last}"
+        if info.has_utc and info.start_ns is not None:
+            expected += f", 0 to {flight_seconds(last, info.start_ns, True):.1f} s"
+    return UsageError(log.path.name, f"no record from {wanted.span}", expected)
+
+
+def _inside(info: "StoreInfo", zero_ns: int, first_ns: int, part: "Part") -> "StoreInfo":
+    """Facts of the flight without what lies outside the part: damaged spans, what was lost there, and findings on it.
+
+    Losses without a known place in time stay: they may lie within.
+    """
+    spans = info.ledger.spans
+    low_s, high_s = ((end_ns - zero_ns) / NS_PER_S for end_ns in (part.start_ns, part.end_ns))
+    within = [one for one in spans if one.start_s < high_s and one.start_s + one.length_s >= low_s]
+    outside = {_mark_of_span(one) for one in spans} - {_mark_of_span(one) for one in within}
+    gone = [entry for entry in info.damages if _mark(entry) in outside]
+    told = {(f"data.{entry.get('kind')}", entry.get("topic"), entry.get("place")) for entry in gone}
+    shift_s = (first_ns - zero_ns) / NS_PER_S
+    lost = {_mark(entry) for entry in gone}
+    return replace(
+        info,
+        damages=[entry for entry in info.damages if entry not in gone],
+        findings=tuple(one for one in info.findings if (one.code, one.topic, one.place) not in told),
+        ledger=Ledger(
+            spans=tuple(replace(one, start_s=round(one.start_s - shift_s, 3)) for one in within),
+            damages=tuple(one for one in info.ledger.damages if (one.kind, one.topic, one.count) not in lost),
+            remarks=info.ledger.remarks,
+        ),
+    )
+
+
+def _mark(damage: Mapping[str, Any]) -> tuple[Any, ...]:
+    """What a loss and its span have in common."""
+    return damage.get("kind"), damage.get("topic"), damage.get("count")
+
+
+def _mark_of_span(span: DamagedSpan) -> tuple[Any, ...]:
+    return span.cause, span.topic, span.count
+
+
+def _origin(
+    source: Source, info: "StoreInfo", zero_ns: int, first_ns: int, part: "Part", wanted: Wanted
+) -> dict[str, str]:
+    """What the part was cut from; of a part of a part, in terms of the flight that both are of."""
+    name, sha256 = source.name, source.sha256
+    base_s = 0.0
+    if CUT_FROM in info.metadata:
+        name, sha256 = info.metadata[CUT_FROM], info.metadata.get(CUT_SHA256, "")
+        base_s = zero_s(info.metadata)
+    ends_ns = {"clip.from": part.start_ns, "clip.to": part.end_ns}
+    given = {"clip.from": wanted.start, "clip.to": wanted.end}
+    ends = {key: (time_ns - zero_ns) / NS_PER_S + base_s for key, time_ns in ends_ns.items() if given[key] is not None}
+    return {
+        CUT_FROM: name,
+        CUT_SHA256: sha256,
+        ZERO: f"{(first_ns - zero_ns) / NS_PER_S + base_s:.9f}",
+        **{f"{key}_s": f"{seconds:.9g}" for key, seconds in ends.items()},
+        **{key: utc_ns_to_iso(ends_ns[key]) for key in ends if info.has_utc},
+        **({"clip.topics": " ".join(wanted.topics)} if wanted.topics else {}),
+    }
+
+
+def zero_s(metadata: Mapping[str, Any]) -> float:
+    """Flight time, of the flight that a part was cut from, at which the part's own begins; 0 for a whole flight.
+
+    Examples
+    --------
+    >>> zero_s({"clip.zero_s": "62.5"}), zero_s({}), zero_s({"clip.zero_s": "?"})
+    (62.5, 0.0, 0.0)
+    """
+    try:
+        return flight_seconds(str(metadata.get(ZERO, "0")), 0, False)
+    except SettingsError:
+        return 0.0
+
+
+def _record(target: Path, done: Converted, configuration: Configuration) -> None:
+    """Write the recording of a part, with everything that its data allows."""
+    from groundstation.viewer.recording import write_recording
+
+    log = open_log(target)
+    flight = read_flight(target, done)
+    identity = flight_id(flight.start_ns if flight.has_utc else None, flight.metadata, log.source.sha256)
+    write_recording(target.with_suffix(".rrd"), flight, analyse(flight, given_of(log, done, identity), configuration))
+
+
+def _told(info: "StoreInfo") -> str:
+    topics = info.ledger.topics
+    rows = sum(topic.rows for topic in topics.values())
+    ends = [info.metadata.get(key) for key in ("clip.from_s", "clip.to_s")]
+    start, end = (f"{float(text):.3f} s" if text else word for text, word in zip(ends, ("start", "end"), strict=True))
+    return f"{rows} records of {len(topics)} topics, {start} to {end} of {info.metadata[CUT_FROM]}"

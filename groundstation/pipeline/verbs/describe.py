@@ -1,0 +1,146 @@
+"""What a log is: format, clock, span and topics, for the verb ``info``."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from groundstation.base.findings import Finding
+from groundstation.base.ledger import Ledger
+from groundstation.base.records import Damage, RecordBatch
+from groundstation.pipeline.many_flights.inputs import no_log
+from groundstation.pipeline.one_flight.log import Log, open_log
+from groundstation.store.info import StoreInfo
+
+
+@dataclass(frozen=True)
+class TopicDescription:
+    """A topic of a log: rows, median rate, span in seconds, fields."""
+
+    name: str
+    rows: int | None
+    rate_hz: float | None
+    span_s: float | None
+    fields: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Description:
+    """A log described: facts for people (name to text), topics, findings."""
+
+    facts: dict[str, str]
+    topics: tuple[TopicDescription, ...]
+    findings: tuple[Finding, ...]
+    has_lost_data: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return asdict(self)
+
+
+def describe(path: Path, profile: Path | None = None) -> Description:
+    """Describe a recorded log, a groundstation MCAP, or an MCAP of another program.
+
+    Raises
+    ------
+    UsageError, UnreadableLogError
+        When the file is missing, or nothing can be said about it.
+    """
+    from groundstation.base.errors import UsageError
+
+    if not path.exists():
+        raise UsageError(str(path), "no such file")
+    if path.is_dir():
+        raise no_log(path)
+    if _is_foreign(path, profile):
+        return _foreign(path)
+    log = open_log(path, profile)
+    return _stored(log) if log.is_store else _recorded(log)
+
+
+def _is_foreign(path: Path, profile: Path | None) -> bool:
+    """Whether a file is an MCAP of another program, and not another log whose first bytes are damaged."""
+    from groundstation.base.errors import GroundstationError
+    from groundstation.readers.registry import identify
+    from groundstation.store.recognition import is_groundstation_mcap, is_mcap
+
+    if not is_mcap(path) or is_groundstation_mcap(path):
+        return False
+    try:
+        identify(path, profile)
+    except GroundstationError:
+        return True
+    return False
+
+
+def _recorded(log: Log) -> Description:
+    from groundstation.integrity.ledger_findings import ledger_findings
+    from groundstation.integrity.survey import survey
+
+    items = log.replay()
+    found = survey(items)
+    fields: dict[str, dict[str, None]] = {}
+    for item in items:
+        if isinstance(item, RecordBatch):
+            fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
+    ledger = found.ledger.document()
+    facts = facts_of(log, dict(found.header.metadata), ledger)
+    lost = any(damage.loses_data for damage in found.damages)
+    return Description(facts, _topics(ledger, fields), ledger_findings(found.ledger), lost)
+
+
+def _stored(log: Log) -> Description:
+    from groundstation.pipeline.one_flight.convert import damage_finding
+    from groundstation.store.reader import read_info
+
+    info = read_info(log.path)
+    fields: dict[str, dict[str, None]] = {}
+    damages = []
+    for item in log.items():
+        if isinstance(item, RecordBatch):
+            fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
+        elif isinstance(item, Damage):
+            damages.append(item)
+    facts = facts_of(log, dict(info.metadata), info.ledger)
+    facts["log"] = f"{info.source_name}, read as {info.reader}"
+    findings = (*info.findings, *(damage_finding(damage) for damage in damages))
+    return Description(facts, _topics(info.ledger, fields), findings, _has_lost(info, damages))
+
+
+def _has_lost(info: StoreInfo, damages: list[Damage]) -> bool:
+    """Whether data was lost: when the log was converted, or of the MCAP since."""
+    return any(entry.get("loses_data") for entry in info.damages) or any(damage.loses_data for damage in damages)
+
+
+def facts_of(log: Log, metadata: Mapping[str, str], ledger: Ledger) -> dict[str, str]:
+    """What a log is, name to text: file, size, format, first and last sample, metadata."""
+    facts = {
+        "file": log.source.name,
+        "size": f"{log.source.size_bytes} bytes",
+        "sha256": log.source.sha256,
+        "format": log.source.reader,
+    }
+    topics = ledger.topics.values()
+    if topics:
+        # Texts of one clock sort as their times do: ISO UTC, or +mm:ss padded by what has the most digits.
+        facts["first sample"] = min((topic.first for topic in topics), key=lambda text: (len(text), text))
+        facts["last sample"] = max((topic.last for topic in topics), key=lambda text: (len(text), text))
+    return {**facts, **{key: metadata[key] for key in sorted(metadata)}}
+
+
+def _topics(ledger: Ledger, fields: dict[str, dict[str, None]]) -> tuple[TopicDescription, ...]:
+    return tuple(
+        TopicDescription(name, entry.rows, entry.nominal_rate_hz, entry.span_s, tuple(fields.get(name, ())))
+        for name, entry in sorted(ledger.topics.items())
+    )
+
+
+def _foreign(path: Path) -> Description:
+    from groundstation.store.foreign import describe_foreign
+
+    found = describe_foreign(path)
+    facts = {"file": path.name, "format": "MCAP of another program (no reader for it in this version)", **found.facts}
+    topics = tuple(
+        TopicDescription(channel.topic, channel.messages, None, None, (channel.schema,)) for channel in found.channels
+    )
+    return Description(facts, topics, (), found.is_damaged)

@@ -1,0 +1,164 @@
+"""Plans from beginning to end: a scenario becomes answers, recording and report in a folder of its own."""
+
+import hashlib
+import platform
+import shutil
+import sys
+import tempfile
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from groundstation.base.errors import UsageError
+from groundstation.base.findings import worst
+from groundstation.base.version import __version__
+from groundstation.estimators.analyses import ANSWER_TYPES, PLANS
+from groundstation.estimators.plan import Plan, Planned
+from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, PLAN_MARK
+from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
+from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX, Stopwatch, place, state_of
+from groundstation.pipeline.one_flight.identity import safe_part
+from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
+from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.pipeline.one_flight.resume import versions
+from groundstation.reports.flight_report import write_flight_report
+from groundstation.results.files import save, write_text
+from groundstation.results.flight import FlightResults, Source
+from groundstation.results.manifest import Host, Manifest, SourceOfRun
+from groundstation.studies.shipped_plans import LoadedPlan, load_plan, plan_names
+
+
+@dataclass(frozen=True)
+class ShippedScenario:
+    """A scenario that comes with the package: its name and its title."""
+
+    name: str
+    title: str
+
+
+def plan_of(name: str) -> Plan[Any]:
+    """The kind of plan of that name."""
+    return next(plan for plan in PLANS if plan.name == name)
+
+
+def shipped_scenarios(name: str) -> tuple[ShippedScenario, ...]:
+    """The scenarios of a kind of plan that come with the package."""
+    plan = plan_of(name)
+    return tuple(ShippedScenario(one, load_plan(plan, one).scenario.title) for one in plan_names(plan))
+
+
+def run_plan(
+    name: str,
+    scenario: str | Path,
+    out: Path,
+    *,
+    force: bool = False,
+    fail_on: str = "none",
+    with_pdf: bool = True,
+    listen: Listener = silent,
+) -> Outcome:
+    """Make a plan into ``<out>/<name of the scenario>/``; one of that name is made again.
+
+    Parameters
+    ----------
+    name : str
+        Kind of plan: ``session``.
+    scenario : str or Path
+        Name of a shipped scenario, or a TOML file.
+    out : Path
+
+    Raises
+    ------
+    UsageError
+        When the scenario is wrong, or ``out`` or its folder is something else's.
+    """
+    plan = plan_of(name)
+    loaded = load_plan(plan, scenario)
+    identity = safe_part(loaded.name) or "plan"
+    refuse_foreign(out, force)
+    target = out / identity
+    if (target / FLIGHT_FOLDER_MARK).is_file() and not (target / PLAN_MARK).is_file():
+        raise UsageError(str(target), "results that are no plan", "a folder for the plan", "name another -o")
+    listen(Event("begin", total=1))
+    with alone_in(out):
+        prepare(out)
+        outcome = _run(plan, loaded, target, fail_on, with_pdf, Stopwatch(listen, loaded.name))
+    listen(Event("end", loaded.name, outcome.text))
+    return outcome
+
+
+def _run(
+    plan: Plan[Any], loaded: LoadedPlan[Any], target: Path, fail_on: str, with_pdf: bool, watch: Stopwatch
+) -> Outcome:
+    partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=target.parent))
+    partial.chmod(0o755)  # mkdtemp's folders are private
+    try:
+        return _run_into(partial, plan, loaded, target, fail_on, with_pdf, watch)
+    except Exception as error:
+        reason, trace = reason_of(loaded.name, error)
+        return Outcome(loaded.name, "failed", reason, sha256=_digest(loaded), times_s=watch.times_s, trace=trace)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def _run_into(
+    partial: Path,
+    plan: Plan[Any],
+    loaded: LoadedPlan[Any],
+    target: Path,
+    fail_on: str,
+    with_pdf: bool,
+    watch: Stopwatch,
+) -> Outcome:
+    from groundstation.viewer.plan import write_plan_recording
+
+    with watch.stage("planning"):
+        planned = plan.run(loaded.scenario)
+    results = _results(plan, loaded, planned, target.name)
+    with watch.stage("saving"):
+        save(partial, results, _manifest(loaded, results))
+        write_text(partial / PLAN_MARK, loaded.text)
+    with watch.stage("recording"):
+        write_plan_recording(partial / f"{results.flight_id}.rrd", results)
+    with watch.stage("reporting"):
+        problem = write_flight_report(partial, ANSWER_TYPES, with_pdf=with_pdf).problem
+    place(partial, target)
+    told = "; ".join(filter(None, (plan.sentence(results.answers), problem)))
+    state = state_of(worst(results.findings), False, fail_on)
+    return Outcome(loaded.name, state, told, results.flight_id, str(target), _digest(loaded), watch.times_s)
+
+
+def _digest(loaded: LoadedPlan[Any]) -> str:
+    return hashlib.sha256(loaded.text.encode()).hexdigest()
+
+
+def _results(plan: Plan[Any], loaded: LoadedPlan[Any], planned: Planned, identity: str) -> FlightResults:
+    source = Source(
+        f"{loaded.name}.toml", _digest(loaded), len(loaded.text.encode()), f"groundstation plan {plan.name}"
+    )
+    owned = tuple(figure for answer in planned.answers.values() for figure in answer.figures)
+    return FlightResults(
+        flight_id=identity,
+        source=source,
+        metadata={"plan": plan.name, "title": loaded.scenario.title},
+        start_utc_ns=None,
+        duration_s=planned.duration_s,
+        status="degraded" if worst(planned.findings) == "fail" else "ok",
+        findings=planned.findings,
+        answers=planned.answers,
+        figures=(*planned.figures, *owned),
+    )
+
+
+def _manifest(loaded: LoadedPlan[Any], results: FlightResults) -> Manifest:
+    source = results.source
+    return Manifest(
+        groundstation=__version__,
+        flight_id=results.flight_id,
+        made_utc=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        source=SourceOfRun("", source.name, source.sha256, source.size_bytes, source.reader),
+        configuration={"scenario": asdict(loaded.scenario)},
+        host=Host(platform.platform(), platform.machine(), sys.version.split()[0]),
+        versions=versions(),
+    )

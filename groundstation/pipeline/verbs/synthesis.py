@@ -1,0 +1,124 @@
+"""Simulated logs and Monte Carlo studies as files."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from groundstation.base.errors import UsageError
+from groundstation.pipeline.many_flights.inputs import STUDY_MARK
+from groundstation.pipeline.one_flight.configuration import read_toml
+from groundstation.pipeline.one_flight.progress import Event, Listener
+
+if TYPE_CHECKING:
+    from groundstation.studies.page import StudyResult
+
+STUDIES = {
+    "heading": "heading correction before take-off: errors, coverage of the interval, the figures of the paper again",
+    "forecast": "forecast of INS errors: every method under true and false models, and how honest its sigma is",
+    "magnetic": "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
+    "cooperative": "navigation between aircraft: published figures with ours beside them, divergence, consistency",
+    "landing": "landing by reference points and by locators: every published figure with ours beside it",
+}
+
+
+def simulate_to(scenario: str, folder: Path, *, seed: int | None = None, force: bool = False) -> list[Path]:
+    """Simulate a scenario (a shipped name or a TOML file) into ``<folder>/<scenario>.csv``.
+
+    A session of several aircraft gives one log for each, ``<folder>/<session>-<aircraft>.csv``, with stations.toml and
+    settings.toml beside them; landing aids give the site file that belongs to them, ``<scenario>.site.toml``.
+
+    Raises
+    ------
+    UsageError
+        When the log is there already and ``force`` is not given, or there is no such scenario.
+    """
+    from groundstation.results.files import write_text
+    from groundstation.simulation.flight import simulate
+    from groundstation.simulation.landing_aids import site_of
+    from groundstation.simulation.samples import write_log
+    from groundstation.simulation.scenario import load_scenario
+
+    if is_session(scenario):
+        return _session_to(scenario, folder, seed, force=force)
+    loaded = load_scenario(scenario)
+    target = folder / f"{loaded.name}.csv"
+    if target.exists() and not force:
+        raise UsageError(str(target), "a file that exists", "a new folder", "-f overwrites it")
+    simulated = simulate(loaded, seed)
+    paths, site = [write_log(simulated, folder)], site_of(simulated.trajectory, loaded)
+    if site:
+        paths.append(folder / f"{loaded.name}.site.toml")
+        write_text(paths[-1], site)
+    return paths
+
+
+def is_session(scenario: str) -> bool:
+    """Whether a scenario is one of several aircraft: a shipped name of such, or a TOML file with ``[[aircraft]]``."""
+    from groundstation.simulation.session_scenario import session_names
+
+    if not scenario.endswith(".toml"):
+        return scenario.lower() in session_names()
+    path = Path(scenario)
+    return path.is_file() and isinstance(read_toml(path).get("aircraft"), list)
+
+
+def _session_to(name: str, folder: Path, seed: int | None, *, force: bool) -> list[Path]:
+    from groundstation.simulation.session_log import session_paths, write_session
+    from groundstation.simulation.session_scenario import load_session
+
+    scenario, stem = load_session(name), Path(name).stem.lower()
+    there = [path for path in session_paths(scenario, folder, stem) if path.exists()]
+    if there and not force:
+        raise UsageError(str(there[0]), "a file that exists", "a new folder", "-f overwrites it")
+    return write_session(scenario, folder, stem, seed)
+
+
+def study_to(name: str, folder: Path, *, runs: int, seed: int, force: bool, listen: Listener) -> str:
+    """Run a study into a folder: ``<name>.md`` and tables/*.csv; returns the page's text.
+
+    Raises
+    ------
+    UsageError
+        When the page is there already and ``force`` is not given, or there is no such study.
+    """
+    from groundstation.results.files import csv_text, write_text
+
+    study = _study(name)
+
+    page = folder / f"{name}.md"
+    if page.exists() and not force:
+        raise UsageError(str(page), "a file that exists", "a new folder", "-f overwrites it")
+    (folder / "tables").mkdir(parents=True, exist_ok=True)
+    listen(Event("begin", total=1))
+    result = study(runs=runs, seed=seed, progress=lambda text: listen(Event("stage", name, text)))
+    for table in result.tables:
+        write_text(folder / "tables" / f"{table.name}.csv", csv_text(table))
+    write_text(page, result.markdown)
+    (folder / STUDY_MARK).touch()
+    listen(Event("end", name, str(page)))
+    return result.markdown
+
+
+def _study(name: str) -> "Callable[..., StudyResult]":
+    """The study's function; each imports its own estimators."""
+    if name == "heading":
+        from groundstation.studies.heading import study_heading
+
+        return study_heading
+    if name == "forecast":
+        from groundstation.studies.forecast import study_forecast
+
+        return study_forecast
+    if name == "magnetic":
+        from groundstation.studies.magnetic import study_magnetic
+
+        return study_magnetic
+    if name == "cooperative":
+        from groundstation.studies.cooperative import study_cooperative
+
+        return study_cooperative
+    if name == "landing":
+        from groundstation.studies.landing import study_landing
+
+        return study_landing
+    raise UsageError("study", repr(name), f"one of {', '.join(STUDIES)}")

@@ -1,0 +1,73 @@
+"""``view``: whatever stands for a flight - folder, recording, MCAP or log - opens in the Rerun viewer."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
+from groundstation.pipeline.many_flights.inputs import COMPARISON_RECORDING, file_in
+from groundstation.pipeline.many_flights.publishing import FLEET_RECORDING
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.flight import Job, run_flight
+
+ADDRESSES = ("rerun://", "rerun+http://", "rerun+https://")
+MAGIC = b"RRF"  # with a digit of the version, at the beginning of every recording
+
+
+def look_at(
+    what: str,
+    *,
+    web: bool,
+    host: str,
+    port: int | None,
+    profile: Path | None,
+    say: Callable[[str], None],
+) -> None:
+    """Open a flight in the Rerun viewer; an MCAP or log is run into a temporary folder first.
+
+    Parameters
+    ----------
+    what : str
+        Path of a folder that ``run`` or ``compare`` made, of a flight folder, recording, MCAP or log; or the address
+        that ``serve`` tells.
+    web : bool
+        In the browser.
+    host, port
+        Where the viewer listens; see :func:`groundstation.viewer.launch.open_viewer`.
+
+    Raises
+    ------
+    UsageError
+        When the path is missing or a folder without a recording.
+    GroundstationError
+        When the log cannot be run, the file is no recording, or the viewer does not start.
+    """
+    from groundstation.viewer.launch import open_viewer
+
+    path = Path(what)
+    if what.startswith(ADDRESSES):
+        code = open_viewer(what, web=web, host=host, port=port)
+    elif not path.exists():
+        raise UsageError(what, "no such file or folder")
+    elif path.is_dir() or path.suffix == ".rrd":
+        code = open_viewer(_recording(path), web=web, host=host, port=port)
+    else:
+        with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
+            say(f"computing {path.name} ...")
+            configuration = Configuration(profile=str(profile) if profile else None)
+            outcome = run_flight(Job(path, Path(folder), configuration, with_pdf=False))
+            if outcome.state == "failed":
+                where, _, found = outcome.text.partition(": ")
+                raise GroundstationError(where, found)
+            code = open_viewer(_recording(Path(outcome.folder)), web=web, host=host, port=port)
+    if code:
+        raise GroundstationError("the Rerun viewer", f"ended with code {code}; its own lines stand above")
+
+
+def _recording(path: Path) -> Path:
+    """A recording, or that of a folder: of a flight, of all flights, of a comparison."""
+    recording = file_in(path, ".rrd", FLEET_RECORDING, COMPARISON_RECORDING) if path.is_dir() else path
+    with told_in_a_line(str(recording)), recording.open("rb") as file:
+        if file.read(len(MAGIC)) != MAGIC:
+            raise GroundstationError(str(recording), "no Rerun recording", next_step="run the log again")
+    return recording

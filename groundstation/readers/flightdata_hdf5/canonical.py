@@ -1,0 +1,157 @@
+"""Which parameters feed which canonical fields, with their units and signs.
+
+A topic has the times of its leading parameter, the first of its rules that the file has; the others are interpolated to
+them between two neighbouring samples. The samples as recorded stay in ``raw.<parameter>``.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray, wrap_180, wrap_360
+from groundstation.base.records import BoolArray, Int64Array
+from groundstation.base.signals import Field, field_of
+from groundstation.base.units import CONVERSIONS
+from groundstation.readers.flightdata_hdf5.container import Container, Parameter
+
+_UNITS: Mapping[str, str] = {"kts": "kt", "deg/sec": "dps"}  # as these files write them -> as base.units does
+Way = Literal["plain", "circle", "step"]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A parameter and the field it feeds: ``sign`` times the value; ``unit`` where the file names none.
+
+    ``way``: how it is brought to another time; ``step`` keeps the last sample.
+    """
+
+    parameter: str
+    field: str
+    unit: str
+    sign: float = 1.0
+    way: Way = "plain"
+
+
+# Topic -> its rules; of several for one field the first that the file has is taken.
+RULES: Mapping[str, tuple[Rule, ...]] = {
+    "ins": (
+        Rule("Latitude", "latitude_deg", "deg"),
+        Rule("Heading True", "true_heading_deg", "deg", way="circle"),
+        Rule("Heading True Continuous", "true_heading_deg", "deg", way="circle"),
+        Rule("Heading", "magnetic_heading_deg", "deg", way="circle"),
+        Rule("Heading Continuous", "magnetic_heading_deg", "deg", way="circle"),
+        Rule("Longitude", "longitude_deg", "deg", way="circle"),
+        Rule("Pitch", "pitch_deg", "deg"),
+        Rule("Roll", "roll_deg", "deg"),
+        Rule("Groundspeed", "ground_speed_mps", "kt"),
+    ),
+    "ins.accelerometer": (Rule("Acceleration Normal", "accel_z_mps2", "g", sign=-1.0),),
+    "guidance": (
+        # The recorder's localizer is positive with the aircraft left of the course, its glide slope above the path.
+        Rule("ILS Localizer", "lateral_deviation_dots", "dots", sign=-1.0),
+        Rule("ILS Glideslope", "vertical_deviation_dots", "dots"),
+        Rule("ILS (L) Frequency", "frequency_mhz", "MHz", way="step"),
+        Rule("ILS Frequency", "frequency_mhz", "MHz", way="step"),
+    ),
+    "radio_altimeter": (Rule("Altitude Radio", "height_m", "ft"),),
+    "radio_altimeter.1": (Rule("Altitude Radio (A)", "height_m", "ft"),),
+    "radio_altimeter.2": (Rule("Altitude Radio (B)", "height_m", "ft"),),
+    "baro": (
+        Rule("Altitude STD", "pressure_altitude_m", "ft"),
+        Rule("Altitude AAL", "height_above_airfield_m", "ft"),
+    ),
+    "air": (
+        Rule("Airspeed", "indicated_airspeed_mps", "kt"),
+        Rule("Airspeed True", "true_airspeed_mps", "kt"),
+    ),
+    "discrete": (Rule("Gear On Ground", "weight_on_wheels", "", way="step"),),
+}
+TRACK = "Track True"  # with Groundspeed: the velocities of ins
+_SAID: Mapping[str, str] = {
+    "Heading True Continuous": "counts on past north: brought into [0, 360)",
+    "Heading Continuous": "counts on past north: brought into [0, 360)",
+    "ILS Localizer": "positive with the aircraft left of the course: the field is its negative",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Feed:
+    """A parameter laid on a field: value times factor."""
+
+    parameter: Parameter
+    field: Field
+    factor: float
+    way: Way
+
+
+def feeds_of(container: Container) -> tuple[dict[str, tuple[Feed, ...]], tuple[tuple[str, str], ...]]:
+    """Feeds by topic, the leading one first, and (topic, remark) for what is told of them."""
+    by_name = {parameter.name: parameter for parameter in container.parameters}
+    feeds: dict[str, tuple[Feed, ...]] = {}
+    remarks: list[tuple[str, str]] = []
+    for topic, rules in RULES.items():
+        found: dict[str, Feed] = {}
+        for rule in rules:
+            parameter = by_name.get(rule.parameter)
+            if parameter is None or rule.field in found:
+                continue
+            factor = _factor(parameter.unit, rule.unit)
+            known = field_of(topic, rule.field)
+            if factor is None or known is None:
+                remarks.append((topic, f"{parameter.name} is in {parameter.unit}, which is no unit of {rule.field}"))
+                continue
+            found[rule.field] = Feed(parameter, known, rule.sign * factor, rule.way)
+            if rule.parameter in _SAID:
+                remarks.append((topic, f"{rule.parameter} {_SAID[rule.parameter]}"))
+        if found:
+            feeds[topic] = tuple(found.values())
+    return feeds, tuple(remarks)
+
+
+def track_feed(container: Container) -> Feed | None:
+    """The parameter that gives the direction of the velocities, None where there is none."""
+    known = field_of("gnss", "track_deg")
+    assert known is not None
+    found = next((one for one in container.parameters if one.name == TRACK), None)
+    return None if found is None or _factor(found.unit, "deg") != 1.0 else Feed(found, known, 1.0, "circle")
+
+
+def _factor(unit: str, usual: str) -> float | None:
+    """Factor from the file's unit (the usual one where it names none) to that of the field; None for another kind."""
+    wanted = _UNITS.get(usual, usual)
+    found = _UNITS.get(unit, unit) or wanted
+    if found == wanted and wanted not in CONVERSIONS:
+        return 1.0
+    if found not in CONVERSIONS or wanted not in CONVERSIONS or CONVERSIONS[found][0] != CONVERSIONS[wanted][0]:
+        return None
+    return CONVERSIONS[found][1]
+
+
+def values_at(feed: Feed, times_ns: Int64Array) -> tuple[FloatArray, BoolArray]:
+    """Values of a feed at given times, and where it has one; between samples only if both neighbours are valid."""
+    parameter = feed.parameter
+    nothing = np.zeros(len(times_ns)), np.zeros(len(times_ns), dtype=bool)
+    if not len(times_ns):
+        return nothing
+    first = max(parameter.first_from(int(times_ns[0])) - 1, 0)
+    last = min(parameter.first_from(int(times_ns[-1])) + 1, parameter.samples)
+    if last <= first:
+        return nothing
+    known_ns = parameter.times_ns(first, last)
+    values, is_valid = parameter.read(first, last)
+    before = np.clip(np.searchsorted(known_ns, times_ns, side="right") - 1, 0, len(known_ns) - 1)
+    since_ns = times_ns - known_ns[before]
+    if feed.way == "step":
+        present = is_valid[before] & (since_ns >= 0) & (since_ns <= 1.5e9 / parameter.frequency_hz)
+        return np.where(present, feed.factor * values[before], 0.0), present & np.isfinite(values[before])
+    behind = np.clip(np.searchsorted(known_ns, times_ns, side="left"), 0, len(known_ns) - 1)
+    present = is_valid[before] & is_valid[behind] & (since_ns >= 0) & (known_ns[behind] >= times_ns)
+    difference = values[behind] - values[before]
+    if feed.way == "circle":
+        difference = wrap_180(difference)
+    out = feed.factor * (values[before] + since_ns / np.maximum(known_ns[behind] - known_ns[before], 1) * difference)
+    if feed.way == "circle":
+        out = wrap_360(out) if feed.field.is_heading else wrap_180(out)
+    return np.where(present, out, 0.0), present & np.isfinite(out)

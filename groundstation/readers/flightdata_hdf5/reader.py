@@ -1,0 +1,196 @@
+"""Items of a recording: every parameter under its own name, the canonical topics beside them, in slices of time."""
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from groundstation.base.records import MAX_BATCH_ROWS, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
+from groundstation.base.signals import RAW_PREFIX
+from groundstation.base.units import NS_PER_S
+from groundstation.readers.flightdata_hdf5.canonical import TRACK, Feed, feeds_of, track_feed, values_at
+from groundstation.readers.flightdata_hdf5.container import FAILURES, HIGHEST_RATE_HZ, Container, Parameter, opened
+from groundstation.readers.layout import velocity_from_track
+from groundstation.readers.source import Source
+
+SLICE_S = MAX_BATCH_ROWS / HIGHEST_RATE_HZ
+SPEED = "ground_speed_mps"
+_NO_TIMES = np.zeros(0, dtype=np.int64)
+_ODD = re.compile(r"[^A-Za-z0-9_\-]+")
+
+
+@dataclass
+class _Losses:
+    """Parameters whose data turned out to be damaged, and by what."""
+
+    broken: dict[str, str] = field(default_factory=dict)
+    lost: dict[str, int] = field(default_factory=dict)
+
+    def add(self, name: str, error: BaseException, samples: int) -> None:
+        self.broken.setdefault(name, " ".join(str(error).split())[:100])
+        self.lost[name] = self.lost.get(name, 0) + samples
+
+    def damages(self) -> Iterator[Damage]:
+        for name, reason in self.broken.items():
+            yield Damage("corrupt", f"parameter {name}", self.lost[name], f"samples that cannot be read ({reason})")
+
+
+def items(source: Source, reader_name: str) -> Iterator[Item]:
+    """Items of a recording, all slices of time one after the other."""
+    with opened(source) as container:
+        start = container.start_utc_s
+        utc_ns = None if start is None else round(start * NS_PER_S)
+        yield LogHeader(reader_name, {}, utc_ns, has_counting_clock=True)
+        feeds, said = feeds_of(container)
+        track = track_feed(container) if any(one.field.name == SPEED for one in feeds.get("ins", ())) else None
+        topics, losses, steps = _raw_topics(container), _Losses(), _Steps()
+        next_index, end_ns = 0, max(_end_ns(parameter) for parameter in container.parameters)
+        for start_ns in range(0, end_ns + 1, round(SLICE_S * NS_PER_S)):
+            batches = [
+                *_raw_batches(topics, start_ns, losses),
+                *_canonical_batches(feeds, track, start_ns, losses),
+            ]
+            for batch in batches:
+                steps.see(batch)
+            instants = np.unique(np.concatenate([_NO_TIMES, *(batch.device_time_ns.values for batch in batches)]))
+            yield from (_numbered(batch, instants, next_index) for batch in batches)
+            next_index += len(instants)
+        yield from _remarks(feeds, track, container)
+        yield from (Remark("converted", text, topic) for topic, text in said)
+        yield from steps.remarks()
+        if container.missing_bytes:
+            yield Damage("truncated", f"byte {source.size}", container.missing_bytes, "bytes cut off")
+        for refused in container.refused:
+            yield Damage("dropped_channel", f"parameter {refused.name}", 1, f"parameter with {refused.reason}")
+        yield from losses.damages()
+
+
+def _raw_topics(container: Container) -> dict[str, Parameter]:
+    """Parameters by their topic, ``raw.<name>``; a name that clashes gets a number."""
+    topics: dict[str, Parameter] = {}
+    for parameter in container.parameters:
+        base = topic = RAW_PREFIX + (_ODD.sub("_", parameter.name).strip("_") or "_")
+        copy = 1
+        while topic in topics:
+            copy += 1
+            topic = f"{base}_{copy}"
+        topics[topic] = parameter
+    return topics
+
+
+def _end_ns(parameter: Parameter) -> int:
+    return round((parameter.offset_s + parameter.samples / parameter.frequency_hz) * NS_PER_S)
+
+
+def _times_in(parameter: Parameter, start_ns: int) -> tuple[int, int]:
+    """First and last number (exclusive) of the samples within the slice that begins at ``start_ns``."""
+    return parameter.first_from(start_ns), parameter.first_from(start_ns + round(SLICE_S * NS_PER_S))
+
+
+def _raw_batches(topics: dict[str, Parameter], start_ns: int, losses: _Losses) -> Iterator[RecordBatch]:
+    for topic, parameter in topics.items():
+        first, last = _times_in(parameter, start_ns)
+        if last <= first:
+            continue
+        try:
+            values, is_valid = parameter.read(first, last)
+        except FAILURES as error:
+            losses.add(parameter.name, error, last - first)
+            continue
+        times_ns = parameter.times_ns(first, last)
+        batch = _batch(topic, times_ns, {"value": Column(values, is_valid)})
+        if batch is not None:
+            yield batch
+
+
+def _canonical_batches(
+    feeds: dict[str, tuple[Feed, ...]], track: Feed | None, start_ns: int, losses: _Losses
+) -> Iterator[RecordBatch]:
+    for topic, several in feeds.items():
+        leader = several[0].parameter
+        times_ns = leader.times_ns(*_times_in(leader, start_ns))
+        columns: dict[str, Column] = {}
+        for feed in (*several, *((track,) if track is not None and topic == "ins" else ())):
+            try:
+                values, present = values_at(feed, times_ns)
+            except FAILURES as error:
+                losses.add(feed.parameter.name, error, 0)
+                continue
+            is_flag = feed.field.kind == "bool"
+            columns[feed.field.name] = Column(values != 0.0 if is_flag else values, present)
+        _with_velocities(columns)
+        batch = _batch(topic, times_ns, columns)
+        if batch is not None:
+            yield batch
+
+
+def _with_velocities(columns: dict[str, Column]) -> None:
+    """Velocities in place of the track, which ``ins`` has no field for."""
+    track, speed = columns.pop("track_deg", None), columns.get(SPEED)
+    if track is None or speed is None:
+        return
+    present = track.mask & speed.mask
+    north, east = velocity_from_track(track.values, speed.values)
+    columns["velocity_north_mps"], columns["velocity_east_mps"] = Column(north, present), Column(east, present)
+
+
+def _batch(topic: str, times_ns: Int64Array, columns: dict[str, Column]) -> RecordBatch | None:
+    """Rows that have any value; None where there is none."""
+    if not columns or not len(times_ns):
+        return None
+    rows = np.logical_or.reduce([column.mask for column in columns.values()])
+    if not rows.any():
+        return None
+    kept = {name: column.take(rows) for name, column in columns.items()}
+    return RecordBatch(topic, np.zeros(int(rows.sum()), dtype=np.int64), Column(times_ns[rows]), kept)
+
+
+def _numbered(batch: RecordBatch, instants: Int64Array, next_index: int) -> RecordBatch:
+    """A batch with its place in the source: the instants of the recording are numbered in order of time."""
+    index = next_index + np.searchsorted(instants, batch.device_time_ns.values).astype(np.int64)
+    return RecordBatch(batch.topic, index, batch.device_time_ns, batch.columns)
+
+
+@dataclass
+class _Steps:
+    """The smallest step of the recorded latitude: how finely positions are written."""
+
+    smallest_deg: float = math.inf
+
+    def see(self, batch: RecordBatch) -> None:
+        if batch.topic != "ins" or "latitude_deg" not in batch.columns:
+            return
+        column = batch.columns["latitude_deg"]
+        steps = np.abs(np.diff(column.values[column.mask]))
+        if (steps > 1e-9).any():
+            self.smallest_deg = min(self.smallest_deg, float(steps[steps > 1e-9].min()))
+
+    def remarks(self) -> Iterator[Remark]:
+        if 1e-5 < self.smallest_deg < 1.0:
+            north_m = self.smallest_deg * 111_195.0
+            text = f"positions are written in steps of {self.smallest_deg:.8f} deg, {north_m:.0f} m of latitude"
+            yield Remark("quantised", text, "ins", ("latitude_deg", "longitude_deg"))
+
+
+def _remarks(feeds: dict[str, tuple[Feed, ...]], track: Feed | None, container: Container) -> Iterator[Remark]:
+    mapped = "; ".join(
+        f"{topic} from {', '.join(one.parameter.name for one in several)}" for topic, several in feeds.items()
+    )
+    if mapped:
+        yield Remark("mapped", mapped)
+    for topic, several in feeds.items():
+        leader = several[0].parameter
+        moved = [one.parameter.name for one in several[1:] if one.parameter.offset_s != leader.offset_s]
+        if moved:
+            text = f"{', '.join(moved)} brought to the times of {leader.name}, between neighbouring samples"
+            yield Remark("converted", f"{text}; as recorded in {RAW_PREFIX}*", topic)
+    if track is not None:
+        text = f"velocities from Groundspeed and {TRACK}, which is heading plus drift: no track apart from the heading"
+        yield Remark("derived", text, "ins", ("velocity_north_mps", "velocity_east_mps"))
+    derived = [parameter.name for parameter in container.parameters if parameter.is_derived]
+    if derived:
+        yield Remark("derived", f"computed by the ground software, not recorded: {', '.join(sorted(derived))}")
+    if any(one.parameter.name in ("Heading", "Heading Continuous") for one in feeds.get("ins", ())):
+        yield Remark("mapped", "Heading without a further word is taken as magnetic", "ins", ("magnetic_heading_deg",))

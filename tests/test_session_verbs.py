@@ -1,0 +1,129 @@
+"""What every verb makes of the folder of a session."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from groundstation.cli.main import main
+from groundstation.estimators.analyses import ANSWER_TYPES
+from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
+from groundstation.pipeline.verbs.compare import compare, session_errors
+from groundstation.pipeline.verbs.serve import recordings_in
+from groundstation.simulation.session_log import write_session
+from groundstation.viewer.fleet_catalog import SESSIONS, catalog_server
+from tests.recording_contents import Contents
+from tests.saved import load
+from tests.session_example import SEED, SHORT
+
+
+def called(*arguments: str | Path) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main([str(argument) for argument in arguments])
+    return int(ended.value.code or 0)
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Flights and their session, as ``run`` leaves them."""
+    logs, folder = tmp_path_factory.mktemp("logs"), tmp_path_factory.mktemp("out")
+    write_session(SHORT, logs, "example", SEED)
+    assert called("run", logs, "-o", folder, "--config", logs / "settings.toml", "-j", "1", "--no-pdf", "-q") == 0
+    return folder
+
+
+@pytest.fixture
+def session(out: Path) -> Path:
+    (found,) = session_folders(out)
+    return found
+
+
+@pytest.mark.parametrize("verb", ["info", "check", "convert", "clip"])
+def test_verbs_for_one_log_refuse_a_session_in_a_line(
+    verb: str, session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = ["-o", str(tmp_path / "x.mcap")] if verb in ("convert", "clip") else []
+    assert called(verb, session, *output) == 2
+    told = capsys.readouterr()
+    assert told.err.count("\n") == 1
+    assert "found a session of several aircraft, expected a log: manifest.json in it names its logs" in told.err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("of", ["", "summary.json"])
+def test_list_tells_the_analyses_of_a_session(of: str, session: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert called("list", session / of, "--json") == 0
+    (entry,) = json.loads(capsys.readouterr().out)
+    assert (entry["name"], entry["would_run"], entry["reason"]) == ("cooperative", True, "")
+
+
+def test_list_takes_a_flight_folder(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert called("list", flight_folders(out)[0], "--json") == 0
+    entries = {entry["name"]: entry for entry in json.loads(capsys.readouterr().out)}
+    assert "no GNSS velocity" in entries["heading"]["reason"]
+
+
+def test_a_session_is_run_again_with_other_settings(session: Path, tmp_path: Path) -> None:
+    assert called("cooperative", session, "-o", tmp_path, "-q", "--no-pdf") == 0
+    (again,) = session_folders(tmp_path)
+    one, other = (load(folder, ANSWER_TYPES).results for folder in (session, again))
+    assert again.name == session.name
+    assert one.source.sha256 == other.source.sha256
+
+    found, saved, _ = compare(session, again)
+    deltas = {delta.name: delta for delta in found.deltas}
+    assert found.is_same_log and found.alignment.event == "utc"
+    reckoned = deltas["cooperative.algorithms.dead_reckoning.two_sigma_r_m"]
+    assert reckoned.is_main and reckoned.delta is not None and reckoned.delta > 100.0, "the shipped sigma is larger"
+    assert "cooperative.vehicles.centralised.A.sigma_north_m" in deltas
+    assert "cooperative.links.A.B.ranges" in deltas
+    assert {"cooperative.ins.position_m"} <= {pair.name for pair in found.settings}
+    assert called("compare", session, again, "-o", tmp_path / "c") == 0
+    assert (tmp_path / "c" / "compare.html").read_text(encoding="utf-8").count("<svg") == 2
+    entities = Contents(tmp_path / "c" / "compare.rrd").batches
+    assert {f"/{side}/session_errors/{name}" for side in "AB" for name in ("two_sigma_r_m", "rms_error_m")} <= set(
+        entities
+    )
+    assert saved.figure("session_errors") is not None
+
+
+def test_the_curves_of_a_comparison_are_those_of_the_tracks(session: Path) -> None:
+    saved = load(session, ANSWER_TYPES)
+    curves, tracks = session_errors(saved), saved.figure("cooperative_tracks")
+    assert curves is not None and tracks is not None
+    last = (tracks["algorithm"] == "centralised") & (tracks["time_s"] == tracks["time_s"].max())
+    assert last.sum() == 3
+    assert curves["two_sigma_r_m"][-1] == tracks["two_sigma_r_m"][last].max()
+    assert curves["rms_error_m"][-1] == pytest.approx(np.sqrt(np.mean(tracks["error_m"][last] ** 2)))
+
+
+def test_a_session_is_not_compared_with_a_flight(out: Path, session: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    flight = flight_folders(out)[0]
+    for pair in ((session, flight), (flight, session)):
+        assert called("compare", *pair) == 2
+        told = capsys.readouterr().err
+        assert told.count("\n") == 1
+        assert f"{session.name}: found a session of several aircraft, expected a flight" in told
+
+
+def test_serve_offers_sessions_as_a_data_set_of_their_own(out: Path, session: Path) -> None:
+    from tests.test_serve import client_of
+
+    flights, sessions, fleet = recordings_in(out, lambda _text: None)
+    assert [path.stem for path in flights] == [folder.name for folder in flight_folders(out)]
+    assert fleet == out / "fleet.rrd"
+    with catalog_server(flights, fleet, host="127.0.0.1", port=0, sessions=sessions) as catalog:
+        assert catalog.sessions == (session.name,)
+        dataset = client_of(catalog.url).get_dataset(SESSIONS)
+        assert dataset.segment_ids() == [session.name]
+        assert dataset.default_blueprint() is not None
+
+
+def test_open_takes_a_session(session: Path) -> None:
+    import groundstation
+
+    opened = groundstation.open(session)
+    assert opened.results.metadata["aircraft"] == "A, B, C"
+    with pytest.raises(groundstation.GroundstationError, match="a session of several aircraft"):
+        opened.tables["ins"]
