@@ -6,6 +6,7 @@ from groundstation.chapters.forecast import forecast
 from groundstation.chapters.generic import generic
 from groundstation.chapters.heading import heading
 from groundstation.chapters.inertial import inertial
+from groundstation.chapters.landing import landing
 from groundstation.chapters.landing_beacons import landing_beacons
 from groundstation.chapters.latency import latency
 from groundstation.chapters.magnetic import magnetic
@@ -17,6 +18,7 @@ from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
+from groundstation.results.landing import LandingResult
 from groundstation.results.landing_beacons import BeaconLanding
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
@@ -29,6 +31,7 @@ FLIGHT_CHAPTERS: tuple[Chapter, ...] = (
     Chapter((ForecastResult,), forecast),
     Chapter((Latencies,), latency),
     Chapter((MagneticResult, GroundDeviation), magnetic),
+    Chapter((LandingResult,), landing),
     Chapter((BeaconLanding,), landing_beacons),
 )
 SESSION_CHAPTERS: tuple[Chapter, ...] = (Chapter((CooperativeResult,), cooperative),)

@@ -5,6 +5,7 @@ from types import MappingProxyType
 from typing import Any
 
 from groundstation.estimators.analysis import Analysis
+from groundstation.estimators.approaches.analysis import LANDING
 from groundstation.estimators.control.analysis import SESSION_PLAN
 from groundstation.estimators.cooperative.analysis import COOPERATIVE
 from groundstation.estimators.heading.analysis import HEADING
@@ -18,7 +19,7 @@ from groundstation.results.answer import Answer
 
 FLIGHT_ANALYSES: tuple[Analysis, ...] = (
     *(HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND),
-    LANDING_BEACONS,
+    *(LANDING, LANDING_BEACONS),
 )
 SESSION_ANALYSES: tuple[Analysis, ...] = (COOPERATIVE,)
 PLANS: tuple[Plan[Any], ...] = (SESSION_PLAN, LANDING_PLAN)

@@ -62,7 +62,11 @@ class Stand:
 
 @dataclass(frozen=True)
 class Runway:
-    """Runway with its true bearing (in the direction of take-off), its threshold and its glide path."""
+    """Runway with its true bearing (in the direction of take-off), the position of its threshold and its approach aids.
+
+    ``localizer_width_m`` is the full width of the course sector
+    at the threshold, ``localizer_distance_m`` from the threshold to its antenna behind the far end.
+    """
 
     name: str
     true_bearing_deg: float = required_number(0.0, 360.0)
@@ -71,6 +75,11 @@ class Runway:
     longitude_deg: float | None = number(None, -180.0, 180.0)
     glide_angle_deg: float = number(3.0, 1.0, 10.0)
     threshold_crossing_height_m: float = number(15.0, 0.0, 100.0)
+    elevation_m: float | None = number(None, -500.0, 6_000.0)  # of the threshold, above mean sea level
+    length_m: float | None = number(None, 50.0, 10_000.0)
+    width_m: float | None = number(None, 1.0, 200.0)
+    localizer_width_m: float | None = number(None, 10.0, 1_000.0)
+    localizer_distance_m: float | None = number(None, 500.0, 10_000.0)
 
     def __post_init__(self) -> None:
         check_ranges(self)

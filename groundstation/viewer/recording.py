@@ -22,6 +22,7 @@ from groundstation.viewer.tabs.forecast import forecast
 from groundstation.viewer.tabs.generic import generic_tab
 from groundstation.viewer.tabs.heading import heading
 from groundstation.viewer.tabs.inertial import inertial
+from groundstation.viewer.tabs.landing import landing
 from groundstation.viewer.tabs.landing_beacons import landing_beacons
 from groundstation.viewer.tabs.log import log
 from groundstation.viewer.tabs.magnetic import magnetic
@@ -38,6 +39,7 @@ ANSWER_TABS: tuple[tuple[Callable[[Recorder, FlightResults], rrb.Container | Non
     (inertial, ("inertial",)),
     (forecast, ("forecast",)),
     (magnetic, ("magnetic", "magnetic_ground")),
+    (landing, ("landing",)),
     (landing_beacons, ("landing_beacons",)),
 )
 SHOWN_ELSEWHERE = ("latency",)  # in the tab on data quality

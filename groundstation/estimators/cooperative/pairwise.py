@@ -13,7 +13,7 @@ asynchronous pairwise communication, International Journal of Robotics Research 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.estimators.cooperative.centralised import LEAP_M, PATIENCE
+from groundstation.estimators.cooperative.centralised import PATIENCE
 from groundstation.estimators.cooperative.error_map import spectral_radius, unit_rows
 from groundstation.estimators.cooperative.events import PEER, POINT, Event, Prepared
 from groundstation.estimators.cooperative.messages import pairwise_bytes
@@ -105,11 +105,11 @@ class Pairwise:
         for who in (event.receiver, event.source) if event.kind == PEER else (event.receiver,):
             vehicle = self._prepared.vehicles[who]
             self._rejected[who] = 0 if passes else self._rejected[who] + 1
-            if self._rejected[who] >= PATIENCE and vehicle.clock >= 0:
+            if self._rejected[who] >= PATIENCE:
                 self._rejected[who] = 0
-                self.recorder.counts["clock_leaps"] += 1
-                for clock in {vehicle.clock, vehicle.receiver_clock}:
-                    self._members[who].P[clock, clock] += LEAP_M**2
+                self.recorder.opened(vehicle)
+                for state, variance in vehicle.doubts.items():
+                    self._members[who].P[state, state] += variance
         return passes
 
     def _private(self, event: Event, row: Row) -> bool:

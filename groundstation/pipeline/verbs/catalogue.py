@@ -18,7 +18,16 @@ def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict
         When the log is missing or cannot be read.
     """
     if log is None:
-        return [*_analyses(), *_session_analyses(), *_formats(), *_scenarios(), *_sessions(), *_studies()]
+        return [
+            *_analyses(),
+            *_session_analyses(),
+            *_formats(),
+            *_scenarios(),
+            *_approaches(),
+            *_sessions(),
+            *_plans(),
+            *_studies(),
+        ]
     folder = log.parent if log.name == SUMMARY else log
     return _of_a_session(folder) if is_session(folder) else _with_answers(log, profile)
 
@@ -87,12 +96,37 @@ def _scenarios() -> list[dict[str, Any]]:
     ]
 
 
+def _approaches() -> list[dict[str, Any]]:
+    from groundstation.simulation.approach import approach_names, load_approach
+
+    return [
+        {"kind": "scenario", "name": name, "title": load_approach(name).title, "needs": "nothing"}
+        for name in approach_names()
+    ]
+
+
 def _sessions() -> list[dict[str, Any]]:
     from groundstation.simulation.session_scenario import load_session, session_names
 
     return [
         {"kind": "session", "name": name, "title": load_session(name).title, "needs": "nothing"}
         for name in session_names()
+    ]
+
+
+def _plans() -> list[dict[str, Any]]:
+    from groundstation.estimators.analyses import PLANS
+    from groundstation.studies.shipped_plans import load_plan, plan_names
+
+    return [
+        {
+            "kind": "plan",
+            "name": f"{plan.name} {name}",
+            "title": load_plan(plan, name).scenario.title,
+            "needs": "nothing",
+        }
+        for plan in PLANS
+        for name in plan_names(plan)
     ]
 
 

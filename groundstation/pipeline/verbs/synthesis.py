@@ -17,7 +17,9 @@ STUDIES = {
     "forecast": "forecast of INS errors: every method under true and false models, and how honest its sigma is",
     "magnetic": "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
     "cooperative": "navigation between aircraft: published figures with ours beside them, divergence, consistency",
+    "control": "control of a session and placement of ground points: published figures with ours, laws flown",
     "landing": "landing by reference points and by locators: every published figure with ours beside it",
+    "approach": "recorded approaches: the localizer as a reference for positions, how honest its interval is",
 }
 
 
@@ -40,6 +42,8 @@ def simulate_to(scenario: str, folder: Path, *, seed: int | None = None, force: 
 
     if is_session(scenario):
         return _session_to(scenario, folder, seed, force=force)
+    if is_approach(scenario):
+        return [_approach_to(scenario, folder, seed, force=force)]
     loaded = load_scenario(scenario)
     target = folder / f"{loaded.name}.csv"
     if target.exists() and not force:
@@ -62,6 +66,26 @@ def is_session(scenario: str) -> bool:
     return path.is_file() and isinstance(read_toml(path).get("aircraft"), list)
 
 
+def is_approach(scenario: str) -> bool:
+    """Whether a scenario is an approach on an ILS: a shipped name of such, or a TOML file with ``[recorded]``."""
+    from groundstation.simulation.approach import approach_names
+
+    if not scenario.endswith(".toml"):
+        return scenario.lower() in approach_names()
+    path = Path(scenario)
+    return path.is_file() and isinstance(read_toml(path).get("recorded"), dict)
+
+
+def _approach_to(name: str, folder: Path, seed: int | None, *, force: bool) -> Path:
+    from groundstation.simulation.approach import load_approach, write_approach
+
+    scenario = load_approach(name)
+    target = folder / f"{scenario.name}.csv"
+    if target.exists() and not force:
+        raise UsageError(str(target), "a file that exists", "a new folder", "-f overwrites it")
+    return write_approach(scenario, folder, seed)
+
+
 def _session_to(name: str, folder: Path, seed: int | None, *, force: bool) -> list[Path]:
     from groundstation.simulation.session_log import session_paths, write_session
     from groundstation.simulation.session_scenario import load_session
@@ -73,8 +97,12 @@ def _session_to(name: str, folder: Path, seed: int | None, *, force: bool) -> li
     return write_session(scenario, folder, stem, seed)
 
 
-def study_to(name: str, folder: Path, *, runs: int, seed: int, force: bool, listen: Listener) -> str:
+def study_to(
+    name: str, folder: Path, *, runs: int, seed: int, force: bool, listen: Listener, recorded: Path | None = None
+) -> str:
     """Run a study into a folder: ``<name>.md`` and tables/*.csv; returns the page's text.
+
+    With ``recorded``, a folder with sets of recorded robots, the cooperative study runs on these instead.
 
     Raises
     ------
@@ -83,7 +111,7 @@ def study_to(name: str, folder: Path, *, runs: int, seed: int, force: bool, list
     """
     from groundstation.results.files import csv_text, write_text
 
-    study = _study(name)
+    study = _study(name) if recorded is None else _study_of(name, recorded)
 
     page = folder / f"{name}.md"
     if page.exists() and not force:
@@ -97,6 +125,19 @@ def study_to(name: str, folder: Path, *, runs: int, seed: int, force: bool, list
     (folder / STUDY_MARK).touch()
     listen(Event("end", name, str(page)))
     return result.markdown
+
+
+def _study_of(name: str, recorded: Path) -> "Callable[..., StudyResult]":
+    """The study of recorded sets as a function that takes what the others take."""
+    if name != "cooperative":
+        raise UsageError("study", f"--recorded with {name}", "cooperative")
+    from groundstation.pipeline.verbs.recorded import recorded_sets
+    from groundstation.studies.recorded import study_recorded
+
+    def run(runs: int, seed: int, progress: Callable[[str], None]) -> "StudyResult":
+        return study_recorded(recorded_sets(recorded), progress)
+
+    return run
 
 
 def _study(name: str) -> "Callable[..., StudyResult]":
@@ -117,8 +158,16 @@ def _study(name: str) -> "Callable[..., StudyResult]":
         from groundstation.studies.cooperative import study_cooperative
 
         return study_cooperative
+    if name == "control":
+        from groundstation.studies.control import study_control
+
+        return study_control
     if name == "landing":
         from groundstation.studies.landing import study_landing
 
         return study_landing
+    if name == "approach":
+        from groundstation.studies.approach import study_approach
+
+        return study_approach
     raise UsageError("study", repr(name), f"one of {', '.join(STUDIES)}")

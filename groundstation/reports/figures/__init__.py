@@ -13,12 +13,14 @@ from groundstation.reports.figures import (
     generic,
     heading,
     inertial,
+    landing,
     landing_beacons,
     landing_ranges,
     latency,
     magnetic,
     magnetic_ground,
     overview,
+    placement,
     quality,
     standstill,
 )
@@ -57,6 +59,9 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "magnetic.branches": magnetic.branches,
     "magnetic.modulus": magnetic.modulus,
     "magnetic.ground_runs": magnetic_ground.ground_runs,
+    "landing.deviations": landing.deviations,
+    "landing.final": landing.final,
+    "landing.protection": landing.protection,
     "overview.track": overview.track_map,
     "overview.profile": overview.profile,
     "overview.states": overview.states,
@@ -68,6 +73,8 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "control.paths": control.paths,
     "control.measures": control.measures,
     "control.law": control.law,
+    "placement.map": placement.accuracy_map,
+    "placement.accuracy": placement.accuracy,
 }
 
 

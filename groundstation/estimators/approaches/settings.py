@@ -1,0 +1,67 @@
+"""Settings of the approaches. Every limit of the method stands here, with its source.
+
+FSF: Flight Safety Foundation, ALAR Briefing Note 7.1, Stabilized Approach (2000). Airbus: Flight Operations Briefing
+Notes, Flying Stabilized Approaches (2006). ICAO: Annex 10, volume I, 3.1.3 and 3.1.5.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from groundstation.base.toml_settings import check_ranges, number
+from groundstation.base.units import M_PER_FOOT, MPS_PER_KNOT
+
+Rounding = Literal["unknown", "nearest", "down"]
+
+
+@dataclass(frozen=True)
+class LandingSettings:
+    """Limits of the analysis of recorded approaches.
+
+    ``localizer_width_m`` is the full width of the course sector at the threshold, ``localizer_distance_m`` from the
+    threshold to its antenna, ``glide_angle_deg`` and ``threshold_crossing_height_m`` those of the path: each where the
+    site file does not say. ``aiming_point_m`` is how far behind the threshold an aircraft touches down, where the
+    threshold is not known. ``course_line_m`` is the tolerance of the mean course line at the threshold (10.5, 7.5 and
+    3 m for category I, II and III), ``bend_ddm`` the 95 % amplitude of its bends, ``width_share`` and ``angle_share``
+    the tolerances of its sensitivity and of the glide angle. ``positions_rounded`` says how the recorder writes
+    positions; unknown widens the interval by what cutting off would shift them.
+    """
+
+    established_lateral_dots: float = number(0.5, 0.05, 2.0)
+    established_vertical_dots: float = number(1.0, 0.05, 2.0)
+    established_min_s: float = number(20.0, 1.0, 600.0)
+    speed_min_mps: float = number(25.0, 5.0, 200.0)  # an approach, not a taxi
+    final_max_m: float = number(35_000.0, 2_000.0, 100_000.0)
+    final_min_m: float = number(1_000.0, 100.0, 20_000.0)
+    final_height_min_m: float = number(30.0, 1.0, 1_000.0)
+    course_tolerance_deg: float = number(12.0, 1.0, 45.0)
+    runway_reach_m: float = number(2_000.0, 50.0, 20_000.0)  # a line that passes farther off is another runway's
+    go_around_height_max_m: float = number(1_000.0 * M_PER_FOOT, 10.0, 1_000.0)
+    go_around_climb_min_m: float = number(100.0, 10.0, 1_000.0)
+
+    localizer_width_m: float = number(700.0 * M_PER_FOOT, 10.0, 1_000.0)  # ICAO 3.1.3.7.1: 210 m at the threshold
+    localizer_distance_m: float = number(3_300.0, 500.0, 10_000.0)
+    glide_angle_deg: float = number(3.0, 1.0, 10.0)
+    threshold_crossing_height_m: float = number(15.0, 0.0, 50.0)
+    aiming_point_m: float = number(300.0, 0.0, 2_000.0)
+
+    gate_high_m: float = number(1_000.0 * M_PER_FOOT, 20.0, 2_000.0)  # FSF: in instrument conditions
+    gate_low_m: float = number(500.0 * M_PER_FOOT, 20.0, 2_000.0)  # FSF: in visual conditions
+    gate_floor_m: float = number(100.0 * M_PER_FOOT, 0.0, 500.0)  # below it the flare begins
+    deviation_max_dots: float = number(1.0, 0.1, 2.0)  # FSF: within one dot of glide slope and localizer
+    sink_rate_max_mps: float = number(1_000.0 * M_PER_FOOT / 60.0, 0.5, 30.0)  # FSF: no more than 1000 ft/min
+    speed_above_max_mps: float = number(20.0 * MPS_PER_KNOT, 0.5, 100.0)  # FSF: reference + 20 kt
+    bank_max_deg: float = number(7.0, 1.0, 60.0)  # Airbus
+
+    course_line_m: float = number(10.5, 0.0, 100.0)  # ICAO 3.1.3.6.1, category I
+    bend_ddm: float = number(0.015, 0.0, 0.1)  # ICAO 3.1.3.4.2, category I near the threshold
+    bend_length_m: float = number(1_000.0, 10.0, 10_000.0)  # over which a bend is one
+    width_share: float = number(0.17, 0.0, 1.0)  # ICAO 3.1.3.7.3, category I and II
+    angle_share: float = number(0.075, 0.0, 0.5)  # ICAO 3.1.5.1.2, category I and II
+    threshold_sigma_m: float = number(1.0, 0.0, 100.0)  # surveyed coordinates
+    centre_line_sigma_m: float = number(3.0, 0.1, 50.0)  # a roll-out beside the centre line
+    position_curvature_mps2: float = number(1e-3, 0.0, 0.1)  # of an INS error over some minutes
+    position_noise_m: float = number(3.0, 0.01, 100.0)  # beyond the steps it is written in
+    positions_rounded: Rounding = "unknown"
+
+    def __post_init__(self) -> None:
+        check_ranges(self)

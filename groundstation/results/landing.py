@@ -1,0 +1,243 @@
+"""Approaches of a recorded flight: the path flown against the runway's, the touchdown, and what shows accuracy."""
+
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
+
+from groundstation.results.answer import Answer
+from groundstation.results.figures import FigureData
+from groundstation.results.heading import Gate
+
+Outcome = Literal["landing", "go-around"]
+PlacedBy = Literal["site file", "positions"]
+Measured = Literal["measured", "not measured"]
+
+
+@dataclass(frozen=True)
+class RunwayUsed:
+    """The runway an approach is measured against.
+
+    Parameters
+    ----------
+    name : str
+        As in the site file; empty where none of it fits.
+    placed_by : {'site file', 'positions'}
+        Whose threshold and course these are. By positions: the line through the positions of the final, the threshold
+        where ``place_reason`` says.
+    true_course_deg, course_sigma_deg : float
+    localizer_width_m, localizer_distance_m : float
+        Full width of the course sector at the threshold, distance from there to the antenna.
+    """
+
+    name: str
+    placed_by: PlacedBy
+    latitude_deg: float
+    longitude_deg: float
+    true_course_deg: float
+    course_sigma_deg: float
+    elevation_m: float | None
+    glide_angle_deg: float
+    threshold_crossing_height_m: float
+    localizer_width_m: float
+    localizer_distance_m: float
+    length_m: float | None = None
+    width_m: float | None = None
+    place_reason: str = ""
+
+
+@dataclass(frozen=True)
+class Touchdown:
+    """Where and how the wheels met the ground.
+
+    Parameters
+    ----------
+    time_s : float
+        Flight time; ``found_by`` says by what, ``time_sigma_s`` how well.
+    past_threshold_m : float or None
+        Along the runway; None where the threshold itself was placed by the touchdown.
+    sink_rate_mps : float or None
+        Over the last seconds before it.
+    peak_load_g : float or None
+        Greatest normal acceleration around it.
+    rollout_course_deg : float or None
+        True direction of the line through the positions of the roll-out.
+    """
+
+    time_s: float
+    time_sigma_s: float
+    found_by: str
+    latitude_deg: float
+    longitude_deg: float
+    past_threshold_m: float | None
+    ground_speed_mps: float | None
+    sink_rate_mps: float | None
+    peak_load_g: float | None
+    rollout_course_deg: float | None
+
+
+@dataclass(frozen=True)
+class Established:
+    """The part of a final that was flown on the guidance, and how closely. Times are flight seconds."""
+
+    start_s: float
+    end_s: float
+    length_m: float
+    start_height_m: float | None
+    end_height_m: float | None
+    line_course_deg: float
+    lateral_rms_dots: float
+    vertical_rms_dots: float | None
+    lateral_rms_m: float
+    vertical_rms_m: float | None
+
+
+@dataclass(frozen=True)
+class StabilisedAt:
+    """The criteria of a stabilised approach from a height down to where the flare begins."""
+
+    height_m: float
+    verdict: Literal["stabilised", "not stabilised", "not measured"]
+    time_s: float | None
+    gates: tuple[Gate, ...]
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class ErrorPart:
+    """What a part of the error budget contributes to sigma at the threshold."""
+
+    name: str
+    sigma_m: float
+
+
+@dataclass(frozen=True)
+class PositionError:
+    """Error of recorded positions across the course, with the localizer for reference: it needs no GNSS.
+
+    Parameters
+    ----------
+    topic : str
+        Whose positions.
+    state : {'measured', 'not measured'}
+        Of ``error_m``; ``reason`` says why not.
+    error_m, sigma_m : float or None
+        Position minus what the localizer says, right of the course positive, as the threshold is crossed.
+    confidence95_m : (float, float) or None
+    rate_mps, rate_sigma_mps : float or None
+        How fast it grows across the course.
+    rollout_error_m, rollout_sigma_m : float or None
+        The same once more by the roll-out on the centre line.
+    change_m, change_sigma_m : float or None
+        Roll-out minus final, both on the course of the final continued: observable wherever the runway lies.
+    drift_nmi_per_h : float or None
+        Size of the error across the course over the time since the flight began: that of one direction.
+    residual_ratio : float or None
+        Root of the residuals' chi-square over their number; above 1 the sigmas were widened by it.
+    """
+
+    topic: str
+    state: Measured
+    reason: str
+    samples: int
+    error_m: float | None = None
+    sigma_m: float | None = None
+    confidence95_m: tuple[float, float] | None = None
+    rate_mps: float | None = None
+    rate_sigma_mps: float | None = None
+    rollout_error_m: float | None = None
+    rollout_sigma_m: float | None = None
+    change_m: float | None = None
+    change_sigma_m: float | None = None
+    drift_nmi_per_h: float | None = None
+    residual_ratio: float | None = None
+    parts: tuple[ErrorPart, ...] = ()
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """How far positions move across the course over how far the localizer shows it: 1 where its sense and width fit.
+
+    ``ratio`` is None where the aircraft never was far enough off the course for it.
+    """
+
+    ratio: float | None
+    sigma: float | None
+    samples: int
+
+
+@dataclass(frozen=True)
+class Protection:
+    """Protection levels of a satellite receiver along a final. The error itself is not known: nothing here is one.
+
+    Parameters
+    ----------
+    horizontal_max_m, vertical_max_m : float or None
+        Greatest protection level of the final; of several kinds the greater.
+    horizontal_alarm_limit_m, vertical_alarm_limit_m : float or None
+        Smallest logged.
+    within_share : float or None
+        Share of epochs with every logged protection level within its alarm limit; None without a limit.
+    operations : tuple of str
+        Operations whose alarm limits all protection levels stay within.
+    """
+
+    epochs: int
+    horizontal_max_m: float | None
+    vertical_max_m: float | None
+    horizontal_alarm_limit_m: float | None
+    vertical_alarm_limit_m: float | None
+    within_share: float | None
+    operations: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Approach:
+    """One approach. Times are flight seconds; distances are before the threshold, behind it negative."""
+
+    number: int
+    outcome: Outcome
+    start_s: float
+    end_s: float
+    final_length_m: float
+    lowest_height_m: float | None
+    position_topic: str
+    guidance_topic: str
+    guidance_source: str
+    height_source: str
+    runway: RunwayUsed
+    established: Established | None
+    sensitivity: Sensitivity | None
+    touchdown: Touchdown | None
+    stabilised: tuple[StabilisedAt, ...]
+    position_errors: tuple[PositionError, ...]
+    protection: Protection | None
+    claim: str
+    position_step_m: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class LeftOutApproach:
+    """A descent that is not told as an approach, and why."""
+
+    time_s: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class LandingResult(Answer):
+    """The approaches of a flight, each against its runway. Accuracy only: integrity and the rest are not shown.
+
+    Parameters
+    ----------
+    approaches : tuple of Approach
+    left_out : tuple of LeftOutApproach
+    figures
+        ``landing_path`` (every sample of every final) and ``landing_protection`` (protection levels and alarm limits).
+    """
+
+    analysis: ClassVar[str] = "landing"
+
+    approaches: tuple[Approach, ...]
+    left_out: tuple[LeftOutApproach, ...] = ()
+    remarks: tuple[str, ...] = ()
+    settings: dict[str, float | str | bool] = field(default_factory=dict)
+    figures: tuple[FigureData, ...] = ()

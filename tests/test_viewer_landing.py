@@ -1,0 +1,69 @@
+"""The chapter, the figures and the tab of the approaches: what they show is what the answer holds."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from groundstation.chapters.landing import landing
+from groundstation.chapters.markdown import markdown
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.figures import with_drawings
+from groundstation.results.answer import by_analysis
+from groundstation.results.flight import FlightResults, Source
+from groundstation.results.landing import LandingResult
+from groundstation.simulation.approach import load_approach, simulate_approach
+from groundstation.viewer.recording import write_recording
+from tests.recording_contents import Contents
+from tests.test_approaches import found, site
+
+SCENARIO = load_approach("ils-approach")
+FLIGHT = simulate_approach(SCENARIO).flight
+
+
+def results(with_site: bool) -> FlightResults:
+    answer = found(FLIGHT, site(SCENARIO) if with_site else None).answer
+    source = Source("a.csv", "00" * 32, 0, "flat-csv")
+    bare = FlightResults("20260504T060000Z_a", source, {}, FLIGHT.start_ns, FLIGHT.duration_s, "ok")
+    return FlightResults(**{**vars(bare), "answers": by_analysis(answer), "figures": answer.figures})
+
+
+@pytest.fixture(scope="module")
+def with_site() -> FlightResults:
+    return results(True)
+
+
+def test_the_chapter_says_what_was_measured_and_what_was_not(with_site: FlightResults) -> None:
+    answer = with_site.answer(LandingResult)
+    assert answer is not None
+    error = answer.approaches[0].position_errors[0]
+    section = landing(with_site)
+    assert section is not None and error.error_m is not None
+    text = markdown(section).replace("\u202f", " ")
+    assert f"{error.error_m:+.0f} m across the course" in text
+    text = text.replace("\\", "")  # escapes of Markdown
+    assert "ILS look-alike" in text and "Accuracy only" in text
+    without = landing(results(False))
+    assert without is not None and "not measured" in markdown(without)
+
+
+def test_every_figure_is_drawn(with_site: FlightResults) -> None:
+    section = landing(with_site)
+    assert section is not None
+    drawn = [part for part in with_drawings(section, with_site).parts if isinstance(part, Drawing)]
+    assert [one.title for one in drawn] == ["Approach 1: deviations", "Approach 1: the final"]
+    assert all("nan" not in one.svg for one in drawn)
+
+
+def test_the_tab_shows_the_samples_of_the_answer(with_site: FlightResults, tmp_path: Path) -> None:
+    write_recording(tmp_path / "flight.rrd", FLIGHT, with_site)
+    contents = Contents(tmp_path / "flight.rrd")
+    answer = with_site.answer(LandingResult)
+    assert answer is not None
+    path = answer.figures[0]
+    shown = contents.scalars("/landing/1/lateral/guidance")[1].ravel()
+    expected = path["lateral_guidance_m"]
+    assert np.array_equal(shown[np.isfinite(shown)], expected[np.isfinite(expected)])
+    corridors = {f"/landing/1/space/corridor/{name}" for name in ("CAT_I", "CAT_II_and_IIIA", "CAT_IIIB")}
+    assert corridors | {"/landing/1/space/track"} <= set(contents.fixed)
+    assert "/landing/1/space/aircraft" in contents.batches
