@@ -150,6 +150,22 @@ def test_honesty_of_filters_that_keep_correlations() -> None:
     assert 1.0 < centralised < 3.5 and split < 2.5, (centralised, split)
 
 
+@pytest.mark.parametrize("algorithm", ["centralised", "split_intersection", "pairwise"])
+def test_a_robot_that_was_carried_away_is_found_again(algorithm: str) -> None:
+    """R1 is put 2 m aside after a minute; its wheels tell nothing of it."""
+    team = Team(np.random.default_rng(8))
+    moved = team.truth["R1"] + np.where(team.time_s > 60.0, 1.0, 0.0)[:, None] * (1.5, -1.5, 0.0)
+    team.truth["R1"] = moved
+    places = {point.name: np.tile(point.position_m[:2], (len(moved), 1)) for point in team.points}
+    team.ranges = team._measure(places | {"R2": team.truth["R2"][:, :2]}, np.random.default_rng(9), 1.0)
+    settings = replace(BELIEF, gate_sigma=5.0)
+    run = run_algorithm(prepare(team.session(), settings), settings, algorithm)
+    error = run.tracks[0].position_m[-10:, :2] - np.array(
+        [[np.interp(at, team.time_s, moved[:, k]) for k in (0, 1)] for at in run.tracks[0].time_s[-10:]]
+    )
+    assert run.counts["reopened"] >= 1 and np.sqrt((error**2).sum(axis=1).mean()) < 0.1, error
+
+
 def test_a_sighting_against_central_differences() -> None:
     team = Team(np.random.default_rng(3))
     observer = WheeledVehicle(team.vehicles[0], BELIEF)
@@ -182,6 +198,7 @@ def test_readings_that_repeat_themselves_weigh_what_they_tell() -> None:
     exact = 1.0 + 2.0 * share * np.sum((1.0 - lags / n) * np.exp(-lags * dt_s / time_s))
     assert events[0].variance_m2 == pytest.approx(0.01)
     assert events[50].variance_m2 / 0.01 == pytest.approx(exact, rel=0.01)
+    assert events[50].variance_m2 * events[50].spread == pytest.approx(0.01)  # the gate knows one reading
 
 
 def test_fusion_without_unknown_correlation_is_that_of_kalman() -> None:

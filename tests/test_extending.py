@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from tests.recording_contents import Contents
@@ -128,6 +129,18 @@ def answer_of(scratch: Scratch) -> dict[str, object]:
     answer = document["results"]["gnss_noise"]
     assert isinstance(answer, dict)
     return answer
+
+
+def test_its_columns_stand_in_the_tables_of_flights(scratch: Scratch) -> None:
+    answer = answer_of(scratch)
+    (row,) = json.loads((scratch.folder / "out" / "index.json").read_text(encoding="utf-8"))["rows"]
+    assert row["gnss_noise_speed_rms_mps"] == answer["speed_rms_mps"]
+    names = list(row)
+    place = names.index("gnss_noise_start_s")
+    assert names[place : place + 3] == ["gnss_noise_start_s", "gnss_noise_speed_rms_mps", "findings_fail"]
+    table = pq.read_table(scratch.folder / "out" / "fleet.parquet")
+    assert table["gnss_noise_start_s"].to_pylist() == [answer["start_s"]]
+    assert json.loads(table.schema.metadata[b"columns"])["gnss_noise_speed_rms_mps"] == "speed shown in it"
 
 
 def test_the_answer_is_saved_with_the_settings_that_were_set(scratch: Scratch) -> None:

@@ -18,9 +18,10 @@ from groundstation.base.errors import UsageError
 from groundstation.estimators.fleet.moments import merged, moments_of
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET, gather, write_fleet
+from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
 from groundstation.pipeline.many_flights.fleet_samples import MEANINGS, SAMPLES, partition
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.results.fleet import FLIGHT_COLUMNS, FleetResults
+from groundstation.results.fleet import FleetResults
 from groundstation.results.heading import OnboardComparison, RunwayCheck
 from tests.fleet_example import START_NS, save_flight, skill
 

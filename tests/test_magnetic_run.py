@@ -17,12 +17,12 @@ from groundstation.estimators.inertial.analysis import INERTIAL
 from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.analysis import MAGNETIC
 from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.pipeline.many_flights.fleet_columns import answer_values
 from groundstation.pipeline.one_flight.analyse import Given, analyse, known_of, run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight, sentence
 from groundstation.pipeline.one_flight.log import open_log
-from groundstation.reports.index import index_row
 from groundstation.results import magnetic as answers
 from groundstation.results.files import SavedFlight, save
 from groundstation.results.flight import FlightResults, Source
@@ -148,7 +148,7 @@ def test_every_answer_is_saved_and_comes_back(name: str, saved: SavedFlight) -> 
 
 
 def test_index_and_front_page_tell_the_deviation(saved: SavedFlight) -> None:
-    found, row = figure_eight().answer(MagneticResult), vars(index_row(saved))
+    found, row = figure_eight().answer(MagneticResult), answer_values(saved.results)
     assert found is not None and found.residual_rms_deg is not None
     method = found.method(found.recommended_method)
     assert (row["magnetic_verdict"], row["magnetic_method"]) == (found.verdict, found.recommended_method)

@@ -1,6 +1,7 @@
 """Plans: what the verb writes, what it refuses, and the scenarios that come with the package."""
 
 import json
+import re
 from pathlib import Path
 
 import jsonschema
@@ -134,6 +135,13 @@ def test_a_wrong_scenario_is_told_in_a_line(tmp_path: Path, change: tuple[str, s
     code, out, err = groundstation("plan", "session", scenario(tmp_path, LEAST.replace(*change)), "-o", str(tmp_path))
     assert (code, out) == (2, "")
     assert err.count("\n") == 1 and "mine.toml" in err and told in err
+
+
+def test_the_scenario_of_the_documentation_is_read(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[1] / "docs" / "control.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    loaded = load_plan(PLANS[0], scenario(tmp_path, text)).scenario
+    assert loaded.user.control == ("speed",) and loaded.placement.keep_out[0].name == "lake"
 
 
 def test_the_scenarios_that_are_shipped_are_listed_and_read() -> None:

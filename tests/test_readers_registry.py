@@ -188,7 +188,6 @@ def test_our_own_entry_point_is_not_a_plug_in(plug_ins: list[Any]) -> None:
         ("damaged/wrong_rmw_test_0.mcap", "MCAP"),
         ("damaged/log_220414_065328______EMPTY.csv", "empty"),
         ("inertial/gv_rf15_attitude_error.csv", "no reader claims"),  # PROVENANCE: not in the flat CSV
-        ("cooperative/murp/17_base-1_targ-2.csv", "no reader claims"),
     ],
 )
 def test_recorded_logs_of_other_formats_are_named(name: str, expected: str) -> None:

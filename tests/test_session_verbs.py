@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from groundstation.cli.main import main
-from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
 from groundstation.pipeline.verbs.compare import compare, session_errors
 from groundstation.pipeline.verbs.serve import recordings_in
@@ -67,7 +66,7 @@ def test_list_takes_a_flight_folder(out: Path, capsys: pytest.CaptureFixture[str
 def test_a_session_is_run_again_with_other_settings(session: Path, tmp_path: Path) -> None:
     assert called("cooperative", session, "-o", tmp_path, "-q", "--no-pdf") == 0
     (again,) = session_folders(tmp_path)
-    one, other = (load(folder, ANSWER_TYPES).results for folder in (session, again))
+    one, other = (load(folder).results for folder in (session, again))
     assert again.name == session.name
     assert one.source.sha256 == other.source.sha256
 
@@ -89,7 +88,7 @@ def test_a_session_is_run_again_with_other_settings(session: Path, tmp_path: Pat
 
 
 def test_the_curves_of_a_comparison_are_those_of_the_tracks(session: Path) -> None:
-    saved = load(session, ANSWER_TYPES)
+    saved = load(session)
     curves, tracks = session_errors(saved), saved.figure("cooperative_tracks")
     assert curves is not None and tracks is not None
     last = (tracks["algorithm"] == "centralised") & (tracks["time_s"] == tracks["time_s"].max())

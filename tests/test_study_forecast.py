@@ -166,7 +166,9 @@ def test_study_writes_its_tables_and_page() -> None:
 
 def test_every_study_is_listed_and_no_other_is_run(tmp_path: Path) -> None:
     listed = [entry["name"] for entry in catalogue() if entry["kind"] == "study"]
-    assert listed == list(STUDIES) == ["heading", "forecast", "magnetic", "cooperative", "landing", "approach"]
+    assert (
+        listed == list(STUDIES) == ["heading", "forecast", "magnetic", "cooperative", "control", "landing", "approach"]
+    )
     with pytest.raises(UsageError, match="one of heading, forecast, magnetic"):
         study_to("weather", tmp_path / "out", runs=10, seed=1, force=False, listen=lambda event: None)
     assert not (tmp_path / "out").exists()

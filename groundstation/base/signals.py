@@ -70,9 +70,11 @@ _INS = (
     _text("mode"),
     _flag("valid"),
     _double("ground_speed_mps", "mps", 0.0, 3_000.0),
+    *(_double(f"position_{axis}_m", "m", -100_000.0, 100_000.0) for axis in ("north", "east", "down")),
 )
 # Protection levels by the satellite-based augmentation and by fault detection in the receiver.
 _PROTECTION = tuple((axis, by) for axis in ("horizontal", "vertical") for by in ("sbas", "fd"))
+_RELATIVE_BEARING = _double("relative_bearing_deg", "deg", -360.0, 360.0)
 
 # Topic kind -> its fields. `ins.1`, `ins.2`, `link.<peer>` are instances of a kind.
 TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
@@ -132,9 +134,11 @@ TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
             *(_double(f"position_{axis}_m", "m") for axis in "xyz"),
             *(_double(f"covariance_{pair}_m2", "m2") for pair in ("xx", "xy", "xz", "yy", "yz", "zz")),
             _double("rank", ""),
+            _RELATIVE_BEARING,
         ),
         "satellite": (_double("pseudorange_m", "m"), *(_double(f"{axis}_m", "m") for axis in "xyz")),
-        "adf": (Field("relative_bearing_deg", "deg", "double", -360.0, 360.0),),
+        "adf": (_RELATIVE_BEARING,),
+        "odometry": (_double("speed_mps", "mps", -100.0, 100.0), _double("turn_rate_dps", "dps", -4_000.0, 4_000.0)),
         "corrected_heading": (
             _heading("magnetic_heading_deg"),
             _heading("uncorrected_magnetic_heading_deg"),

@@ -267,23 +267,27 @@ def simulate(
 @answers_with_exit_code
 def study(
     name: Annotated[
-        Literal["heading", "forecast", "magnetic", "cooperative", "landing", "approach"],
-        typer.Argument(help="heading, forecast, magnetic, cooperative, landing or approach.", metavar="NAME"),
+        Literal["heading", "forecast", "magnetic", "cooperative", "control", "landing", "approach"],
+        typer.Argument(help="heading, forecast, magnetic, cooperative, control, landing or approach.", metavar="NAME"),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the tables.", metavar="DIR")],
     runs: Annotated[int, typer.Option("--runs", help="Simulated runs of each family or case.", min=10)] = 200,
     seed: Annotated[int, typer.Option("--seed", help="Seed; families and cases take those that follow from it.")] = 71,
+    recorded: Annotated[
+        Path | None,
+        typer.Option("--recorded", help="Folder of recorded robots (cooperative only): run on them.", metavar="FOLDER"),
+    ] = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
     progress: Progress = "auto",
 ) -> int | None:
-    """Monte Carlo behind the published figures, with ours beside them."""
+    """Monte Carlo behind the published figures, with ours beside them; or every algorithm on recorded robots."""
     from groundstation.cli.progress import listener
     from groundstation.pipeline.verbs.synthesis import study_to
 
     with listener("none" if quiet else progress) as listen:
-        text = study_to(name, output, runs=runs, seed=seed, force=force, listen=listen)
+        text = study_to(name, output, runs=runs, seed=seed, force=force, listen=listen, recorded=recorded)
     if not quiet:
         typer.echo(text)
     return DONE

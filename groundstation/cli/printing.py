@@ -107,6 +107,7 @@ KINDS = {
     "format": "formats",
     "scenario": "scenarios",
     "session": "sessions",
+    "plan": "plans",
     "study": "studies",
 }
 

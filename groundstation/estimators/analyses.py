@@ -17,8 +17,8 @@ from groundstation.estimators.plan import Plan
 from groundstation.results.answer import Answer
 
 FLIGHT_ANALYSES: tuple[Analysis, ...] = (
-    *(HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND, LANDING),
-    LANDING_BEACONS,
+    *(HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND),
+    *(LANDING, LANDING_BEACONS),
 )
 SESSION_ANALYSES: tuple[Analysis, ...] = (COOPERATIVE,)
 PLANS: tuple[Plan[Any], ...] = (SESSION_PLAN,)

@@ -6,6 +6,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from groundstation.base.findings import Finding
 from groundstation.results.answer import Answer, Answers
+from groundstation.results.columns import AnswerColumn
 
 Data = TypeVar("Data", contravariant=True)  # a flight, or a session of several
 KnownT = TypeVar("KnownT", contravariant=True)
@@ -83,6 +84,8 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
         ``rests_on(data, answer)``: the samples whose damage makes the answer doubtful.
     sentence : callable
         One line for people, of all answers; empty where another analysis says it.
+    columns : tuple of AnswerColumn
+        What it gives to the tables of flights: index.json, index.csv, fleet.parquet. Names differ between analyses.
     check : callable
         ``check(settings, aircraft)`` raises SettingsError for settings that contradict what is known of the aircraft.
     """
@@ -100,6 +103,7 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     is_expected: Callable[[Any, Any], bool] = _always
     rests_on: Callable[[Any, Any], RestsOn | None] = _no_samples
     sentence: Callable[[Answers], str] = _nothing
+    columns: tuple[AnswerColumn[AnswerT], ...] = ()
     check: Callable[[Any, Any], None] = _any_settings
 
     @property

@@ -64,8 +64,8 @@ class Stand:
 class Runway:
     """Runway with its true bearing (in the direction of take-off), the position of its threshold and its approach aids.
 
-    ``localizer_width_m`` is the full width of the course sector at the threshold, ``localizer_distance_m`` from the
-    threshold to its antenna behind the far end.
+    ``localizer_width_m`` is the full width of the course sector
+    at the threshold, ``localizer_distance_m`` from the threshold to its antenna behind the far end.
     """
 
     name: str

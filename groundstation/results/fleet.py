@@ -18,85 +18,8 @@ from groundstation.results.magnetic import LETTERS
 if TYPE_CHECKING:
     import pandas as pd
 
-Kind = Literal["text", "category", "number", "count", "time", "flag"]
 TrendQuantity = Literal["error_deg", "radial_error_rate_50_nmiph"]
 WHOLE_FLEET = ""  # where an aircraft is named and all of them are meant
-
-
-@dataclass(frozen=True)
-class FlightColumn:
-    """A column of the table of flights: name with unit, kind, and what it is in plain words.
-
-    In memory ``number`` and ``count`` are float64 (NaN where missing), ``flag`` is bool, ``time`` datetime64[ns] in UTC
-    (NaT where missing), the rest text (empty where missing). In fleet.parquet a missing value is null.
-    """
-
-    name: str
-    kind: Kind
-    meaning: str
-
-
-FLIGHT_COLUMNS: tuple[FlightColumn, ...] = (
-    FlightColumn("flight_id", "text", "name of the flight and of its folder"),
-    FlightColumn("aircraft", "category", "as the log or the aircraft file says"),
-    FlightColumn("flight", "text", "flight number as logged"),
-    FlightColumn("start_utc", "time", "first corrected time; missing for a log without absolute time"),
-    FlightColumn("month", "category", "year and month of start_utc: 2026-05"),
-    FlightColumn("duration_s", "number", "from the first sample of any topic to the last"),
-    FlightColumn("status", "category", "ok, degraded (data lost) or failed"),
-    FlightColumn("has_lost_data", "flag", "the log is cut or damaged"),
-    FlightColumn("verdict", "category", "of the heading correction: accept, reject, extend, undecided"),
-    FlightColumn("verdict_reason", "text", "why, in words"),
-    FlightColumn("error_deg", "number", "heading error, INS - true, corrected by"),
-    FlightColumn("standard_error_deg", "number", "of error_deg, errors correlated over seconds allowed for"),
-    FlightColumn("confidence95_low_deg", "number", "lower end of the 95 % interval of error_deg"),
-    FlightColumn("confidence95_high_deg", "number", "its upper end"),
-    FlightColumn("correction_deg", "number", "the number to type; missing unless accepted"),
-    FlightColumn("paper_error_deg", "number", "plain running mean of the paper"),
-    FlightColumn("precision_deg", "number", "the paper's e"),
-    FlightColumn("quality_deg", "number", "spread of the running mean"),
-    FlightColumn("estimate_sd_deg", "number", "standard deviation of the differences"),
-    FlightColumn("samples", "count", "distinct GNSS epochs used"),
-    FlightColumn("sample_mean_deg", "number", "mean of the used differences INS heading - track"),
-    FlightColumn("sample_m2_deg2", "number", "sum of squares of the used differences about their mean"),
-    FlightColumn("taxi_seconds", "number", "straight taxi used"),
-    FlightColumn("drift_deg_per_h", "number", "azimuth drift during taxi"),
-    FlightColumn("drift_sigma_deg_per_h", "number", "its sigma"),
-    FlightColumn("standstill_speed_of_mean_mps", "number", "length of the mean GNSS velocity at standstill"),
-    FlightColumn("lever_arm_m", "number", "GNSS antenna ahead of the main gear"),
-    FlightColumn("time_offset_s", "number", "age of the GNSS velocity against the INS heading"),
-    FlightColumn("parking_heading_deg", "number", "INS heading at the stand, corrected"),
-    FlightColumn("parking_sigma_deg", "number", "its sigma"),
-    FlightColumn("reference_residual_arcmin", "number", "corrected parking heading - reference"),
-    FlightColumn("onboard_error_deg", "number", "heading error the aircraft found itself"),
-    FlightColumn("onboard_difference_deg", "number", "onboard - ours"),
-    FlightColumn("ins_kind", "category", "unaided, gnss_aided or unknown"),
-    FlightColumn("radial_error_rate_50_nmiph", "number", "INS radial position error rate, half of the time below"),
-    FlightColumn("radial_error_rate_95_nmiph", "number", "the same, 95 % of the time below"),
-    FlightColumn("forecast_method", "category", "method the forecast figures belong to"),
-    FlightColumn("forecast_30min_rms_m", "number", "radial error of the forecast after 30 min, RMS over starts"),
-    FlightColumn("forecast_60min_rms_m", "number", "after 60 min"),
-    FlightColumn("forecast_120min_rms_m", "number", "after 120 min"),
-    FlightColumn("magnetic_verdict", "category", "of the magnetic deviation: accept, reject, undecided"),
-    FlightColumn("magnetic_method", "category", "method recommended to correct by; the coefficients are its own"),
-    FlightColumn("magnetic_before_rms_deg", "number", "magnetic heading error in level flight no fit has seen, RMS"),
-    FlightColumn("magnetic_after_rms_deg", "number", "the same after correction"),
-    *(
-        FlightColumn(f"magnetic_{letter.lower()}{end}_deg", "number", meaning)
-        for letter in LETTERS
-        for end, meaning in (("", f"coefficient {letter} of the magnetic heading error"), ("_sigma", "its sigma"))
-    ),
-    FlightColumn("findings_fail", "count", "findings of severity fail"),
-    FlightColumn("findings_warn", "count", "findings of severity warn"),
-    FlightColumn("findings_info", "count", "findings of severity info"),
-    FlightColumn("not_assessable", "text", "analyses that could not be carried out and why, joined by '; '"),
-    FlightColumn("source", "text", "name of the log"),
-    FlightColumn("sha256", "text", "of the log"),
-    FlightColumn("summary", "text", "file, relative to the folder of flights; empty when it is not there"),
-    FlightColumn("report", "text", "file, the same"),
-    FlightColumn("recording", "text", "file, the same"),
-    FlightColumn("mcap", "text", "file, the same"),
-)
 
 
 @dataclass(frozen=True)
@@ -342,7 +265,7 @@ class FleetResults:
     Parameters
     ----------
     flights : FigureData
-        One row per flight by flight id, columns :data:`FLIGHT_COLUMNS`.
+        One row per flight by flight id; its columns are :class:`groundstation.results.columns.FlightColumn`.
     densities : Densities
     normals : tuple of FittedNormal
         The whole fleet first, then each named aircraft with samples.

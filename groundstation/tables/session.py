@@ -127,6 +127,8 @@ class Ranges:
         From the nose of the receiver, to the right positive.
     is_two_way : bool
         Two-way ranges: no clock stands in them.
+    arm_m : ndarray, shape (n, 3), optional
+        Known lever arms, frame of the session: that of the receiver's antenna less that of the source's.
     """
 
     time_s: FloatArray
@@ -138,6 +140,7 @@ class Ranges:
     bearing_deg: FloatArray | None = None
     bearing_sigma_deg: FloatArray | None = None
     is_two_way: bool = False
+    arm_m: FloatArray | None = None
 
     def __post_init__(self) -> None:
         _freeze(self)
@@ -163,6 +166,7 @@ class Ranges:
             None if self.bearing_deg is None else self.bearing_deg[rows],
             None if self.bearing_sigma_deg is None else self.bearing_sigma_deg[rows],
             self.is_two_way,
+            None if self.arm_m is None else self.arm_m[rows],
         )
 
 

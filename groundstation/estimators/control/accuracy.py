@@ -68,6 +68,9 @@ class Accuracy:
 class AccuracyModel:
     """Covariance of the centralised filter along given tracks, and its derivative.
 
+    ``dynamics``, ``noise`` and ``start`` are transition and noise of a step and the covariance before it, (n, n);
+    ``variance_m2`` is that of a range of one step.
+
     Parameters
     ----------
     plan : SessionPlan
@@ -81,15 +84,19 @@ class AccuracyModel:
         self.user = plan.aircraft.index(plan.user)
         pairs = [(one, other) for one in self.estimated for other in range(self.sources) if other != one]
         self._receiver, self._source = (np.array(column) for column in zip(*pairs, strict=True))
-        self._variance = plan.ranging.variance_m2(plan.step_s)
-        self._transition, self._start, self.dynamics = self._models()
+        self.variance_m2 = plan.ranging.variance_m2(plan.step_s)
+        self.dynamics, self.noise, self.start = self._models()
+        rows, columns = np.nonzero(self.dynamics)
+        noisy_rows, noisy_columns = np.nonzero(np.triu(self.noise))
+        values, noise = self.dynamics[rows, columns][None], self.noise[noisy_rows, noisy_columns][None]
+        self._transition = Transition.sparse(self.size, rows, columns, values, noisy_rows, noisy_columns, noise)
 
     def first_of(self, aircraft: int) -> int:
         """Place of the first state of an aircraft; -1 for an exact one and for a ground point."""
         return STATES * self.estimated.index(aircraft) if aircraft in self.estimated else -1
 
-    def _models(self) -> tuple[Transition, FloatArray, FloatArray]:
-        """Transition of all aircraft, covariance at the start, and the transition matrix."""
+    def _models(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Transition of all aircraft over a step, covariance of its noise, and covariance at the start."""
         F, Q, P = (np.zeros((self.size, self.size)) for _ in range(3))
         for place, number in enumerate(self.estimated):
             errors = self.plan.aircraft[number].errors
@@ -103,13 +110,7 @@ class AccuracyModel:
             F[own, own], Q[own, own] = discretise(local_dynamics(*times), density, self.plan.step_s)
             p = errors.position_m, errors.position_m, errors.velocity_mps, errors.velocity_mps, errors.baro_m
             P[own, own] = np.diag(np.square([*p, errors.clock_m, errors.clock_mps]))
-        rows, columns = np.nonzero(F)
-        noisy_rows, noisy_columns = np.nonzero(np.triu(Q))
-        noise = Q[noisy_rows, noisy_columns][None]
-        transition = Transition.sparse(
-            self.size, rows, columns, F[rows, columns][None], noisy_rows, noisy_columns, noise
-        )
-        return transition, P, F
+        return F, Q, P
 
     def links(self, position_m: FloatArray) -> Links:
         """Lines of all ranges, at every epoch but the first."""
@@ -142,10 +143,10 @@ class AccuracyModel:
         at = np.repeat(np.arange(epochs), count)
         flat, nothing = H.reshape(-1, n), np.zeros((epochs * count, 0))
         kind = np.tile(np.arange(count), epochs)
-        measured = Measurements.of(at, nothing, np.arange(n), flat, self._variance, kind=kind)
+        measured = Measurements.of(at, nothing, np.arange(n), flat, self.variance_m2, kind=kind)
         step = np.zeros(epochs, dtype=np.int64)
-        run = run_filter(self._transition, step, measured, Start(np.zeros((n, 0)), self._start))
-        return Accuracy(np.concatenate([self._start[None], run.P]), links, H, run)
+        run = run_filter(self._transition, step, measured, Start(np.zeros((n, 0)), self.start))
+        return Accuracy(np.concatenate([self.start[None], run.P]), links, H, run)
 
     def by_position(self, found: Accuracy, by_covariance: FloatArray) -> FloatArray:
         """Derivative of a measure of the covariances by every position.

@@ -4,6 +4,7 @@ from groundstation.estimators.control.scenario import SessionPlan
 from groundstation.estimators.plan import Plan, Planned
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.control import UNCONTROLLED, ControlPlan
+from groundstation.results.placement import PlacementPlan
 
 
 def _run(scenario: SessionPlan) -> Planned:
@@ -13,6 +14,10 @@ def _run(scenario: SessionPlan) -> Planned:
 
 
 def _sentence(answers: Answers) -> str:
+    return "; ".join(filter(None, (_of_control(answers), _of_placement(answers))))
+
+
+def _of_control(answers: Answers) -> str:
     answer = answer_of(answers, ControlPlan)
     if answer is None:
         return ""
@@ -25,11 +30,22 @@ def _sentence(answers: Answers) -> str:
     return f"{told} ({without}); law: {answer.recommended}"
 
 
+def _of_placement(answers: Answers) -> str:
+    answer = answer_of(answers, PlacementPlan)
+    if answer is None:
+        return ""
+    row, places = answer.design(answer.recommended), answer.places_of(answer.recommended)
+    placed = [one for one in places if one.is_placed]
+    where = ", ".join(f"{one.point} {one.north_m:.0f} m north {one.east_m:.0f} m east" for one in placed)
+    sigmas = f"{row.two_sigma_north_m:.1f}, {row.two_sigma_east_m:.1f}, {row.two_sigma_up_m:.1f} m"
+    return f"{where}: 2 sigma north, east, up {sigmas} at the fixed point; design: {answer.recommended}"
+
+
 SESSION_PLAN = Plan(
     name="session",
-    title="how aircraft should move for the accuracy of one of them, by ranges between them",
+    title="how aircraft should move, and where ground points should stand, for the accuracy of one aircraft",
     scenario=SessionPlan,
-    answers=(ControlPlan,),
+    answers=(ControlPlan, PlacementPlan),
     run=_run,
     sentence=_sentence,
 )

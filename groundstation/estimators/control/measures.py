@@ -29,8 +29,8 @@ class Geometry:
 
     @property
     def determinant(self) -> FloatArray:
-        """det(H'H), shape (epochs,)."""
-        return np.asarray(np.prod(self.eigenvalues, axis=1))
+        """det(H'H), shape (epochs,); 0 where it is nothing but rounding."""
+        return np.where(self.is_singular, 0.0, np.prod(self.eigenvalues, axis=1))
 
     @property
     def least_eigenvalue(self) -> FloatArray:
@@ -79,21 +79,20 @@ def loss(geometry: Geometry, criterion: LocalCriterion) -> FloatArray:
 
 
 def loss_by_direction(geometry: Geometry, criterion: LocalCriterion, axes: Sequence[Axis]) -> FloatArray:
-    """Derivative of the loss by the directions, shape (epochs, l, 3); zero where the dilution is infinite.
+    """Derivative of the loss by the directions, shape (epochs, l, 3); of a singular H'H zero.
 
     With A = H'H the derivative by H is 2 H times that by A: adj(A) of the determinant, n n' of the least eigenvalue
     with its vector n, -A^-2 / (2 dilution) of the dilution. Where the two least eigenvalues are equal that of the least
     is one of its one-sided derivatives.
     """
-    values, vectors = geometry.eigenvalues, geometry.vectors
+    values, vectors, known = geometry.eigenvalues, geometry.vectors, ~geometry.is_singular
+    weights = np.zeros(values.shape)
     if criterion == "determinant":
-        weights = -np.stack([np.prod(np.delete(values, k, axis=1), axis=1) for k in range(values.shape[1])], axis=1)
+        for column in range(values.shape[1]):
+            weights[known, column] = -np.prod(np.delete(values[known], column, axis=1), axis=1)
     elif criterion == "eigenvalue":
-        weights = np.zeros(values.shape)
         weights[:, 0] = -1.0
     else:
-        known = ~geometry.is_singular
-        weights = np.zeros(values.shape)
         weights[known] = -(values[known] ** -2.0) / (2.0 * geometry.dilution()[known, None])
     by_information = (vectors * weights[:, None, :]) @ np.swapaxes(vectors, 1, 2)
     by_columns = 2.0 * geometry.H @ by_information

@@ -11,6 +11,7 @@ from groundstation.estimators.control.accuracy import PLACE, Accuracy
 from groundstation.estimators.control.laws import Law, Session, integral_law, local_law, random_starts
 from groundstation.estimators.control.measures import Geometry
 from groundstation.estimators.control.motion import Paths
+from groundstation.estimators.control.placement import plan_placement
 from groundstation.estimators.control.scenario import LOCAL_CRITERIA, NEAREST_M, SessionPlan
 from groundstation.estimators.plan import Planned
 from groundstation.results.answer import by_analysis
@@ -41,13 +42,21 @@ class Flown:
 
 
 def plan_session(plan: SessionPlan) -> Planned:
-    """Find every law of control of a session and the accuracy it leads to.
+    """Find laws of control of a session where anything is controlled, and places of points that are to be placed.
 
     Raises
     ------
     GroundstationError
-        When an aircraft meets a source on its way without control: there the geometry has no meaning.
+        When an aircraft meets a source on its way without control: there the geometry has no meaning. When a point has
+        no allowed place.
     """
+    is_placed = any(point.is_placed for point in plan.points)
+    placement, remarks = plan_placement(plan) if is_placed else (None, ())
+    control, findings = (None, ()) if is_placed and not any(one.control for one in plan.aircraft) else _control(plan)
+    return Planned(by_analysis(control, placement), plan.duration_s, (*findings, *remarks))
+
+
+def _control(plan: SessionPlan) -> tuple[ControlPlan, tuple[Finding, ...]]:
     session = Session(plan)
     _require_distance(session)
     flown = {UNCONTROLLED: _flown(session, UNCONTROLLED, Law(session.motion.uncontrolled))}
@@ -60,7 +69,7 @@ def plan_session(plan: SessionPlan) -> Planned:
         flown[INTEGRAL] = _flown(session, INTEGRAL, integral_law(session, starts))
     recommended = plan.control.criterion if session.motion.bounds else UNCONTROLLED
     answer = _answer(session, flown, recommended)
-    return Planned(by_analysis(answer), plan.duration_s, _findings(session, flown, answer))
+    return answer, _findings(session, flown, answer)
 
 
 def _flown(session: Session, name: str, law: Law) -> Flown:

@@ -1,5 +1,6 @@
 """Scenario of a session to be planned: who flies, who may be controlled within which bounds, what is measured."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -8,6 +9,7 @@ from groundstation.base.toml_settings import check_ranges, number, required_numb
 
 Controlled = Literal["speed", "heading"]
 Axis = Literal["north", "east", "up", "clock"]
+Over = Literal["fixed", "way", "lost"]
 LocalCriterion = Literal["determinant", "eigenvalue", "dop"]
 Criterion = Literal["determinant", "eigenvalue", "dop", "covariance"]
 LOCAL_CRITERIA: tuple[LocalCriterion, ...] = ("determinant", "eigenvalue", "dop")
@@ -90,15 +92,108 @@ class PlannedAircraft:
 
 @dataclass(frozen=True)
 class PlannedPoint:
-    """A ground reference point, its position known without error."""
+    """A ground reference point, its position known without error.
+
+    Parameters
+    ----------
+    name : str
+    north_m, east_m, height_m : float
+        Where it stands; of one that is to be placed: as given, to compare with and to start from.
+    is_placed : bool
+        Its place is to be found.
+    mirrors : str
+        Name of a placed point on the other side of the axis east = 0 that it goes with; empty: none.
+    """
 
     name: str
     north_m: float = required_number(-1e6, 1e6)
     east_m: float = required_number(-1e6, 1e6)
     height_m: float = number(0.0, -500.0, 9000.0)
+    is_placed: bool = False
+    mirrors: str = ""
 
     def __post_init__(self) -> None:
         check_ranges(self)
+        if self.is_placed and self.mirrors:
+            raise SettingsError("mirrors", f"{self.mirrors!r} of a point that is_placed itself", "one of the two")
+
+
+@dataclass(frozen=True)
+class KeepOut:
+    """A polygon without ground points: water, the runway strip, a village. Corners are north, east in metres."""
+
+    name: str
+    corners_m: tuple[tuple[float, float], ...]
+
+    def __post_init__(self) -> None:
+        if len(self.corners_m) < 3:
+            raise SettingsError("corners_m", f"{len(self.corners_m)} corners", "three or more")
+        if not all(math.isfinite(value) for corner in self.corners_m for value in corner):
+            raise SettingsError("corners_m", "a number that is not finite", "metres north and east")
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where points that are to be placed may stand and what is asked of them.
+
+    Parameters
+    ----------
+    criterion : {'covariance', 'determinant', 'eigenvalue', 'dop'}
+        The local ones look at the geometry of a single place of the judged aircraft, the covariance at the filter along
+        its whole way there.
+    over : {'fixed', 'way', 'lost'}
+        What the recommended design is best for: the fixed point, the worst point of the way, or the fixed point with
+        whichever ground point lost costs most (covariance alone).
+    fixed_at_s : float
+        Time at which the judged aircraft is at the fixed point.
+    from_s, to_s : float
+        Part of the way of which the worst point counts.
+    axes, weight_north, weight_east, weight_up
+        As of :class:`Control`.
+    low_north_m, high_north_m, low_east_m, high_east_m : float
+        Rectangle for the points.
+    keep_out : tuple of KeepOut
+    overflown_m : float
+        A point nearer than this below the way is worth a warning.
+    map_side : int
+        Places along each side of the map of the last placed point.
+    starts, seed, iterations, tolerance
+        Random starts besides the places given; of each descent: at most so many iterations, and the first-order gain
+        left within a hundredth of the rectangle, over the loss.
+    """
+
+    criterion: Criterion = "covariance"
+    over: Over = "fixed"
+    fixed_at_s: float = number(0.0, 0.0, 1e5)
+    from_s: float = number(0.0, 0.0, 1e5)
+    to_s: float = number(1e5, 0.0, 1e5)
+    axes: tuple[Axis, ...] = ("north", "east", "up")
+    weight_north: float = number(1.0, 0.0, 1e6)
+    weight_east: float = number(1.0, 0.0, 1e6)
+    weight_up: float = number(1.0, 0.0, 1e6)
+    low_north_m: float = number(-5000.0, -1e6, 1e6)
+    high_north_m: float = number(5000.0, -1e6, 1e6)
+    low_east_m: float = number(-5000.0, -1e6, 1e6)
+    high_east_m: float = number(5000.0, -1e6, 1e6)
+    keep_out: tuple[KeepOut, ...] = ()
+    overflown_m: float = number(100.0, 0.0, 1e4)
+    map_side: int = number(31, 2, 201)
+    starts: int = number(4, 0, 100)
+    seed: int = number(1, 0)
+    iterations: int = number(100, 1, 10_000)
+    tolerance: float = number(1e-4, 1e-12, 0.1)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+        check_criterion(self.axes, (self.weight_north, self.weight_east, self.weight_up))
+        for axis in ("north", "east"):
+            low, high = getattr(self, f"low_{axis}_m"), getattr(self, f"high_{axis}_m")
+            if low > high:
+                raise SettingsError(f"low_{axis}_m", f"{low:g} m", f"at most high_{axis}_m, {high:g} m")
+        if self.over == "lost" and self.criterion != "covariance":
+            raise SettingsError("over", f'"lost" with {self.criterion}', 'criterion = "covariance"')
+        if self.from_s > self.to_s:
+            raise SettingsError("from_s", f"{self.from_s:g} s", f"at most to_s, {self.to_s:g} s")
 
 
 @dataclass(frozen=True)
@@ -160,10 +255,15 @@ class Control:
 
     def __post_init__(self) -> None:
         check_ranges(self)
-        if not self.axes or len(set(self.axes)) < len(self.axes):
-            raise SettingsError("axes", "none, or one that stands twice", 'some of "north", "east", "up", "clock"')
-        if self.weight_north + self.weight_east + self.weight_up <= 0.0:
-            raise SettingsError("weight_north", "weights that are all zero", "at least one above zero")
+        check_criterion(self.axes, (self.weight_north, self.weight_east, self.weight_up))
+
+
+def check_criterion(axes: tuple[Axis, ...], weights: tuple[float, ...]) -> None:
+    """Refuse no axes, an axis that stands twice, and weights that are all zero."""
+    if not axes or len(set(axes)) < len(axes):
+        raise SettingsError("axes", "none, or one that stands twice", 'some of "north", "east", "up", "clock"')
+    if sum(weights) <= 0.0:
+        raise SettingsError("weight_north", "weights that are all zero", "at least one above zero")
 
 
 @dataclass(frozen=True)
@@ -180,6 +280,8 @@ class SessionPlan:
     duration_s, step_s : float
     ranging : Ranging
     control : Control
+    placement : Placement
+        Counts where a point ``is_placed``.
     separation_m : float
         Aircraft nearer to each other than this are a warning.
     """
@@ -193,6 +295,7 @@ class SessionPlan:
     separation_m: float = number(300.0, 0.0, 1e5)
     ranging: Ranging = field(default_factory=Ranging)
     control: Control = field(default_factory=Control)
+    placement: Placement = field(default_factory=Placement)
     notes: str = ""
 
     def __post_init__(self) -> None:
@@ -212,6 +315,15 @@ class SessionPlan:
             raise SettingsError("judged", f"{self.user.name}, which is exact", "an aircraft with errors")
         if len(names) < 2:
             raise SettingsError("points", "nothing to range to", "a point or a second aircraft")
+        placed = {point.name for point in self.points if point.is_placed}
+        for point in self.points:
+            if point.mirrors and point.mirrors not in placed:
+                raise SettingsError("points", f"{point.name} mirrors {point.mirrors!r}", "the name of a placed point")
+        if placed and not self.step_s <= self.placement.fixed_at_s <= self.duration_s:
+            expected = f"within [{self.step_s:g}, {self.duration_s:g}] s, the interval"
+            raise SettingsError("placement.fixed_at_s", f"{self.placement.fixed_at_s:g} s", expected)
+        if placed and self.placement.from_s > self.duration_s:
+            raise SettingsError("placement.from_s", f"{self.placement.from_s:g} s", f"at most {self.duration_s:g} s")
 
     @property
     def steps(self) -> int:

@@ -31,8 +31,7 @@ from groundstation.estimators.cooperative.tracks import GATED, USED, AlgorithmRu
 from groundstation.estimators.kalman.arrays import Pattern
 from groundstation.estimators.kalman.kernels import add_noise, predict_covariance, update_covariance
 
-PATIENCE = 30  # rejections of a vehicle in a row: then its clock has leapt
-LEAP_M = 1e5
+PATIENCE = 30  # rejections of a vehicle in a row: then its clock has leapt, or it is not where it thinks
 KNOWN_WRONG_SIGMAS = 3.0
 
 
@@ -109,16 +108,17 @@ class _Joint:
         (here, by_here), (there, by_there) = (
             vehicles[who].place(state, event.time_s) for who, state in zip(ends, x, strict=True)
         )
+        arm = np.zeros(3) if event.arm_m is None else event.arm_m
         read = [here - by_here @ x[0], there - by_there @ x[1]]
-        line = read[0] - self.offsets_m[ends[0]] - read[1] + self.offsets_m[ends[1]]
-        away = here - there - line
+        line = arm + read[0] - self.offsets_m[ends[0]] - read[1] + self.offsets_m[ends[1]]
+        away = arm + here - there - line
         across = away - line * float(line @ away) / float(line @ line)
         derivative = np.zeros((3, len(self.x)))
         derivative[:, self.slices[ends[0]]], derivative[:, self.slices[ends[1]]] = by_here, -by_there
         shared = across @ derivative
         if float(across @ across) ** 2 > KNOWN_WRONG_SIGMAS**2 * float(shared @ self.P @ shared):
             self.offsets_m[ends[0]], self.offsets_m[ends[1]] = read[0] - here, read[1] - there
-            return np.asarray(here - there)
+            return np.asarray(arm + here - there)
         return np.asarray(line)
 
     def _at(self, who: int, at_s: float) -> tuple[FloatArray, FloatArray]:
@@ -194,8 +194,10 @@ def _members(event: Event) -> tuple[int, ...]:
     return (event.receiver, event.source) if event.kind == PEER else (event.receiver,)
 
 
-def _is_gated(joint: _Joint, row: Row, h: FloatArray, settings: CooperativeSettings) -> tuple[bool, float]:
-    total = float(h @ joint.P @ h) + row.variance
+def _is_gated(
+    joint: _Joint, event: Event, row: Row, h: FloatArray, settings: CooperativeSettings
+) -> tuple[bool, float]:
+    total = float(h @ joint.P @ h) + row.variance * event.spread
     return settings.gate_sigma > 0.0 and row.innovation**2 > settings.gate_sigma**2 * total, total
 
 
@@ -206,7 +208,7 @@ def _use_one(
     if not rows:
         recorder.counts["lost"] += 1
     for k, (row, h) in enumerate(rows):
-        gated, total = _is_gated(joint, row, h, settings)
+        gated, total = _is_gated(joint, event, row, h, settings)
         recorder.judge(event, row.innovation, total, GATED if gated else USED)
         _count_rejections(joint, event, gated, rejected, recorder)
         if gated:
@@ -222,7 +224,7 @@ def _use_together(
     kept = []
     for event in events:
         for row, h in joint.rows(event):
-            gated, total = _is_gated(joint, row, h, settings)
+            gated, total = _is_gated(joint, event, row, h, settings)
             recorder.judge(event, row.innovation, total, GATED if gated else USED)
             _count_rejections(joint, event, gated, rejected, recorder)
             if not gated:
@@ -236,16 +238,16 @@ def _use_together(
 
 
 def _count_rejections(joint: _Joint, event: Event, gated: bool, rejected: list[int], recorder: Recorder) -> None:
-    """Open the clock of a vehicle none of whose ranges fits any more."""
+    """Open the states in doubt of a vehicle none of whose ranges fits any more."""
     for who in _members(event):
         rejected[who] = rejected[who] + 1 if gated else 0
         vehicle = joint.prepared.vehicles[who]
-        if rejected[who] >= PATIENCE and vehicle.clock >= 0 and event.kind != HEIGHT:
+        if rejected[who] >= PATIENCE and event.kind != HEIGHT:
             rejected[who] = 0
-            recorder.counts["clock_leaps"] += 1
-            for clock in {vehicle.clock, vehicle.receiver_clock}:
-                at = joint.slices[who].start + clock
-                joint.P[at, at] += LEAP_M**2
+            recorder.opened(vehicle)
+            for state, variance in vehicle.doubts.items():
+                at = joint.slices[who].start + state
+                joint.P[at, at] += variance
 
 
 def _count_messages(prepared: Prepared, settings: CooperativeSettings, recorder: Recorder) -> None:

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.estimators.cooperative.centralised import LEAP_M, PATIENCE
+from groundstation.estimators.cooperative.centralised import PATIENCE
 from groundstation.estimators.cooperative.error_map import Other, corrected_rows, spectral_radius, unit_rows
 from groundstation.estimators.cooperative.events import HEIGHT, PEER, POINT, Event, Prepared
 from groundstation.estimators.cooperative.messages import Broadcast, decode
@@ -278,12 +278,12 @@ class Decentralised:
         return brought
 
     def _passes(self, who: int, rows: list[Used]) -> bool:
-        """Whether all rows of a measurement are inside the gate; counts, opens the clock after many rejections."""
+        """Whether all rows of a measurement pass the gate; counts, opens what is in doubt after many rejections."""
         own, vehicle = self._own[who], self._prepared.vehicles[who]
         offer, brought = rows[0].offer, np.diag(self._brought(rows))
         passes = True
         for used, noise in zip(rows, brought.tolist(), strict=True):
-            total = float(used.h @ own.P @ used.h) + used.row.variance + noise
+            total = float(used.h @ own.P @ used.h) + used.row.variance * offer.event.spread + noise
             fits = self._settings.gate_sigma <= 0.0 or used.row.innovation**2 <= self._settings.gate_sigma**2 * total
             passes = passes and fits
             if offer.sighting is None:
@@ -291,12 +291,12 @@ class Decentralised:
             if not passes:
                 break  # the bearing of a wrong range is another object's
         self._rejected[who] = 0 if passes else self._rejected[who] + 1
-        if self._rejected[who] >= PATIENCE and vehicle.clock >= 0 and offer.event.kind != HEIGHT:
+        if self._rejected[who] >= PATIENCE and offer.event.kind != HEIGHT:
             self._rejected[who] = 0
-            self.recorder.counts["clock_leaps"] += 1
+            self.recorder.opened(vehicle)
             P = own.P.copy()
-            for clock in {vehicle.clock, vehicle.receiver_clock}:
-                P[clock, clock] += LEAP_M**2
+            for state, variance in vehicle.doubts.items():
+                P[state, state] += variance
             self._own[who] = replace(own, P=P)
         return passes
 

@@ -250,6 +250,9 @@ def _findings(judged: Sequence[Judged], settings: CooperativeSettings) -> list[F
         if counts.get("clock_leaps", 0):
             text = f"{name}: the clock of a vehicle was taken as leapt {counts['clock_leaps']} times"
             found.append(Finding("warn", "cooperative.clock_reset", text, count=counts["clock_leaps"]))
+        if counts.get("reopened", 0):
+            text = f"{name}: a vehicle was not where it was believed {counts['reopened']} times; its place was opened"
+            found.append(Finding("warn", "cooperative.reopened", text, count=counts["reopened"]))
     return found
 
 

@@ -38,6 +38,10 @@ class Event:
     bearing_rad, bearing_variance_rad2 : float
         NaN without.
     is_two_way : bool
+    arm_m : ndarray, shape (3,), optional
+        From the source's antenna to its place, and from the receiver's place to its antenna.
+    spread : float
+        Share of the variances that is the spread of one reading, for the gate; the rest is for its repeating itself.
     """
 
     time_s: float
@@ -51,6 +55,8 @@ class Event:
     bearing_rad: float = float("nan")
     bearing_variance_rad2: float = float("nan")
     is_two_way: bool = False
+    arm_m: FloatArray | None = None
+    spread: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -224,6 +230,8 @@ def _link_events(
                 float(bearing[row]) if has_bearing[row] else float("nan"),
                 float(bearing_sigma[row] ** 2 * as_white[row]),
                 table.is_two_way,
+                None if table.arm_m is None else table.arm_m[row],
+                1.0 / float(as_white[row]),
             )
         )
     _count_away(findings, away, "link rows")
@@ -239,12 +247,15 @@ def _as_white(table: Ranges, settings: CooperativeSettings) -> FloatArray:
     share, time_s = settings.correlated_share, settings.correlation_s
     if share <= 0.0:
         return np.ones(len(table))
-    since_s, latest = np.full(len(table), np.inf), dict[tuple[str, str], float]()
+    since_s, latest = np.full(len(table), np.inf), dict[tuple[str, str], tuple[float, float]]()
     for row, (at_s, receiver, source) in enumerate(
         zip(table.time_s.tolist(), table.receiver.tolist(), table.source.tolist(), strict=True)
     ):
-        since_s[row] = at_s - latest.get((receiver, source), -np.inf)
-        latest[receiver, source] = at_s
+        last_s, before_s = latest.get((receiver, source), (-np.inf, -np.inf))
+        if at_s > last_s:  # several antennas of a pair measure at one time
+            last_s, before_s = at_s, last_s
+        since_s[row] = at_s - before_s
+        latest[receiver, source] = last_s, before_s
     return np.asarray(1.0 - share + share / np.tanh(np.clip(since_s / time_s, 0.01, 100.0) / 2.0))
 
 

@@ -74,7 +74,10 @@ def dilution(H: FloatArray, has_clock: bool) -> tuple[float, float]:
 
 
 def geometry_of(session: Session, settings: CooperativeSettings, run: AlgorithmRun) -> tuple[Geometry, ...]:
-    """Geometry of every vehicle with time, seen from the positions of a run."""
+    """Geometry of every vehicle with time, seen from the positions of a run.
+
+    The frame in which the session ends is left out: it holds but a part of what is heard in one.
+    """
     prepared = prepare(session, settings)
     frames: list[dict[int, dict[tuple[str, int, bytes], Event]]] = [{} for _ in prepared.vehicles]
     for event in prepared.events:
@@ -83,6 +86,9 @@ def geometry_of(session: Session, settings: CooperativeSettings, run: AlgorithmR
         number = int((event.time_s + 1e-9) // settings.frame_s)
         place = b"" if event.place_m is None or event.kind != SATELLITE else event.place_m.tobytes()
         frames[event.receiver].setdefault(number, {})[(event.kind, event.source, place)] = event
+    last = max((number for heard in frames for number in heard), default=0)
+    if last:
+        frames = [{number: heard[number] for number in heard if number != last} for heard in frames]
     return tuple(
         _one(vehicle, heard, run.tracks, index, settings, prepared.session)
         for index, (vehicle, heard) in enumerate(zip(prepared.vehicles, frames, strict=True))

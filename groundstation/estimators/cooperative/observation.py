@@ -82,6 +82,8 @@ def rows_of(
     source = event.place_m if source_m is None else source_m
     assert source is not None
     view = vehicle.view(x, event.time_s)
+    if event.arm_m is not None:
+        source = source - event.arm_m
     line = view.place_m - source
     distance = float(np.sqrt(line @ line))
     if distance < NEAREST_M:

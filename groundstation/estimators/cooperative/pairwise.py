@@ -13,7 +13,7 @@ asynchronous pairwise communication, International Journal of Robotics Research 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.estimators.cooperative.centralised import LEAP_M, PATIENCE
+from groundstation.estimators.cooperative.centralised import PATIENCE
 from groundstation.estimators.cooperative.error_map import spectral_radius, unit_rows
 from groundstation.estimators.cooperative.events import PEER, POINT, Event, Prepared
 from groundstation.estimators.cooperative.messages import pairwise_bytes
@@ -100,16 +100,17 @@ class Pairwise:
         return rows_of(event, self._prepared.vehicles[event.receiver], one.x, source_m, clock_m)
 
     def _passes(self, event: Event, row: Row, total: float) -> bool:
+        total -= row.variance * (1.0 - event.spread)
         passes = self._settings.gate_sigma <= 0.0 or row.innovation**2 <= self._settings.gate_sigma**2 * total
         self.recorder.judge(event, row.innovation, total, USED if passes else GATED)
         for who in (event.receiver, event.source) if event.kind == PEER else (event.receiver,):
             vehicle = self._prepared.vehicles[who]
             self._rejected[who] = 0 if passes else self._rejected[who] + 1
-            if self._rejected[who] >= PATIENCE and vehicle.clock >= 0:
+            if self._rejected[who] >= PATIENCE:
                 self._rejected[who] = 0
-                self.recorder.counts["clock_leaps"] += 1
-                for clock in {vehicle.clock, vehicle.receiver_clock}:
-                    self._members[who].P[clock, clock] += LEAP_M**2
+                self.recorder.opened(vehicle)
+                for state, variance in vehicle.doubts.items():
+                    self._members[who].P[state, state] += variance
         return passes
 
     def _private(self, event: Event, row: Row) -> bool:

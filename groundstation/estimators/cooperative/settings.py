@@ -117,7 +117,8 @@ class CooperativeSettings:
     range_share : float
         Likewise of all ranges over the link, in proportion to the range.
     correlated_share, correlation_s : float
-        Share of the variance of ranges and bearings that stays while a pair measures again, and for how long.
+        Share of the variance of ranges and bearings that stays while a pair measures again, and for how long. The gate
+        knows the spread of one reading alone.
     """
 
     update: Update = "sequential"

@@ -90,7 +90,7 @@ class AlgorithmRun:
     judged : tuple of Judged
         Ranges alone.
     counts : dict
-        ``used``, ``gated``, ``lost``, ``unused``, ``clock_leaps``.
+        ``used``, ``gated``, ``lost``, ``unused``, ``clock_leaps``, ``reopened``.
     messages : dict of vehicle to (messages, bytes)
     map_time_s, map_radius : ndarrays, shape (w,)
         Spectral radius of the joint error map over each window; empty for a centralised filter.
@@ -131,6 +131,10 @@ class Recorder:
         self.counts["used" if mark == USED else "gated"] += 1
         sigma = float(np.sqrt(variance))
         self.judged.append(Judged(event.time_s, event.kind, event.receiver, event.source, innovation, sigma, mark))
+
+    def opened(self, vehicle: Vehicle) -> None:
+        """Count that nothing fitted a vehicle's estimate any more and its states in doubt were opened."""
+        self.counts["clock_leaps" if vehicle.clock >= 0 else "reopened"] += 1
 
     def sent(self, who: int, size: int) -> None:
         """Count a message of a vehicle."""

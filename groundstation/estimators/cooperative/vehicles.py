@@ -5,6 +5,7 @@ reckoning: corrected = reading - estimated error. A wheeled vehicle's state is i
 (wheeled_vehicle.py).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol
@@ -20,6 +21,7 @@ from groundstation.tables.session import DeadReckoning, Frame
 RAD_PER_ARCSEC = float(np.deg2rad(1.0 / 3600.0))
 GRAVITY_MPS2 = 9.7803253359, 0.00193185265241, 0.00669437999  # Somigliana, WGS-84 (NIMA TR8350.2)
 SAME_TIME_S = 1e-9
+LEAP_M = 1e5  # of a clock
 Step = tuple[FloatArray, FloatArray, FloatArray]
 
 
@@ -49,7 +51,8 @@ class Vehicle(Protocol):
     """One vehicle as the filters see it.
 
     ``clock`` and ``receiver_clock`` are places of the clock offsets in the state, ``bias`` that of the range bias,
-    ``heading`` that of the heading in radians; -1 where there is no such state. ``height`` likewise.
+    ``heading`` that of the heading in radians; -1 where there is no such state. ``height`` likewise. ``doubts``
+    are the states that are opened when nothing fits any more, each with the variance that it then gets on top.
     """
 
     name: str
@@ -59,6 +62,7 @@ class Vehicle(Protocol):
     bias: int
     heading: int
     height: int
+    doubts: Mapping[int, float]
     first_s: float
     last_s: float
 
@@ -103,6 +107,7 @@ class InertialVehicle:
         if belief.has_separate_clocks:
             self.receiver_clock = len(self.states)
             self.states += ("receiver_clock_m", "receiver_clock_mps")
+        self.doubts: Mapping[int, float] = {self.clock: LEAP_M**2, self.receiver_clock: LEAP_M**2}
         self.bias, self._lever = -1, -1
         if settings.range_bias_m > 0.0:
             self.bias = len(self.states)

@@ -5,7 +5,9 @@ nose by its mounting angle, and its stamps are late. Each is a state where its s
 beforehand.
 """
 
+from collections.abc import Mapping
 from itertools import pairwise
+from types import MappingProxyType
 
 import numpy as np
 
@@ -15,6 +17,7 @@ from groundstation.estimators.cooperative.vehicles import SAME_TIME_S, Step, Vie
 from groundstation.tables.session import Odometry
 
 LONG_S = 1e6  # a constant
+LOST_M, LOST_RAD = 1.0, 0.5  # a vehicle that slipped or was carried away
 
 
 class WheeledVehicle:
@@ -24,6 +27,7 @@ class WheeledVehicle:
     receiver_clock: int = -1
     height: int = -1
     heading: int = 2
+    doubts: Mapping[int, float] = MappingProxyType({0: LOST_M**2, 1: LOST_M**2, 2: LOST_RAD**2})
 
     def __init__(self, track: Odometry, settings: CooperativeSettings) -> None:
         self.name, self._track, self._settings = track.name, track, settings

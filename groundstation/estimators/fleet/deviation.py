@@ -23,7 +23,7 @@ def deviations(flights: FigureData) -> tuple[DeviationRow, ...]:
     Parameters
     ----------
     flights : FigureData
-        Columns of :data:`groundstation.results.fleet.FLIGHT_COLUMNS`.
+        The table of flights; see :class:`groundstation.results.fleet.FleetResults`.
 
     Returns
     -------

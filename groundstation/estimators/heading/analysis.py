@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from groundstation.base.findings import Finding
 from groundstation.estimators.analysis import Analysis, Found, RestsOn
+from groundstation.estimators.heading.columns import COLUMNS
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.known import Known
 from groundstation.results.answer import Answers, answer_of
@@ -86,4 +87,5 @@ HEADING = Analysis(
     builds_on=("latency",),
     rests_on=_rests_on,
     sentence=_sentence,
+    columns=COLUMNS,
 )

@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.analysis import Analysis, Found, RestsOn
+from groundstation.estimators.inertial.columns import FORECAST_COLUMNS, INERTIAL_COLUMNS
 from groundstation.estimators.inertial.noise import choose_class
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.known import AircraftData, Known
@@ -92,6 +93,7 @@ INERTIAL = Analysis(
     rests_on=_rests_on,
     sentence=_sentence,
     check=_check,
+    columns=INERTIAL_COLUMNS,
 )
 FORECAST = Analysis(
     name="forecast",
@@ -104,4 +106,5 @@ FORECAST = Analysis(
     table="inertial",
     requires=("inertial",),
     is_expected=_is_forecast_expected,
+    columns=FORECAST_COLUMNS,
 )

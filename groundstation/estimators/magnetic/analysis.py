@@ -7,6 +7,7 @@ from groundstation.base.signals import topics_of_kind
 from groundstation.estimators.analysis import Analysis, Found
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.known import Known
+from groundstation.estimators.magnetic.columns import COLUMNS
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.answer import Answers, answer_of
@@ -122,6 +123,7 @@ MAGNETIC = Analysis(
     builds_on=("heading", "inertial", "latency"),
     is_expected=_has_readings,
     sentence=_sentence,
+    columns=COLUMNS,
 )
 MAGNETIC_GROUND = Analysis(
     name="magnetic_ground",

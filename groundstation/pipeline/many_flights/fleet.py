@@ -17,6 +17,7 @@ from groundstation.estimators.fleet.density import SampleHistogram, densities_of
 from groundstation.estimators.fleet.deviation import deviations
 from groundstation.estimators.fleet.moments import Moments
 from groundstation.estimators.fleet.skill import SkillMerger
+from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
 from groundstation.pipeline.many_flights.fleet_rows import (
     checks_of,
     flight_row,
@@ -29,9 +30,10 @@ from groundstation.pipeline.many_flights.fleet_samples import SampleStore
 from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports.index import INDEX_JSON
+from groundstation.results.columns import FlightColumn, Kind
 from groundstation.results.figures import FigureData
 from groundstation.results.files import load, write_bytes
-from groundstation.results.fleet import FLIGHT_COLUMNS, FleetResults, FlightColumn, Kind, NotInFleet, SessionRow
+from groundstation.results.fleet import FleetResults, NotInFleet, SessionRow
 
 FLEET_PARQUET = "fleet.parquet"
 TEXTS: tuple[Kind, ...] = ("text", "category")

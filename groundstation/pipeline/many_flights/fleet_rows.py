@@ -17,11 +17,13 @@ from groundstation.estimators.fleet.moments import Moments, moments_of
 from groundstation.estimators.fleet.skill import SkillOfFlight
 from groundstation.estimators.heading.figures import IN_PAUSE
 from groundstation.estimators.heading.references import REFERENCE_SIGMA_DEG, logged_reference
+from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, answer_values
 from groundstation.reports.index import index_row, reasons_of
+from groundstation.results.columns import Kind
 from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.figures import FigureData, flags, numbers, texts
 from groundstation.results.files import SavedFlight, utf8_text
-from groundstation.results.fleet import FLIGHT_COLUMNS, Kind, SessionRow
+from groundstation.results.fleet import SessionRow
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.heading import HeadingResult
 
@@ -69,26 +71,17 @@ def to_number(value: Any) -> float:
 def flight_row(saved: SavedFlight, samples: HeadingSamples | None) -> dict[str, Any]:
     """Build the row of a flight: a value for every one of :data:`FLIGHT_COLUMNS`, of the type its kind has."""
     results = saved.results
-    start, heading = results.start_utc_ns, results.answer(HeadingResult)
+    start = results.start_utc_ns
     start = start if start is not None and abs(start) < LATEST_NS else None
     moments = samples.moments if samples is not None else Moments()
-    standstill = heading.standstill if heading else None
     found: dict[str, Any] = vars(index_row(saved)) | {
         "flight_id": saved.folder.name,
         "start_utc": start,
         "month": "" if start is None else str(np.datetime64(start, "ns").astype("datetime64[M]")),
         "has_lost_data": results.ledger.loses_data,
         "not_assessable": "; ".join(reasons_of(results)),
-        "standstill_speed_of_mean_mps": standstill.speed_of_mean_mps if standstill else None,
+        **answer_values(results),
     }
-    if heading is not None:
-        found |= {
-            "paper_error_deg": heading.paper_error_deg,
-            "drift_sigma_deg_per_h": heading.drift_sigma_deg_per_h,
-            "lever_arm_m": heading.lever_arm_m,
-            "time_offset_s": heading.time_offset_s,
-            "parking_sigma_deg": heading.parking_sigma_deg,
-        }
     if moments.count:
         found |= {"samples": moments.count, "sample_mean_deg": moments.mean, "sample_m2_deg2": moments.m2}
     return {column.name: _typed(column.kind, found.get(column.name)) for column in FLIGHT_COLUMNS}

@@ -6,6 +6,7 @@ from pathlib import Path
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
 from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET, write_fleet
+from groundstation.pipeline.many_flights.fleet_columns import INDEXED, answer_values
 from groundstation.pipeline.many_flights.fleet_samples import SAMPLES
 from groundstation.pipeline.many_flights.inputs import (
     FLIGHT_FOLDER_MARK,
@@ -57,13 +58,14 @@ def write_index_of(out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[I
     listed: tuple[tuple[Kind, list[Path]], ...] = (("flight", flight_folders(out)), ("session", session_folders(out)))
     for kind, folder in ((kind, folder) for kind, folders in listed for folder in folders):
         try:
-            rows.append(index_row(load(folder, ANSWER_TYPES), kind))
+            saved = load(folder, ANSWER_TYPES)
+            rows.append(index_row(saved, kind, answer_values(saved.results)))
         except GroundstationError as error:
             problems.append(Outcome(str(folder), "failed", str(error)))
     without_flight = [one for one in outcomes if not one.flight_id and not (one.is_session and one.state == "skipped")]
     rows += [failed_row(one.source, one.state, one.text) for one in (*without_flight, *problems)]
     try:
-        write_index(out, rows)
+        write_index(out, rows, INDEXED)
     except OSError as error:
         problems.append(Outcome(str(out), "failed", f"{out}: the index cannot be written ({error.strerror or error})"))
     return tuple(problems)

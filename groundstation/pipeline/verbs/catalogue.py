@@ -25,6 +25,7 @@ def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict
             *_scenarios(),
             *_approaches(),
             *_sessions(),
+            *_plans(),
             *_studies(),
         ]
     folder = log.parent if log.name == SUMMARY else log
@@ -110,6 +111,22 @@ def _sessions() -> list[dict[str, Any]]:
     return [
         {"kind": "session", "name": name, "title": load_session(name).title, "needs": "nothing"}
         for name in session_names()
+    ]
+
+
+def _plans() -> list[dict[str, Any]]:
+    from groundstation.estimators.analyses import PLANS
+    from groundstation.studies.shipped_plans import load_plan, plan_names
+
+    return [
+        {
+            "kind": "plan",
+            "name": f"{plan.name} {name}",
+            "title": load_plan(plan, name).scenario.title,
+            "needs": "nothing",
+        }
+        for plan in PLANS
+        for name in plan_names(plan)
     ]
 
 

@@ -17,6 +17,7 @@ STUDIES = {
     "forecast": "forecast of INS errors: every method under true and false models, and how honest its sigma is",
     "magnetic": "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
     "cooperative": "navigation between aircraft: published figures with ours beside them, divergence, consistency",
+    "control": "control of a session and placement of ground points: published figures with ours, laws flown",
     "landing": "landing by reference points and by locators: every published figure with ours beside it",
     "approach": "recorded approaches: the localizer as a reference for positions, how honest its interval is",
 }
@@ -87,8 +88,12 @@ def _session_to(name: str, folder: Path, seed: int | None, *, force: bool) -> li
     return write_session(scenario, folder, stem, seed)
 
 
-def study_to(name: str, folder: Path, *, runs: int, seed: int, force: bool, listen: Listener) -> str:
+def study_to(
+    name: str, folder: Path, *, runs: int, seed: int, force: bool, listen: Listener, recorded: Path | None = None
+) -> str:
     """Run a study into a folder: ``<name>.md`` and tables/*.csv; returns the page's text.
+
+    With ``recorded``, a folder with sets of recorded robots, the cooperative study runs on these instead.
 
     Raises
     ------
@@ -97,7 +102,7 @@ def study_to(name: str, folder: Path, *, runs: int, seed: int, force: bool, list
     """
     from groundstation.results.files import csv_text, write_text
 
-    study = _study(name)
+    study = _study(name) if recorded is None else _study_of(name, recorded)
 
     page = folder / f"{name}.md"
     if page.exists() and not force:
@@ -111,6 +116,19 @@ def study_to(name: str, folder: Path, *, runs: int, seed: int, force: bool, list
     (folder / STUDY_MARK).touch()
     listen(Event("end", name, str(page)))
     return result.markdown
+
+
+def _study_of(name: str, recorded: Path) -> "Callable[..., StudyResult]":
+    """The study of recorded sets as a function that takes what the others take."""
+    if name != "cooperative":
+        raise UsageError("study", f"--recorded with {name}", "cooperative")
+    from groundstation.pipeline.verbs.recorded import recorded_sets
+    from groundstation.studies.recorded import study_recorded
+
+    def run(runs: int, seed: int, progress: Callable[[str], None]) -> "StudyResult":
+        return study_recorded(recorded_sets(recorded), progress)
+
+    return run
 
 
 def _study(name: str) -> "Callable[..., StudyResult]":
@@ -131,6 +149,10 @@ def _study(name: str) -> "Callable[..., StudyResult]":
         from groundstation.studies.cooperative import study_cooperative
 
         return study_cooperative
+    if name == "control":
+        from groundstation.studies.control import study_control
+
+        return study_control
     if name == "landing":
         from groundstation.studies.landing import study_landing
 

@@ -19,6 +19,7 @@ from groundstation.reports.figures import (
     magnetic,
     magnetic_ground,
     overview,
+    placement,
     quality,
     standstill,
 )
@@ -68,6 +69,8 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "control.paths": control.paths,
     "control.measures": control.measures,
     "control.law": control.law,
+    "placement.map": placement.accuracy_map,
+    "placement.accuracy": placement.accuracy,
 }
 
 

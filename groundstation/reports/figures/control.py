@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.angles import unwrap
 from groundstation.chapters.control import title_of
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
@@ -151,6 +152,6 @@ def law(results: FlightResults) -> Drawing | None:
 
 
 def _unwrapped(data: FigureData, rows: NDArray[np.bool_], start_deg: float) -> NDArray[np.float64]:
-    """Headings without jumps through north, beginning near the start."""
-    track = np.unwrap(numbers(data, "track_deg")[rows], period=360.0)
-    return np.asarray(track + 360.0 * np.round((start_deg - track[0]) / 360.0))
+    """Headings without jumps through north, beginning at the start."""
+    track = unwrap(numbers(data, "track_deg")[rows])
+    return np.asarray(start_deg + track - track[0])

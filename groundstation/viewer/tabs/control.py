@@ -1,9 +1,13 @@
 """Control of a session: the aircraft moving in space under the recommended law, the law, accuracy and geometry."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from groundstation.base.angles import unwrap
+from groundstation.base.records import BoolArray, Int64Array
 from groundstation.chapters.control import control as chapter
 from groundstation.chapters.control import title_of
 from groundstation.chapters.markdown import markdown
@@ -17,14 +21,14 @@ from groundstation.viewer.series import FloatArray
 from groundstation.viewer.views import document, figure_of, numbers, plot
 
 MARK, TRAIL, RANGE = 5.0, 1.2, 0.8  # radii in points of the screen
-THIN = 1.0
+THIN, BOLD = 1.0, 2.0
 MEASURES = (
     ("two_sigma_north_m", "2σ north, m"),
     ("two_sigma_east_m", "2σ east, m"),
     ("determinant", "det(H'H)"),
     ("dop", "DOP"),
 )
-CONTROLS = (("speed_mps", "speed", "Speed, m/s"), ("track_deg", "heading", "Track, deg"))
+COLUMN = {"speed": "speed_mps", "heading": "track_deg"}
 
 
 def control(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
@@ -85,42 +89,38 @@ def _ranges(recorder: Recorder, judged: str, ways: dict[str, FloatArray], time_s
 
 
 def _laws(recorder: Recorder, answer: ControlPlan, paths: FigureData) -> list[rrb.View]:
-    """Every control with time, a view each, every law a line."""
-    law, aircraft, views = paths["law"].astype(np.str_), paths["aircraft"].astype(np.str_), list[rrb.View]()
-    for column, kind, title in CONTROLS:
-        for row in answer.controls:
-            if row.control != kind:
-                continue
-            path = f"control/{kind}/{path_parts([row.aircraft])[0]}"
-            _by_law(recorder, answer, path, paths, column, law, aircraft == row.aircraft)
-            views.append(plot(f"{clean_text(row.aircraft)}: {title}", path, legend=not views))
+    """Every control with time, a view each, every law a line; headings do not jump at north."""
+    aircraft, views = paths["aircraft"].astype(np.str_), list[rrb.View]()
+    for row in answer.controls:
+        path = f"control/{row.control}/{path_parts([row.aircraft])[0]}"
+        for law, rows, line in _lines(answer, paths, aircraft == row.aircraft):
+            values = numbers(paths, COLUMN[row.control])[rows]
+            if row.control == "heading":
+                values = row.start + unwrap(values) - values[0]
+            recorder.lines(f"{path}/{law}", recorder.time_ns(numbers(paths, "time_s")[rows]), values[:, None], [line])
+        unit = "m/s" if row.control == "speed" else "deg"
+        views.append(plot(f"{clean_text(row.aircraft)}: {row.control}, {unit}", path, legend=False))
     return views
 
 
 def _measures(recorder: Recorder, answer: ControlPlan, results: FlightResults) -> list[rrb.View]:
+    """Accuracy and geometry with time, every law a line; from the first ranges on, or the scale would hide the rest."""
     data = figure_of(results, "control_measures", "time_s", "law", *(column for column, _ in MEASURES))
     if data is None:
         return []
-    law, views = data["law"].astype(np.str_), list[rrb.View]()
+    views, time_s = list[rrb.View](), numbers(data, "time_s")
     for column, title in MEASURES:
         path = f"control/measures/{column}"
-        _by_law(recorder, answer, path, data, column, law, np.ones(len(data), dtype=bool))
+        for law, rows, line in _lines(answer, data, time_s > 0.0):
+            values = numbers(data, column)[rows][:, None]
+            recorder.lines(f"{path}/{law}", recorder.time_ns(time_s[rows]), values, [line])
         views.append(plot(f"{clean_text(answer.judged)}: {title}", path, legend=not views))
     return views
 
 
-def _by_law(
-    recorder: Recorder,
-    answer: ControlPlan,
-    path: str,
-    data: FigureData,
-    column: str,
-    law: np.ndarray,
-    used: np.ndarray,
-) -> None:
-    shades = colours.for_series(len(answer.laws))
+def _lines(answer: ControlPlan, data: FigureData, used: BoolArray) -> Iterator[tuple[str, Int64Array, Line]]:
+    """Rows of each law, and how its line looks."""
+    of, shades = data["law"].astype(np.str_), colours.for_series(len(answer.laws))
     for row, shade in zip(answer.laws, shades, strict=True):
-        mine = used & (law == row.law)
-        time_ns = recorder.time_ns(numbers(data, "time_s")[mine])
-        line = Line(title_of(row.law), shade, THIN)
-        recorder.lines(f"{path}/{row.law}", time_ns, numbers(data, column)[mine][:, None], [line])
+        width = BOLD if row.law == answer.recommended else THIN
+        yield row.law, np.flatnonzero(used & (of == row.law)), Line(title_of(row.law), shade, width)

@@ -1,0 +1,32 @@
+"""What the INS errors and their forecast give to the tables of flights."""
+
+from groundstation.results.columns import AnswerColumn
+from groundstation.results.forecast import ForecastResult
+from groundstation.results.inertial import InertialResult
+
+INERTIAL_COLUMNS: tuple[AnswerColumn[InertialResult], ...] = (
+    AnswerColumn("ins_kind", "category", "unaided, gnss_aided or unknown", lambda inertial: inertial.kind),
+    AnswerColumn("radial_error_rate_50_nmiph", "number", "INS radial position error rate, half of the time below"),
+    AnswerColumn("radial_error_rate_95_nmiph", "number", "the same, 95 % of the time below"),
+)
+
+
+def _rms_m(forecast: ForecastResult, horizon_min: float) -> float | None:
+    """RMS of the shipped method at a horizon; None where it was not replayed."""
+    rows = {row.horizon_min: row.rms_m for row in forecast.skill if row.method == forecast.default_method}
+    return rows.get(horizon_min)
+
+
+FORECAST_COLUMNS: tuple[AnswerColumn[ForecastResult], ...] = (
+    AnswerColumn(
+        "forecast_method", "category", "method the forecast figures belong to", lambda forecast: forecast.default_method
+    ),
+    AnswerColumn(
+        "forecast_30min_rms_m",
+        "number",
+        "radial error of the forecast after 30 min, RMS over starts",
+        lambda forecast: _rms_m(forecast, 30.0),
+    ),
+    AnswerColumn("forecast_60min_rms_m", "number", "after 60 min", lambda forecast: _rms_m(forecast, 60.0)),
+    AnswerColumn("forecast_120min_rms_m", "number", "after 120 min", lambda forecast: _rms_m(forecast, 120.0)),
+)

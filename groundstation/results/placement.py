@@ -1,0 +1,124 @@
+"""Answer of a planned session: where ground points should stand."""
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from groundstation.results.figures import FigureData
+from groundstation.results.plan import PlanAnswer
+
+GIVEN = "given"
+
+
+@dataclass(frozen=True)
+class DesignRow:
+    """One set of places and the accuracy it leads to.
+
+    Parameters
+    ----------
+    design : str
+        ``given``, or criterion and what it is best for: ``determinant_fixed``, ``covariance_way``, ``covariance_lost``.
+    determinant, eigenvalue, dop : float
+        Of H'H at the fixed point, in the axes asked for.
+    two_sigma_north_m, two_sigma_east_m, two_sigma_up_m : float
+        At the fixed point, as the filter computes them on its way there.
+    worst_two_sigma_north_m, worst_two_sigma_east_m, worst_two_sigma_up_m : float
+        Each the largest over the part of the way that counts.
+    lost : str
+        The ground point whose loss costs most at the fixed point; empty where none may be lost.
+    lost_two_sigma_north_m, lost_two_sigma_east_m, lost_two_sigma_up_m : float or None
+        At the fixed point without it.
+    gap : float
+        First-order gain left within a hundredth of the rectangle, over the loss.
+    has_converged : bool
+    iterations, evaluations, starts : int
+    start_spread : float
+        Largest loss over the least one among the starts, less 1.
+    """
+
+    design: str
+    determinant: float
+    eigenvalue: float
+    dop: float
+    two_sigma_north_m: float
+    two_sigma_east_m: float
+    two_sigma_up_m: float
+    worst_two_sigma_north_m: float
+    worst_two_sigma_east_m: float
+    worst_two_sigma_up_m: float
+    lost: str
+    lost_two_sigma_north_m: float | None
+    lost_two_sigma_east_m: float | None
+    lost_two_sigma_up_m: float | None
+    gap: float
+    has_converged: bool
+    iterations: int
+    evaluations: int
+    starts: int
+    start_spread: float
+
+
+@dataclass(frozen=True)
+class PlaceRow:
+    """Where one point stands in one design.
+
+    ``keep_out_distance_m`` is that to the nearest edge of what is kept out; ``below_way_m`` how far below the way it
+    stands, None where the way does not lead over it.
+    """
+
+    design: str
+    point: str
+    north_m: float
+    east_m: float
+    height_m: float
+    is_placed: bool
+    keep_out_distance_m: float | None
+    below_way_m: float | None
+
+
+@dataclass(frozen=True)
+class PlacementPlan(PlanAnswer):
+    """Where ground points should stand for the accuracy of an aircraft on a given way.
+
+    Parameters
+    ----------
+    judged : str
+        The aircraft whose accuracy counts.
+    recommended : str
+        The design asked for.
+    fixed_at_s, fixed_north_m, fixed_east_m, fixed_height_m : float
+        The fixed point.
+    from_s, to_s : float
+        Part of the way whose worst point counts.
+    designs : tuple of DesignRow
+    places : tuple of PlaceRow
+    moved : str
+        The point that moves in the map.
+    settings : dict
+    figures : tuple of FigureData
+        ``placement_points`` (design, name, north_m, east_m, up_m, is_placed), ``placement_accuracy`` (time_s, design,
+        north_m, east_m, up_m, dop, two_sigma_north_m, two_sigma_east_m, two_sigma_up_m), ``placement_map`` (north_m,
+        east_m, sigma_m, determinant; NaN where a point may not stand), ``placement_keep_out`` (name, north_m, east_m).
+    """
+
+    analysis: ClassVar[str] = "placement"
+    judged: str
+    recommended: str
+    fixed_at_s: float
+    fixed_north_m: float
+    fixed_east_m: float
+    fixed_height_m: float
+    from_s: float
+    to_s: float
+    designs: tuple[DesignRow, ...]
+    places: tuple[PlaceRow, ...] = ()
+    moved: str = ""
+    settings: dict[str, float | str | bool] = field(default_factory=dict)
+    figures: tuple[FigureData, ...] = ()
+
+    def design(self, name: str) -> DesignRow:
+        """The row of a design."""
+        return next(row for row in self.designs if row.design == name)
+
+    def places_of(self, design: str) -> tuple[PlaceRow, ...]:
+        """The places of a design."""
+        return tuple(row for row in self.places if row.design == design)
