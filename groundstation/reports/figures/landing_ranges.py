@@ -13,6 +13,7 @@ from groundstation.results.landing_categories import CATEGORIES, LINEAR_95
 from groundstation.results.landing_ranges import HONEST, WHITE, RangeLanding
 
 M_PER_KM = 1000.0
+NAME_KM = 0.08  # from a point to its name
 MOST_TRIALS = 30
 LEAST_SHOWN_M = 0.1
 
@@ -47,11 +48,10 @@ def space(results: FlightResults) -> Drawing | None:
                     row = int(np.flatnonzero(name == point.name)[0])
                     axes.plot(along[row], across[row], "^", color=d.INK, markersize=5.0)
                     if axes is above:
-                        place = along[row], across[row]
-                        d.beside(axes, *place, d.label(point.name, 16), d.INK, axes.transData, "center")
+                        place = along[row] + NAME_KM, across[row] - 3.5 * NAME_KM
+                        d.beside(axes, *place, d.label(point.name, 16), d.INK, axes.transData, "left")
             axes.set_ylabel(title)
         above.set_aspect("equal", adjustable="datalim")
-        above.margins(y=0.15)
         side.set_xlim(above.get_xlim())
         above.tick_params(labelbottom=False)
         side.set_xlabel("beyond the threshold, km")
@@ -84,7 +84,8 @@ def accuracy(results: FlightResults) -> Drawing | None:
             for value in sorted({getattr(one, limit) for one in CATEGORIES}, reverse=True):
                 named = [one.name for one in CATEGORIES if getattr(one, limit) == value]
                 text = "" if named == [CATEGORIES[-1].name] else f"{named[0]}: {value:g} m"  # too near for a text
-                d.limit_line(axes, value, text)
+                d.limit_line(axes, value, "")
+                d.beside(axes, 0.66, value, text, d.LIMIT, axes.get_yaxis_transform(), "left")
             axes.axvline(0.0, color=d.FAINT, linewidth=0.8)
             axes.set_yscale("log")
             plain_log(axes.yaxis)

@@ -131,7 +131,7 @@ def _accuracy(recorder: Recorder, path: FigureData) -> list[rrb.View]:
         titles = [f"{column.removesuffix('_95_m')} 95 %, m" for column in columns]
         lines = [Line(name, shade, BOLD) for name, shade in zip(titles, shades, strict=True)]
         lines += [Line(one.name, colours.LIMIT, THIN) for one in CATEGORIES]
-        entity, most = f"landing_ranges/{title}", 2.0 * max(limits)
+        entity, most = f"landing_ranges/{title}", 4.0 * max(limits)
         recorder.lines(entity, time_ns, np.column_stack(values), lines)
         views.append(plot(f"{title.capitalize()} 95 %, m (cut at {most:g})", entity, axis_range=(0.0, most)))
     return views
