@@ -15,6 +15,7 @@ from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES, PLA
 from groundstation.reports.drawing import Drawing, draw, sketching
 from groundstation.reports.figures import with_drawings
 from groundstation.results.answer import Answer, by_analysis
+from groundstation.results.columns import AnswerColumn
 from groundstation.results.figures import FigureData
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults
@@ -213,3 +214,9 @@ def test_every_shipped_answer_has_a_chapter_of_its_own() -> None:
 def test_tabs_name_analyses_that_there_are() -> None:
     named = [*SHOWN_ELSEWHERE, *(name for _, names in ANSWER_TABS for name in names)]
     assert sorted(named) == sorted({analysis.name for analysis in FLIGHT_ANALYSES})
+
+
+def test_a_column_without_a_field_is_refused_where_the_analysis_is_defined() -> None:
+    heading = next(analysis for analysis in FLIGHT_ANALYSES if analysis.name == "heading")
+    with pytest.raises(TypeError, match="HeadingResult has no field for the columns eror_deg"):
+        replace(heading, columns=(AnswerColumn("eror_deg", "number", "misspelt"),))

@@ -196,16 +196,8 @@ def test_a_beacon_of_a_runway_that_is_not_there_is_refused() -> None:
 
 
 def test_a_log_of_a_simulated_approach_from_file_to_summary(tmp_path: Path) -> None:
-    simulate_to("approach-beacons", tmp_path / "log")
-    _, places = flown(approach_scenario())
-    site = [f'[[runways]]\nname = "06"\ntrue_bearing_deg = {places.course_deg:.4f}\n']
-    site += [
-        f'[[beacons]]\nname = "{one.name}"\nbefore_threshold_m = {one.before_threshold_m}\nright_m = {one.right_m}\n'
-        for one in BEACONS
-    ]
-    (tmp_path / "site.toml").write_text("\n".join(site), encoding="utf-8")
-    configuration = load_configuration(site=tmp_path / "site.toml")
-    log = next((tmp_path / "log").glob("*.csv"))
+    log, site = simulate_to("approach-beacons", tmp_path / "log")
+    configuration = load_configuration(site=site)
     (outcome,) = run_many([str(log)], str(tmp_path / "out"), configuration, jobs=1, with_pdf=False)
     assert "approach by bearings" in outcome.text
     back = load(Path(outcome.folder)).results.answer(BeaconLanding)

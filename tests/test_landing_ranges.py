@@ -7,7 +7,7 @@ import pytest
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.errors import SettingsError
-from groundstation.estimators.landing_ranges.answer import HONEST, TOUCHDOWN, WHITE, category_spans, range_landing
+from groundstation.estimators.landing_ranges.answer import category_spans, range_landing
 from groundstation.estimators.landing_ranges.filter import (
     covariance_along,
     filter_ranges,
@@ -25,6 +25,7 @@ from groundstation.estimators.landing_ranges.scenario import (
     StraightPath,
 )
 from groundstation.estimators.landing_ranges.trials import draw_errors, fly_trials
+from groundstation.results.landing_ranges import HONEST, TOUCHDOWN, WHITE
 
 PAIR = (GroundPoint("left", 0.0, -1000.0), GroundPoint("right", 0.0, 1000.0))
 THIRD = (*PAIR, GroundPoint("third", 100.0, 0.0))
@@ -107,7 +108,7 @@ def test_three_points_on_the_ground_leave_no_aircraft_below_it() -> None:
     assert np.abs(trials.error_m[:, -1, 2]).max() < 4.0 * trials.sigma_m[:, -1, 2].max()
 
 
-def test_correlated_ranges_taken_for_white_make_a_filter_too_sure() -> None:
+def test_correlated_ranges_taken_for_white_make_a_filter_overconfident() -> None:
     scenario = replace(FOUR, noise=CORRELATED, trials=6, seed=3)
     answer = range_landing(scenario)
     honest, white = ([row for row in answer.trials if row.filter == name][-1] for name in (HONEST, WHITE))

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -10,6 +11,7 @@ from typer.testing import CliRunner
 
 from groundstation.cli.main import app
 from groundstation.estimators.analyses import ANSWER_TYPES, PLANS
+from groundstation.estimators.control.scenario import SessionPlan
 from groundstation.estimators.plan import Plan
 from groundstation.pipeline.many_flights.inputs import flight_folders, plan_folders
 from groundstation.pipeline.many_flights.publishing import report_again
@@ -117,6 +119,14 @@ def test_a_plan_is_made_again_in_its_folder_and_nowhere_else(tmp_path: Path) -> 
     assert groundstation("plan", "session", file, "-o", str(other), "--no-pdf")[0] == 2
 
 
+def test_a_warning_stands_in_the_line_of_the_plan(tmp_path: Path) -> None:
+    on_one_line = LEAST.replace("east_m = 1000", "east_m = 0").replace("east_m = 2000", "east_m = 0")
+    file, out = scenario(tmp_path, on_one_line), str(tmp_path / "out")
+    code, text, _ = groundstation("plan", "session", file, "-o", out, "--no-pdf")
+    assert code == 0 and "warning: the sources do not tell north and east apart" in text
+    assert groundstation("plan", "session", file, "-o", out, "--no-pdf", "--fail-on", "warn")[0] == 4
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [
@@ -154,8 +164,76 @@ def test_the_scenarios_that_are_shipped_are_listed_and_read() -> None:
     assert groundstation("plan", "session")[0] == 2
 
 
+def quick(scenario: object) -> object:
+    """The scenario with few iterations: the study's tests make plans in full."""
+    if not isinstance(scenario, SessionPlan):
+        return scenario
+    control = replace(scenario.control, starts=0, iterations=5)
+    return replace(scenario, control=control, placement=replace(scenario.placement, starts=0, iterations=5, map_side=5))
+
+
 @pytest.mark.parametrize(("plan", "name"), [(plan, name) for plan in PLANS for name in plan_names(plan)])
 def test_every_shipped_scenario_gives_a_plan(plan: Plan[object], name: str) -> None:
-    planned = plan.run(load_plan(plan, name).scenario)
+    planned = plan.run(quick(load_plan(plan, name).scenario))
     assert planned.answers and plan.sentence(planned.answers)
     assert not [finding for finding in planned.findings if finding.severity == "fail"]
+
+
+LANDING = """
+title = "short final"
+trials = 3
+[path]
+start_m = 1500
+[noise]
+interval_s = 0.1
+white_m = 1
+correlated_m = 1
+[moving]
+[[points]]
+name = "left"
+before_threshold_m = 0
+right_m = -1000
+[[points]]
+name = "right"
+before_threshold_m = 0
+right_m = 1000
+[[points]]
+name = "third"
+before_threshold_m = 100
+right_m = 0
+"""
+
+
+def test_a_landing_is_planned_into_a_folder_with_its_answer_in_a_line(tmp_path: Path) -> None:
+    file = scenario(tmp_path, LANDING)
+    code, text, _ = groundstation("plan", "landing", file, "-o", str(tmp_path / "out"))
+    assert code == 0 and "touchdown, 95 %" in text and "CAT IIIB" in text
+    folder = tmp_path / "out" / "mine"
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator(SCHEMA).validate(summary)
+    assert [row["place"] for row in summary["results"]["landing_ranges"]["rows"]][-1] == "touchdown"
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "Landing by ranges" in page and "integrity, continuity and availability are not shown" in page
+    assert {"landing_ranges_path.csv", "landing_ranges_errors.csv"} <= {
+        one.name for one in (folder / "tables").iterdir()
+    }
+    recording = Contents(folder / "mine.rrd")
+    assert {"/landing/aircraft/now", "/landing/ranges", "/landing_ranges/error_up"} <= set(recording.batches)
+    assert sum(path.startswith("/landing/corridor/") for path in recording.fixed) == 3
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (("start_m = 1500", "runway_length_m = 0"), "runway_length_m"),
+        (("before_threshold_m = 100\nright_m = 0", "before_threshold_m = 0\nright_m = 0\nup_m = 15"), "off the path"),
+        (("white_m = 1", "white_m = 0"), "white_m"),
+        (("[moving]", "[moving]\nspeed_mps = 10"), "its bounds"),
+        (("[moving]", "[moving]\nheight_m = nan"), "height_m"),
+    ],
+)
+def test_a_wrong_landing_is_told_in_a_line(tmp_path: Path, change: tuple[str, str], told: str) -> None:
+    file = scenario(tmp_path, LANDING.replace(*change))
+    code, out, err = groundstation("plan", "landing", file, "-o", str(tmp_path / "out"))
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1 and "mine.toml" in err and told in err

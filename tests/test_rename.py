@@ -19,12 +19,12 @@ PACKAGE = Path(groundstation.__file__).parent
 CHECKED = (
     *("results/heading.py", "results/inertial.py", "base/ledger.py", "integrity/ledger.py"),
     *("estimators/heading/answer.py", "estimators/inertial/estimate.py"),
-    *("reports/index.py", "cli/check_table.py"),
+    *("chapters/heading.py", "chapters/inertial.py", "cli/check_table.py"),
 )
 # Field, and the files that define and make it; those that read it keep the old name.
 RENAMED = (
-    ("estimate_sd_deg", ("results/heading.py", "estimators/heading/answer.py"), "reports/index.py"),
-    ("radial_error_rate_50_nmiph", ("results/inertial.py", "estimators/inertial/estimate.py"), "reports/index.py"),
+    ("estimate_sd_deg", ("results/heading.py", "estimators/heading/answer.py"), "chapters/heading.py"),
+    ("radial_error_rate_50_nmiph", ("results/inertial.py", "estimators/inertial/estimate.py"), "chapters/inertial.py"),
     ("longest_s", ("base/ledger.py", "integrity/ledger.py"), "cli/check_table.py"),
 )
 

@@ -272,14 +272,16 @@ def test_the_algorithm_to_trust(answer: CooperativeResult) -> None:
         changed = tuple(replace(row, **change) for row, change in zip(rows, changes, strict=True))  # type: ignore[arg-type]
         return trusted(replace(answer, algorithms=changed)).algorithm
 
-    sound = {"is_consistent": True, "diverges": False}
-    wrong = {"is_consistent": False, "diverges": False, "rms_m": 5.0}
+    sound = {"is_consistent": True, "diverges": False, "nees": 2.0, "nees_high": 3.0}
+    wrong = {"is_consistent": False, "diverges": False, "rms_m": 5.0, "nees": 4.0, "nees_high": 3.0}
+    careful = {"is_consistent": False, "diverges": False, "rms_m": 5.0, "nees": 0.1, "nees_high": 3.0}
     assert among({**sound, "rms_m": 1.0}, {**sound, "rms_m": 9.0}, {**sound, "rms_m": 5.0}) == "centralised"
     assert among({**sound, "rms_m": 1.0}, {**wrong, "rms_m": 9.0}, {**sound, "rms_m": 5.0}) == "neighbour_exact"
     assert among({**sound, "rms_m": 1.0}, {**sound, "rms_m": 9.0}, wrong) == "centralised"
-    lost = {"is_consistent": True, "diverges": True, "rms_m": 1.0}
+    assert among({**sound, "rms_m": 1.0}, careful, {**sound, "rms_m": 1.0}) == "centralised"  # errs less than it says
+    lost = {**sound, "diverges": True, "rms_m": 1.0}
     assert among({**sound, "rms_m": 1.0}, {**sound, "rms_m": 9.0}, lost) == "centralised"
-    unknown = {"is_consistent": None, "diverges": None, "rms_m": None}
+    unknown = {"is_consistent": None, "diverges": None, "rms_m": None, "nees": None, "nees_high": None}
     assert among(unknown, unknown, unknown) == "centralised"
     assert among(unknown) == "dead_reckoning"
 

@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from groundstation.estimators.landing_ranges.answer import TOUCHDOWN, range_landing
-from groundstation.results.landing_ranges import RangeLanding
+from groundstation.estimators.landing_ranges.answer import range_landing
+from groundstation.estimators.landing_ranges.plan import LANDING_PLAN
+from groundstation.results.landing_ranges import TOUCHDOWN, RangeLanding
 from groundstation.studies import landing_cases
 from groundstation.studies.landing_bearings import bearing_spans, bearing_table
-from groundstation.studies.landing_cases import APPROACHES, CLAIMS, FLOWN, PUBLISHED, SIGMAS, approach, variations
+from groundstation.studies.landing_cases import CLAIMS, FLOWN, PUBLISHED, SIGMAS, approach, variations
+from groundstation.studies.landing_runs import run_approaches
 from groundstation.studies.landing_tables import (
     category_table,
     holds,
@@ -17,6 +19,7 @@ from groundstation.studies.landing_tables import (
     trial_table,
     variation_table,
 )
+from groundstation.studies.shipped_plans import plan_names
 
 
 @pytest.fixture(scope="module")
@@ -25,8 +28,8 @@ def answers() -> dict[str, RangeLanding]:
 
 
 def test_every_case_names_a_shipped_approach() -> None:
-    assert {*FLOWN, *PUBLISHED} <= set(APPROACHES.names())
-    assert all(approach(name).title for name in APPROACHES.names())
+    assert {*FLOWN, *PUBLISHED} <= set(plan_names(LANDING_PLAN))
+    assert all(approach(name).title for name in plan_names(LANDING_PLAN))
 
 
 def test_published_sigmas_are_found_within_a_factor_of_two(answers: dict[str, RangeLanding]) -> None:
@@ -64,9 +67,14 @@ def test_height_at_touchdown_follows_the_wander_of_the_barometer() -> None:
     assert up["3 m each 0.5 s"] > 3.0
 
 
-def test_trials_are_told_with_their_limits() -> None:
-    scenario = replace(approach("moving-fourth"), noise=landing_cases.RangeNoise(interval_s=0.1), trials=3)
-    answer = range_landing(scenario)
+def test_trials_are_flown_in_processes_and_told_with_their_limits() -> None:
+    scenario = replace(approach("moving-fourth"), noise=landing_cases.RangeNoise(interval_s=0.1))
+    told: list[str] = []
+    found = run_approaches({"one": scenario, "two": scenario}, {"one": 3}, 7, told.append)
+    assert told == ["one: 3 approaches", "two: 0 approaches"]
+    assert found["two"].trials == ()
+    answer = found["one"]
+    assert answer.trials == range_landing(replace(scenario, trials=3, seed=7)).trials
     table = trial_table({"one": answer})
     assert len(table) == len(answer.trials)
     assert set(table["trials"]) == {3}

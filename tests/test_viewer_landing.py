@@ -14,6 +14,7 @@ from groundstation.results.flight import FlightResults, Source
 from groundstation.results.landing import LandingResult
 from groundstation.simulation.approach import load_approach, simulate_approach
 from groundstation.viewer.recording import write_recording
+from groundstation.viewer.tabs.landing import SEEN_M
 from tests.recording_contents import Contents
 from tests.test_approaches import found, site
 
@@ -61,9 +62,12 @@ def test_the_tab_shows_the_samples_of_the_answer(with_site: FlightResults, tmp_p
     answer = with_site.answer(LandingResult)
     assert answer is not None
     path = answer.figures[0]
-    shown = contents.scalars("/landing/1/lateral/guidance")[1].ravel()
-    expected = path["lateral_guidance_m"]
+    shown = contents.scalars("/landing/1/motion")[1][:, 0]
+    expected = path["sink_rate_mps"]
     assert np.array_equal(shown[np.isfinite(shown)], expected[np.isfinite(expected)])
+    near = (path["distance_m"] < SEEN_M) & np.isfinite(path["lateral_guidance_m"])
+    moved = sum(batch.num_rows for batch in contents.batches["/landing/1/lateral/aircraft"])
+    assert moved == near.sum() > 20
     corridors = {f"/landing/1/space/corridor/{name}" for name in ("CAT_I", "CAT_II_and_IIIA", "CAT_IIIB")}
-    assert corridors | {"/landing/1/space/track"} <= set(contents.fixed)
+    assert corridors | {"/landing/1/space/positions", "/landing/1/space/guidance"} <= set(contents.fixed)
     assert "/landing/1/space/aircraft" in contents.batches

@@ -89,16 +89,23 @@ def cooperative(results: FlightResults) -> Section | None:
 def trusted(answer: CooperativeResult) -> AlgorithmRow:
     """The algorithm to trust.
 
-    The default, unless the truth speaks against it: then, of those that neither diverge nor are inconsistent, the one
-    with the least error, where there is any. One session is too little to choose by its error alone. Dead reckoning
-    only where nothing else ran.
+    The default, unless the truth speaks against it: then, of those that neither diverge nor claim less error than they
+    make, the one with the least error, where there is any. One session is too little to choose by its error alone. Dead
+    reckoning only where nothing else ran.
     """
     ran = [row for row in answer.algorithms if row.algorithm != REFERENCE] or list(answer.algorithms)
     default = next((row for row in ran if row.algorithm == answer.default_algorithm), ran[0])
-    sound = [row for row in ran if row.is_consistent and row.diverges is False and is_number(row.rms_m)]
+    sound = [row for row in ran if _is_safe(row)]
     if default in sound or not sound:
         return default
     return min(sound, key=lambda row: (row.rms_m or 0.0, row.algorithm))
+
+
+def _is_safe(row: AlgorithmRow) -> bool:
+    """Whether truth shows neither divergence nor a sigma that is too small; one that is too large misleads nobody."""
+    if row.nees is None or row.nees_high is None:
+        return False
+    return row.diverges is False and row.nees <= row.nees_high
 
 
 def title_of(algorithm: str) -> str:
@@ -175,17 +182,19 @@ def _reason(answer: CooperativeResult, best: AlgorithmRow) -> str:
             f"{name} is the algorithm to trust by its construction: no log holds a truth, so nothing judges the errors "
             "or whether the computed sigma is honest."
         )
-    if best.diverges or not best.is_consistent:
+    if not _is_safe(best):
         return (
-            f"No algorithm is consistent with the truth without diverging; {name} is the default, and its sigma is not "
-            "to be trusted."
+            f"Against the truth every algorithm diverges or is overconfident; {name} is the default, and its sigma is "
+            "not to be trusted."
         )
-    if best.algorithm == answer.default_algorithm:
+    if best.algorithm != answer.default_algorithm:
+        return (
+            f"{name} has the least error of the algorithms that neither diverge nor are overconfident; the default, "
+            f"{title_of(answer.default_algorithm)}, is not among them."
+        )
+    if best.is_consistent:
         return f"{name}: its errors against the truth are consistent with its computed sigma, and it does not diverge."
-    return (
-        f"{name} has the least error of the algorithms that are consistent with the truth and do not diverge; the "
-        f"default, {title_of(answer.default_algorithm)}, is not among them."
-    )
+    return f"{name}: its errors against the truth are smaller than its computed sigma says, and it does not diverge."
 
 
 def _advice(answer: CooperativeResult, best: AlgorithmRow) -> Note:

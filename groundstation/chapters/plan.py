@@ -3,15 +3,21 @@
 from groundstation.base.findings import worst
 from groundstation.chapters.chapter import Chapter
 from groundstation.chapters.control import control
+from groundstation.chapters.landing_ranges import landing_ranges
 from groundstation.chapters.parts import Cell, Facts, Front, Mark, Note
 from groundstation.chapters.placement import placement
 from groundstation.results.control import ControlPlan
 from groundstation.results.flight import FlightResults
+from groundstation.results.landing_ranges import RangeLanding
 from groundstation.results.placement import PlacementPlan
 from groundstation.results.plan import PlanAnswer
 
 # In the order of the report. An answer that none of them tells has the generic chapter.
-PLAN_CHAPTERS: tuple[Chapter, ...] = (Chapter((ControlPlan,), control), Chapter((PlacementPlan,), placement))
+PLAN_CHAPTERS: tuple[Chapter, ...] = (
+    Chapter((ControlPlan,), control),
+    Chapter((PlacementPlan,), placement),
+    Chapter((RangeLanding,), landing_ranges),
+)
 MARKS = {
     None: Mark("good", "Planned"),
     "info": Mark("good", "Planned"),

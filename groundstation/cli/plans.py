@@ -20,7 +20,7 @@ from groundstation.cli.application import (
 )
 
 plans = typer.Typer(
-    help="Plan a session: how aircraft should move for the accuracy of one of them.",
+    help="Plan a session of several aircraft, or a landing by ranges, for the accuracy one needs.",
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -51,6 +51,24 @@ def session(
 ) -> int | None:
     """Plan how aircraft should move, within their bounds, for the accuracy of one of them."""
     return _plan("session", scenario, output, listed, fail_on, no_pdf, force, quiet, verbose, json, progress)
+
+
+@plans.command()
+@answers_with_exit_code
+def landing(
+    scenario: Scenario = None,
+    output: Output = None,
+    listed: Listed = False,
+    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 when a finding is this grave.")] = "none",
+    no_pdf: NoPdf = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+    progress: Progress = "auto",
+) -> int | None:
+    """Plan an approach by ranges to reference points: which category's accuracy is met, and where."""
+    return _plan("landing", scenario, output, listed, fail_on, no_pdf, force, quiet, verbose, json, progress)
 
 
 def _plan(

@@ -11,6 +11,7 @@ from groundstation.estimators.cooperative.analysis import COOPERATIVE
 from groundstation.estimators.heading.analysis import HEADING
 from groundstation.estimators.inertial.analysis import FORECAST, INERTIAL
 from groundstation.estimators.landing_beacons.analysis import LANDING_BEACONS
+from groundstation.estimators.landing_ranges.plan import LANDING_PLAN
 from groundstation.estimators.latency.analysis import LATENCY
 from groundstation.estimators.magnetic.analysis import MAGNETIC, MAGNETIC_GROUND
 from groundstation.estimators.plan import Plan
@@ -21,7 +22,7 @@ FLIGHT_ANALYSES: tuple[Analysis, ...] = (
     *(LANDING, LANDING_BEACONS),
 )
 SESSION_ANALYSES: tuple[Analysis, ...] = (COOPERATIVE,)
-PLANS: tuple[Plan[Any], ...] = (SESSION_PLAN,)
+PLANS: tuple[Plan[Any], ...] = (SESSION_PLAN, LANDING_PLAN)
 
 # What the answers of a saved flight, session or plan become, by the name of their analysis.
 ANSWER_TYPES: Mapping[str, type[Answer]] = MappingProxyType(

@@ -1,8 +1,9 @@
 """One analysis as one object: what it needs, its settings and answer, how it runs, what it says in a line."""
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar, cast
 
 from groundstation.base.findings import Finding
 from groundstation.results.answer import Answer, Answers
@@ -105,6 +106,12 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     sentence: Callable[[Answers], str] = _nothing
     columns: tuple[AnswerColumn[AnswerT], ...] = ()
     check: Callable[[Any, Any], None] = _any_settings
+
+    def __post_init__(self) -> None:
+        known = {field.name for field in dataclasses.fields(cast(Any, self.answer))}
+        unknown = [column.name for column in self.columns if column.of is None and column.name not in known]
+        if unknown:
+            raise TypeError(f"{self.answer.__name__} has no field for the columns {', '.join(unknown)}")
 
     @property
     def settings_table(self) -> str:

@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.normal import NORMAL_95
 
-LINEAR_95 = 1.959964  # 95 % of one Gaussian error lie within so many sigma
+LINEAR_95 = NORMAL_95  # 95 % of one Gaussian error lie within so many sigma
 RADIAL_95 = 2.447747  # the same of the radius of two with equal sigmas: sqrt(-2 ln 0.05)
 _ANGLES, _RATIOS, _HALVINGS = 720, 201, 50
 

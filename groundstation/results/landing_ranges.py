@@ -3,8 +3,12 @@
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
+from groundstation.results.plan import PlanAnswer
+
+TOUCHDOWN = "touchdown"  # place of the last row
+ALL_AXES = "horizontal and vertical"  # axis of a span
+HONEST, WHITE = "models_correlation", "takes_it_for_white"  # filters of the trials
 
 
 @dataclass(frozen=True)
@@ -95,7 +99,7 @@ class TrialRow:
 
 
 @dataclass(frozen=True)
-class RangeLanding(Answer):
+class RangeLanding(PlanAnswer):
     """Landing by ranges to reference points.
 
     Parameters

@@ -15,6 +15,7 @@ from groundstation.base.records import Column
 from groundstation.simulation.landing_settings import AdfSettings, RadioAltimeterSettings, RunwayOfLanding
 from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.readings import Readings, every, quantised
+from groundstation.simulation.scenario import Scenario
 from groundstation.simulation.trajectory import Trajectory
 
 
@@ -55,6 +56,18 @@ def runway_places(trajectory: Trajectory, runway: RunwayOfLanding) -> RunwayPlac
         wrap_180(trajectory.heading_deg - course_deg),
         course_deg,
     )
+
+
+def site_of(trajectory: Trajectory, scenario: Scenario) -> str:
+    """Site file (TOML) of the runway and the beacons of a scenario that has any, else empty."""
+    if scenario.adf is None:
+        return ""
+    course_deg = runway_places(trajectory, scenario.runway).course_deg
+    lines = ["[[runways]]", 'name = "landing"', f"true_bearing_deg = {course_deg:.4f}"]
+    for beacon in scenario.adf.beacons:
+        lines += ["", "[[beacons]]", f'name = "{beacon.name}"', f"before_threshold_m = {beacon.before_threshold_m:g}"]
+        lines.append(f"right_m = {beacon.right_m:g}")
+    return "\n".join((*lines, ""))
 
 
 def adf_readings(

@@ -6,12 +6,11 @@ Source: O. N. Skrypnik, thesis on navigation between aircraft, 2010, chapters 5 
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from groundstation.base.shipped_toml import ShippedToml
-from groundstation.base.toml_settings import settings_from
+from groundstation.estimators.landing_ranges.plan import LANDING_PLAN
 from groundstation.estimators.landing_ranges.scenario import OwnErrors, RangeApproach, RangeNoise
 from groundstation.results.landing_categories import CATEGORIES
+from groundstation.studies.shipped_plans import load_plan
 
-APPROACHES = ShippedToml("groundstation", "plans/landing", "plan of a landing")
 FACTOR = 2.0  # a figure of ours within so many times of the published one counts as the same
 FIRST_SEED = 90_000  # no smaller seed belongs to this study
 Figure = Literal["touchdown_up", "least_along", "least_right", "least_up"]
@@ -76,8 +75,7 @@ FLOWN = ("three-points-axis", "three-points-offset", "three-points-near", "movin
 
 def approach(name: str) -> RangeApproach:
     """A shipped approach."""
-    file = APPROACHES.read(name)
-    return settings_from(RangeApproach, file.table, file.where)
+    return load_plan(LANDING_PLAN, name).scenario
 
 
 def variations() -> dict[str, RangeApproach]:

@@ -21,10 +21,15 @@ def run_approaches(
     wanted = {name: replace(one, trials=trials.get(name, 0), seed=seed) for name, one in approaches.items()}
     found: dict[str, RangeLanding] = {}
     if not any(one.trials for one in wanted.values()):
-        return {name: range_landing(one) for name, one in wanted.items()}
+        return {name: _answer(one) for name, one in wanted.items()}
     with ProcessPoolExecutor(min(WORKERS, os.cpu_count() or 1), mp_context=get_context("spawn")) as pool:
-        for name, answer in zip(wanted, pool.map(range_landing, wanted.values()), strict=True):
+        for name, answer in zip(wanted, pool.map(_answer, wanted.values()), strict=True):
             found[name] = answer
             if progress:
                 progress(f"{name}: {wanted[name].trials} approaches")
     return found
+
+
+def _answer(scenario: RangeApproach) -> RangeLanding:
+    """The answer without its arrays, which no table of the study needs and no process can hand over."""
+    return replace(range_landing(scenario), figures=())

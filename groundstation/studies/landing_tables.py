@@ -4,10 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from groundstation.estimators.landing_ranges.answer import TOUCHDOWN, WHITE
 from groundstation.results.figures import FigureData
 from groundstation.results.landing_categories import CATEGORIES
-from groundstation.results.landing_ranges import AccuracyRow, RangeLanding
+from groundstation.results.landing_ranges import TOUCHDOWN, WHITE, AccuracyRow, RangeLanding
 from groundstation.studies.landing_cases import CLAIMS, FACTOR, SIGMAS, Axis, Figure, PublishedCategory
 
 THRESHOLD = "threshold"

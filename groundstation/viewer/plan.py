@@ -13,10 +13,11 @@ from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.recording import save_stream, send_layout
 from groundstation.viewer.tabs.control import control
 from groundstation.viewer.tabs.generic import generic_tab
+from groundstation.viewer.tabs.landing_ranges import landing_ranges
 from groundstation.viewer.tabs.log import log
 from groundstation.viewer.tabs.placement import placement
 
-PLAN_TABS = (control, placement)  # in the order of the report
+PLAN_TABS = (control, placement, landing_ranges)  # in the order of the report
 
 
 def write_plan_recording(path: Path, results: FlightResults) -> None:

@@ -21,8 +21,8 @@ class LandingSettings:
     threshold to its antenna, ``glide_angle_deg`` and ``threshold_crossing_height_m`` those of the path: each where the
     site file does not say. ``aiming_point_m`` is how far behind the threshold an aircraft touches down, where the
     threshold is not known. ``course_line_m`` is the tolerance of the mean course line at the threshold (10.5, 7.5 and
-    3 m for category I, II and III), ``bend_ddm`` the 95 % amplitude of its bends, ``width_share`` and ``angle_share``
-    the tolerances of its sensitivity and of the glide angle. ``positions_rounded`` says how the recorder writes
+    3 m for category I, II and III), ``bend_ddm`` the 95 % amplitude of its bends, ``width_share``
+    the tolerance of its sensitivity. ``positions_rounded`` says how the recorder writes
     positions; unknown widens the interval by what cutting off would shift them.
     """
 
@@ -56,7 +56,6 @@ class LandingSettings:
     bend_ddm: float = number(0.015, 0.0, 0.1)  # ICAO 3.1.3.4.2, category I near the threshold
     bend_length_m: float = number(1_000.0, 10.0, 10_000.0)  # over which a bend is one
     width_share: float = number(0.17, 0.0, 1.0)  # ICAO 3.1.3.7.3, category I and II
-    angle_share: float = number(0.075, 0.0, 0.5)  # ICAO 3.1.5.1.2, category I and II
     threshold_sigma_m: float = number(1.0, 0.0, 100.0)  # surveyed coordinates
     centre_line_sigma_m: float = number(3.0, 0.1, 50.0)  # a roll-out beside the centre line
     position_curvature_mps2: float = number(1e-3, 0.0, 0.1)  # of an INS error over some minutes

@@ -19,6 +19,10 @@ from groundstation.results.landing_categories import (
     category_met,
 )
 from groundstation.results.landing_ranges import (
+    ALL_AXES,
+    HONEST,
+    TOUCHDOWN,
+    WHITE,
     AccuracyRow,
     CategorySpan,
     RangeLanding,
@@ -28,8 +32,6 @@ from groundstation.results.landing_ranges import (
 
 DECISION_HEIGHTS_M = (("200 ft", 60.96), ("100 ft", 30.48))
 TRIAL_PLACES_M = (3500.0, 2000.0, 1000.0, 500.0, 0.0)  # before the threshold; touchdown besides
-TOUCHDOWN = "touchdown"
-HONEST, WHITE = "models_correlation", "takes_it_for_white"
 
 
 def range_landing(scenario: RangeApproach) -> RangeLanding:
@@ -97,7 +99,7 @@ def category_spans(track: ApproachTrack) -> tuple[CategorySpan, ...]:
     for category in CATEGORIES:
         is_vertical = track.vertical_95_m <= category.vertical_m
         is_met = {
-            "horizontal and vertical": is_vertical & (track.horizontal_95_m <= category.horizontal_m),
+            ALL_AXES: is_vertical & (track.horizontal_95_m <= category.horizontal_m),
             "lateral": track.lateral_95_m <= category.horizontal_m,
             "vertical": is_vertical,
         }
@@ -146,7 +148,7 @@ def _remarks(rows: Sequence[TrialRow]) -> list[str]:
     if wrong:
         places = ", ".join(f"{row.before_threshold_m:.0f} m" for row in wrong)
         remarks.append(
-            f"The filter is over-confident at {places} before the threshold: heights far from any point are badly "
+            f"The filter is overconfident at {places} before the threshold: heights far from any point are badly "
             "known and ranges are curved over their uncertainty."
         )
     white = [row for row in rows if row.filter == WHITE]

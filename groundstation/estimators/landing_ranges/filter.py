@@ -15,6 +15,7 @@ from groundstation.results.landing_categories import axis_95_m, radius_95_m
 OUTPUT_STEP_S = 0.25
 FIRST_PASS, GROWTH = 10, 1.5  # epochs of the first pass; each later one goes so many times as far,
 LONGEST_S = 1.0  # and no further than this
+MIRRORED_SIGMA = 3.0  # below ground by more: the mirror image of the aircraft was found
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,7 @@ def covariance_along(scenario: RangeApproach, *, models_correlation: bool = True
     """Covariance of the filter along the true path, linearised about it."""
     model = error_model(scenario, has_slow_errors=models_correlation)
     run = _Run(scenario, model, nominal_readings(scenario))
-    run.to(len(scenario.time_s), np.zeros_like(scenario.places_m))
+    run.to(len(scenario.time_s), np.zeros_like(scenario.places_m), np.zeros((3, 3)), is_curved=False)
     return run.track()
 
 
@@ -142,7 +143,7 @@ def filter_ranges(
         reference = np.full((count, 3), np.nan)
         if done:
             reference[:done] = run.back_from(done)
-        run.to(until, reference)
+        run.to(until, reference, run.P[np.ix_(PLACE, PLACE)])
         done = until
     return run.track()
 
@@ -161,12 +162,13 @@ class _Run:
         )
         self.every = max(1, round(OUTPUT_STEP_S / scenario.noise.interval_s))
         self.kept = np.arange(0, len(scenario.time_s), self.every)
-        self.x = np.zeros((1, model.size))
+        self.x, self.P = np.zeros((1, model.size)), np.array(model.P0)
         self.place_x, self.place_p = np.empty((len(self.kept), 3)), np.empty((len(self.kept), 3, 3))
         self.innovation = np.empty(readings.range_m.shape)
+        self.height = np.empty((len(scenario.time_s), 2))
         self.outputs = 0
 
-    def to(self, until: int, reference_m: FloatArray) -> None:
+    def to(self, until: int, reference_m: FloatArray, reference_p: FloatArray, *, is_curved: bool = True) -> None:
         """Filter from the start to an epoch (not included); what was kept before the last pass's end stays."""
         from groundstation.estimators.landing_ranges.loop import filter_approach
 
@@ -174,7 +176,7 @@ class _Run:
         moving = (np.arange(3) + model.moving) if model.moving >= 0 else np.zeros(3, dtype=np.int64)
         has_place = np.zeros(self.readings.range_m.shape[1], dtype=np.int64)
         has_place[-1] = model.moving >= 0
-        self.x[:] = 0.0
+        self.x[:], self.P[:] = 0.0, model.P0
         outputs = -(-until // self.every)
         place_x, place_p = np.empty((outputs, 3)), np.empty((outputs, 3, 3))
         filter_approach(
@@ -189,26 +191,37 @@ class _Run:
             model.slow,
             self.readings.place_m[:until],
             frozen(reference_m[:until]),
+            reference_p,
+            is_curved,
             self.readings.points_m[:until],
             self.readings.range_m[:until],
             self.variance_m2,
             self.x,
-            np.array(model.P0),
+            self.P,
             self.every,
             place_x,
             place_p,
             self.innovation[:until],
+            self.height[:until],
         )
         new = slice(self.outputs, outputs)
         self.place_x[new], self.place_p[new], self.outputs = place_x[new], place_p[new], outputs
 
     def back_from(self, epoch: int) -> FloatArray:
-        """Errors of the place at all earlier epochs as the state of this one tells them, shape (epoch, 3)."""
+        """Errors of the place at all earlier epochs as they look from this one, shape (epoch, 3).
+
+        Along and right: by the velocity. Height: smoothed, for the barometer wanders.
+        """
+        from groundstation.estimators.landing_ranges.loop import smooth_walk
+
         x, own = self.x[0], self.scenario.own
         back_s = self.scenario.noise.interval_s * np.arange(epoch - 1, -1, -1.0)
         moved_s = own.velocity_s * np.expm1(back_s / own.velocity_s)
-        reading_m = self.readings.place_m[:epoch, 2]
-        up_m = reading_m - np.abs(reading_m - x[4])  # aircraft stay above ground: ranges do not tell above from below
+        smooth_walk(self.height[:epoch], float(self.model.Q[PLACE[2], PLACE[2]]))
+        up_m = self.height[:epoch, 0].copy()
+        above_m = self.readings.place_m[:epoch, 2] - up_m
+        mirrored = above_m < -MIRRORED_SIGMA * np.sqrt(self.P[PLACE[2], PLACE[2]])
+        up_m[mirrored] += 2.0 * above_m[mirrored]  # aircraft stay above ground: ranges do not tell it from below
         return np.column_stack([x[0] - x[2] * moved_s, x[1] - x[3] * moved_s, up_m])
 
     def track(self) -> ApproachTrack:

@@ -27,6 +27,8 @@ def filter_approach(
     slow: int,
     reading_m: FloatArray,
     reference_m: FloatArray,
+    reference_p: FloatArray,
+    is_curved: bool,
     points_m: FloatArray,
     range_m: FloatArray,
     variance_m2: float,
@@ -36,6 +38,7 @@ def filter_approach(
     place_x: FloatArray,
     place_p: FloatArray,
     innovation: FloatArray,
+    height: FloatArray,
 ) -> None:
     """Filter one approach.
 
@@ -52,6 +55,10 @@ def filter_approach(
         INS and barometric readings of the place.
     reference_m : ndarray, shape (n, 3)
         Errors of those readings about which a range is linearised; NaN: about the filter's own estimate.
+    reference_p : ndarray, shape (3, 3)
+        How wrong those may be.
+    is_curved : bool
+        Whether terms of second order enter.
     points_m : ndarray, shape (n, k, 3)
         Known or reported places of the points.
     range_m : ndarray, shape (n, k)
@@ -62,11 +69,13 @@ def filter_approach(
         Filled: estimated errors of the place and their covariance after each ``every``-th epoch.
     innovation : ndarray, shape (n, k)
         Filled: over its sigma.
+    height : ndarray, shape (n, 2)
+        Filled: estimated error of the height and its variance after every epoch.
 
     Notes
     -----
-    Range = |place - point| + clock + slow error. About the own estimate, its second derivative across the line,
-    (I - u u') / range, times the covariance of the place, c, gives mean tr(c) / 2 and variance tr(c c) / 2 of what the
+    Range = |place - point| + clock + slow error. Its second derivative across the line, (I - u u') / range, times the
+    covariance of the line about which it is linearised, c, gives mean tr(c) / 2 and variance tr(c c) / 2 of what the
     linear term leaves out; both enter (Gaussian filter of second order: Jazwinski, Stochastic Processes and Filtering
     Theory, 1970, section 9.3).
     """
@@ -97,14 +106,19 @@ def filter_approach(
             if not is_own:
                 for a in range(3):
                     mean -= h[a] * (x[0, columns[a]] - reference_m[k, a])
-            for a in range(3 if is_own else 0):  # c = (I - u u') P / distance
+            for a in range(3 if is_curved else 0):  # c = (I - u u') P / distance
                 for b in range(3):
                     total = 0.0
                     for e in range(3):
                         across = (1.0 if a == e else 0.0) - h[a] * h[e]
-                        total += across * p[columns[e], columns[b]]
+                        spread_of = p[columns[e], columns[b]] if is_own else reference_p[e, b]
+                        if moves:
+                            spread_of += p[columns[4 + e], columns[4 + b]]
+                            if is_own:
+                                spread_of -= p[columns[e], columns[4 + b]] + p[columns[4 + e], columns[b]]
+                        total += across * spread_of
                     c[a, b] = total / distance
-            for a in range(3 if is_own else 0):
+            for a in range(3 if is_curved else 0):
                 mean += 0.5 * c[a, a]
                 for b in range(3):
                     spread += 0.5 * c[a, b] * c[b, a]
@@ -124,8 +138,20 @@ def filter_approach(
                 s = update_covariance(states, columns, h, 0, 8, variance_m2 + spread, has_place[:0], p, g, gain)
                 correct_states(states, gain, y, x, 0)
                 innovation[k, i] = y / s**0.5
+        height[k, 0], height[k, 1] = x[0, columns[2]], p[columns[2], columns[2]]
         if k % every == 0:
             for a in range(3):
                 place_x[k // every, a] = x[0, columns[a]]
                 for b in range(3):
                     place_p[k // every, a, b] = p[columns[a], columns[b]]
+
+
+@compiled
+def smooth_walk(height: FloatArray, step_variance: float) -> None:
+    """Smooth the estimates of a random walk in place, as if it were alone: shape (n, 2), estimate and variance.
+
+    Source: Rauch, Tung and Striebel, Maximum likelihood estimates of linear dynamic systems, AIAA Journal 3(8), 1965.
+    """
+    for k in range(len(height) - 2, -1, -1):
+        share = height[k, 1] / (height[k, 1] + step_variance)
+        height[k, 0] += share * (height[k + 1, 0] - height[k, 0])

@@ -163,7 +163,7 @@ class RangeApproach:
     moving: MovingPoint | None = None
     noise: RangeNoise = field(default_factory=RangeNoise)
     own: OwnErrors = field(default_factory=OwnErrors)
-    trials: int = number(20, 0, 1000)
+    trials: int = number(10, 0, 1000)
     seed: int = number(1, 0)
 
     def __post_init__(self) -> None:

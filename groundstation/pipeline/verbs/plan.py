@@ -124,7 +124,8 @@ def _run_into(
     with watch.stage("reporting"):
         problem = write_flight_report(partial, ANSWER_TYPES, with_pdf=with_pdf).problem
     place(partial, target)
-    told = "; ".join(filter(None, (plan.sentence(results.answers), problem)))
+    warned = (f"warning: {finding.text}" for finding in results.findings if finding.severity != "info")
+    told = "; ".join(filter(None, (plan.sentence(results.answers), *warned, problem)))
     state = state_of(worst(results.findings), False, fail_on)
     return Outcome(loaded.name, state, told, results.flight_id, str(target), _digest(loaded), watch.times_s)
 

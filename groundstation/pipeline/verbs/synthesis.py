@@ -27,24 +27,33 @@ def simulate_to(scenario: str, folder: Path, *, seed: int | None = None, force: 
     """Simulate a scenario (a shipped name or a TOML file) into ``<folder>/<scenario>.csv``.
 
     A session of several aircraft gives one log for each, ``<folder>/<session>-<aircraft>.csv``, with stations.toml and
-    settings.toml beside them.
+    settings.toml beside them; landing aids give the site file that belongs to them, ``<scenario>.site.toml``.
 
     Raises
     ------
     UsageError
         When the log is there already and ``force`` is not given, or there is no such scenario.
     """
-    from groundstation.simulation.samples import write_scenario
+    from groundstation.results.files import write_text
+    from groundstation.simulation.flight import simulate
+    from groundstation.simulation.landing_aids import site_of
+    from groundstation.simulation.samples import write_log
     from groundstation.simulation.scenario import load_scenario
 
     if is_session(scenario):
         return _session_to(scenario, folder, seed, force=force)
     if is_approach(scenario):
         return [_approach_to(scenario, folder, seed, force=force)]
-    target = folder / f"{load_scenario(scenario).name}.csv"
+    loaded = load_scenario(scenario)
+    target = folder / f"{loaded.name}.csv"
     if target.exists() and not force:
         raise UsageError(str(target), "a file that exists", "a new folder", "-f overwrites it")
-    return [write_scenario(scenario, folder, seed)]
+    simulated = simulate(loaded, seed)
+    paths, site = [write_log(simulated, folder)], site_of(simulated.trajectory, loaded)
+    if site:
+        paths.append(folder / f"{loaded.name}.site.toml")
+        write_text(paths[-1], site)
+    return paths
 
 
 def is_session(scenario: str) -> bool:

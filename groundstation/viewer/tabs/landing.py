@@ -12,6 +12,7 @@ from groundstation.results.flight import FlightResults
 from groundstation.results.landing import Approach, LandingResult
 from groundstation.results.landing_categories import CATEGORIES
 from groundstation.viewer import colours
+from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after
 from groundstation.viewer.views import document, figure_of, numbers, plot
@@ -20,6 +21,8 @@ SEEN_M = 6_000.0  # of the final, before the threshold
 ENLARGED = 10.0  # across and up against along: corridors of metres along kilometres
 MARK, TRAIL, EDGE = 6.0, 2.0, 0.8  # radii in points of the screen
 THIN, BOLD = 1.0, 2.0
+M_PER_KM = 1000.0
+LEAST_REACH_M, ROOM, BEHIND_M, HEIGHT = 20.0, 1.15, 500.0, 110.0  # of the charts
 MOST_APPROACHES = 6
 SHADES = dict(zip((one.name for one in CATEGORIES), (colours.ORANGE, colours.PINK, colours.YELLOW_GREEN), strict=True))
 SPACE_NAME = (
@@ -37,21 +40,22 @@ def landing(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     tabs = [_approach(recorder, results, one, data) for one in answer.approaches[:MOST_APPROACHES]]
     approaches = tabs[0] if len(tabs) == 1 else rrb.Tabs(contents=tabs, active_tab=0)
     text = document("Approaches", "landing/answer")
-    return rrb.Horizontal(contents=[approaches, text], column_shares=[3.0, 2.0], name="Landing")
+    return rrb.Horizontal(contents=[approaches, text], column_shares=[3.0, 1.5], name="Landing")
 
 
 def _approach(recorder: Recorder, results: FlightResults, one: Approach, data: FigureData) -> rrb.Container:
     mine = np.flatnonzero(numbers(data, "approach") == one.number)
     column = {name: numbers(data, name)[mine] for name in data.columns}
     path = f"landing/{one.number}"
-    views = [*_space(recorder, f"{path}/space", column)]
-    time_ns = recorder.time_ns(column["time_s"])
-    for axis, title in (("lateral", "Right of the course"), ("vertical", "Above the path")):
-        views += _deviation(recorder, f"{path}/{axis}", f"{title}, m", time_ns, column, axis)
-    views += _motion(recorder, f"{path}/motion", time_ns, column)
-    views += _protection(recorder, f"{path}/protection", results, one)
-    name = f"Approach {one.number}"
-    return rrb.Vertical(contents=views, row_shares=[2.0, *[1.0] * (len(views) - 1)], name=name)
+    left = _space(recorder, f"{path}/space", column)
+    left += _motion(recorder, f"{path}/motion", recorder.time_ns(column["time_s"]), column)
+    left += _protection(recorder, f"{path}/protection", results, one)
+    right = _deviation(recorder, f"{path}/lateral", "Right of the course, m", column, "lateral")
+    right += _deviation(recorder, f"{path}/vertical", "Above the path, m", column, "vertical")
+    shares = [2.0, *[1.0] * (len(left) - 1)]
+    columns = [rrb.Vertical(contents=left, row_shares=shares), rrb.Vertical(contents=right)]
+    contents = [view for view, has in zip(columns, (left, right), strict=True) if has]
+    return rrb.Horizontal(contents=contents, name=f"Approach {one.number}")
 
 
 def _place(along_m: FloatArray, across_m: FloatArray, height_m: FloatArray) -> FloatArray:
@@ -60,15 +64,25 @@ def _place(along_m: FloatArray, across_m: FloatArray, height_m: FloatArray) -> F
 
 
 def _space(recorder: Recorder, path: str, column: dict[str, FloatArray]) -> list[rrb.View]:
-    """The end of the final as a track with the aircraft on it, between the frames of the categories."""
+    """The end of the final between the frames of the categories, by positions (grey) and by the guidance.
+
+    The aircraft moves where the guidance has it, else along the positions.
+    """
     distance = column["distance_m"]
     seen = (distance < SEEN_M) & np.isfinite(column["height_m"]) & np.isfinite(column["across_m"])
     if seen.sum() < 2:
         return []
     place = _place(-distance[seen], column["across_m"][seen], column["height_m"][seen])
-    track = rr.LineStrips3D([place], colors=[colours.INS], radii=rr.Radius.ui_points(TRAIL))
-    recorder.static(f"{path}/track", track)
-    before = seen & (distance > 0.0)
+    track = rr.LineStrips3D([place], colors=[colours.SAMPLES], radii=rr.Radius.ui_points(EDGE))
+    recorder.static(f"{path}/positions", track)
+    guided_height = column["path_height_m"] + column["vertical_guidance_m"]
+    guided = (distance < SEEN_M) & np.isfinite(guided_height) & np.isfinite(column["lateral_guidance_m"])
+    if guided.sum() > 1:
+        seen = guided
+        place = _place(-distance[seen], column["lateral_guidance_m"][seen], guided_height[seen])
+        track = rr.LineStrips3D([place], colors=[colours.INS], radii=rr.Radius.ui_points(TRAIL))
+        recorder.static(f"{path}/guidance", track)
+    before = (distance < SEEN_M) & (distance > 0.0)
     for category in CATEGORIES:
         along, height = -distance[before], column["path_height_m"][before]
         edges = [
@@ -93,29 +107,35 @@ def _space(recorder: Recorder, path: str, column: dict[str, FloatArray]) -> list
     return [rrb.Spatial3DView(name=SPACE_NAME, origin=f"/{path}")]
 
 
-def _deviation(
-    recorder: Recorder, path: str, name: str, time_ns: Int64Array, column: dict[str, FloatArray], axis: str
-) -> list[rrb.View]:
-    """Deviation by the guidance on the band of one dot, and by the positions or the height."""
+def _deviation(recorder: Recorder, path: str, title: str, column: dict[str, FloatArray], axis: str) -> list[rrb.View]:
+    """Deviation over the end of the final, in a dot of the guidance and the figures of the categories."""
+    distance, guided, dot = column["distance_m"], column[f"{axis}_guidance_m"], column[f"{axis}_dot_m"]
     placed = column["across_m"] if axis == "lateral" else column["height_m"] - column["path_height_m"]
-    placed = np.where(column["distance_m"] > 0.0, placed, np.nan)
-    guided = column[f"{axis}_guidance_m"]
-    entities = []
-    if np.isfinite(guided).any():
-        known = np.isfinite(guided)
-        half_m = np.where(known, column[f"{axis}_dot_m"], 0.0)
-        style = rr.Measurements.from_fields(names=["one dot, m"], colors=[colours.DIM], widths=[THIN])
-        recorder.static(f"{path}/band", style)
-        columns = rr.Measurements.columns(values=np.where(known, 0.0, np.nan), variances=half_m**2)
-        recorder.stream.send_columns(f"{path}/band", recorder.indexes(time_ns), columns)
-        line = Line("by the guidance, m", colours.INS, BOLD)
-        recorder.lines(f"{path}/guidance", time_ns, guided[:, None], [line], gap_after(time_ns))
-        entities = [f"{path}/band", f"{path}/guidance"]
-    if np.isfinite(placed).any():
-        title = "by the positions, m" if axis == "lateral" else "by the height, m"
-        recorder.dots(f"{path}/placed", time_ns, placed, Line(title, colours.SAMPLES, THIN))
-        entities.append(f"{path}/placed")
-    return [plot(name, entities)] if entities else []
+    placed = np.where(distance > 0.0, placed, np.nan)
+    shown = guided if np.isfinite(guided).any() else placed
+    seen = (distance < SEEN_M) & np.isfinite(shown)
+    if seen.sum() < 2:
+        return []
+    reach = max(LEAST_REACH_M, ROOM * float(np.max(np.abs(shown[seen]))))
+    ends = np.array([-min(SEEN_M, float(distance[seen].max())), BEHIND_M]) / M_PER_KM
+    ahead, off = Axis("distance along the runway, km", *ends.tolist()), Axis(title, -reach, reach)
+    chart = Chart(recorder, path, ahead, off, HEIGHT)
+    along = -distance / M_PER_KM
+    lines = [Line("one dot", colours.DIM, THIN), *(Line(name, shade, THIN) for name, shade in SHADES.items())]
+    halves = [one.horizontal_m if axis == "lateral" else one.vertical_m for one in CATEGORIES]
+    levels = [dot, *(np.full(len(dot), half) for half in halves)]
+    curves = [(along, sign * half, line) for half, line in zip(levels, lines, strict=True) for sign in (1.0, -1.0)]
+    named = [*lines, Line("positions" if axis == "lateral" else "height", colours.SAMPLES, THIN)]
+    named += [Line("guidance", colours.INS, BOLD)]
+    chart.curves("curves", [*curves, (along, placed, named[-2]), (along, guided, named[-1])])
+    chart.key(named)
+    recorder.static(
+        f"{path}/aircraft", rr.Points2D.from_fields(colors=[colours.ANSWER], radii=rr.Radius.ui_points(MARK))
+    )
+    indexes = recorder.indexes(recorder.time_ns(column["time_s"][seen]))
+    points = np.nan_to_num(chart.points(along[seen], shown[seen])).astype(np.float32)
+    recorder.stream.send_columns(f"{path}/aircraft", indexes, rr.Points2D.columns(positions=points))
+    return [chart.view()]
 
 
 def _motion(recorder: Recorder, path: str, time_ns: Int64Array, column: dict[str, FloatArray]) -> list[rrb.View]:
@@ -126,7 +146,7 @@ def _motion(recorder: Recorder, path: str, time_ns: Int64Array, column: dict[str
         return []
     values = np.column_stack([column[name] for name in known])
     recorder.lines(path, time_ns, values, [lines[name] for name in known], gap_after(time_ns))
-    return [plot("Sink rate, m/s, and bank, deg", path)]
+    return [plot("Sink rate, m/s (blue), and bank, deg (orange)", path, legend=False)]
 
 
 def _protection(recorder: Recorder, path: str, results: FlightResults, one: Approach) -> list[rrb.View]:
@@ -147,4 +167,4 @@ def _protection(recorder: Recorder, path: str, results: FlightResults, one: Appr
     time_ns = recorder.time_ns(numbers(data, "time_s")[mine])
     values = np.column_stack([numbers(data, name)[mine] for name in known])
     recorder.lines(path, time_ns, values, [lines[name] for name in known], gap_after(time_ns))
-    return [plot("Protection levels and alarm limits, m", path)]
+    return [plot("Protection levels, m: horizontal orange, vertical green; alarm limit red", path, legend=False)]

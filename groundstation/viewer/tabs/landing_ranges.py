@@ -1,0 +1,169 @@
+"""Landing by ranges: the approach in space with the corridors of the categories, accuracy and errors with time."""
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from groundstation.chapters.landing_ranges import landing_ranges as chapter
+from groundstation.chapters.markdown import markdown
+from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults
+from groundstation.results.landing_categories import CATEGORIES, LINEAR_95
+from groundstation.results.landing_ranges import HONEST, RangeLanding
+from groundstation.viewer import colours
+from groundstation.viewer.names import clean_text, path_parts
+from groundstation.viewer.recorder import Line, Recorder
+from groundstation.viewer.series import FloatArray
+from groundstation.viewer.views import document, figure_of, numbers, plot
+
+MARK, TRAIL, RANGE = 5.0, 1.2, 0.8  # radii in points of the screen
+BOLD, THIN = 1.6, 1.0
+CORRIDORS = (colours.ANSWER, colours.PAPER, colours.OVER_LIMIT)
+TIMES_LARGER = 5.0  # corridors and ellipsoids are drawn so many times their size
+MOST_TRIALS = 10
+VIEW_NAME = f"Along, left, up, m; frames: corridors of CAT I, II, III and ellipsoid of 95 %, {TIMES_LARGER:g} times"
+
+
+def landing_ranges(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
+    """Log the tab; None without an answer."""
+    answer, section = results.answer(RangeLanding), chapter(results)
+    space = figure_of(results, "landing_ranges_space", "time_s", "name", "along_m", "right_m", "up_m", "speed_mps")
+    path = figure_of(results, "landing_ranges_path", "time_s", "sigma_along_m", "vertical_95_m", "determinant")
+    if answer is None or section is None or space is None or path is None:
+        return None
+    recorder.document("landing_ranges/answer", markdown(section))
+    left = [_space(recorder, answer, space, path), document("What was found", "landing_ranges/answer")]
+    right = [*_accuracy(recorder, path), *_errors(recorder, results), *_moving(recorder, space)]
+    columns = [rrb.Vertical(contents=left, row_shares=[2.0, 1.0]), rrb.Vertical(contents=right)]
+    return rrb.Horizontal(contents=columns, column_shares=[1.4, 1.0], name="Landing")
+
+
+def _space(recorder: Recorder, answer: RangeLanding, space: FigureData, path: FigureData) -> rrb.View:
+    """Aircraft and points in space, ranges as lines, corridor frames every half kilometre."""
+    name, time_s = space["name"].astype(np.str_), numbers(space, "time_s")
+    place = np.column_stack([numbers(space, "along_m"), -numbers(space, "right_m"), numbers(space, "up_m")])
+    flown = place[name == "aircraft"]
+    ways = [("aircraft", colours.ANSWER)] + ([("moving", colours.GNSS)] if (name == "moving").any() else [])
+    for which, shade in ways:
+        way = place[name == which]
+        recorder.static(
+            f"landing/{which}/way", rr.LineStrips3D([way], colors=[shade], radii=rr.Radius.ui_points(TRAIL))
+        )
+        mark = rr.Points3D.from_fields(colors=[shade], radii=rr.Radius.ui_points(MARK), labels=[which])
+        recorder.static(f"landing/{which}/now", mark)
+        columns = rr.Points3D.columns(positions=way.astype(np.float32))
+        indexes = recorder.indexes(recorder.time_ns(time_s[name == which]))
+        recorder.stream.send_columns(f"landing/{which}/now", indexes, columns)
+    ground = [(one.name, place[name == one.name][0]) for one in answer.points if not one.is_moving]
+    marks = rr.Points3D(
+        [where for _, where in ground],
+        labels=[clean_text(one) for one, _ in ground],
+        colors=[colours.LIGHT] * len(ground),
+        radii=rr.Radius.ui_points(MARK),
+    )
+    recorder.static("landing/points", marks)
+    length = float(answer.settings["path.runway_length_m"])
+    half = 0.5 * float(answer.settings["path.runway_width_m"])
+    runway = rr.Boxes3D(centers=[[0.5 * length, 0.0, 0.0]], half_sizes=[[0.5 * length, half, 0.5]], labels=["runway"])
+    recorder.static("landing/runway", runway)
+    _corridors(recorder, flown)
+    _ranges(recorder, path, flown, ground, place[name == "moving"])
+    _ellipsoid(recorder, path, flown)
+    recorder.static("landing", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    return rrb.Spatial3DView(name=VIEW_NAME, origin="/landing")
+
+
+def _corridors(recorder: Recorder, flown: FloatArray) -> None:
+    """Frames of each category's corridor across the path, joined by its edges."""
+    for category, shade, part in zip(CATEGORIES, CORRIDORS, path_parts(one.name for one in CATEGORIES), strict=True):
+        wide, high = TIMES_LARGER * category.horizontal_m, TIMES_LARGER * category.vertical_m
+        corners = np.array([(0.0, wide, high), (0.0, -wide, high), (0.0, -wide, -high), (0.0, wide, -high)])
+        frames = flown[:: max(1, len(flown) // 8)][:, None, :] + corners
+        closed = [np.vstack([frame, frame[:1]]) for frame in frames]
+        edges = [frames[:, corner] for corner in range(4)]
+        strips = rr.LineStrips3D([*closed, *edges], colors=[shade], radii=rr.Radius.ui_points(RANGE))
+        recorder.static(f"landing/corridor/{part}", strips)
+
+
+def _ranges(
+    recorder: Recorder,
+    path: FigureData,
+    flown: FloatArray,
+    ground: list[tuple[str, FloatArray]],
+    moving: FloatArray,
+) -> None:
+    """A line from every point to the aircraft."""
+    ends = [np.broadcast_to(where, flown.shape) for _, where in ground] + ([moving] if len(moving) else [])
+    strips = np.stack([np.stack([end, flown], axis=1) for end in ends], axis=1)
+    drawn = rr.LineStrips3D.from_fields(colors=[colours.DIM], radii=rr.Radius.ui_points(RANGE))
+    recorder.static("landing/ranges", drawn)
+    flat = list(strips.reshape(-1, 2, 3).astype(np.float32))
+    columns = rr.LineStrips3D.columns(strips=flat).partition([len(ends)] * len(strips))
+    recorder.stream.send_columns("landing/ranges", recorder.indexes(_time_ns(recorder, path)), columns)
+
+
+def _ellipsoid(recorder: Recorder, path: FigureData, flown: FloatArray) -> None:
+    half = TIMES_LARGER * LINEAR_95 * np.column_stack([numbers(path, f"sigma_{axis}_m") for axis in _AXES])
+    recorder.static(
+        "landing/aircraft/ellipsoid", rr.Ellipsoids3D.from_fields(colors=[(*colours.ANSWER[:3], 90)], fill_mode="solid")
+    )
+    columns = rr.Ellipsoids3D.columns(half_sizes=half.astype(np.float32), centers=flown.astype(np.float32))
+    recorder.stream.send_columns("landing/aircraft/ellipsoid", recorder.indexes(_time_ns(recorder, path)), columns)
+
+
+_AXES = ("along", "right", "up")
+
+
+def _time_ns(recorder: Recorder, figure: FigureData) -> np.ndarray:
+    return recorder.time_ns(numbers(figure, "time_s"))
+
+
+def _accuracy(recorder: Recorder, path: FigureData) -> list[rrb.View]:
+    """95 % figures with the limits of the categories as level lines, and the measure of observability."""
+    time_ns, views = _time_ns(recorder, path), list[rrb.View]()
+    panels = (
+        ("horizontal", ("horizontal_95_m", "lateral_95_m"), [one.horizontal_m for one in CATEGORIES]),
+        ("vertical", ("vertical_95_m",), [one.vertical_m for one in CATEGORIES]),
+    )
+    for title, columns, limits in panels:
+        values = [numbers(path, column) for column in columns] + [np.full(len(path), limit) for limit in limits]
+        shades = colours.for_series(len(columns))
+        titles = [f"{column.removesuffix('_95_m')} 95 %, m" for column in columns]
+        lines = [Line(name, shade, BOLD) for name, shade in zip(titles, shades, strict=True)]
+        lines += [Line(one.name, colours.LIMIT, THIN) for one in CATEGORIES]
+        entity, most = f"landing_ranges/{title}", 4.0 * max(limits)
+        recorder.lines(entity, time_ns, np.column_stack(values), lines)
+        views.append(plot(f"{title.capitalize()} 95 %, m (cut at {most:g})", entity, axis_range=(0.0, most)))
+    return views
+
+
+def _errors(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
+    """Errors of the first simulated approaches in the computed 95 % band."""
+    data = figure_of(results, "landing_ranges_errors", "time_s", "filter", "trial", "error_up_m", "sigma_up_m")
+    if data is None:
+        return []
+    honest, trial, views = data["filter"].astype(np.str_) == HONEST, numbers(data, "trial"), list[rrb.View]()
+    count = min(int(trial.max()), MOST_TRIALS)
+    for axis in _AXES[1:]:
+        first = honest & (trial == 1)
+        band = LINEAR_95 * numbers(data, f"sigma_{axis}_m")[first]
+        rows = [numbers(data, f"error_{axis}_m")[honest & (trial == one)] for one in range(1, count + 1)]
+        lines = [Line("95 %, m", colours.LIMIT, BOLD), Line("95 %, other side, m", colours.LIMIT, BOLD)]
+        lines += [Line(f"approach {one}", colours.DIM, THIN) for one in range(1, count + 1)]
+        entity, most = f"landing_ranges/error_{axis}", 6.0 if axis == "right" else 20.0
+        values = np.clip(np.column_stack([band, -band, *rows]), -most, most)
+        recorder.lines(entity, recorder.time_ns(numbers(data, "time_s")[first]), values, lines)
+        title = f"Error {axis} of simulated approaches, m (cut at {most:g})"
+        views.append(plot(title, entity, axis_range=(-most, most), legend=False))
+    return views
+
+
+def _moving(recorder: Recorder, space: FigureData) -> list[rrb.View]:
+    """Speed of the moving point."""
+    rows = space["name"].astype(np.str_) == "moving"
+    if not rows.any():
+        return []
+    speed = numbers(space, "speed_mps")[rows][:, None]
+    entity = "landing_ranges/speed"
+    recorder.lines(entity, recorder.time_ns(numbers(space, "time_s")[rows]), speed, [Line("speed", colours.GNSS, BOLD)])
+    return [plot("Speed of the moving point, m/s", entity)]
