@@ -9,6 +9,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
 from groundstation.estimators.analysis import Analysis, Found, RestsOn
+from groundstation.estimators.approaches.columns import COLUMNS
 from groundstation.estimators.approaches.figures import path_columns, path_figure, protection_figure
 from groundstation.estimators.approaches.finals import Final, ends_of, final_of
 from groundstation.estimators.approaches.findings import findings_of
@@ -294,4 +295,5 @@ LANDING = Analysis(
     is_expected=_is_expected,
     rests_on=_rests_on,
     sentence=_sentence,
+    columns=COLUMNS,
 )

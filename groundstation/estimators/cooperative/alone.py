@@ -28,6 +28,7 @@ from groundstation.estimators.cooperative.arrays import (
 from groundstation.estimators.cooperative.joint import LEAP_M, PATIENCE, SAME_TIME_S
 from groundstation.estimators.cooperative.motion import place, position, step, turn_covariance, turn_rows
 from groundstation.estimators.cooperative.observation import observe
+from groundstation.estimators.cooperative.plain.split_covariance import ROUNDING
 from groundstation.tables.session import NO_SLOT
 
 EXACT, RANKED, MODIFIED, SPLIT = 0, 1, 2, 3
@@ -797,6 +798,7 @@ def _best_weight(
     for i in range(n):
         one += h[i] * by_dependent[i]
         two += h[i] * by_independent[i]
+    least *= 1.0 - ROUNDING
     for weight in weights:
         S, left = one / weight + two + brought / (1.0 - weight) + sensor, 0.0
         for i in range(n):

@@ -16,6 +16,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 
 WEIGHTS = np.array([0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.995, 0.999])
+ROUNDING = 1e-9  # a smaller gain is none
 
 
 class Fused(NamedTuple):
@@ -64,7 +65,7 @@ def fuse(
     known = np.flatnonzero(before > 0.0)
     left = (np.diagonal(after, axis1=1, axis2=2)[:, known] / before[known]).sum(axis=1)
     best = int(np.argmin(left))
-    if len(weights) > 1 and not left[best] < len(known):
+    if len(weights) > 1 and not left[best] < len(known) * (1.0 - ROUNDING):
         return None
     kept = np.eye(len(P)) - gain[best] @ H
     alone = kept @ independent @ kept.T + gain[best] @ R_independent @ gain[best].T
