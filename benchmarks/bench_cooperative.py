@@ -1,3 +1,5 @@
+from functools import partial
+
 """Navigation between aircraft: the centralised filter against filterpy, and what every filter costs against k.
 
 Ten aircraft in a local frame, 70 states, every direction of every link once a second. filterpy runs the same extended
@@ -28,6 +30,8 @@ from groundstation.estimators.cooperative.events import Prepared, prepare  # noq
 from groundstation.estimators.cooperative.settings import CooperativeSettings  # noqa: E402
 from groundstation.simulation.session import simulate_session  # noqa: E402
 from groundstation.simulation.session_scenario import LinkSettings, SessionAircraft, SessionScenario  # noqa: E402
+
+compiled = partial(run_algorithm, is_repeated=True)
 
 Array = NDArray[np.float64]
 SEED, AIRCRAFT, DURATION_S, SHARED_S = 2010, 10, 500.0, 50.0
@@ -124,18 +128,17 @@ def against_filterpy() -> bool:
     assert ends == len(prepared.events.time_s)
     peer = Peer(prepared)
     x, P = peer.run()
-    run = run_algorithm(prepared, replace(settings, output_step_s=prepared.events.time_s[-1]), "centralised")
+    run = compiled(prepared, replace(settings, output_step_s=prepared.events.time_s[-1]), "centralised")
     sigma = np.sqrt(np.diag(P))
     ours = np.concatenate([track.state[-1] for track in run.tracks])
     spread = np.concatenate([np.sqrt(np.diag(track.covariance[-1])) for track in run.tracks])
     apart = max(float(np.abs((ours - x) / sigma).max()), float(np.abs(spread / sigma - 1.0).max()))
     rounds = [
-        (seconds_of(peer.run), seconds_of(lambda: run_algorithm(prepared, settings, "centralised")))
-        for _ in range(ROUNDS)
+        (seconds_of(peer.run), seconds_of(lambda: compiled(prepared, settings, "centralised"))) for _ in range(ROUNDS)
     ]
     theirs, own = (min(part) for part in zip(*rounds, strict=True))
     whole = prepared_of(session(AIRCRAFT, DURATION_S, 1.0), settings)
-    all_s = min(seconds_of(lambda: run_algorithm(whole, settings, "centralised")) for _ in range(ROUNDS))
+    all_s = min(seconds_of(lambda: compiled(whole, settings, "centralised")) for _ in range(ROUNDS))
     ranges, everything = len(prepared.events.time_s), len(whole.events.time_s)
     print(
         f"centralised, {AIRCRAFT} aircraft, 70 states, {ranges} ranges: filterpy {1e6 * theirs / ranges:.0f} us, "
@@ -154,9 +157,9 @@ def against_number() -> None:
     for count in COUNTS:
         everybody = prepared_of(session(count, 60.0, 2.0), settings)
         two = prepared_of(session(count, 120.0, 2.0, min(2, count - 1)), settings)
-        joint = min(seconds_of(lambda: run_algorithm(everybody, settings, "centralised")) for _ in range(ROUNDS))  # noqa: B023
+        joint = min(seconds_of(lambda: compiled(everybody, settings, "centralised")) for _ in range(ROUNDS))  # noqa: B023
         costs = [
-            min(seconds_of(lambda: run_algorithm(two, settings, name)) for _ in range(ROUNDS)) / count / 60.0  # noqa: B023
+            min(seconds_of(lambda: compiled(two, settings, name)) for _ in range(ROUNDS)) / count / 60.0  # noqa: B023
             for name in ALONE
         ]
         shown = "  ".join(f"{1e6 * cost:7.1f}" for cost in costs)

@@ -19,6 +19,7 @@ from groundstation.studies.cooperative_cases import Case, settings_of
 
 Progress = Callable[[str], None]
 WORKERS = 2
+MANY_RUNS = 20  # from which on compiling the filters pays
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,8 @@ def run_cases(
 ) -> dict[str, tuple[Outcome, ...]]:
     """Every case ``runs`` times; cases of one session see the same flights, whatever the number of workers."""
     outcomes: dict[str, tuple[Outcome, ...]] = {}
-    jobs = [(case, seed, run) for case in cases for run in range(runs)]
+    is_repeated = runs >= MANY_RUNS
+    jobs = [(case, seed, run, is_repeated) for case in cases for run in range(runs)]
     if workers <= 1 or len(jobs) < 8:
         found = [fly(*job) for job in jobs]
         for at, case in enumerate(cases):
@@ -73,21 +75,24 @@ def run_cases(
         return outcomes
     with ProcessPoolExecutor(min(workers, os.cpu_count() or 1), mp_context=get_context("spawn")) as pool:
         for case in cases:
-            several = pool.map(fly, [case] * runs, [seed] * runs, range(runs), chunksize=max(1, runs // (4 * workers)))
+            own = zip(*(job for job in jobs if job[0] is case), strict=True)
+            several = pool.map(fly, *own, chunksize=max(1, runs // (4 * workers)))
             outcomes[case.name] = tuple(several)
             if progress:
                 progress(f"{case.name}: {runs} runs")
     return outcomes
 
 
-def fly(case: Case, seed: int, run: int) -> Outcome:
+def fly(case: Case, seed: int, run: int, is_repeated: bool) -> Outcome:
     """Simulate and filter one run of a case."""
     scenario = load_session(case.session)
     settings = settings_of(scenario, case)
     simulated = simulate_session(scenario, seed, run)
     prepared = prepare(simulated.session, settings)
-    done = run_algorithm(prepared, settings, case.algorithm)
-    other = run_algorithm(prepared, settings, case.against) if case.metric == "gain_over_ins" else done
+    done = run_algorithm(prepared, settings, case.algorithm, is_repeated=is_repeated)
+    other = done
+    if case.metric == "gain_over_ins":
+        other = run_algorithm(prepared, settings, case.against, is_repeated=is_repeated)
     who = simulated.session.names.index(case.aircraft)
     errors = []
     for track, truth in zip(done.tracks, simulated.truth, strict=True):
