@@ -1,5 +1,3 @@
-from functools import partial
-
 """Navigation between aircraft: the centralised filter against filterpy, and what every filter costs against k.
 
 Ten aircraft in a local frame, 70 states, every direction of every link once a second. filterpy runs the same extended
@@ -16,6 +14,7 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # one core on both sides
