@@ -48,11 +48,12 @@ app = typer.Typer(
 Parameters = ParamSpec("Parameters")
 
 ProgressMode = Literal["auto", "none", "json"]
-FailOn = Literal["none", "warn", "fail"]
+FailOnMode = Literal["none", "warn", "fail"]
 
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing but errors on the terminal.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more; show where an internal error came from.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
+FailOn = Annotated[FailOnMode, typer.Option("--fail-on", help="Exit 4 at a finding this severe or worse.")]
 Force = Annotated[bool, typer.Option("-f", "--force", help="Overwrite what is there.")]
 NoPdf = Annotated[bool, typer.Option("--no-pdf", help="Leave report.pdf and steer_card.pdf out.")]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]

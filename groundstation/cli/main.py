@@ -73,7 +73,7 @@ def check(
     thresholds: ThresholdsFile = None,
     config: ConfigFile = None,
     profile: Profile = None,
-    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 at a finding this severe or worse.")] = "none",
+    fail_on: FailOn = "none",
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
@@ -136,7 +136,7 @@ def run(
     scheduler: Annotated[
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
     ] = "",
-    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 at a finding this severe or worse.")] = "none",
+    fail_on: FailOn = "none",
     apply: Annotated[
         str,
         typer.Option(
@@ -333,7 +333,7 @@ def cooperative(
     ] = None,
     config: ConfigFile = None,
     profile: Profile = None,
-    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Exit 4 at a finding this severe or worse.")] = "none",
+    fail_on: FailOn = "none",
     no_pdf: NoPdf = False,
     force: Force = False,
     quiet: Quiet = False,
