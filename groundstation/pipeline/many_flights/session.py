@@ -4,11 +4,9 @@ import hashlib
 import json
 import platform
 import shutil
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +17,6 @@ from groundstation.base.ledger import Ledger
 from groundstation.base.records import RecordBatch
 from groundstation.base.signals import kind_of
 from groundstation.base.toml_settings import settings_from
-from groundstation.base.version import __version__
 from groundstation.chapters.cooperative import names_or_count
 from groundstation.estimators.analyses import ANSWER_TYPES, SESSION_ANALYSES
 from groundstation.estimators.cooperative.analysis import SessionKnown
@@ -31,13 +28,14 @@ from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX, Stopwatch, place, state_of
 from groundstation.pipeline.one_flight.identity import MAX_PART_CHARACTERS, flight_id, safe_part
 from groundstation.pipeline.one_flight.log import Log
+from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.pipeline.one_flight.resume import versions
 from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
 from groundstation.results.files import MANIFEST, load_document, load_manifest, save, save_manifest
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.manifest import Host, Keys, LogOfSession, Manifest, Resume, SourceOfRun
+from groundstation.results.manifest import Keys, LogOfSession, Manifest, Resume
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.session_assemble import AssembledSession, session_from_flights
 from groundstation.tables.session_settings import Stations
@@ -326,16 +324,5 @@ def _sentence(results: FlightResults) -> str:
 
 
 def _manifest(job: SessionJob, results: FlightResults, logs: tuple[LogOfSession, ...], resume: Resume) -> Manifest:
-    source = results.source
-    return Manifest(
-        groundstation=__version__,
-        flight_id=results.flight_id,
-        made_utc=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
-        source=SourceOfRun("", source.name, source.sha256, source.size_bytes, source.reader),
-        configuration=job.configuration.to_dict() | {"stations": asdict(job.stations)},
-        host=Host(platform.platform(), platform.machine(), sys.version.split()[0]),
-        versions=versions(),
-        logs=logs,
-        is_found=job.is_found,
-        resume=resume,
-    )
+    configuration = job.configuration.to_dict() | {"stations": asdict(job.stations)}
+    return replace(manifest_of(results, configuration, resume=resume), logs=logs, is_found=job.is_found)

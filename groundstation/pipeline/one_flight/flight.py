@@ -163,7 +163,8 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         text = sentence(results)
         keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf)
         resume = Resume(keys, text, converted.has_lost_data)
-        save(partial, results, manifest_of(log, job.url, results, job.configuration, resume))
+        path = job.url or str(log.path.absolute())
+        save(partial, results, manifest_of(results, job.configuration.to_dict(), path=path, resume=resume))
     with watch.stage("recording"):
         write_recording(partial / f"{identity}.rrd", flight, results)
     with watch.stage("reporting"):

@@ -2,31 +2,39 @@
 
 import platform
 import sys
+from collections.abc import Mapping
 from datetime import UTC, datetime
+from typing import Any
 
 from groundstation.base.version import __version__
-from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.log import Log
 from groundstation.pipeline.one_flight.resume import versions
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult
 from groundstation.results.manifest import Host, Manifest, Resume, SourceOfRun
 
 
-def manifest_of(log: Log, url: str, results: FlightResults, configuration: Configuration, resume: Resume) -> Manifest:
-    """Describe a run: the log, what the user set, versions, host and time, and what a later run need not do again.
+def manifest_of(
+    results: FlightResults, configuration: Mapping[str, Any], *, path: str = "", resume: Resume | None = None
+) -> Manifest:
+    """Describe a run of a flight, a session or a plan: source, settings, versions, host and time.
 
-    ``url`` is where the log is, if this machine has but a copy of it.
+    Parameters
+    ----------
+    results : FlightResults
+    configuration : mapping
+        What the user set, as TOML has it.
+    path : str
+        Where the source is, or its URL.
+    resume : Resume, optional
+        What a later run need not do again.
     """
-    source, heading = log.source, results.answer(HeadingResult)
+    source, heading = results.source, results.answer(HeadingResult)
     return Manifest(
         groundstation=__version__,
         flight_id=results.flight_id,
         made_utc=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
-        source=SourceOfRun(
-            url or str(log.path.absolute()), source.name, source.sha256, source.size_bytes, source.reader
-        ),
-        configuration=configuration.to_dict(),
+        source=SourceOfRun(path, source.name, source.sha256, source.size_bytes, source.reader),
+        configuration=dict(configuration),
         heading_settings=heading.settings if heading else {},
         host=Host(platform.platform(), platform.machine(), sys.version.split()[0]),
         versions=versions(),

@@ -1,31 +1,26 @@
 """Plans from beginning to end: a scenario becomes answers, recording and report in a folder of its own."""
 
 import hashlib
-import platform
 import shutil
-import sys
 import tempfile
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from groundstation.base.errors import UsageError
 from groundstation.base.findings import worst
-from groundstation.base.version import __version__
 from groundstation.estimators.analyses import ANSWER_TYPES, PLANS
 from groundstation.estimators.plan import Plan, Planned
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, PLAN_MARK
 from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
 from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX, Stopwatch, place, state_of
 from groundstation.pipeline.one_flight.identity import safe_part
+from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
-from groundstation.pipeline.one_flight.resume import versions
 from groundstation.reports.flight_report import write_flight_report
 from groundstation.results.files import save, write_text
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.manifest import Host, Manifest, SourceOfRun
 from groundstation.studies.shipped_plans import LoadedPlan, load_plan, plan_names
 
 
@@ -117,7 +112,7 @@ def _run_into(
         planned = plan.run(loaded.scenario)
     results = _results(plan, loaded, planned, target.name)
     with watch.stage("saving"):
-        save(partial, results, _manifest(loaded, results))
+        save(partial, results, manifest_of(results, {"scenario": asdict(loaded.scenario)}))
         write_text(partial / PLAN_MARK, loaded.text)
     with watch.stage("recording"):
         write_plan_recording(partial / f"{results.flight_id}.rrd", results)
@@ -149,17 +144,4 @@ def _results(plan: Plan[Any], loaded: LoadedPlan[Any], planned: Planned, identit
         findings=planned.findings,
         answers=planned.answers,
         figures=(*planned.figures, *owned),
-    )
-
-
-def _manifest(loaded: LoadedPlan[Any], results: FlightResults) -> Manifest:
-    source = results.source
-    return Manifest(
-        groundstation=__version__,
-        flight_id=results.flight_id,
-        made_utc=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
-        source=SourceOfRun("", source.name, source.sha256, source.size_bytes, source.reader),
-        configuration={"scenario": asdict(loaded.scenario)},
-        host=Host(platform.platform(), platform.machine(), sys.version.split()[0]),
-        versions=versions(),
     )
