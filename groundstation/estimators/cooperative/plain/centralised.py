@@ -1,20 +1,4 @@
-"""One extended Kalman filter of all vehicles: 7 k states in a local frame, 13 k (15 k) in the global one.
-
-A vehicle's block is moved on when a measurement or an output asks for it: noise of different vehicles is independent,
-so that blocks may stand at different times. Vehicles that are not there yet keep their start. Ground points whose own
-position is uncertain are constant states. Dead reckoning is the same filter without measurements.
-
-A range between two aircraft is linearised, value and direction, about a reference place of each: its dead reckoning
-less an offset, at first 0. While the line between the estimates lies within ``KNOWN_WRONG_SIGMAS`` claimed sigmas of
-the reference line, across it, the reference stays: directions that follow the estimate tell of a turn of the whole
-group, which ranges inside it cannot see (first-estimates Jacobian: Huang, Mourikis and Roumeliotis, 2010). Beyond, the
-reference is known to be wrong and both its ends move to the estimate. A direction that stays while the value is taken
-at the estimate is no such filter: for aircraft in line its sign across the line may be the wrong one, and every update
-then drives the estimate further away.
-
-Source: Kalman, A new approach to linear filtering and prediction problems, 1960; sequential use of simultaneous
-measurements: Maybeck, Stochastic Models, Estimation, and Control, volume 1, 1979, section 5.6.
-"""
+"""Plain numpy form of the centralised filter: the method stands in cooperative/centralised.py."""
 
 from itertools import pairwise
 

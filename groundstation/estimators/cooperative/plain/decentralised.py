@@ -1,21 +1,8 @@
-"""Filters in which every vehicle estimates its own states alone and hears what its neighbours broadcast.
+"""Plain numpy form of the filters of vehicles that estimate alone: the method stands in cooperative/decentralised.py.
 
-Four algorithms differ in what they make of a neighbour's estimate:
-
-- ``neighbour_exact``: it is the truth.
-- ``ranked``: only neighbours of a higher rank are used, and h P h' of their covariance is added to the noise.
-- ``modified``: ranked, all ranges of a frame together; the noise of two neighbours is correlated by what they share:
-  each keeps and broadcasts its covariance C with the errors of uncertain ground points (a consider filter), and the
-  noise of neighbours a and b has the covariance h_a C_a Pc^-1 C_b' h_b'.
-- ``split_intersection``: a covariance has an independent part and one that may be correlated with anything; the latter
-  is fused by covariance intersection. All that was ever broadcast counts as correlated, and so does all that is heard:
-  others have heard it too. What gathers between two transmissions is independent. Consistent whatever the correlation.
-
-Who measures range and bearing of another tells it where it stands (sighting.py): each of the two learns from what one
-of them measured, under the same rule. Both then share the noise of the sensor: nothing of theirs is independent.
-
-Source: Skrypnik, Inter-aircraft navigation in air traffic management, 2010, chapters 3 and 4 (the first three);
-Schmidt, Application of state-space methods to navigation problems, 1966 (consider states); split_covariance.py.
+Beyond the compiled form, who measures range and bearing of another tells it where it stands (sighting.py): each of the
+two learns from what one of them measured, under the same rule. Both then share the noise of the sensor: nothing of
+theirs is independent.
 """
 
 from collections import deque

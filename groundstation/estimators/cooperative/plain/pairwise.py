@@ -1,14 +1,4 @@
-"""Decentralised filter with stored pairwise cross-covariances: close to the centralised one at the price of an answer.
-
-Each vehicle i keeps its own state and, for every other j, a factor s_ij so that the cross-covariance is s_ij s_ji'. It
-moves the factor on and corrects it by itself; only the two vehicles of a range exchange anything, and they update as
-one filter of both. What one of them alone sees corrects nobody else (suboptimal, yet the factors stay right). Factors
-towards third vehicles are scaled by P_i(after) P_i(before)^-1: that is the method's one approximation. The receiver
-answers in the same slot: latency has no meaning here.
-
-Source: Luft, Schubert, Roumeliotis and Burgard, Recursive decentralized localization for multi-robot systems with
-asynchronous pairwise communication, International Journal of Robotics Research 37(10), 2018, algorithm 1 and section 4.
-"""
+"""Plain numpy form of the filter with pairwise cross-covariances: the method stands in cooperative/pairwise.py."""
 
 import numpy as np
 
