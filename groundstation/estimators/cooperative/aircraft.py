@@ -25,7 +25,7 @@ from groundstation.estimators.cooperative.arrays import (
     Fleet,
     Numbers,
 )
-from groundstation.estimators.cooperative.joint import LEAP_M
+from groundstation.estimators.cooperative.judging import LEAP_M
 from groundstation.estimators.cooperative.motion import ROOMS, place, step
 from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.estimators.cooperative.vehicles import Step, View

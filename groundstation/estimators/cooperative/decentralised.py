@@ -20,7 +20,8 @@ localization using split covariance intersection filter, 2013, equations 10 to 1
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.estimators.cooperative.alone import (
+from groundstation.estimators.cooperative.alone import run_alone
+from groundstation.estimators.cooperative.alone_arrays import (
     EXACT,
     MODIFIED,
     NOBODY,
@@ -32,7 +33,6 @@ from groundstation.estimators.cooperative.alone import (
     Own,
     Past,
     Room,
-    run_alone,
 )
 from groundstation.estimators.cooperative.arrays import Items, Log
 from groundstation.estimators.cooperative.error_map import blocks, spectral_radius, unit_rows, windows

@@ -7,15 +7,11 @@ import numpy as np
 from groundstation.base.compile import compiled, part
 from groundstation.base.records import Int64Array
 from groundstation.estimators.cooperative.arrays import (
-    CLOCK_LEAPS,
-    GATED,
     HEIGHT,
-    JUDGED,
     LOST,
     OUTPUTS,
     PEER,
     POINT,
-    USED,
     Events,
     Fleet,
     FloatArray,
@@ -25,13 +21,12 @@ from groundstation.estimators.cooperative.arrays import (
     Rows,
     Rules,
 )
+from groundstation.estimators.cooperative.judging import count_rejection, write_down
 from groundstation.estimators.cooperative.motion import ROOMS, place, position, step
 from groundstation.estimators.cooperative.observation import observe
 from groundstation.estimators.kalman.arrays import Pattern
 from groundstation.estimators.kalman.kernels import predict_covariance, predicted_variance, update_covariance
 
-PATIENCE = 30  # rejections of a vehicle in a row: then its clock has leapt, or it is not where it thinks
-LEAP_M = 1e5
 KNOWN_WRONG_SIGMAS = 3.0
 SAME_TIME_S = 1e-12
 
@@ -325,20 +320,11 @@ def _judge(
         lines.columns, lines.values, lines.starts[at], lines.starts[at + 1], joint.P
     )
     is_gated = rules.gate_sigma > 0.0 and lines.innovation[at] ** 2 > rules.gate_sigma**2 * total
-    row = log.counts[JUDGED]
-    log.event[row], log.innovation[row], log.variance[row] = event, lines.innovation[at], total
-    log.mark[row] = GATED if is_gated else USED
-    log.counts[JUDGED] += 1
+    write_down(event, lines.innovation[at], total, not is_gated, log)
     for end in range(2 if events.kind[event] == PEER else 1):
         who = events.receiver[event] if end == 0 else events.source[event]
-        joint.rejected[who] = joint.rejected[who] + 1 if is_gated else 0
-        if joint.rejected[who] >= PATIENCE and fleet.clock[who] >= 0 and events.kind[event] != HEIGHT:
-            joint.rejected[who] = 0
-            log.counts[CLOCK_LEAPS] += 1
-            at_clock, other = joint.first[who] + fleet.clock[who], joint.first[who] + fleet.receiver_clock[who]
-            joint.P[at_clock, at_clock] += LEAP_M**2
-            if other != at_clock:
-                joint.P[other, other] += LEAP_M**2
+        may_open = events.kind[event] != HEIGHT
+        count_rejection(fleet, who, not is_gated, may_open, joint.rejected, joint.first[who], joint.P, log)
     return not is_gated
 
 

@@ -6,16 +6,12 @@ import numpy as np
 
 from groundstation.base.compile import compiled, part
 from groundstation.base.records import BoolArray, Int64Array
-from groundstation.estimators.cooperative.alone import solve
+from groundstation.estimators.cooperative.alone_update import solve
 from groundstation.estimators.cooperative.arrays import (
-    CLOCK_LEAPS,
-    GATED,
-    JUDGED,
     LOST,
     OUTPUTS,
     PEER,
     POINT,
-    USED,
     Events,
     Fleet,
     FloatArray,
@@ -24,7 +20,8 @@ from groundstation.estimators.cooperative.arrays import (
     Points,
     Rows,
 )
-from groundstation.estimators.cooperative.joint import LEAP_M, PATIENCE, SAME_TIME_S
+from groundstation.estimators.cooperative.joint import SAME_TIME_S
+from groundstation.estimators.cooperative.judging import count_rejection, write_down
 from groundstation.estimators.cooperative.motion import ROOMS, place, position, step, turn_covariance, turn_rows
 from groundstation.estimators.cooperative.observation import observe
 
@@ -177,20 +174,10 @@ def _passes(
 ) -> bool:
     """Whether an innovation is inside the gate; counts, and opens clocks after many rejections."""
     passes = gate_sigma <= 0.0 or innovation**2 <= gate_sigma**2 * total
-    at = log.counts[JUDGED]
-    log.event[at], log.innovation[at], log.variance[at] = event, innovation, total
-    log.mark[at] = USED if passes else GATED
-    log.counts[JUDGED] += 1
+    write_down(event, innovation, total, passes, log)
     for end in range(2 if events.kind[event] == PEER else 1):
         who = events.receiver[event] if end == 0 else events.source[event]
-        members.rejected[who] = 0 if passes else members.rejected[who] + 1
-        clock, other = fleet.clock[who], fleet.receiver_clock[who]
-        if members.rejected[who] >= PATIENCE and clock >= 0:
-            members.rejected[who] = 0
-            log.counts[CLOCK_LEAPS] += 1
-            members.P[who, clock, clock] += LEAP_M**2
-            if other != clock:
-                members.P[who, other, other] += LEAP_M**2
+        count_rejection(fleet, who, passes, True, members.rejected, 0, members.P[who], log)
     return passes
 
 

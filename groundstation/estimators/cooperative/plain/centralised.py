@@ -9,7 +9,8 @@ from groundstation.base.records import Int64Array
 from groundstation.estimators.cooperative.arrays import HEIGHT, PEER, POINT
 from groundstation.estimators.cooperative.centralised import reports
 from groundstation.estimators.cooperative.events import Prepared
-from groundstation.estimators.cooperative.joint import KNOWN_WRONG_SIGMAS, PATIENCE
+from groundstation.estimators.cooperative.joint import KNOWN_WRONG_SIGMAS
+from groundstation.estimators.cooperative.judging import PATIENCE
 from groundstation.estimators.cooperative.plain.observation import Row, rows_of
 from groundstation.estimators.cooperative.plain.steps import Event, Recorder, steps
 from groundstation.estimators.cooperative.settings import CooperativeSettings

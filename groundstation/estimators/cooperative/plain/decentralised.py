@@ -14,7 +14,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.estimators.cooperative.arrays import HEIGHT, PEER, POINT
 from groundstation.estimators.cooperative.error_map import spectral_radius
 from groundstation.estimators.cooperative.events import Prepared
-from groundstation.estimators.cooperative.joint import PATIENCE
+from groundstation.estimators.cooperative.judging import PATIENCE
 from groundstation.estimators.cooperative.messages import Broadcast, decode
 from groundstation.estimators.cooperative.plain.error_map import Other, corrected_rows, unit_rows
 from groundstation.estimators.cooperative.plain.observation import Row, rows_of
