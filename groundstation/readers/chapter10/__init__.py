@@ -1,10 +1,14 @@
 """IRIG 106 Chapter 10 and 11 recordings: every bus word kept, navigation words named by an ICD."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from groundstation.base.records import Item
 from groundstation.readers.source import Claim, Source
+
+if TYPE_CHECKING:
+    from groundstation.readers.icd import Icd
 
 NAME = "chapter10"
 # Sync, and after 12 bytes data type versions that exist, a sequence number, flags; see packets.py.
@@ -27,8 +31,8 @@ def _is_header(data: bytes, at: int) -> bool:
     return words is not None and words[0] == 0xEB25 and sum(words[:11]) & 0xFFFF == words[11]
 
 
-def read(source: Source) -> Iterator[Item]:
-    """Yield the header, then the recording's batches, then remarks and damages."""
+def read(source: Source, icds: "Sequence[Icd]" = ()) -> Iterator[Item]:
+    """Yield the header, then the recording's batches and the signals that ICDs find in them, remarks and damages."""
     from groundstation.readers.chapter10.reader import items  # brings numba
 
-    return items(source)
+    return items(source, icds)

@@ -7,7 +7,9 @@ from datetime import date
 import numpy as np
 
 from groundstation.readers.chapter10 import scan
-from groundstation.readers.chapter10.packets import ARINC_429, NS_PER_COUNT, TIME, TMATS, Block, Walk
+from groundstation.readers.chapter10.bus_words import messages_1553, words_429
+from groundstation.readers.chapter10.naming import Seen
+from groundstation.readers.chapter10.packets import ARINC_429, MIL_STD_1553, NS_PER_COUNT, TIME, TMATS, Block, Walk
 from groundstation.readers.chapter10.timing import Reading, dates_in, reading
 from groundstation.readers.chapter10.tmats import Tmats, parse
 from groundstation.readers.source import Source
@@ -23,10 +25,11 @@ class Overview:
     tmats: Tmats = field(default_factory=Tmats)
     readings: list[Reading] = field(default_factory=list)
     dates: Counter[date] = field(default_factory=Counter)
+    seen: Seen = field(default_factory=Seen)
 
 
-def overview(source: Source) -> Overview:
-    """Read a recording once; of several TMATS packets in a row all are one text."""
+def overview(source: Source, *, with_buses: bool) -> Overview:
+    """Read a recording once; of several TMATS packets in a row all are one text. What is on the buses takes longer."""
     found, texts, is_setup = Overview(), [], True
     for block in Walk(source):
         for packet in block.of(TMATS) if is_setup else ():
@@ -42,6 +45,9 @@ def overview(source: Source) -> Overview:
             found.readings += [told] if told else []
         if found.dates.total() < _ENOUGH_DATES and not (found.readings and found.readings[0].year):
             found.dates += _dates(block)
+        for kind, channel, packets in block.by_channel() if with_buses else ():
+            if kind in (MIL_STD_1553, ARINC_429):
+                found.seen.add((messages_1553 if kind == MIL_STD_1553 else words_429)(block, channel, packets)[0])
     found.tmats = parse(b"".join(texts))
     return found
 

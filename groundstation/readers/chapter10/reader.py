@@ -1,14 +1,16 @@
 """Puts a recording together: an overview, then block by block what every channel holds, then what was found."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from groundstation.base.records import Damage, Item, LogHeader, RecordBatch
 from groundstation.readers.chapter10.bus_words import bounded, messages_1553, words_429
-from groundstation.readers.chapter10.overview import overview
+from groundstation.readers.chapter10.naming import named
+from groundstation.readers.chapter10.overview import Overview, overview
 from groundstation.readers.chapter10.packets import ARINC_429, EVENT, MIL_STD_1553, Block, Walk
 from groundstation.readers.chapter10.payloads import batch_of
 from groundstation.readers.chapter10.timing import start_of
 from groundstation.readers.chapter10.tmats import Tmats
+from groundstation.readers.icd import Icd
 from groundstation.readers.source import Source
 
 READER = "chapter10"
@@ -20,9 +22,17 @@ _FACTS = {
 }
 
 
-def items(source: Source) -> Iterator[Item]:
-    """Yield the header, batches in the order of the blocks of the file, then remarks and damages."""
-    found = overview(source)
+def items(source: Source, icds: Sequence[Icd] = ()) -> Iterator[Item]:
+    """Yield the header, batches in the order of the blocks of the file, then remarks and damages.
+
+    Behind each batch of bus words are the signals that ``icds`` find in it.
+    """
+    found = overview(source, with_buses=bool(icds))
+    told = _recorded(source, found)
+    return named(told, icds, found.seen) if icds else told
+
+
+def _recorded(source: Source, found: Overview) -> Iterator[Item]:
     start = start_of(found.readings, found.dates, found.tmats)
     yield LogHeader(READER, metadata(found.tmats), start.utc_of_zero_ns, has_counting_clock=True)
     walk, lost = Walk(source), dict[str, int]()
