@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UsageError
-from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
@@ -23,7 +22,7 @@ def convert_many(
 ) -> tuple[Outcome, ...]:
     """Convert logs to MCAP: one to the file ``output``, several into the folder ``output``.
 
-    Of the configuration, the profile and the thresholds of the ledger count.
+    Of the configuration, the profile, the ICDs and the thresholds of the ledger count.
 
     Raises
     ------
@@ -31,8 +30,6 @@ def convert_many(
         When a log is missing, the target exists and ``force`` is not given, or a threshold is wrong.
     """
     configuration = configuration or Configuration()
-    thresholds = configuration.settings.thresholds
-    profile = configuration.profile_path
     for log in logs:
         if not log.exists():
             raise UsageError(str(log), "no such file")
@@ -52,14 +49,15 @@ def convert_many(
     outcomes = []
     for log, target in zip(logs, targets, strict=True):
         listen(Event("stage", log.name, "converting"))
-        outcomes.append(_convert_one(log, target, profile, thresholds))
+        outcomes.append(_convert_one(log, target, configuration))
         listen(Event("end", log.name, outcomes[-1].text))
     return tuple(outcomes)
 
 
-def _convert_one(path: Path, target: Path, profile: Path | None, thresholds: Thresholds) -> Outcome:
+def _convert_one(path: Path, target: Path, configuration: Configuration) -> Outcome:
     try:
-        converted = convert_log(open_log(path, profile), target, thresholds)
+        log = open_log(path, configuration.profile_path, configuration.icds)
+        converted = convert_log(log, target, configuration.settings.thresholds)
     except GroundstationError as error:
         return Outcome(str(path), "failed", str(error))
     grave = [finding.text for finding in converted.findings if finding.severity != "info"]

@@ -1,7 +1,7 @@
 """ICDs: what the words of MIL-STD-1553 and ARINC 429 buses mean. DTS files in YAML, and some that are shipped."""
 
 from groundstation.readers.icd.instances import numbered
-from groundstation.readers.icd.load import load, shipped, shipped_names
+from groundstation.readers.icd.load import load, named_icd, shipped, shipped_names
 from groundstation.readers.icd.model import (
     ANY_SDI,
     Element,
@@ -32,6 +32,7 @@ __all__ = [
     "has_odd_parity",
     "labels_of",
     "load",
+    "named_icd",
     "numbered",
     "shipped",
     "shipped_names",
