@@ -26,9 +26,8 @@ def convert_many(
 ) -> tuple[Outcome, ...]:
     """Convert logs to MCAP: one to the file ``output``, several into the folder ``output``.
 
-    A file ``*.ch10`` is written as Chapter 10, with the ICD of its buses beside it.
-
-    Of the configuration, the profile and the thresholds of the ledger count.
+    A file ``*.ch10`` is written as Chapter 10, with the ICD of its buses beside it. Of the configuration, the profile,
+    the ICDs and the thresholds of the ledger count.
 
     Raises
     ------
@@ -36,8 +35,6 @@ def convert_many(
         When a log is missing, the target exists and ``force`` is not given, or a threshold is wrong.
     """
     configuration = configuration or Configuration()
-    thresholds = configuration.settings.thresholds
-    profile = configuration.profile_path
     for log in logs:
         if not log.exists():
             raise UsageError(str(log), "no such file")
@@ -57,18 +54,19 @@ def convert_many(
     outcomes = []
     for log, target in zip(logs, targets, strict=True):
         listen(Event("stage", log.name, "converting"))
-        outcomes.append(_convert_one(log, target, profile, thresholds))
+        outcomes.append(_convert_one(log, target, configuration))
         listen(Event("end", log.name, outcomes[-1].text))
     return tuple(outcomes)
 
 
-def _convert_one(path: Path, target: Path, profile: Path | None, thresholds: Thresholds) -> Outcome:
-    told = ""
+def _convert_one(path: Path, target: Path, configuration: Configuration) -> Outcome:
+    told, thresholds = "", configuration.settings.thresholds
     try:
+        log = open_log(path, configuration.profile_path, configuration.icds)
         if target.suffix == ".ch10":
-            converted, told = _to_chapter10(open_log(path, profile), target, thresholds)
+            converted, told = _to_chapter10(log, target, thresholds)
         else:
-            converted = convert_log(open_log(path, profile), target, thresholds)
+            converted = convert_log(log, target, thresholds)
     except GroundstationError as error:
         return Outcome(str(path), "failed", str(error))
     grave = [finding.text for finding in converted.findings if finding.severity != "info"]

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from groundstation.base.ledger import Ledger
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.log import Log, open_log
+from groundstation.readers.chapter10.contents import BusContents, named_by
 from groundstation.store.info import StoreInfo
 
 
@@ -25,21 +27,37 @@ class TopicDescription:
 
 
 @dataclass(frozen=True)
+class BusWord:
+    """Messages of one terminal and subaddress, or words of one label, of a bus.
+
+    ``place`` is the channel, of ARINC 429 with the number of the bus behind a dot; ``names`` are those that ICDs give.
+    """
+
+    place: str
+    bus: str
+    what: str
+    count: int
+    rate_hz: float | None
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Description:
-    """A log described: facts for people (name to text), topics, findings."""
+    """A log described: facts for people (name to text), topics, findings, and what is on its buses."""
 
     facts: dict[str, str]
     topics: tuple[TopicDescription, ...]
     findings: tuple[Finding, ...]
     has_lost_data: bool
+    buses: tuple[BusWord, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
         return asdict(self)
 
 
-def describe(path: Path, profile: Path | None = None) -> Description:
-    """Describe a recorded log, a groundstation MCAP, or an MCAP of another program.
+def describe(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()) -> Description:
+    """Describe a recorded log, a groundstation MCAP, or an MCAP of another program; ``icds`` name its bus words.
 
     Raises
     ------
@@ -54,7 +72,7 @@ def describe(path: Path, profile: Path | None = None) -> Description:
         raise no_log(path)
     if _is_foreign(path, profile):
         return _foreign(path)
-    log = open_log(path, profile)
+    log = open_log(path, profile, icds)
     return _stored(log) if log.is_store else _recorded(log)
 
 
@@ -80,13 +98,30 @@ def _recorded(log: Log) -> Description:
     items = log.replay()
     found = survey(items)
     fields: dict[str, dict[str, None]] = {}
+    buses = BusContents()
     for item in items:
+        buses.add(item)
         if isinstance(item, RecordBatch):
             fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
     ledger = found.ledger.document()
     facts = facts_of(log, dict(found.header.metadata), ledger)
     lost = any(damage.loses_data for damage in found.damages)
-    return Description(facts, _topics(ledger, fields), ledger_findings(found.ledger), lost)
+    return Description(facts, _topics(ledger, fields), ledger_findings(found.ledger), lost, _buses(buses, log))
+
+
+def _buses(contents: BusContents, log: Log) -> tuple[BusWord, ...]:
+    """What is on the buses, in the order of the channels."""
+    return tuple(
+        BusWord(
+            str(one.channel) if one.sub_channel is None else f"{one.channel}.{one.sub_channel}",
+            one.bus,
+            one.title,
+            one.count,
+            one.rate_hz if isfinite(one.rate_hz) else None,
+            tuple(holder.name for holder in named_by(one, log.loaded_icds)),
+        )
+        for one in contents.entries()
+    )
 
 
 def _stored(log: Log) -> Description:
@@ -95,8 +130,9 @@ def _stored(log: Log) -> Description:
 
     info = read_info(log.path)
     fields: dict[str, dict[str, None]] = {}
-    damages = []
+    damages, buses = [], BusContents()
     for item in log.items():
+        buses.add(item)
         if isinstance(item, RecordBatch):
             fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
         elif isinstance(item, Damage):
@@ -104,7 +140,7 @@ def _stored(log: Log) -> Description:
     facts = facts_of(log, dict(info.metadata), info.ledger)
     facts["log"] = f"{info.source_name}, read as {info.reader}"
     findings = (*info.findings, *(damage_finding(damage) for damage in damages))
-    return Description(facts, _topics(info.ledger, fields), findings, _has_lost(info, damages))
+    return Description(facts, _topics(info.ledger, fields), findings, _has_lost(info, damages), _buses(buses, log))
 
 
 def _has_lost(info: StoreInfo, damages: list[Damage]) -> bool:

@@ -153,7 +153,11 @@ class BusContents:
     def entries(self) -> tuple[OnBus, ...]:
         """Everything that is on the buses, by channel."""
         ordered = sorted(self._counts.items(), key=lambda one: channel_of(one[0]))
-        return tuple(entry for topic, counts in ordered for entry in self._of(topic, counts))
+        return tuple(
+            entry
+            for topic, counts in ordered
+            for entry in sorted(self._of(topic, counts), key=lambda one: (one.sub_channel or 0, one.key))
+        )
 
     def _of(self, topic: str, counts: _Counts) -> Iterator[OnBus]:
         channel, is_429 = channel_of(topic), topic.startswith(TOPIC_429)

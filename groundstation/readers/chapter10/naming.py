@@ -25,6 +25,8 @@ from groundstation.readers.icd import (
 )
 from groundstation.readers.icd.model import REVERSED_BYTE
 
+# Codes of the remarks that naming makes.
+NAMING_CODES = ("icd", "icd_of_another", "mapped", "several_units", "derived", "bus_errors", "not_used")
 TRANSMITS = 0x400
 WRONG_WORD = 6  # flags of a 429 word: format or parity error seen by the recorder
 TIME_TAG = "time_tag"  # element that counts the samples of a message sent more often than it is computed
@@ -78,7 +80,7 @@ class Found:
 
 
 def found_on(seen: Seen, icds: Sequence[Icd], names: BusNames) -> Found:
-    """What of the ICDs is on the buses. One that may be on several buses and is on several is a unit on each."""
+    """What of the ICDs is on the buses. A word that may be on any bus is one of another unit on each."""
     words: list[Word429] = []
     messages: list[Message1553] = []
     remarks = []
@@ -89,7 +91,7 @@ def found_on(seen: Seen, icds: Sequence[Icd], names: BusNames) -> Found:
             places = seen.places(holder, names)
             count += bool(places)
             for channel, bus in places:
-                placed = _placed(holder, len(places) > 1, channel, bus, names)
+                placed = _placed(holder, channel, bus, names)
                 (words if isinstance(holder, Word429) else messages).append(placed)
         text = f"ICD {icd.name}: {count} of its {len(icd)} words and messages are on the buses"
         remarks += [Remark("icd" if count else "icd_of_another", text), *(Remark("icd", note) for note in icd.notes)]
@@ -97,10 +99,10 @@ def found_on(seen: Seen, icds: Sequence[Icd], names: BusNames) -> Found:
     return Found(of_words, of_messages, tuple(remarks))
 
 
-def _placed(holder: Any, is_repeated: bool, channel: int, bus: int | None, names: BusNames) -> Any:
-    """The word or message at one of its places; of several, its signals without a number are numbered by place."""
+def _placed(holder: Any, channel: int, bus: int | None, names: BusNames) -> Any:
+    """The word or message at one of its places; the units of one that may be on any bus are numbered by place."""
     elements = holder.elements
-    if is_repeated:
+    if not holder.bus and holder.channel is None:
         elements = tuple(
             replace(one, is_by_name=True) if one.signal and one.signal.count(".") == 1 else one for one in elements
         )

@@ -2,7 +2,7 @@
 
 from groundstation.readers.icd.dump import to_yaml
 from groundstation.readers.icd.instances import numbered
-from groundstation.readers.icd.load import load, shipped, shipped_names
+from groundstation.readers.icd.load import load, named_icd, shipped, shipped_names
 from groundstation.readers.icd.model import (
     ANY_SDI,
     Element,
@@ -35,6 +35,7 @@ __all__ = [
     "has_odd_parity",
     "labels_of",
     "load",
+    "named_icd",
     "numbered",
     "shipped",
     "shipped_names",

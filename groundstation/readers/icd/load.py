@@ -88,6 +88,17 @@ def usual_status(schema: str, unit: str) -> Status:
     return STATUS_OF.get(schema, "bnr" if unit else "discrete")
 
 
+def named_icd(name: str) -> Icd:
+    """The ICD of a file, or a shipped one by its name.
+
+    Raises
+    ------
+    SettingsError
+        As :func:`load`, and for a name that is neither.
+    """
+    return load(Path(name)) if name not in shipped_names() or Path(name).is_file() else shipped(name)
+
+
 @dataclass
 class _Checker:
     """Turns the mappings into words and messages; every complaint names the file, the word and the key."""
