@@ -26,6 +26,7 @@ from groundstation.readers.icd import (
     shipped_names,
     signal_values,
     status_of,
+    to_yaml,
     usable_1553,
     word_values,
 )
@@ -437,3 +438,17 @@ def test_icds_of_others_load_as_they_are(name: str, count: int) -> None:
     found = load(real_log(f"ch10/icd/example_{name}.yaml"))
     assert len(found) == count
     assert found.notes == ()
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_an_icd_written_and_read_back_is_the_same(tmp_path: Path, name: str) -> None:
+    found = shipped(name)
+    path = tmp_path / f"{name}.yaml"
+    path.write_text(to_yaml(found, {holder.name: "seen" for holder, _one in found.elements()}, ["x"]), encoding="utf-8")
+    assert load(path) == found
+
+
+def test_an_element_kept_from_its_name_stays_so(tmp_path: Path) -> None:
+    found = icd(tmp_path, MESSAGE.replace('uom: "deg"', 'uom: "deg", signal: ""'))
+    assert found.messages_1553[0].elements[0].signal is None
+    assert icd(tmp_path, to_yaml(found)).messages_1553 == found.messages_1553

@@ -101,7 +101,13 @@ def check(
 def convert(
     logs: Annotated[list[Path], typer.Argument(help="Recorded logs.", metavar="LOG", readable=False)],
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="MCAP to write; a folder for several logs.", metavar="FILE")
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            help="MCAP to write; a folder for several logs. A name *.ch10 writes Chapter 10 with its ICD.",
+            metavar="FILE",
+        ),
     ],
     thresholds: ThresholdsFile = None,
     config: ConfigFile = None,
@@ -258,6 +264,9 @@ def simulate(
     scenario: Annotated[str, typer.Argument(help="Name of a shipped scenario, or a TOML file.", metavar="SCENARIO")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the log.", metavar="DIR")],
     seed: Annotated[int | None, typer.Option("--seed", help="Seed in place of the scenario's own.")] = None,
+    form: Annotated[
+        Literal["csv", "ch10"], typer.Option("--format", help="csv, or ch10: IRIG 106 Chapter 10 with its ICD.")
+    ] = "csv",
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -266,7 +275,7 @@ def simulate(
     """Simulate a flight as a flat CSV, with the truth beside it. `groundstation list` names the scenarios."""
     from groundstation.pipeline.verbs.synthesis import simulate_to
 
-    tell_written(simulate_to(scenario, output, seed=seed, force=force), as_json_text=json, quiet=quiet)
+    tell_written(simulate_to(scenario, output, seed=seed, form=form, force=force), as_json_text=json, quiet=quiet)
     return DONE
 
 

@@ -1,5 +1,6 @@
 """ICDs: what the words of MIL-STD-1553 and ARINC 429 buses mean. DTS files in YAML, and some that are shipped."""
 
+from groundstation.readers.icd.dump import to_yaml
 from groundstation.readers.icd.instances import numbered
 from groundstation.readers.icd.load import load, named_icd, shipped, shipped_names
 from groundstation.readers.icd.model import (
@@ -13,7 +14,7 @@ from groundstation.readers.icd.model import (
     labels_of,
 )
 from groundstation.readers.icd.signals import TRUE_TRACK, signal_values, word_values
-from groundstation.readers.icd.words_429 import decode_429, encode_429, has_odd_parity, status_of
+from groundstation.readers.icd.words_429 import decode_429, encode_429, has_odd_parity, status_of, step_429
 from groundstation.readers.icd.words_1553 import decode_1553, encode_1553, usable_1553
 
 __all__ = [
@@ -38,6 +39,8 @@ __all__ = [
     "shipped_names",
     "signal_values",
     "status_of",
+    "step_429",
+    "to_yaml",
     "usable_1553",
     "word_values",
 ]

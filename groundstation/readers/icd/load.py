@@ -94,6 +94,11 @@ def named_icd(name: str) -> Icd:
     return load(Path(name)) if name not in shipped_names() or Path(name).is_file() else shipped(name)
 
 
+def usual_status(schema: str, unit: str) -> Status:
+    """How the sign/status matrix of an element is read that does not say so; bits without a unit are discrete."""
+    return STATUS_OF.get(schema, "bnr" if unit else "discrete")
+
+
 @dataclass
 class _Checker:
     """Turns the mappings into words and messages; every complaint names the file, the word and the key."""
@@ -318,7 +323,7 @@ class _Checker:
         if holder.sdi != -1 and lsb < 11:
             self.fail(f"{place}: lsb", f"{lsb}", "11 or more: bits 9 and 10 are the SDI, which the word states")
         common = self.common(table, place)
-        status = STATUS_OF.get(schema, "bnr" if common["unit"] else "discrete")
+        status = usual_status(schema, common["unit"])
         if "status" in table:
             status = cast(Status, self.choice(table, "status", place, get_args(Status)))
         step = self.number(table["step"], f"{place}: step") if "step" in table else 1.0

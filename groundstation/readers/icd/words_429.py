@@ -74,7 +74,15 @@ def decode_429(words: Words429, element: Element429) -> tuple[FloatArray, NDArra
         field = (field ^ sign) - sign
     elif element.schema == "SIGNMAG":
         field = np.where(field & sign, -(field & (sign - 1)), field)
-    return np.asarray(field * _scale(element), dtype=np.float64), np.asarray(usable)
+    return np.asarray(field * step_429(element), dtype=np.float64), np.asarray(usable)
+
+
+def step_429(element: Element429) -> float:
+    """Value of an element's last bit, or digit, in the ICD's unit."""
+    if element.schema == "BCD":
+        return element.step
+    below = element.bit_count - (1 if element.schema == "UNSIGNEDBITS" else 2)
+    return element.msbval / 2.0**below if element.msbval else 1.0
 
 
 def encode_429(word: Word429, values: Mapping[str, FloatArray], *, sdi: int = 0) -> Words429:
@@ -118,7 +126,7 @@ def _field(values: FloatArray, element: Element429) -> NDArray[np.int64]:
         for place in range((element.bit_count + 3) // 4):
             field |= number // 10**place % 10 << 4 * place
         return field & ((1 << element.bit_count) - 1)
-    number = np.rint(values / _scale(element))
+    number = np.rint(values / step_429(element))
     full = 1 << (element.bit_count - 1)
     if element.schema == "SIGNMAG":
         magnitude = np.minimum(np.abs(number), full - 1).astype(np.int64)
@@ -133,8 +141,3 @@ def _field(values: FloatArray, element: Element429) -> NDArray[np.int64]:
 def _digits(field: NDArray[np.int64], bit_count: int) -> list[NDArray[np.int64]]:
     """Decimal digits, the last first; the first of a number may have fewer than four bits."""
     return [(field >> place) & 0xF for place in range(0, bit_count, 4)]
-
-
-def _scale(element: Element429) -> float:
-    below = element.bit_count - (1 if element.schema == "UNSIGNEDBITS" else 2)
-    return element.msbval / 2.0**below if element.msbval else 1.0
