@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from groundstation.base.errors import UsageError
 from groundstation.base.geodesy import north_east_m
 from groundstation.base.records import Item, RecordBatch, Remark
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
-from groundstation.pipeline.verbs.describe import describe
+from groundstation.pipeline.verbs.describe import describe, suggest_icd
 from groundstation.readers import registry
 from groundstation.readers.chapter10.bus_words import BETWEEN_TERMINALS, TIME_OUT
 from groundstation.readers.icd import Icd, load, shipped
@@ -254,3 +255,19 @@ def test_an_egi_at_25_hz() -> None:
         assert steps.min() > 0.036 and np.median(steps) == pytest.approx(0.04, abs=0.003)
     errors = sum(int(text.split(": ")[1].split()[0]) for text in texts(items, "bus_errors"))
     assert errors == 992 + 213
+
+
+def test_a_suggested_icd_is_read_back_and_names_all(tmp_path: Path) -> None:
+    packets = made.packet(4, 0x19, made.messages_1553([message(at, at, at) for at in range(9)]), 0)
+    words = [(0, 1_000, made.word_429(0o314, at)) for at in range(9)]
+    log = tmp_path / "log.ch10"
+    log.write_bytes(packets + made.packet(7, 0x38, made.words_429(words), 0))
+    suggested = tmp_path / "suggested.yaml"
+    suggested.write_text(suggest_icd(log))
+    told = describe(log, icds=(str(suggested),))
+    assert [one.what for one in told.buses] == ["RT 6 T SA 29", "label 314"]
+    assert all(len(one.names) == 1 for one in told.buses)
+    with pytest.raises(UsageError, match="no words"):
+        table = tmp_path / "flat.csv"
+        table.write_text("time_s,ins.roll_deg\n0,1\n1,2\n")
+        suggest_icd(table)

@@ -26,9 +26,8 @@ def convert_many(
 ) -> tuple[Outcome, ...]:
     """Convert logs to MCAP: one to the file ``output``, several into the folder ``output``.
 
-    A file ``*.ch10`` is written as Chapter 10, with the ICD of its buses beside it.
-
-    Of the configuration, the profile, the ICDs and the thresholds of the ledger count.
+    A file ``*.ch10`` is written as Chapter 10, with the ICD of its buses beside it. Of the configuration, the profile,
+    the ICDs and the thresholds of the ledger count.
 
     Raises
     ------

@@ -129,6 +129,27 @@ def _buses(contents: "BusContents", log: Log) -> tuple[BusWord, ...]:
     )
 
 
+def suggest_icd(path: Path) -> str:
+    """The beginning of an ICD, as YAML, from what is on the buses of a log.
+
+    Raises
+    ------
+    UsageError
+        When the log has no bus words.
+    """
+    from groundstation.base.errors import UsageError
+    from groundstation.readers.chapter10.contents import BusContents
+    from groundstation.readers.icd import suggest
+
+    buses = BusContents()
+    for item in open_log(path).items():
+        buses.add(item)
+    entries = buses.entries()
+    if not entries:
+        raise UsageError(path.name, "no words of 1553 or ARINC-429 buses", "a Chapter 10 recording, or its MCAP")
+    return suggest(entries)
+
+
 def _stored(log: Log) -> Description:
     from groundstation.pipeline.one_flight.convert import damage_finding
     from groundstation.readers.chapter10.contents import BusContents

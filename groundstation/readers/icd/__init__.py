@@ -14,12 +14,14 @@ from groundstation.readers.icd.model import (
     labels_of,
 )
 from groundstation.readers.icd.signals import TRUE_TRACK, signal_values, word_values
+from groundstation.readers.icd.suggest import BusEntry, suggest
 from groundstation.readers.icd.words_429 import decode_429, encode_429, has_odd_parity, status_of, step_429
 from groundstation.readers.icd.words_1553 import decode_1553, encode_1553, usable_1553
 
 __all__ = [
     "ANY_SDI",
     "TRUE_TRACK",
+    "BusEntry",
     "Element",
     "Element429",
     "Element1553",
@@ -40,6 +42,7 @@ __all__ = [
     "signal_values",
     "status_of",
     "step_429",
+    "suggest",
     "to_yaml",
     "usable_1553",
     "word_values",

@@ -83,6 +83,11 @@ def shipped(name: str) -> Icd:
     return load(SHIPPED / f"{name}.yaml")
 
 
+def usual_status(schema: str, unit: str) -> Status:
+    """How the sign/status matrix of an element is read that does not say so; bits without a unit are discrete."""
+    return STATUS_OF.get(schema, "bnr" if unit else "discrete")
+
+
 def named_icd(name: str) -> Icd:
     """The ICD of a file, or a shipped one by its name.
 
@@ -92,11 +97,6 @@ def named_icd(name: str) -> Icd:
         As :func:`load`, and for a name that is neither.
     """
     return load(Path(name)) if name not in shipped_names() or Path(name).is_file() else shipped(name)
-
-
-def usual_status(schema: str, unit: str) -> Status:
-    """How the sign/status matrix of an element is read that does not say so; bits without a unit are discrete."""
-    return STATUS_OF.get(schema, "bnr" if unit else "discrete")
 
 
 @dataclass
