@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from groundstation.base.errors import UsageError
 from groundstation.base.geodesy import north_east_m
 from groundstation.base.records import Item, RecordBatch, Remark
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
-from groundstation.pipeline.verbs.describe import describe
+from groundstation.pipeline.verbs.describe import describe, suggest_icd
 from groundstation.readers import registry
 from groundstation.readers.chapter10.bus_words import BETWEEN_TERMINALS, TIME_OUT
 from groundstation.readers.icd import Icd, load, shipped
@@ -107,7 +108,7 @@ def bnr(value: float, full_scale: float) -> int:
 
 
 def test_429_words_that_belong_together(tmp_path: Path) -> None:
-    """Latitude with longitude at the later word; velocities from track and speed; no computed data is absent."""
+    """One sample at the time of its first word; velocities from track and speed; no computed data is absent."""
     gap = 4_000
     words = [
         (0, 0, made.word_429(0o310, bnr(34.5, 180))),
@@ -125,9 +126,7 @@ def test_429_words_that_belong_together(tmp_path: Path) -> None:
     batch = batches[0]
     told = {name: column.values[column.mask] for name, column in batch.columns.items()}
     assert told["true_heading_deg"].tolist() == [270.0] and "roll_deg" not in told
-    both = batch.columns["latitude_deg"].mask
-    assert (both == batch.columns["longitude_deg"].mask).all()
-    assert batch.device_time_ns.values[both].tolist() == [1_000_000_000 + 100 * gap]
+    assert batch.device_time_ns.values.tolist() == [1_000_000_000]
     np.testing.assert_allclose([told["latitude_deg"][0], told["longitude_deg"][0]], [34.5, -117.5], atol=180 / 2**18)
     speed_mps = 100 * 1852 / 3600
     np.testing.assert_allclose(
@@ -138,6 +137,18 @@ def test_429_words_that_belong_together(tmp_path: Path) -> None:
     assert len(texts(items, "not_used")) == 2
     other = rows(items, "ins.2")["true_heading_deg"]
     np.testing.assert_allclose(other, [10.0], atol=180 / 2**15)
+
+
+def test_samples_of_429_words(tmp_path: Path) -> None:
+    """A word that comes again, or late, begins a new sample."""
+    near, far = 4_000, 200_000
+    pitch, roll = made.word_429(0o324, bnr(2, 180)), made.word_429(0o325, bnr(1, 180))
+    words = [(0, 0, pitch), (0, near, roll), (0, near, pitch), (0, near, roll), (0, far, roll), (0, far, pitch)]
+    items = read(tmp_path, made.packet(7, 0x38, made.words_429(words), 0), shipped("arinc429_inertial"))
+    (batch,) = [item for item in items if isinstance(item, RecordBatch) and item.topic == "ins"]
+    assert batch.columns["pitch_deg"].mask.tolist() == [True, True, False, True]
+    assert batch.columns["roll_deg"].mask.tolist() == [True, True, True, False]
+    np.testing.assert_allclose(batch.device_time_ns.values / 1e9, [0.0, 8e-4, 0.0212, 0.0412], atol=1e-12)
 
 
 def canonical(path: Path) -> dict[str, tuple[list[float], list[int]]]:
@@ -244,3 +255,19 @@ def test_an_egi_at_25_hz() -> None:
         assert steps.min() > 0.036 and np.median(steps) == pytest.approx(0.04, abs=0.003)
     errors = sum(int(text.split(": ")[1].split()[0]) for text in texts(items, "bus_errors"))
     assert errors == 992 + 213
+
+
+def test_a_suggested_icd_is_read_back_and_names_all(tmp_path: Path) -> None:
+    packets = made.packet(4, 0x19, made.messages_1553([message(at, at, at) for at in range(9)]), 0)
+    words = [(0, 1_000, made.word_429(0o314, at)) for at in range(9)]
+    log = tmp_path / "log.ch10"
+    log.write_bytes(packets + made.packet(7, 0x38, made.words_429(words), 0))
+    suggested = tmp_path / "suggested.yaml"
+    suggested.write_text(suggest_icd(log))
+    told = describe(log, icds=(str(suggested),))
+    assert [one.what for one in told.buses] == ["RT 6 T SA 29", "label 314"]
+    assert all(len(one.names) == 1 for one in told.buses)
+    with pytest.raises(UsageError, match="no words"):
+        table = tmp_path / "flat.csv"
+        table.write_text("time_s,ins.roll_deg\n0,1\n1,2\n")
+        suggest_icd(table)

@@ -56,14 +56,20 @@ def info(
     log: Annotated[Path, typer.Argument(help="A recorded log or an MCAP.", metavar="LOG", readable=False)],
     profile: Profile = None,
     icd: IcdFiles = None,
+    suggest_icd: Annotated[
+        bool, typer.Option("--suggest-icd", help="Print the beginning of an ICD for what is on its buses.")
+    ] = False,
     json: Json = False,
     verbose: Verbose = False,
 ) -> int | None:
     """Tell what a log is: format, clock, span, topics with rows, rates, fields; its buses (word by word with -v)."""
     from groundstation.cli import printing
-    from groundstation.pipeline.verbs.describe import describe
+    from groundstation.pipeline.verbs import describe
 
-    description = describe(log, profile, tuple(icd or ()))
+    if suggest_icd:
+        typer.echo(describe.suggest_icd(log))
+        return DONE
+    description = describe.describe(log, profile, tuple(icd or ()))
     shown = printing.as_json(description.to_dict()) if json else printing.description(description, everything=verbose)
     typer.echo(shown)
     return DATA_LOST if description.has_lost_data else DONE

@@ -11,6 +11,8 @@ from groundstation.cli.text import as_json, printable
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
 from groundstation.pipeline.verbs.describe import BusWord, Description
 
+NAMED_SHOWN = 6  # words of a bus that an ICD names, told one by one
+
 __all__ = ["as_json", "catalogue", "description", "outcomes", "worst_code"]
 
 
@@ -56,7 +58,8 @@ def _every_bus(buses: Sequence[BusWord]) -> str:
     for place, found in groupby(buses, key=lambda one: one.place):
         words = list(found)
         named = [one for one in words if one.names]
-        listed = ", ".join(f"{one.what}: {' '.join(one.names)}" for one in named)
+        listed = ", ".join(f"{one.what}: {' '.join(one.names)}" for one in named[:NAMED_SHOWN])
+        listed += f" and {len(named) - NAMED_SHOWN} more" if len(named) > NAMED_SHOWN else ""
         total = sum(one.count for one in words)
         rows.append([place, printable(words[0].bus), str(total), str(len(words)), str(len(named)), printable(listed)])
     return columns(rows, right=(2, 3, 4))

@@ -4,15 +4,17 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.log import Log, open_log
-from groundstation.readers.chapter10.contents import BusContents, named_by
 from groundstation.store.info import StoreInfo
+
+if TYPE_CHECKING:
+    from groundstation.readers.chapter10.contents import BusContents
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,7 @@ def _is_foreign(path: Path, profile: Path | None) -> bool:
 def _recorded(log: Log) -> Description:
     from groundstation.integrity.ledger_findings import ledger_findings
     from groundstation.integrity.survey import survey
+    from groundstation.readers.chapter10.contents import BusContents
 
     items = log.replay()
     found = survey(items)
@@ -109,8 +112,10 @@ def _recorded(log: Log) -> Description:
     return Description(facts, _topics(ledger, fields), ledger_findings(found.ledger), lost, _buses(buses, log))
 
 
-def _buses(contents: BusContents, log: Log) -> tuple[BusWord, ...]:
+def _buses(contents: "BusContents", log: Log) -> tuple[BusWord, ...]:
     """What is on the buses, in the order of the channels."""
+    from groundstation.readers.chapter10.contents import named_by
+
     return tuple(
         BusWord(
             str(one.channel) if one.sub_channel is None else f"{one.channel}.{one.sub_channel}",
@@ -124,8 +129,30 @@ def _buses(contents: BusContents, log: Log) -> tuple[BusWord, ...]:
     )
 
 
+def suggest_icd(path: Path) -> str:
+    """The beginning of an ICD, as YAML, from what is on the buses of a log.
+
+    Raises
+    ------
+    UsageError
+        When the log has no bus words.
+    """
+    from groundstation.base.errors import UsageError
+    from groundstation.readers.chapter10.contents import BusContents
+    from groundstation.readers.icd import suggest
+
+    buses = BusContents()
+    for item in open_log(path).items():
+        buses.add(item)
+    entries = buses.entries()
+    if not entries:
+        raise UsageError(path.name, "no words of 1553 or ARINC-429 buses", "a Chapter 10 recording, or its MCAP")
+    return suggest(entries)
+
+
 def _stored(log: Log) -> Description:
     from groundstation.pipeline.one_flight.convert import damage_finding
+    from groundstation.readers.chapter10.contents import BusContents
     from groundstation.store.reader import read_info
 
     info = read_info(log.path)

@@ -11,7 +11,7 @@ from groundstation.base.records import BoolArray, Item, LogHeader, RecordBatch, 
 from groundstation.base.signals import kind_of, topics_of_kind
 from groundstation.readers.chapter10.bus_words import ANY_ERROR, TOPIC_429, TOPIC_1553, bounded, words_of
 from groundstation.readers.chapter10.contents import KEYS, BusNames, channel_of, keys_429, keys_1553
-from groundstation.readers.chapter10.pieces import Piece, completed, merged
+from groundstation.readers.chapter10.pieces import SAMPLE_NS, Piece, completed, merged
 from groundstation.readers.icd import (
     Element,
     Icd,
@@ -181,7 +181,8 @@ class Namer:
         table = self._tables.get(batch.topic)
         if table is None:
             return
-        pieces = self._of_429(batch, table) if batch.topic.startswith(TOPIC_429) else self._of_1553(batch, table)
+        is_429 = batch.topic.startswith(TOPIC_429)
+        pieces = self._of_429(batch, table) if is_429 else self._of_1553(batch, table)
         by_topic: dict[str, list[Piece]] = {}
         for topic, piece in pieces:
             by_topic.setdefault(topic, []).append(piece)
@@ -189,7 +190,7 @@ class Namer:
             ready, derived = completed(kind_of(topic), several, has_velocity=topic in self._with_velocity)
             if derived:
                 self._derived[topic] = None
-            made = merged(topic, ready)
+            made = merged(topic, ready, SAMPLE_NS if is_429 else 0) if ready else None
             if made is not None:
                 yield from bounded(made)
 

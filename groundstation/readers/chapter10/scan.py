@@ -271,3 +271,28 @@ def messages_stamped(
             at = start + size + size % 2
             count += 1
     return count
+
+
+@compiled
+def samples(time_ns: Any, fields: Any, span_ns: int, sample: Any) -> int:
+    """Which words are of one sample; how many samples there are.
+
+    A sample ends where a word tells a field again, or comes more than a span after its first word.
+
+    Parameters
+    ----------
+    time_ns : ndarray of int64, shape (n,)
+    fields : ndarray of int64, shape (n,)
+        A bit for each field that a word tells.
+    span_ns : int
+    sample : ndarray of int64, shape (n,), out
+        Number of each word's sample.
+    """
+    count, told, start = 0, 0, 0
+    for k in range(len(time_ns)):
+        if k == 0 or told & fields[k] != 0 or abs(time_ns[k] - start) > span_ns:
+            count += 1
+            told, start = 0, time_ns[k]
+        told |= fields[k]
+        sample[k] = count - 1
+    return count
