@@ -182,7 +182,6 @@ def test_our_own_entry_point_is_not_a_plug_in(plug_ins: list[Any]) -> None:
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
-        ("ch10/kc135_429_1553_1MB.c10", "Chapter 10"),
         ("gnss/ublox_ins_drive_pvat.ubx", "UBX"),
         ("gnss/pygpsdata-NMEA.log", "NMEA"),
         ("damaged/wrong_rmw_test_0.mcap", "MCAP"),

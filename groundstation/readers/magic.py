@@ -12,7 +12,7 @@ _CONTROL = re.compile(rb"[\0-\x08\x0b\x0c\x0e-\x1f]")
 _AT_START: tuple[tuple[bytes, str], ...] = (
     (b"ULog\x01\x12\x35", "PX4 ULog"),
     (b"\xa3\x95", "ArduPilot DataFlash without its definitions"),
-    (b"\x25\xeb", "IRIG 106 Chapter 10"),
+    (b"\x25\xeb", "IRIG 106 Chapter 10 without a whole packet header"),
     (b"\xb5\x62", "u-blox UBX"),
     (b"#ROSBAG", "ROS 1 bag"),
     (b"\x89MCAP0\r\n", "MCAP"),

@@ -84,7 +84,7 @@ class Job:
     def asked(self) -> tuple[str, Keys] | None:
         """Digest of its log and the keys of what is asked for; None when only its run can tell what is wrong."""
         try:
-            source = open_log(self.path, self.configuration.profile_path).source
+            source = open_log(self.path, self.configuration.profile_path, self.configuration.icds).source
             return source.sha256, keys_of(source, self.configuration, with_pdf=self.with_pdf)
         except Exception:
             return None
@@ -108,7 +108,7 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
         if job.finished is not None and job.step in ("nothing", "reports"):
             return _run_reports(job, job.finished, watch)
         version = _version(job.path)
-        log = open_log(job.path, job.configuration.profile_path)
+        log = open_log(job.path, job.configuration.profile_path, job.configuration.icds)
         sha256 = log.source.sha256
         job.out.mkdir(parents=True, exist_ok=True)
         partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=job.out))
