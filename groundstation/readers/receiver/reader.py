@@ -76,8 +76,7 @@ def _epoch_start_of(found: Overview) -> Callable[[Frames], int]:
 
 def _of_block(frames: Frames, found: Overview, told: _Told) -> Iterator[RecordBatch]:
     block = Block()
-    for messages in ubx.messages_of(frames):
-        time = ubx.time_of(messages, found.anchors)
+    for messages, time in ubx.timed(frames, found.anchors):
         batches = text_batches if messages.name.startswith("INF-") else raw_batches
         yield from batches(messages, time)
         if len(messages) > len(block.get(messages.name, ())):

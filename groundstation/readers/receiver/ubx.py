@@ -59,6 +59,25 @@ def time_of(messages: Messages, anchors: Anchors) -> Column:
     return Column(np.zeros(len(messages), dtype=np.int64), np.zeros(len(messages), dtype=bool))
 
 
+def timed(frames: Frames, anchors: Anchors) -> list[tuple[Messages, Column]]:
+    """Messages of a block with their times; one that tells none has that of the message with a time before it."""
+    several = [(messages, time_of(messages, anchors)) for messages in messages_of(frames)]
+    known = [(messages.places[time.mask], time.values[time.mask]) for messages, time in several]
+    if not known:
+        return several
+    places, utc_ns = (np.concatenate(parts) for parts in zip(*known, strict=True))
+    order = np.argsort(places, kind="stable")
+    places, utc_ns = places[order], utc_ns[order]
+    return [(messages, _filled(messages, time, places, utc_ns)) for messages, time in several]
+
+
+def _filled(messages: Messages, time: Column, places: Int64Array, utc_ns: Int64Array) -> Column:
+    if time.mask.any() or not len(places):  # a message that tells its time is not given another
+        return time
+    at = np.searchsorted(places, messages.places) - 1
+    return Column(np.where(at >= 0, utc_ns[np.maximum(at, 0)], 0), at >= 0)
+
+
 def _is_gps_time(week: NDArray[Any], week_s: NDArray[Any]) -> BoolArray:
     return np.asarray((week >= FIRST_WEEK) & (week < LAST_WEEK) & (week_s >= 0.0) & (week_s < S_PER_WEEK))
 
