@@ -18,10 +18,19 @@ CODES = {
     name: int(code, 16)
     for name, code in (
         word.split("=")
-        for word in (
-            "NAV-PVT=0107 NAV-PVAT=0117 NAV-DOP=0104 NAV-HPPOSLLH=0114 NAV-RELPOSNED=013C NAV-ATT=0105 NAV-POSLLH=0102 "
-            "NAV-VELNED=0112 NAV-TIMEGPS=0120 NAV-STATUS=0103 ESF-INS=1015"
-        ).split()
+        for word in [
+            "NAV-PVT=0107",
+            "NAV-PVAT=0117",
+            "NAV-DOP=0104",
+            "NAV-HPPOSLLH=0114",
+            "NAV-RELPOSNED=013C",
+            "NAV-ATT=0105",
+            "NAV-POSLLH=0102",
+            "NAV-VELNED=0112",
+            "NAV-TIMEGPS=0120",
+            "NAV-STATUS=0103",
+            "ESF-INS=1015",
+        ]
     )
 }
 
