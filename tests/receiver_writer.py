@@ -14,25 +14,11 @@ from groundstation.readers.receiver.ubx_messages import LAYOUTS
 
 LEAP_S = 18
 GPS_EPOCH_NS = iso_to_utc_ns("1980-01-06T00:00:00Z")[0]
-CODES = {
-    name: int(code, 16)
-    for name, code in (
-        word.split("=")
-        for word in [
-            "NAV-PVT=0107",
-            "NAV-PVAT=0117",
-            "NAV-DOP=0104",
-            "NAV-HPPOSLLH=0114",
-            "NAV-RELPOSNED=013C",
-            "NAV-ATT=0105",
-            "NAV-POSLLH=0102",
-            "NAV-VELNED=0112",
-            "NAV-TIMEGPS=0120",
-            "NAV-STATUS=0103",
-            "ESF-INS=1015",
-        ]
-    )
-}
+_CODES_OF = """
+    NAV-PVT=0107 NAV-PVAT=0117 NAV-DOP=0104 NAV-HPPOSLLH=0114 NAV-RELPOSNED=013C NAV-ATT=0105 NAV-POSLLH=0102
+    NAV-VELNED=0112 NAV-TIMEGPS=0120 NAV-STATUS=0103 ESF-INS=1015
+"""
+CODES = {word[:-5]: int(word[-4:], 16) for word in _CODES_OF.split()}
 
 
 def ubx_frame(code: int, payload: bytes) -> bytes:
