@@ -9,6 +9,8 @@ import numpy as np
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import MPS_PER_KNOT, NS_PER_S
 from groundstation.readers.receiver.layouts import layout
+from groundstation.readers.receiver.novatel_messages import LAYOUTS as NOVATEL_LAYOUTS
+from groundstation.readers.receiver.novatel_messages import NAMES
 from groundstation.readers.receiver.scan import crc_tables
 from groundstation.readers.receiver.ubx_messages import LAYOUTS
 
@@ -58,13 +60,25 @@ def rtcm(number: int, size: int = 20) -> bytes:
     return frame + crc.to_bytes(3, "big")
 
 
-def novatel(number: int, body: bytes, week: int, week_ms: int) -> bytes:
-    """A frame of NovAtel with the long header."""
-    header = struct.pack(
-        "<3sBHBBHHBBHIIHH", b"\xaaD\x12", 28, number, 0, 0x20, len(body), 0, 0, 180, week, week_ms, 0, 0, 0
-    )
+def novatel_frame(
+    number: int, body: bytes, week: int, week_ms: int, status: int = 180, *, is_short: bool = False
+) -> bytes:
+    """A frame of NovAtel with the long header, or the short one."""
+    header = struct.pack("<3sBHHI", b"\xaaD\x13", len(body), number, week, week_ms)
+    if not is_short:
+        of_message = (28, number, 0, 32, len(body), 0, 0, status, week, week_ms, 0, 0, 0)
+        header = struct.pack("<3sBHBBHHBBHIIHH", b"\xaaD\x12", *of_message)
     content = header + body
     return content + (zlib.crc32(content, 0xFFFFFFFF) ^ 0xFFFFFFFF).to_bytes(4, "little")
+
+
+def novatel(name: str, week_ms: int, status: int = 180, *, is_short: bool = False, **members: int | float) -> bytes:
+    """A message of week 2417 by the members of its structure."""
+    record = np.zeros(1, layout(NOVATEL_LAYOUTS[name]).head.dtype)
+    for member, value in members.items():
+        record[member] = value
+    number = next(number for number, known in NAMES.items() if known == name)
+    return novatel_frame(number, record.tobytes(), 2417, week_ms, status, is_short=is_short)
 
 
 def week_ms(utc: str) -> int:

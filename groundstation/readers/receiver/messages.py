@@ -13,6 +13,7 @@ from groundstation.readers.receiver.stream import Frames
 
 PIECE_BYTES = MAX_TEXT_CHARACTERS // 2  # of a payload that is kept as hexadecimal digits
 PIECES_AT_ONCE = 4_096
+Columns = dict[str, Column]
 _DIGITS = np.frombuffer(b"0123456789abcdef", dtype=np.uint8)
 
 
@@ -49,9 +50,8 @@ class Messages:
 
     @property
     def topic(self) -> str:
-        """``raw.<name>``; with the bytes of the payload behind it where that is not as long as the layout says."""
-        layout = self.layout
-        is_usual = layout is None or (self.size >= layout.size if layout.group else self.size == layout.size)
+        """``raw.<name>``; with the bytes of the payload behind it where that is shorter than the layout."""
+        is_usual = self.layout is None or self.size >= self.layout.size
         return f"raw.{self.name}" if is_usual else f"raw.{self.name}.{self.size}"
 
     def head(self) -> NDArray[Any]:
@@ -140,3 +140,28 @@ def bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
         return
     for start in range(0, len(batch), MAX_BATCH_ROWS):
         yield batch.take(slice(start, start + MAX_BATCH_ROWS))
+
+
+class Block(dict[str, Messages]):
+    """Messages of a block by name; of a name that occurs with several lengths the most."""
+
+    def add(self, messages: Messages) -> None:
+        """Take in messages."""
+        if len(messages) > len(self.get(messages.name, ())):
+            self[messages.name] = messages
+
+    def fields(self, name: str) -> "dict[str, NDArray[Any]] | None":
+        """Values of a message by field; None where the block has none."""
+        messages = self.get(name)
+        if messages is None or messages.layout is None or not len(messages):
+            return None
+        return {key: one.values for key, one in messages.layout.head.columns(messages.head(), messages.size).items()}
+
+
+def occupied(topic: str, places: Int64Array, time: Column, columns: Columns) -> RecordBatch | None:
+    """A batch of the rows that have any value."""
+    if not columns:
+        return None
+    rows = np.logical_or.reduce([column.mask for column in columns.values()])
+    batch = RecordBatch(topic, places, time, columns)
+    return batch if rows.all() else (batch.take(rows) if rows.any() else None)

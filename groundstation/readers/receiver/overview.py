@@ -9,12 +9,12 @@ import numpy as np
 from groundstation.base.records import Int64Array, Remark
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.receiver import nmea, scan, ubx
-from groundstation.readers.receiver.messages import Messages
+from groundstation.readers.receiver import nmea, novatel, novatel_messages, scan, ubx
+from groundstation.readers.receiver.messages import Block, Messages
 from groundstation.readers.receiver.sentences import FORMATTERS, sentences_of
 from groundstation.readers.receiver.stream import Frames, Stream
 from groundstation.readers.receiver.times import DAY_NS, Anchors
-from groundstation.readers.receiver.ubx_canonical import ATTITUDE_SOURCES, POSITION_SOURCES, Block, has_attitude
+from groundstation.readers.receiver.ubx_canonical import ATTITUDE_SOURCES, POSITION_SOURCES, has_attitude
 from groundstation.readers.source import Source
 
 NAME = "receiver"
@@ -45,11 +45,6 @@ class Overview:
     remarks: list[Remark] = field(default_factory=list)
     rtcm: Counter[int] = field(default_factory=Counter)
 
-    @property
-    def is_ubx(self) -> bool:
-        """Whether UBX messages give the canonical topics."""
-        return bool(self.leader)
-
 
 def overview(source: Source, bare: bool) -> Overview:
     """Walk through a stream once."""
@@ -60,7 +55,10 @@ def overview(source: Source, bare: bool) -> Overview:
         for messages in ubx.messages_of(frames):
             found.counts[messages.name] += len(messages)
             full_times.take(messages)
-            block[messages.name] = messages
+            block.add(messages)
+        for timed in novatel.messages_of(frames):
+            found.counts[timed.name] += len(timed)
+            full_times.take_time(timed.places, timed.time())
         attitudes.update(name for name in ATTITUDE_SOURCES if has_attitude(block, name))
         if _VERSION in block and not found.metadata:
             found.metadata = _versions(block[_VERSION])
@@ -80,8 +78,11 @@ _NOTHING: Int64Array = np.zeros(0, dtype=np.int64)
 
 
 def _choose(found: Overview, attitudes: Counter[str]) -> None:
-    found.leader = next((name for name in POSITION_SOURCES if found.counts[name]), "")
+    leaders = (*POSITION_SOURCES, *novatel_messages.POSITION_SOURCES)
+    found.leader = next((name for name in leaders if found.counts[name]), "")
     found.attitude = next((name for name in ATTITUDE_SOURCES if attitudes[name]), "")
+    if not found.attitude:
+        found.attitude = next((name for name in novatel_messages.INS_SOURCES if found.counts[name]), "")
     formatters = {_formatter(name) for name in found.counts}
     if not found.attitude:
         found.attitude = next((name for name in nmea.HEADING_FORMATTERS if name in formatters), "")
@@ -141,8 +142,7 @@ def remarks(found: Overview) -> Iterator[Remark]:
     """What serves as what, and what was passed over."""
     yield from found.remarks
     if found.leader:
-        is_alone = found.leader in ("NAV-PVT", "NAV-PVAT")
-        added = ("NAV-DOP", "NAV-HPPOSLLH") if is_alone else ("NAV-DOP", "NAV-VELNED", "NAV-STATUS")
+        added = _ADDED.get(found.leader, ("NAV-DOP", "NAV-VELNED", "NAV-STATUS"))
         others = ", ".join(name for name in added if found.counts[name])
         text = f"gnss from {found.leader}" + (f" with {others} of the same epoch" if others else "")
         sentences = sorted({_formatter(name) for name in found.counts} & {"GGA", "RMC", "GNS", "GLL"})
@@ -162,16 +162,27 @@ def remarks(found: Overview) -> Iterator[Remark]:
             )
 
 
+_ADDED = dict.fromkeys(("NAV-PVT", "NAV-PVAT"), ("NAV-DOP", "NAV-HPPOSLLH")) | {
+    name: (velocity, "PSRDOP") for name, velocity in novatel_messages.VELOCITY_OF.items()
+}
 _FUSED = (
     "the receiver's own filter of GNSS and inertial sensors (gnss_aided); its position and velocity are those of gnss"
+)
+_TWO_ANTENNAS = (
+    "heading of the line from one antenna to the other, true heading of the vehicle where that line points forward "
+    "(gnss_aided)"
 )
 _ATTITUDE_SENSE = {
     "NAV-PVAT": _FUSED,
     "NAV-ATT": _FUSED,
     "NAV-PVT": _FUSED,
-    "NAV-RELPOSNED": "heading of the line from the moving base's antenna to the other, true heading of the vehicle "
-    "where that line points forward; two antennas (gnss_aided)",
+    "NAV-RELPOSNED": _TWO_ANTENNAS,
     "PASHR": _FUSED,
+    **dict.fromkeys(
+        ("INSPVAX", "INSPVA", "INSPVAS", "INSATT", "INSATTS"),
+        "the receiver's own filter of GNSS and inertial sensors (gnss_aided)",
+    ),
+    **dict.fromkeys(("DUALANTENNAHEADING", "HEADING2", "HEADING"), _TWO_ANTENNAS),
     "HDT": "true heading as the receiver or compass tells it (gnss_aided)",
     "THS": "true heading as the receiver or compass tells it (gnss_aided)",
     "HDM": "magnetic heading as the receiver or compass tells it",

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator, Mapping
 
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Column, Damage, Item, LogHeader, RecordBatch, Remark
-from groundstation.readers.receiver import nmea, scan, ubx
-from groundstation.readers.receiver.messages import bounded, raw_batches, text_batches
+from groundstation.readers.receiver import nmea, novatel, scan, ubx, ubx_canonical
+from groundstation.readers.receiver.messages import Block, bounded, raw_batches, text_batches
+from groundstation.readers.receiver.novatel_messages import INS_SOURCES
 from groundstation.readers.receiver.overview import NAME, Overview, overview, remarks
 from groundstation.readers.receiver.sentences import Sentences, sentences_of
 from groundstation.readers.receiver.stream import Frames, Stream
-from groundstation.readers.receiver.ubx_canonical import INS_MODE, Block, gnss_batch, ins_batch
 from groundstation.readers.source import Source
 
 _NAMES_TOLD = 5
@@ -69,8 +69,8 @@ def _what_it_has(found: Overview) -> str:
 
 
 def _epoch_start_of(found: Overview) -> Callable[[Frames], int]:
-    if found.is_ubx:
-        return ubx.epoch_start
+    if found.leader:
+        return ubx.epoch_start if found.leader in ubx_canonical.POSITION_SOURCES else novatel.epoch_start
     return lambda frames: nmea.epoch_start(frames, {one.address: one for one in sentences_of(frames)})
 
 
@@ -79,15 +79,19 @@ def _of_block(frames: Frames, found: Overview, told: _Told) -> Iterator[RecordBa
     for messages, time in ubx.timed(frames, found.anchors):
         batches = text_batches if messages.name.startswith("INF-") else raw_batches
         yield from batches(messages, time)
-        if len(messages) > len(block.get(messages.name, ())):
-            block[messages.name] = messages
+        block.add(messages)
+    for timed in novatel.messages_of(frames):
+        yield from raw_batches(timed, timed.time())
+        block.add(timed)
     sentences = {one.address: one for one in sentences_of(frames)}
     epochs = nmea.epochs_of(sentences)
     time = nmea.day_times(epochs, found.anchors)
     for address, one in sentences.items():
         yield from _raw_sentences(one, epochs.time_of(address, time), told)
-    if found.is_ubx:
-        gnss = gnss_batch(block, found.leader, found.anchors)
+    if found.leader in ubx_canonical.POSITION_SOURCES:
+        gnss = ubx_canonical.gnss_batch(block, found.leader, found.anchors)
+    elif found.leader:
+        gnss = novatel.gnss_batch(block, found.leader)
     else:
         gnss, astray = nmea.gnss_batch(epochs, time)
         told.astray += astray
@@ -104,8 +108,10 @@ def _ins(block: Block, epochs: nmea.Epochs, time: Column, found: Overview) -> Re
     if not found.attitude:
         return None
     if found.attitude in nmea.HEADING_FORMATTERS:
-        return nmea.ins_batch(epochs, found.attitude, time, INS_MODE)
-    return ins_batch(block, found.attitude, found.anchors)
+        return nmea.ins_batch(epochs, found.attitude, time, ubx_canonical.INS_MODE)
+    if found.attitude in INS_SOURCES:
+        return novatel.ins_batch(block, found.attitude)
+    return ubx_canonical.ins_batch(block, found.attitude, found.anchors)
 
 
 def _raw_sentences(sentences: Sentences, time: Column, told: _Told) -> Iterator[RecordBatch]:

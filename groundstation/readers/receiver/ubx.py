@@ -30,7 +30,7 @@ _ITOW_AT_4 = (0x14, 0x13, 0x3C, 0x3B)  # HPPOSLLH, HPPOSECEF, RELPOSNED, SVIN ha
 
 
 def messages_of(frames: Frames) -> Iterator[Messages]:
-    """UBX messages of a block by name; of several lengths those with the same length together."""
+    """UBX messages of a block by name; those shorter than the layout apart, by their length."""
     which = frames.of(scan.UBX)
     at = frames.offsets[which]
     code = frames.data[at + 2].astype(np.int64) * 256 + frames.data[at + 3]
@@ -40,7 +40,7 @@ def messages_of(frames: Frames) -> Iterator[Messages]:
         for size in np.unique(sizes[of_code]).tolist():
             name = name_of(number, size)
             known = layout(LAYOUTS[name]) if name in LAYOUTS else None
-            is_open = known is None or (known.group is not None and size >= known.size)
+            is_open = known is None or size >= known.size
             rows = of_code[sizes[of_code] >= size] if is_open else of_code[sizes[of_code] == size]
             yield Messages(name, frames, frames.places[which[rows]], at[rows] + HEADER_BYTES, sizes[rows], known)
             if is_open:
@@ -102,8 +102,11 @@ class FullTimes:
         elif messages.name == "NAV-TIMEGPS" and head is not None:
             self._of_week(messages, head)
         elif messages.name == "RXM-RAWX" and messages.has("rcvTow"):
-            time = time_of(messages, self.anchors())
-            self._add(messages.places, time.values, np.full(len(messages), -1), time.mask)
+            self.take_time(messages.places, time_of(messages, self.anchors()))
+
+    def take_time(self, places: Int64Array, time: Column) -> None:
+        """Take in messages of which each tells its full time."""
+        self._add(places, time.values, np.full(len(places), -1), time.mask)
 
     def anchors(self) -> Anchors:
         """What was gathered, in the order of the file."""

@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_360
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
-from groundstation.readers.receiver.messages import Messages
+from groundstation.readers.receiver.messages import Block, Columns, occupied
 from groundstation.readers.receiver.times import Anchors
 from groundstation.readers.receiver.ubx import time_of
 
-Columns = dict[str, Column]
 DEAD_RECKONING, FIX_2D, FIX_3D, WITH_SENSORS = 1, 2, 3, 4
 FLOAT, FIXED = 1, 2
 MM = 1e-3
@@ -20,17 +19,6 @@ POSITION_SOURCES = ("NAV-PVT", "NAV-PVAT", "NAV-HPPOSLLH", "NAV-POSLLH")  # the 
 ATTITUDE_SOURCES = ("NAV-PVAT", "NAV-ATT", "NAV-RELPOSNED", "NAV-PVT")
 _FIXES = np.array(["none", "dead_reckoning", "2d", "3d", "gnss_ins", "none"])
 INS_MODE = "gnss_aided"
-
-
-class Block(dict[str, Messages]):
-    """Messages of a block by name; of a name that occurs with several lengths the last."""
-
-    def fields(self, name: str) -> "dict[str, NDArray[Any]] | None":
-        """Values of a message by field; None where the block has none."""
-        messages = self.get(name)
-        if messages is None or messages.layout is None or not len(messages):
-            return None
-        return {key: one.values for key, one in messages.layout.head.columns(messages.head(), messages.size).items()}
 
 
 def gnss_batch(block: Block, leader: str, anchors: Anchors) -> RecordBatch | None:
@@ -44,7 +32,7 @@ def gnss_batch(block: Block, leader: str, anchors: Anchors) -> RecordBatch | Non
         columns |= _added(block, "NAV-STATUS", fields, _status)
     columns |= _precise(block, fields, columns)
     columns = _added(block, "NAV-DOP", fields, _dilution) | columns
-    return _occupied("gnss", messages.places, time_of(messages, anchors), columns)
+    return occupied("gnss", messages.places, time_of(messages, anchors), columns)
 
 
 def ins_batch(block: Block, source: str, anchors: Anchors) -> RecordBatch | None:
@@ -58,7 +46,7 @@ def ins_batch(block: Block, source: str, anchors: Anchors) -> RecordBatch | None
     heading = columns.get("true_heading_deg")
     if heading is not None:
         columns["mode"] = Column(np.full(len(messages), INS_MODE), heading.present)
-    return _occupied("ins", messages.places, time_of(messages, anchors), columns)
+    return occupied("ins", messages.places, time_of(messages, anchors), columns)
 
 
 def has_attitude(block: Block, source: str) -> bool:
@@ -224,12 +212,3 @@ def _same_epoch(fields: Mapping[str, NDArray[Any]], other: Mapping[str, NDArray[
     at = np.searchsorted(other["iTOW"], fields["iTOW"], side="right", sorter=order) - 1
     at = order[np.maximum(at, 0)]
     return at, np.asarray(other["iTOW"][at] == fields["iTOW"])
-
-
-def _occupied(topic: str, places: Int64Array, time: Column, columns: Columns) -> RecordBatch | None:
-    """A batch of the rows that have any value."""
-    if not columns:
-        return None
-    rows = np.logical_or.reduce([column.mask for column in columns.values()])
-    batch = RecordBatch(topic, places, time, columns)
-    return batch if rows.all() else (batch.take(rows) if rows.any() else None)
