@@ -305,3 +305,40 @@ def test_long_arrays_are_counted_and_what_follows_is_read() -> None:
     columns = shape.columns(np.frombuffer(message, np.uint8), np.array([0]))
     assert {name: column.values.tolist() for name, column in columns.items()} == {"image.count": [100], "after": [7.5]}
     assert shape.shortened == ("image",)
+
+
+def rows_of(path: Path) -> tuple[int, list[Damage]]:
+    """Raw messages that are read of a file, and its damage."""
+    found = list(registry.read(path))
+    check(found)
+    rows = sum(len(item) for item in found if isinstance(item, RecordBatch) and item.topic.startswith("raw."))
+    return rows, [item for item in found if isinstance(item, Damage)]
+
+
+@pytest.mark.parametrize("form", ["ros1", "mcap", "sqlite3"])
+def test_a_cut_file_gives_what_stands_before_the_cut(tmp_path: Path, form: str) -> None:
+    made = written(tmp_path, form)
+    path = next(file for file in made.iterdir() if file.suffix != ".yaml") if made.is_dir() else made
+    data = path.read_bytes()
+    whole, damages = rows_of(path)
+    assert whole == 480 and not damages
+    kept = []
+    for share in (0.9, 0.6, 0.4):
+        path.write_bytes(data[: int(share * len(data))])
+        rows, damages = rows_of(path)
+        kept.append(rows)
+        assert any(damage.kind == "truncated" and damage.loses_data for damage in damages)
+    assert whole >= kept[0] >= kept[1] >= kept[2] and whole > kept[1]
+    assert kept[1] > 0, "not only whole chunks"
+
+
+@pytest.mark.parametrize("form", ["ros1", "mcap", "sqlite3"])
+def test_a_damaged_record_costs_little_of_the_rest(tmp_path: Path, form: str) -> None:
+    made = written(tmp_path, form)
+    path = next(file for file in made.iterdir() if file.suffix != ".yaml") if made.is_dir() else made
+    data = path.read_bytes()
+    whole, _ = rows_of(path)
+    at = len(data) // 2
+    path.write_bytes(data[:at] + bytes(b ^ 0x5A for b in data[at : at + 600]) + data[at + 600 :])
+    rows, damages = rows_of(path)
+    assert damages and whole > rows > 0.9 * whole

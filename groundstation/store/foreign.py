@@ -29,12 +29,13 @@ from groundstation.store.framing import (
     read_chunk_head,
     read_summary,
 )
-from groundstation.store.messages import RECORD_PREFIX, ByteArray, Messages
+from groundstation.store.messages import HEAD, RECORD_PREFIX, ByteArray, Messages
 from groundstation.store.walk import find_messages
 
 PEEK_BYTES = 64
 SEARCH_BYTES = 1 << 20
 _CHUNK = re.compile(rb"\x06(?=[\0-\xff]{5}\0{3})")  # opcode and a length below 2**40
+_MESSAGE = re.compile(rb"\x05(?=[\0-\xff]{3}\0{5})")
 _KNOWN_OPCODES = frozenset(range(Opcode.HEADER, Opcode.DATA_END + 1))
 
 
@@ -50,13 +51,14 @@ class ForeignMessages:
 
 @dataclass(frozen=True)
 class ForeignLost:
-    """Bytes ``start`` to ``end`` that could not be used; ``kept`` bytes of a chunk that was cut could."""
+    """What could not be used in the bytes ``start`` to ``end``: ``count`` of ``what``, before message ``before``."""
 
     start: int
     end: int
-    reason: str
+    what: str
+    count: int
+    before: int
     is_cut: bool = False
-    before: int = 0
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,7 @@ class ForeignMcap:
             elif len(peek) < RECORD_PREFIX or peek[0] not in _KNOWN_OPCODES or end > self._size:
                 place = self.find_chunk(at + 1)
                 is_cut = place == self._size and not has_end
-                yield ForeignLost(at, place, "no record can be recognised", is_cut, self._count)
+                yield ForeignLost(at, place, "bytes that are no record", place - at, self._count, is_cut)
                 if is_cut:
                     break
                 at = place
@@ -124,12 +126,12 @@ class ForeignMcap:
                 if len(loose) < SEARCH_BYTES and at < self._size:
                     continue
             if loose:
-                yield from self._records(np.frombuffer(bytes(loose), np.uint8))
+                yield from self._records(np.frombuffer(bytes(loose), np.uint8), at - len(loose), at)
                 loose.clear()
         if loose:
-            yield from self._records(np.frombuffer(bytes(loose), np.uint8))
+            yield from self._records(np.frombuffer(bytes(loose), np.uint8), at - len(loose), at)
         if not has_end:
-            yield ForeignLost(self._size, self._size, "the file ends without its summary", True, self._count)
+            yield ForeignLost(self._size, self._size, "file that ends without its summary", 1, self._count, True)
         if self._unknown:
             yield UnknownChannel(self._unknown)
 
@@ -154,27 +156,34 @@ class ForeignMcap:
         end = at + head.length
         if end > self._size:
             raw = _beginning(head.compression, data, head.uncompressed_size)
-            yield from self._records(raw)
-            yield ForeignLost(
-                at, self._size, f"a chunk is cut, {len(raw)} bytes of its content kept", True, self._count
-            )
+            yield from self._records(raw[: _whole_records(raw.tobytes())], at, end)
+            what = f"bytes of a chunk that is cut; {len(raw)} bytes of its content are kept"
+            yield ForeignLost(at, self._size, what, self._size - at, self._count, True)
             return
         try:
             raw = decompress(head.compression, data, head.uncompressed_size, head.crc or None)
         except ChunkError as error:
-            yield ForeignLost(at, end, f"chunk: {error}", before=self._count)
+            yield ForeignLost(at, end, f"bytes of a chunk that is lost: {error}", end - at, self._count)
             return
-        yield from self._records(raw)
+        yield from self._records(raw, at, end)
 
-    def _records(self, raw: ByteArray) -> Iterator[Found]:
-        """Messages among records that stand one after the other, definitions taken in; a cut last one is left out."""
+    def _stretches(self, raw: ByteArray, at: int, end: int) -> Iterator[Found]:
+        """Records that stand one after the other, searched for behind what is none; of a chunk without a checksum."""
+        data, start = raw.tobytes(), 0
+        while start < len(data):
+            whole = start + _whole_records(data[start:])
+            yield from self._records(raw[start:whole], at, end)
+            if whole == len(data):
+                return
+            start = _next_message(data, whole + 1)
+            yield ForeignLost(at, end, "bytes of a chunk's content that are no record", start - whole, self._count)
+
+    def _records(self, raw: ByteArray, at: int, end: int) -> Iterator[Found]:
+        """Messages among records that stand one after the other, definitions taken in."""
         found = find_messages(raw)
         if found is None:
-            whole = sum(len(record) for _opcode, record in parse_records(raw.tobytes()))
-            raw = raw[:whole]
-            found = find_messages(raw)
-            if found is None:
-                return
+            yield from self._stretches(raw, at, end)
+            return
         starts, sizes = found
         self._define(raw, starts, sizes)
         if not len(starts):
@@ -203,8 +212,36 @@ class ForeignMcap:
                 for opcode, record in parse_records(raw[start:end].tobytes()):
                     if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                         parsed = parse_record(opcode, record[RECORD_PREFIX:])
-                        if isinstance(parsed, Schema | Channel):
+                        if isinstance(parsed, Schema | Channel) and not self._is_sure_of(parsed):
                             self._known.add(parsed, b"")
+
+    def _is_sure_of(self, found: Schema | Channel) -> bool:
+        """Whether an intact summary defines the same id: it has a checksum, which the definition here may lack."""
+        known = self._known.schemas if isinstance(found, Schema) else self._known.channels
+        return self._known.is_intact and found.id in known
+
+
+def _whole_records(data: bytes) -> int:
+    """Bytes of the whole records that stand one after the other at the beginning."""
+    whole = 0
+    for opcode, record in parse_records(data):
+        if opcode == Opcode.MESSAGE and len(record) < HEAD.itemsize:
+            break
+        whole += len(record)
+    return whole
+
+
+def _next_message(data: bytes, start: int) -> int:
+    """Place of the next message behind damage: two whole messages must stand there, or one that ends the data."""
+    for match in _MESSAGE.finditer(data, start):
+        at = match.start()
+        for _number in range(2):
+            at += RECORD_PREFIX + int.from_bytes(data[at + 1 : at + RECORD_PREFIX], "little")
+            if at >= len(data) or data[at] != Opcode.MESSAGE:
+                break
+        if at == len(data) or (at < len(data) and data[at] == Opcode.MESSAGE):
+            return match.start()
+    return len(data)
 
 
 def _beginning(compression: str, data: bytes, size: int) -> ByteArray:

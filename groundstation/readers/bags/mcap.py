@@ -62,7 +62,5 @@ class Mcap:
 
 def _damage(lost: "ForeignLost") -> Damage:
     place = bytes_place(lost.start, lost.end) if lost.end > lost.start else f"byte {lost.start}"
-    between = lost.before - 1, lost.before
-    if lost.is_cut:
-        return Damage("truncated", place, max(lost.end - lost.start, 1), f"bytes at the end: {lost.reason}")
-    return Damage("corrupt", place, lost.end - lost.start, f"bytes skipped: {lost.reason}", between_records=between)
+    kind = "truncated" if lost.is_cut else "corrupt"
+    return Damage(kind, place, lost.count, lost.what, between_records=(lost.before - 1, lost.before))

@@ -29,6 +29,7 @@ MAX_CHUNK_BYTES = 256 << 20  # decompressed; recorders close a chunk at 768 kB
 SEARCH_BYTES = 1 << 20
 # Every record's header has the field "op" of one byte: 4 bytes of length, "op=", the number.
 _OP = re.compile(rb"\x04\0\0\0op=[\x02-\x07]")
+_OP_OUTSIDE = re.compile(rb"\x04\0\0\0op=[\x04-\x06]")  # of records that stand in no chunk
 
 
 class _Head(NamedTuple):
@@ -122,7 +123,7 @@ class Ros1Bag:
                 continue
             stream.seek(head.data_at)
             is_cut = head.end > size
-            if is_cut and (head.op != CHUNK or self._next_record(stream, head.data_at, size) < size):
+            if is_cut and (head.op != CHUNK or self._next_record(stream, head.data_at, size, _OP_OUTSIDE) < size):
                 place = self._next_record(stream, at + 1, size)  # its length is not to be trusted, or the end is cut
                 if place == size:
                     yield Damage("truncated", bytes_place(at, size), size - at, "bytes of a record cut off")
@@ -134,7 +135,7 @@ class Ros1Bag:
                 stream.seek(head.data_at)
                 yield from self._chunk(head, stream.read(min(head.end, size) - head.data_at), at, is_cut)
             elif head.op in (MESSAGE, CONNECTION):
-                yield from self._messages(_read(stream, at, head.end - at))
+                yield from self._messages(_read(stream, at, head.end - at), bytes_place(at, head.end))
             at = head.end if not is_cut else size
 
     def _read_head(self, stream: BinaryIO, at: int, size: int) -> _Head | None:
@@ -145,12 +146,12 @@ class Ros1Bag:
         head = _head_at(data, 0, size)
         return None if head is None else head._replace(data_at=at + head.data_at, end=at + head.end)
 
-    def _next_record(self, stream: BinaryIO, start: int, size: int) -> int:
+    def _next_record(self, stream: BinaryIO, start: int, size: int, ops: re.Pattern[bytes] = _OP) -> int:
         """Where a record begins from ``start`` on, told by its operation; ``size`` when none does."""
         at = start
         while at < size:
             block = _read(stream, at, SEARCH_BYTES + 64)
-            for match in _OP.finditer(block):
+            for match in ops.finditer(block):
                 # The fields of a header have no order: it begins at one of the lengths before.
                 for back in range(4, min(match.start(), 512) + 1):
                     begin = match.start() - back
@@ -173,24 +174,28 @@ class Ros1Bag:
         elif reason or len(content) != size:
             what = f"chunk that {reason or 'has another size than it claims'}, {len(content)} of {size} bytes kept"
             yield Damage("corrupt", place, 1, what)
-        yield from self._messages(content)
+        yield from self._messages(content, place, is_told=len(content) != size)
 
-    def _messages(self, content: bytes) -> Iterator[Part]:
+    def _messages(self, content: bytes, place: str, *, is_told: bool = False) -> Iterator[Part]:
         """Messages that stand one after the other; definitions among them are taken in."""
         found: dict[int, _Gathered] = {}
-        at = 0
+        at = lost = 0
         while at < len(content):
             head = _head_at(content, at, len(content))
             if head is None or head.end > len(content):
                 match = next((one.start() for one in _OP.finditer(content, at + 5)), len(content))
                 begins = (begin for begin in range(max(at + 1, match - 512), match) if _fits(content, begin, match))
-                at = next(begins, match + 1 if match < len(content) else match)
+                behind = next(begins, match + 1 if match < len(content) else match)
+                lost += behind - at if behind < len(content) or not is_told else 0
+                at = behind
                 continue
             if head.op == CONNECTION:
                 self._connect(head, content[head.data_at : head.end])
             elif head.op == MESSAGE:
                 self._message(head, found)
             at = head.end
+        if lost:
+            yield Damage("corrupt", place, lost, "bytes of a chunk's content that are no record")
         buffer = np.frombuffer(content, np.uint8)
         for number, one in found.items():
             times = np.array(one.times, dtype=np.int64)

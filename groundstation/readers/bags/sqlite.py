@@ -53,12 +53,13 @@ class Ros2Sqlite:
             newest = int(database.execute("SELECT max(id) FROM messages").fetchone()[0] or 0)
         except (*_FAILURES, TypeError, ValueError):
             newest = 0
-        failures = 0
+        failures = missing = 0
         while True:
             rows, failure = _next_rows(database, last)
             if rows:
                 unknown += sum(row[1] not in connections for row in rows)
                 yield from self._blocks([row for row in rows if row[1] in connections], connections)
+                missing += rows[-1][0] - max(last, 0) - len(rows)
                 last, jump = rows[-1][0], 1
             if failure:
                 lost_at = lost_at or f"behind message {last}"
@@ -72,6 +73,9 @@ class Ros2Sqlite:
             yield Damage(
                 "truncated" if last >= newest else "corrupt", lost_at, 1, "stretch of the database that cannot be read"
             )
+        if missing > 0:
+            what = "messages that are missing from the numbering"
+            yield Damage("dropped_rows", "the whole log", missing, what, loses_data=bool(lost_at))
         if unknown:
             yield Damage("dropped_channel", "the whole log", unknown, "messages of a topic that is not in the file")
 
