@@ -1,6 +1,7 @@
 """Robots' bags: values, frames, clocks, containers; every value of recorded ones equals rosbags' own decoding."""
 
 import json
+import re
 import struct
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 
+from groundstation.base.errors import SettingsError
 from groundstation.base.records import Damage, RecordBatch, Remark
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
@@ -342,3 +344,93 @@ def test_a_damaged_record_costs_little_of_the_rest(tmp_path: Path, form: str) ->
     path.write_bytes(data[:at] + bytes(b ^ 0x5A for b in data[at : at + 600]) + data[at + 600 :])
     rows, damages = rows_of(path)
     assert damages and whole > rows > 0.9 * whole
+
+
+PROFILE = """
+name = "own"
+[[messages]]
+topic = "/state"
+time = { field = "when", unit = "ms" }
+[messages.fields]
+"psi" = { field = "ins.true_heading_deg", unit = "rad", offset = 6.283185307179586 }
+"ok" = { field = "ins.valid" }
+"up" = { field = "ins.altitude_msl_m", unit = "ft", sign = -1 }
+"none" = { field = "ins.mode" }
+[messages.vectors]
+"v" = { topic = "ins", quantity = "velocity", frame = "enu", unit = "kmh" }
+"w" = { topic = "ins", quantity = "rates", frame = "flu", unit = "radps" }
+"""
+
+
+def profiled(tmp_path: Path, text: str) -> tuple[Path, Path]:
+    """A log of messages of its own in JSON, and a profile."""
+    rows = []
+    for row in range(20):
+        message = {
+            "when": START_NS // 10**6 + row * 100,
+            "psi": -1.0,
+            "ok": True,
+            "up": 1000.0,
+            "v": {"x": 36.0, "y": 72.0, "z": 3.6},
+            "w": {"x": 1.0, "y": 1.0, "z": 1.0},
+        }
+        rows.append(("/state", START_NS + row * 10**8 + LAG_NS, json.dumps(message).encode()))
+    (tmp_path / "own.toml").write_text(text)
+    log = mcap(tmp_path / "a.mcap", {"/state": ("own.State", "jsonschema", "json", b"{}")}, rows)
+    return log, tmp_path / "own.toml"
+
+
+def test_a_profile_says_what_messages_mean_and_is_told_with_its_units(tmp_path: Path) -> None:
+    path, profile = profiled(tmp_path, PROFILE)
+    items = list(registry.read(path, profile))
+    check(items)
+    remarks = {item.code: item.text for item in items if isinstance(item, Remark)}
+    assert "ins velocity = v (kmh) in enu x 0.277778" in remarks["profile"]
+    assert "ins.altitude_msl_m = up (ft) x -0.3048" in remarks["profile"]
+    assert "/state has no none" in remarks["missing_columns"]
+    flight = read_flight(tmp_path / "b.mcap", convert_log(open_log(path, profile), tmp_path / "b.mcap"))
+    ins = flight["ins"]
+    expected = {
+        "true_heading_deg": 360.0 - np.rad2deg(1.0),
+        "altitude_msl_m": -304.8,
+        "velocity_north_mps": 20.0,
+        "velocity_east_mps": 10.0,
+        "velocity_down_mps": -1.0,
+        "rate_x_dps": np.rad2deg(1.0),
+        "rate_y_dps": -np.rad2deg(1.0),
+    }
+    for name, value in expected.items():
+        assert np.abs(ins.values(name) - value).max() < 1e-9, name
+    assert ins.columns["valid"].values.all()
+    assert ins.time_ns[3] == START_NS + 3 * 10**8, "the profile's time"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ('quantity = "velocity"', 'quantity = "speed"', "messages[0].vectors.v.quantity"),
+        ('frame = "enu"', 'frame = "flu"', "messages[0].vectors.v.frame"),
+        ('unit = "rad"', 'unit = "m"', "messages[0].fields.psi.unit"),
+        ("ins.valid", "ins.colour", "messages[0].fields.ok.field"),
+        ('topic = "/state"', 'topik = "/state"', "messages[0].topik"),
+        ('unit = "ms"', 'unit = "fortnight"', "messages[0].time.unit"),
+    ],
+)
+def test_a_slip_in_a_profile_is_named(tmp_path: Path, old: str, new: str, key: str) -> None:
+    path, profile = profiled(tmp_path, PROFILE.replace(old, new, 1))
+    with pytest.raises(SettingsError, match=re.escape(f"own.toml, {key}")):
+        registry.identify(path, profile)
+
+
+def test_messages_of_px4_are_mapped_as_in_its_own_log(tmp_path: Path) -> None:
+    definition = "uint64 timestamp\nfloat32[4] q\n"
+    rows = []
+    for row in range(20):
+        stamp_us = START_NS // 1000 + row * 100_000
+        message = struct.pack("<4xQ4f", stamp_us, np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5))
+        rows.append(("/fmu/out/vehicle_attitude", stamp_us * 1000 + 1_000, b"\0\1" + message[2:]))
+    channel = ("px4_msgs/msg/VehicleAttitude", "ros2msg", "cdr", definition.encode())
+    path = mcap(tmp_path / "a.mcap", {"/fmu/out/vehicle_attitude": channel}, rows)
+    flight = flight_of(path, tmp_path)
+    assert flight["ins"].values("true_heading_deg") == pytest.approx(np.full(20, 90.0), abs=1e-5)
+    assert flight["ins"].time_ns[0] == START_NS

@@ -92,7 +92,7 @@ def identify(path: str | Path, profile: Path | None = None) -> Claim:
     ----------
     path : path of the log
     profile : path of a profile (TOML), optional
-        With it, the file is a table of that layout whatever it looks like.
+        With it, the file is a table of that layout whatever it looks like; of a bag it explains messages.
 
     Raises
     ------
@@ -113,8 +113,8 @@ def read(path: str | Path | Source, profile: Path | None = None) -> Iterator[Ite
     source = path if isinstance(path, Source) else Source(Path(path))
     claim, troubles = _claim(source, profile)
     reader = _readers()[claim.reader]
-    if reader is csv_profile:
-        items = csv_profile.read(source, profile)
+    if reader in (bags, csv_profile):
+        items = reader.read(source, profile)
     else:
         items = reader.read(source) if reader in _BUILT_IN else _guarded(reader, claim, source)
     return chain(items, _of_the_source(source), (Remark("plug_in", trouble) for trouble in troubles))
@@ -139,7 +139,8 @@ def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]
     if source.is_empty:
         raise UnclaimedLogError(source.name, "an empty file", "a recorded log", "check how it was copied")
     if profile is not None:
-        return csv_profile.claim_by(source, profile), plug_in_failures()
+        by_profile = bags if bags.sniff(source) else csv_profile
+        return by_profile.claim_by(source, profile), plug_in_failures()
     claims: list[Claim] = []
     refusals: list[GroundstationError] = []
     troubles = list(plug_in_failures())

@@ -1,6 +1,7 @@
 """Robots' logs: MCAP of other programs, ROS 1 bags (.bag), ROS 2 bags (sqlite3, MCAP, split ones by their folder)."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 from groundstation.base.records import Item
 from groundstation.readers.bags.bag import kind_of
@@ -15,8 +16,22 @@ def sniff(source: Source) -> Claim | None:
     return Claim(NAME, kind) if kind else None
 
 
-def read(source: Source) -> Iterator[Item]:
+def claim_by(source: Source, profile: Path) -> Claim:
+    """Claim of a bag whose messages the user's profile explains.
+
+    Raises
+    ------
+    SettingsError
+        When the profile cannot be used.
+    """
+    from groundstation.readers.bags.profile import load
+
+    return Claim(NAME, f"{kind_of(source)} {load(profile).name}")
+
+
+def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
     """Yield the header, batches of every topic (raw and canonical), remarks and damages."""
+    from groundstation.readers.bags.profile import load
     from groundstation.readers.bags.reader import items
 
-    yield from items(source, NAME)
+    yield from items(source, NAME, load(profile) if profile is not None else None)

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from groundstation.base.records import Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
-from groundstation.base.signals import RAW_PREFIX, field_of
+from groundstation.base.signals import RAW_PREFIX
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.bags.bag import Bag, kind_of
 from groundstation.readers.bags.decode import Decoded, Decoder
 from groundstation.readers.bags.messages import Block, Connection, joined
-from groundstation.readers.bags.survey import LARGEST_LAG_S, Survey, stamp_of, survey
-from groundstation.readers.bags.values import Values
+from groundstation.readers.bags.profile import MessageProfile
+from groundstation.readers.bags.survey import LARGEST_LAG_S, Survey, survey
 from groundstation.readers.parts import Part, bounded, merged, occupied
 from groundstation.readers.source import Source
 
@@ -24,10 +24,10 @@ PUBLISHED = "publish_time_ns"
 _ODD = re.compile(r"[^A-Za-z0-9_\-/]")
 
 
-def items(source: Source, reader_name: str) -> Iterator[Item]:
-    """Items of a bag."""
+def items(source: Source, reader_name: str, profile: MessageProfile | None = None) -> Iterator[Item]:
+    """Items of a bag; ``profile`` says what messages of its own mean."""
     bag = Bag(source)
-    found = survey(bag)
+    found = survey(bag, profile)
     names = _raw_names(found)
     yield LogHeader(
         f"{reader_name} {kind_of(source)}",
@@ -109,14 +109,7 @@ class _Topics:
                 part = self._part(block, decoded)
                 raw.append(part)
                 for feed in self._found.feeds.get(number, ()):
-                    if not decoded.columns.keys() >= set(feed.needs):
-                        continue
-                    columns = {
-                        name: column
-                        for name, column in feed.columns(Values(decoded.columns)).items()
-                        if name not in feed.without and field_of(feed.topic, name) is not None and column.mask.any()
-                    }
-                    of_topic = occupied(Part(part.index, part.time, columns, part.validity_ns))
+                    of_topic = occupied(Part(part.index, part.time, feed.of(decoded.columns), part.validity_ns))
                     if of_topic is not None:
                         canonical.setdefault(feed.topic, []).append(of_topic)
             yield from bounded(merged(self._names[number], raw))
@@ -135,7 +128,8 @@ class _Topics:
 
     def _validity(self, connection: Connection, decoded: Decoded, log_ns: Int64Array) -> Int64Array | None:
         """Header stamps where they are believed, log time where one is far from it."""
-        stamp_ns = stamp_of(connection, decoded.columns) if connection.number in self._found.stamped else None
+        is_stamped = connection.number in self._found.stamped
+        stamp_ns = self._found.seen[connection.number].stamp_of(decoded.columns) if is_stamped else None
         if stamp_ns is None:
             return None
         is_far = np.abs(log_ns - stamp_ns) > LARGEST_LAG_S * NS_PER_S

@@ -6,13 +6,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from groundstation.base.records import Column, Int64Array, Remark
-from groundstation.base.signals import field_of
+from groundstation.base.signals import field_of, kind_of
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.bags import px4
 from groundstation.readers.bags.bag import Bag
 from groundstation.readers.bags.canonical import MESSAGES, is_earth_frame, wheel_odometry
 from groundstation.readers.bags.decode import Decoder
 from groundstation.readers.bags.messages import Block, Connection
+from groundstation.readers.bags.profile import MessageProfile, MessageRule
 from groundstation.readers.bags.values import Columns, Values
 
 SAMPLE = 4_000  # messages of a connection that are looked at
@@ -37,6 +38,18 @@ class Feed:
     columns: Callable[[Values], Columns]
     without: frozenset[str] = frozenset()
 
+    def of(self, columns: dict[str, Column]) -> Columns:
+        """Fields of the canonical topic that messages with these columns give; those that have a value."""
+        if not columns.keys() >= set(self.needs):
+            return {}
+        with np.errstate(over="ignore", invalid="ignore"):  # of absurd numbers: becomes infinite or NaN
+            found = self.columns(Values(columns))
+        return {
+            name: column
+            for name, column in found.items()
+            if name not in self.without and field_of(self.topic, name) is not None and column.mask.any()
+        }
+
 
 @dataclass
 class Seen:
@@ -45,6 +58,8 @@ class Seen:
     Attributes
     ----------
     connection : Connection
+    rule : MessageRule, optional
+        What the user's profile says of its messages.
     messages : int
     first_ns, last_ns : int
         Log time of the first and the last message.
@@ -57,6 +72,7 @@ class Seen:
     """
 
     connection: Connection
+    rule: MessageRule | None = None
     messages: int = 0
     first_ns: int = 0
     last_ns: int = 0
@@ -75,12 +91,24 @@ class Seen:
             head = block.take(slice(0, SAMPLE - self.messages))
             for part in decoder.decode(head):
                 self.columns = self.columns or part.columns
-                stamp = stamp_of(self.connection, part.columns)
+                stamp = self.stamp_of(part.columns)
                 if stamp is not None:
                     self.stamps_ns.append(stamp)
                     self.lags_ns.append(head.log_time_ns[part.rows] - stamp)
         self.messages += len(block)
         self.last_ns = int(block.log_time_ns[-1])
+
+    def stamp_of(self, columns: dict[str, Column]) -> Int64Array | None:
+        """When values of messages were true by the messages themselves, shape (n,); None where they do not tell."""
+        if self.rule is not None and self.rule.time is not None:
+            return self.rule.stamp_ns(columns)
+        name = next((name for name in STAMPS if name in columns), None)
+        if name is not None:
+            return columns[name].values.astype(np.int64)
+        if px4.is_px4(self.connection.type) and "timestamp" in columns:
+            stamp_us = columns["timestamp"].values.astype(np.float64)
+            return (np.where(stamp_us < 2.0**52, stamp_us, 0.0) * 1e3).astype(np.int64)
+        return None
 
     @property
     def lags(self) -> Int64Array:
@@ -96,17 +124,6 @@ class Seen:
     def has_good_stamps(self) -> bool:
         """Whether nearly all stamps are near the log time."""
         return len(self.lags) > 0 and bool(np.mean(np.abs(self.lags) <= LARGEST_LAG_S * NS_PER_S) >= USUAL_SHARE)
-
-
-def stamp_of(connection: Connection, columns: dict[str, Column]) -> Int64Array | None:
-    """When the values of messages were true by the messages themselves, shape (n,); None where they do not tell."""
-    name = next((name for name in STAMPS if name in columns), None)
-    if name is not None:
-        return columns[name].values.astype(np.int64)
-    if px4.is_px4(connection.type) and "timestamp" in columns:
-        stamp_us = columns["timestamp"].values.astype(np.float64)
-        return (np.where(stamp_us < 2.0**52, stamp_us, 0.0) * 1e3).astype(np.int64)
-    return None
 
 
 @dataclass
@@ -133,23 +150,27 @@ class Survey:
         return any(seen.steps_back_ns >= NS_PER_S for seen in self.seen.values())
 
 
-def survey(bag: Bag) -> Survey:
-    """Look at all messages of a bag, into the first of each topic."""
+def survey(bag: Bag, profile: MessageProfile | None = None) -> Survey:
+    """Look at all messages of a bag, into the first of each topic; ``profile`` says what some of them mean."""
     found = Survey()
     decoders: dict[int, Decoder] = {}
     for part in bag:
         if isinstance(part, Block) and len(part):
             number = part.connection.number
             decoder = decoders.setdefault(number, Decoder(part.connection))
-            found.seen.setdefault(number, Seen(part.connection)).take(part, decoder)
+            if number not in found.seen:
+                rule = profile.rule_for(part.connection) if profile is not None else None
+                found.seen[number] = Seen(part.connection, rule)
+            found.seen[number].take(part, decoder)
     _map(found)
     _choose_clock(found)
     return found
 
 
 def _map(found: Survey) -> None:
-    """Lay the messages on canonical topics."""
-    served = {number: seen for number, seen in found.seen.items() if _serves(seen)}
+    """Lay the messages on canonical topics, those of the profile first."""
+    told = _map_by_rules(found)
+    served = {number: seen for number, seen in found.seen.items() if seen.rule is None and _serves(seen)}
     units = _units([seen for seen in served.values() if MESSAGES[seen.connection.type].role in _ORDER])
     kinds: dict[str, list[list[Seen]]] = {}
     for unit in units:
@@ -157,7 +178,10 @@ def _map(found: Survey) -> None:
     alone = [seen for seen in served.values() if MESSAGES[seen.connection.type].role not in _ORDER]
     kinds.setdefault("magnetometer", []).extend([seen] for seen in alone)
     for seen in kinds.pop("", []):
-        _leave_raw(found, seen[0])
+        _leave_raw(found, seen[0], "whose it is and along which axes is not told; a profile can say it")
+    for kind in kinds.keys() & told:
+        for one in (seen for unit in kinds.pop(kind) for seen in unit):
+            _leave_raw(found, one, f"the profile says what {kind} is")
     for kind, several in kinds.items():
         several.sort(key=lambda unit: (-len(unit), unit[0].connection.topic))
         for place, unit in enumerate(several, start=1):
@@ -204,11 +228,25 @@ def _kind_of(unit: list[Seen]) -> str:
     return "odometry" if "odometry" in roles else ""
 
 
-def _leave_raw(found: Survey, seen: Seen) -> None:
-    text = (
-        f"{seen.connection.topic} ({seen.connection.type}) is kept as raw: whose it is and along which axes "
-        "is not told; a profile can say it"
-    )
+def _map_by_rules(found: Survey) -> set[str]:
+    """Lay messages on topics as the profile says; returns the kinds of topics that it names."""
+    kinds: set[str] = set()
+    for number, seen in found.seen.items():
+        if seen.rule is None:
+            continue
+        for topic in seen.rule.topics:
+            found.feeds.setdefault(number, []).append(Feed(topic, (), seen.rule.feeding(topic)))
+            kinds.add(kind_of(topic))
+        text, missing = seen.rule.told(seen.columns)
+        found.remarks.append(Remark("profile", f"{seen.connection.topic} by the profile: {text}"))
+        if missing:
+            text = f"{seen.connection.topic} has no {', '.join(missing)}, which the profile names"
+            found.remarks.append(Remark("missing_columns", text))
+    return kinds
+
+
+def _leave_raw(found: Survey, seen: Seen, why: str) -> None:
+    text = f"{seen.connection.topic} ({seen.connection.type}) is kept as raw: {why}"
     found.remarks.append(Remark("not_mapped", text))
 
 
@@ -219,11 +257,7 @@ def _feed(found: Survey, topic: str, unit: list[Seen]) -> None:
         message = MESSAGES[seen.connection.type]
         columns = wheel_odometry if topic.startswith("odometry") else message.columns
         feed = Feed(topic, message.needs, columns, frozenset(given))
-        fields = {
-            name: column
-            for name, column in columns(Values(seen.columns)).items()
-            if name not in given and field_of(topic, name) is not None and column.mask.any()
-        }
+        fields = feed.of(seen.columns)
         found.feeds.setdefault(seen.connection.number, []).append(feed)
         given |= fields.keys()
         if "true_heading_deg" in fields:

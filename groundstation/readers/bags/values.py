@@ -40,6 +40,10 @@ class Values:
             values = column.values.astype(np.float64)
         return values if column.present is None else np.where(column.present, values, np.nan)
 
+    def column(self, name: str) -> Column:
+        """A column as it was decoded."""
+        return self._columns[name]
+
     def items(self) -> Iterator[tuple[str, Column]]:
         """All columns with their names."""
         yield from self._columns.items()
