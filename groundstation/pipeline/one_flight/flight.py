@@ -17,8 +17,8 @@ from groundstation.pipeline.one_flight.analyse import Given, analyse
 from groundstation.pipeline.one_flight.apply_deviation import apply_deviation, corrected_name, write_corrected
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
-from groundstation.pipeline.one_flight.identity import flight_id, sha256_of
-from groundstation.pipeline.one_flight.log import Log, open_log
+from groundstation.pipeline.one_flight.identity import flight_id
+from groundstation.pipeline.one_flight.log import Log, digest_of, open_log
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
@@ -131,7 +131,7 @@ def _version(path: Path) -> tuple[int, int]:
 
 def _require_unchanged(log: Log, version: tuple[int, int]) -> None:
     """Refuse a log that was written to while it was read: the digest is not of what was converted."""
-    if _version(log.path) != version and (log.is_store or sha256_of(log.path) != log.source.sha256):
+    if _version(log.path) != version and (log.is_store or digest_of(log.path) != log.source.sha256):
         raise UnreadableLogError(log.path.name, "changed while it was read", "", "run it again once it is complete")
 
 
