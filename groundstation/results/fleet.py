@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.errors import UnknownNameError
 from groundstation.base.records import frozen
 from groundstation.base.serial import to_json
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.results.figures import FigureData
-from groundstation.results.frames import no_such_table, row_fields, rows_frame
+from groundstation.results.frames import row_fields, rows_frame
 from groundstation.results.magnetic import LETTERS
 
 if TYPE_CHECKING:
@@ -357,7 +358,7 @@ class FleetResults:
         found = getattr(self, name, None)
         if not isinstance(found, FigureData):
             known = [part.name for part in fields(self) if part.name != "stated"]
-            raise no_such_table(name, known)
+            raise UnknownNameError("tables", name, known)
         frame = found.to_frame()
         for key, values in found.columns.items():
             if values.dtype.kind == "M":
