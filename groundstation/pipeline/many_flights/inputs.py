@@ -7,10 +7,11 @@ from pathlib import Path
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.one_flight.deviation_to_apply import CORRECTED
 from groundstation.reports.index import INDEX_CSV, INDEX_JSON
-from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY
+from groundstation.results.files import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY
 
 FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, STUDY_MARK = MANIFEST, INDEX_JSON, ".groundstation-study"
-SESSION_MARK = f"{ARRAYS}/session_clocks.parquet"  # of a session of several aircraft, which is no flight
+SESSION_ARRAYS = "session_clocks.parquet"  # what a session of several aircraft has and no flight
+SESSION_MARKS = tuple(f"{folder}/{SESSION_ARRAYS}" for folder in (ARRAYS, OLD_ARRAYS))
 PLAN_MARK = "plan.toml"  # the scenario of a plan, which is no flight
 COMPARISON_MARKS = "compare.html", "compare.csv"
 COMPARISON_RECORDING = "compare.rrd"
@@ -58,7 +59,7 @@ def is_ours(folder: Path) -> bool:
 
 def is_session(folder: Path) -> bool:
     """Whether a folder is that of a session of several aircraft."""
-    return (folder / SESSION_MARK).is_file()
+    return any((folder / mark).is_file() for mark in SESSION_MARKS)
 
 
 def no_log(folder: Path) -> UsageError:
@@ -90,7 +91,7 @@ def file_in(folder: Path, ending: str, *others: str) -> Path:
 
 def flight_folders(out: Path) -> list[Path]:
     """Flight folders in an OUT, in the order of their names."""
-    marks = SESSION_MARK, PLAN_MARK
+    marks = *SESSION_MARKS, PLAN_MARK
     return [folder for folder in _finished_folders(out) if not any((folder / mark).is_file() for mark in marks)]
 
 
