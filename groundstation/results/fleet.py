@@ -79,8 +79,9 @@ class AircraftRow:
 
     Parameters
     ----------
-    flights, assessed, accepted : int
-        Flights, those with a heading error, those with the verdict accept.
+    flights, assessed, averaged, accepted : int
+        Flights, those with a heading error, those of them that enter the statistics below (all but those with the
+        verdict reject), those with the verdict accept.
     samples : int
         Used samples of the flights that have their samples.
     mean_deg, confidence95_deg
@@ -100,6 +101,7 @@ class AircraftRow:
     aircraft: str
     flights: int
     assessed: int
+    averaged: int
     accepted: int
     samples: int
     mean_deg: float | None
