@@ -19,6 +19,7 @@ from groundstation.readers.compressed import COMPRESSIONS
 from groundstation.readers.source import Claim, Reader, Source
 
 ENTRY_POINT_GROUP = "groundstation.readers"
+FLAT_CSV = f"the flat CSV ({flat_csv.PAGE})"
 _OF_TEXT: tuple[Reader, ...] = (csv_profile, flat_csv, miluv, utias)
 _BUILT_IN: tuple[Reader, ...] = (dataflash, ulog, flightdata_hdf5, *_OF_TEXT)
 
@@ -204,11 +205,12 @@ def _unclaimed(source: Source, refusals: list[GroundstationError], troubles: lis
         return UnclaimedLogError(source.name, f"{known} data that cannot be decompressed")
     if known is not None:
         return UnclaimedLogError(
-            source.name, f"recognised as {known}, not readable in this version", "", "convert it to the flat CSV"
+            source.name, f"recognised as {known}, not readable in this version", "", f"convert it to {FLAT_CSV}"
         )
     if refusals:
         return refusals[0]
     found = "binary data of an unknown format" if magic.is_binary(source) else "text that no reader claims"
     names = ", ".join(reader for reader in _readers())
     found += f" ({'; '.join(troubles)})" if troubles else ""
-    return UnclaimedLogError(source.name, found, f"one of {names}", "describe a table by a profile (--profile FILE)")
+    next_step = f"write {FLAT_CSV}, or describe a table by a profile (--profile FILE)"
+    return UnclaimedLogError(source.name, found, f"one of {names}", next_step)
