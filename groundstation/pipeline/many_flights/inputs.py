@@ -15,6 +15,7 @@ SESSION_MARKS = tuple(f"{folder}/{SESSION_ARRAYS}" for folder in (ARRAYS, OLD_AR
 PLAN_MARK = "plan.toml"  # the scenario of a plan, which is no flight
 COMPARISON_MARKS = "compare.html", "compare.csv"
 COMPARISON_RECORDING = "compare.rrd"
+NO_LOGS = ".toml"  # settings, stations, aircraft, profiles: they stand beside logs and are none
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ def collect(paths: Sequence[Path], out: Path | None = None) -> tuple[Input, ...]
     """List the files that ``paths`` (files or folders, recursive) stand for, in a stable order, each once.
 
     OUT and folders that groundstation made (they hold its manifest or index) are never inputs of a folder walk; nor
-    are hidden files.
+    are hidden files and settings (TOML).
 
     Raises
     ------
@@ -118,7 +119,7 @@ def _walk(folder: Path, out: Path | None) -> list[Path]:
     except OSError:
         return [folder]  # it fails in its turn, with its name, and stops nothing else
     for entry in entries:
-        if entry.name.startswith("."):
+        if entry.name.startswith(".") or entry.suffix.lower() == NO_LOGS:
             continue
         if entry.is_dir() and not entry.is_symlink():
             files += _walk(entry, out)

@@ -195,6 +195,7 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
         folder=str(finished.folder),
         sha256=finished.sha256,
         times_s=watch.times_s,
+        was_finished=job.step == "nothing",
     )
 
 
@@ -238,8 +239,11 @@ def sentence(results: FlightResults) -> str:
     found = [text for analysis in FLIGHT_ANALYSES if (text := analysis.sentence(results.answers))]
     if found:
         return "; ".join(found)
-    reasons = "; ".join(f"{entry.analysis}: {entry.reason}" for entry in results.not_assessable)
-    return f"not assessable: {reasons or 'no analysis applies'}"
+    if not results.not_assessable:
+        return "not assessable: no analysis applies"
+    first, *others = results.not_assessable
+    more = f" (of {len(others)} more the report says why)" if others else ""
+    return f"not assessable: {first.analysis}: {first.reason}{more}"
 
 
 def is_made(name: str, identity: str) -> bool:
