@@ -4,7 +4,6 @@ from collections.abc import Iterable
 
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.forecast_conclusions import conclusions, rows_of, title_of
-from groundstation.chapters.inertial import AIDED
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Part, Section, Tone
 from groundstation.chapters.wording import clock, is_number, number, percent, words
 from groundstation.results.flight import FlightResults
@@ -51,7 +50,7 @@ def forecast(results: FlightResults) -> Section | None:
         _phases(answer.phases),
         _coupled(answer.coupled),
     )
-    headline = AIDED if kind == "gnss_aided" else f"Shipped method: {title_of(answer.default_method)}"
+    headline = f"Shipped method: {title_of(answer.default_method)}"
     return Section("forecast", TITLE, LEAD, tuple(part for part in parts if part is not None), headline)
 
 

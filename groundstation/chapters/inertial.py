@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from groundstation.chapters.aided_ins import aided
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, Tone
 from groundstation.chapters.wording import (
@@ -33,7 +34,6 @@ LEAD = (
     "While GNSS is there a Kalman filter finds the errors of the INS, north and east apart: position, velocity, "
     "platform tilt, gyro drift. Error = INS − truth."
 )
-AIDED = "This INS is aided by GNSS: a forecast from it means nothing"
 
 
 def inertial(results: FlightResults) -> Section | None:
@@ -41,6 +41,8 @@ def inertial(results: FlightResults) -> Section | None:
     answer = results.answer(InertialResult)
     if answer is None:
         return without_answer(results, "inertial", TITLE, LEAD)
+    if answer.kind == "gnss_aided":
+        return aided(answer)
     parts: tuple[Part | None, ...] = (
         *_conclusions(answer),
         _figures_of_merit(answer),
@@ -60,8 +62,6 @@ def inertial(results: FlightResults) -> Section | None:
 
 
 def _headline(answer: InertialResult) -> str:
-    if answer.kind == "gnss_aided":
-        return AIDED
     if answer.kind == "unknown":
         return "Whether GNSS corrects this INS cannot be told"
     rate = number(answer.radial_error_rate_50_nmiph, 2, "nmi/h")
@@ -70,11 +70,9 @@ def _headline(answer: InertialResult) -> str:
 
 def _conclusions(answer: InertialResult) -> list[Note]:
     """The chapter in a few sentences: what the INS is like, and whether the filter can be trusted."""
-    reason = typeset(answer.kind_reason).strip().rstrip(".")
-    if answer.kind == "gnss_aided":
-        return [Note(f"This INS is aided by GNSS, and a forecast from it means nothing: {reason}.", "warn")]
     notes = []
     if answer.kind == "unknown":
+        reason = typeset(answer.kind_reason).strip().rstrip(".")
         text = f"Whether GNSS corrects this INS already cannot be told: {reason or 'the log does not show it'}."
         notes.append(Note(f"{text} If it does, its errors and any forecast mean nothing.", "unknown"))
     notes.append(_quality(answer))

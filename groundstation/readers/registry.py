@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from groundstation.readers.icd import Icd
 
 ENTRY_POINT_GROUP = "groundstation.readers"
+FLAT_CSV = f"the flat CSV ({flat_csv.PAGE})"
 _OF_TEXT: tuple[Reader, ...] = (csv_profile, flat_csv, miluv, rtklib_pos, utias)
 _BUILT_IN: tuple[Reader, ...] = (chapter10, dataflash, ulog, flightdata_hdf5, receiver, sbet, bags, *_OF_TEXT)
 
@@ -229,11 +230,12 @@ def _unclaimed(source: Source, refusals: list[GroundstationError], troubles: lis
         return UnclaimedLogError(source.name, f"{known} data that cannot be decompressed")
     if known is not None:
         return UnclaimedLogError(
-            source.name, f"recognised as {known}, not readable in this version", "", "convert it to the flat CSV"
+            source.name, f"recognised as {known}, not readable in this version", "", f"convert it to {FLAT_CSV}"
         )
     if refusals:
         return refusals[0]
     found = "binary data of an unknown format" if magic.is_binary(source) else "text that no reader claims"
     names = ", ".join(reader for reader in _readers())
     found += f" ({'; '.join(troubles)})" if troubles else ""
-    return UnclaimedLogError(source.name, found, f"one of {names}", "describe a table by a profile (--profile FILE)")
+    next_step = f"write {FLAT_CSV}, or describe a table by a profile (--profile FILE)"
+    return UnclaimedLogError(source.name, found, f"one of {names}", next_step)
