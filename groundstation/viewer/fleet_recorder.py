@@ -79,11 +79,7 @@ class FleetRecorder(Recorder):
             rows = rr.StateChange.columns(state=shown[part].tolist())
             self.stream.send_columns(path, self.indexes(time_ns[part]), rows)
 
-    def _scalars(self, path: str, time_ns: Int64Array, values: FloatArray) -> None:
-        for part in self._parts(time_ns):
-            super()._scalars(path, time_ns[part], values[part])
-
-    def _parts(self, numbers: Int64Array) -> list[Int64Array]:
+    def _parts(self, time_ns: Int64Array) -> list[Int64Array]:
         """Rows of flights with a time, and of those without."""
-        has_time = numbers <= self.timed
+        has_time = time_ns <= self.timed
         return [rows for rows in (np.flatnonzero(has_time), np.flatnonzero(~has_time)) if len(rows)]

@@ -23,7 +23,7 @@ MARGIN = 1.08
 FAN_HEIGHT, GROWTH_HEIGHT = 140.0, 115.0
 SHOWN = Line("GNSS showed", colours.GNSS, BOLD)
 FORECAST = Line("forecast", colours.ANSWER, BOLD)
-CLAIMED = Line("± 1.96 σ", colours.HONEST, THIN)
+CLAIMED = Line("95 % as claimed", colours.HONEST, THIN)
 
 
 def forecast(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
@@ -72,8 +72,7 @@ def _fan(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
         axis = Axis(f"{channel.capitalize()} error, m,", -size, size)
         chart = Chart(recorder, f"forecast/fan_{channel}", x, axis, FAN_HEIGHT)
         chart.legend([FORECAST, CLAIMED, SHOWN])
-        curves = [(expected - half, CLAIMED), (expected + half, CLAIMED), (expected, FORECAST), (actual, SHOWN)]
-        _starts(chart, fan, minutes, curves)
+        _starts(chart, fan, minutes, [(expected, FORECAST), (actual, SHOWN)], (expected - half, expected + half))
         views.append(chart.view())
     return [*views, _radial(recorder, fan, minutes, x)]
 
@@ -104,16 +103,23 @@ def _largest(*values: FloatArray) -> float:
     return MARGIN * max(float(np.abs(known).max(initial=0.0)), 1.0)
 
 
-def _starts(chart: Chart, fan: FigureData, minutes: FloatArray, curves: list[tuple[FloatArray, Line]]) -> None:
+def _starts(
+    chart: Chart,
+    fan: FigureData,
+    minutes: FloatArray,
+    curves: list[tuple[FloatArray, Line]],
+    band: tuple[FloatArray, FloatArray] | None = None,
+) -> None:
+    """Log the curves of each start from its time on; before the first one they are its own."""
     starts = numbers(fan, "start_s")
     each = np.unique(starts[np.isfinite(starts)])
-    if each.size and each[0] > 0.0:
-        first = _clock(float(each[0]))
-        chart.note("start", f"move the playhead past the first start, {first}", 0.0)
-    for start in each.tolist():
-        rows = starts == start
-        chart.curves("latest", [(minutes[rows], values[rows], line) for values, line in curves], start)
-        chart.note("start", f"GNSS taken away at {_clock(start)}", start)
+    for place, start in enumerate(each.tolist()):
+        rows, at_s = starts == start, start if place else min(start, 0.0)
+        if band is not None:
+            low, high = band
+            chart.band("claimed", minutes[rows], low[rows], high[rows], CLAIMED.colour, at_s)
+        chart.curves("latest", [(minutes[rows], values[rows], line) for values, line in curves], at_s)
+        chart.note("start", f"GNSS taken away at {_clock(start)}; the playhead chooses the start", at_s)
 
 
 # ---------------------------------------------------------------------------------------------------- skill

@@ -45,7 +45,7 @@ def heading(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
 
 
 def _difference(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    """Differences d as dots, the running mean, and two bands of thin lines about it: the honest one and the paper's."""
+    """Differences d as dots, the running mean, and two filled bands about it: the honest one and the paper's."""
     path = "heading/difference"
     samples = figure_of(results, "heading_samples", "time_s", "difference_deg", "used")
     running = figure_of(results, "heading_running", "time_s", "mean_deg")
@@ -77,16 +77,14 @@ def _range_of_used(samples: FigureData) -> tuple[float, float] | None:
 
 def _running(recorder: Recorder, path: str, running: FigureData) -> None:
     time_ns, mean = recorder.time_ns(numbers(running, "time_s")), numbers(running, "mean_deg")
-    columns, lines = [mean], [Line("running mean, deg", colours.ANSWER, BOLD)]
-    for column, name, colour in (
-        ("honest_half_width_deg", "mean ± honest 95 % interval, deg", colours.HONEST),
-        ("precision_deg", "mean ± e (the paper's precision), deg", colours.PAPER),
+    gaps = gap_after(time_ns)
+    for column, part, name, colour in (
+        ("honest_half_width_deg", "a_honest", "mean ± honest 95 % interval, deg", colours.HONEST),
+        ("precision_deg", "b_precision", "mean ± e (the paper's precision), deg", colours.PAPER),
     ):
         if column in running.columns:
-            half = numbers(running, column)
-            columns += [mean + half, mean - half]
-            lines += [Line(name, colour, THIN), Line(name, colour, THIN)]
-    recorder.lines(path, time_ns, np.column_stack(columns), lines, gap_after(time_ns))
+            recorder.band(f"{path}/{part}", time_ns, mean, numbers(running, column), Line(name, colour, THIN), gaps)
+    recorder.lines(f"{path}/c_mean", time_ns, mean[:, None], [Line("running mean, deg", colours.ANSWER, BOLD)], gaps)
 
 
 def _taxi(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
