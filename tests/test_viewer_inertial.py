@@ -106,16 +106,11 @@ def test_an_aided_ins_is_told_in_both_panels(tmp_path: Path, flight: Flight, res
         assert plain(contents.text(entity)).startswith("# This INS is aided by GNSS: a forecast from it means nothing")
 
 
-def test_reasons_stand_in_place_of_results(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
+def test_reasons_stand_in_the_overview_and_make_no_tab(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
     reasons = (NotAssessable("inertial", "GNSS for a minute only"), NotAssessable("forecast", "too short"))
     contents = written(tmp_path, flight, replace(results, answers={}, not_assessable=reasons))
-    assert "GNSS for a minute only" in contents.text("/inertial/answer")
-    assert "too short" in contents.text("/forecast/answer")
-
-
-def test_without_results_and_reasons_there_are_no_tabs(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
-    figures = tuple(item for item in results.figures if not item.name.startswith(("inertial", "forecast")))
-    contents = written(tmp_path, flight, replace(results, answers={}, figures=figures))
+    told = contents.text("/summary")
+    assert "GNSS for a minute only" in told and "too short" in told
     entities = [*contents.batches, *contents.fixed]
     assert not [entity for entity in entities if entity.startswith(("/inertial", "/forecast"))]
 

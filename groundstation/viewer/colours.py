@@ -31,6 +31,18 @@ FAINT: Final = 0.35  # brightness of a filled band, of that of its line
 # Meanings. A quantity keeps its colour on every tab.
 INS, GNSS, ANSWER, LIMIT, HONEST, PAPER = SKY, ORANGE, GREEN, VERMILION, PINK, YELLOW
 SAMPLES, NORMAL, OVER_LIMIT = GREY, VERMILION, ORANGE
+WORDS: Final[dict[Colour, str]] = {
+    SKY: "blue",
+    BLUE: "dark blue",
+    ORANGE: "orange",
+    GREEN: "green",
+    YELLOW_GREEN: "yellow-green",
+    YELLOW: "yellow",
+    VERMILION: "red",
+    PINK: "pink",
+    GREY: "grey",
+    DIM: "dark grey",
+}
 SERIES: Final = (SKY, ORANGE, GREEN, PINK, YELLOW, BLUE, VERMILION, GREY)
 
 PHASES: Final[dict[str, Colour]] = {

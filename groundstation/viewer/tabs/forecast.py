@@ -27,9 +27,9 @@ CLAIMED = Line("95 % as claimed", colours.HONEST, THIN)
 
 
 def forecast(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
-    """Log the forecast tab; None when the flight was not assessed and no reason is known."""
+    """Log the forecast tab; None when the flight was not assessed: the overview says why."""
     section, answer = chapter(results), results.answer(ForecastResult)
-    if section is None:
+    if section is None or answer is None:
         return None
     recorder.document("forecast/answer", markdown(section))
     text = document("How far a forecast can be trusted", "forecast/answer")
@@ -125,7 +125,7 @@ def _starts(
 # ---------------------------------------------------------------------------------------------------- skill
 
 
-def _growth(recorder: Recorder, results: FlightResults, answer: ForecastResult | None) -> list[rrb.View]:
+def _growth(recorder: Recorder, results: FlightResults, answer: ForecastResult) -> list[rrb.View]:
     """RMS by horizon over methods, the shipped one bold; both axes logarithmic."""
     growth = figure_of(results, "forecast_growth", "horizon_min")
     if growth is None:
@@ -138,7 +138,7 @@ def _growth(recorder: Recorder, results: FlightResults, answer: ForecastResult |
     times = horizon[np.isfinite(horizon) & (horizon > 0.0)]
     if not values.size or not times.size:
         return []
-    default = "" if answer is None else answer.default_method
+    default = answer.default_method
     x = Axis("horizon, min", float(times.min()) / MARGIN, float(times.max()) * MARGIN, True)
     y = Axis("RMS radial error over all starts, m,", float(values.min()) / 1.3, float(values.max()) * 1.3, True)
     chart = Chart(recorder, "forecast/growth", x, y, GROWTH_HEIGHT)
@@ -172,7 +172,7 @@ def method_colours(default: str) -> dict[str, colours.Colour]:
     return {name: fixed[name] if name in fixed else next(left) for name in METHODS}
 
 
-def _map(recorder: Recorder, results: FlightResults, answer: ForecastResult | None) -> list[rrb.View | rrb.Container]:
+def _map(recorder: Recorder, results: FlightResults, answer: ForecastResult) -> list[rrb.View | rrb.Container]:
     """The hindcast map, one tensor a method: radial error by start and horizon, all on one colour scale."""
     figure = figure_of(results, "forecast_map", "start_s", "horizon_min")
     if figure is None:
@@ -185,7 +185,7 @@ def _map(recorder: Recorder, results: FlightResults, answer: ForecastResult | No
     cubes = {name: numbers(figure, f"{name}_m").reshape(shape) for name in known}
     reference = cubes.get("raw_ins", cubes[known[0]])
     top = float(np.nanmax(reference)) if np.isfinite(reference).any() else 1.0
-    default = "" if answer is None else answer.default_method
+    default = answer.default_method
     order = [name for name in (default, "raw_ins") if name in known]
     views: list[rrb.View] = []
     for name in [*order, *(name for name in known if name not in order)]:

@@ -3,7 +3,6 @@
 import numpy as np
 import rerun.blueprint as rrb
 
-from groundstation.chapters.assessed import reason_of
 from groundstation.chapters.heading import heading as heading_chapter
 from groundstation.chapters.markdown import markdown
 from groundstation.results.figures import FigureData
@@ -23,8 +22,8 @@ MARGIN, SMALLEST_MARGIN_DEG = 0.15, 0.05
 
 
 def heading(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
-    """Log the heading tab; None when the flight was not assessed and no reason is known."""
-    if results.answer(HeadingResult) is None and not reason_of(results, "heading"):
+    """Log the heading tab; None when the flight was not assessed: the overview says why."""
+    if results.answer(HeadingResult) is None:
         return None
     recorder.document("heading/verdict", markdown(heading_chapter(results)))
     verdict = document("Verdict and the number to type", "heading/verdict")

@@ -36,9 +36,9 @@ TITLES = {
 
 
 def inertial(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
-    """Log the tab of the INS errors; None when the flight was not assessed and no reason is known."""
+    """Log the tab of the INS errors; None when the flight was not assessed: the overview says why."""
     section = chapter(results)
-    if section is None:
+    if section is None or results.answer(InertialResult) is None:
         return None
     recorder.document("inertial/answer", markdown(section))
     right: list[rrb.View] = [document("How good this INS is", "inertial/answer")]

@@ -25,9 +25,9 @@ RUN, FITTED = Line("ground runs", colours.INS, BOLD), Line("A to E", colours.ANS
 
 
 def magnetic(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
-    """Log the tab of the magnetic deviation; None when the flight was not assessed and no reason is known."""
+    """Log the tab of the magnetic deviation; None when the flight was not assessed: the overview says why."""
     section = chapter(results)
-    if section is None:
+    if section is None or not any(results.answer(kind) for kind in (MagneticResult, GroundDeviation)):
         return None
     recorder.document("magnetic/answer", markdown(section))
     text = document("Verdict and card", "magnetic/answer")
