@@ -1,13 +1,10 @@
 """Log: findings and events as lines in time, beside the findings by their gravity; gaps apart, lest they bury them."""
 
-import re
-
 import numpy as np
 import rerun.blueprint as rrb
 
-from groundstation.base.findings import SEVERITIES, Finding
+from groundstation.base.findings import SEVERITIES, Finding, place_time_ns
 from groundstation.base.signals import RAW_PREFIX, topics_of_kind
-from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.chapters.findings import findings
 from groundstation.chapters.markdown import markdown
@@ -19,8 +16,6 @@ from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.views import document, figure_of, numbers
 
 MAX_GAPS = 2_000  # of all topics; the lanes of the data quality tab show every one
-_AT_UTC = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z")
-_AT_SECONDS = re.compile(r"(?:^|\bat )\+?(\d+(?:\.\d+)?) s\b")
 
 
 def log(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Container:
@@ -64,10 +59,8 @@ def place_s(place: str, flight: Flight) -> float:
     >>> place_s("at 12.4 s", Flight({})), place_s("row 7", Flight({}))
     (0.0, 0.0)
     """
-    seconds, utc = _AT_SECONDS.search(place), _AT_UTC.search(place)
-    found = float(seconds.group(1)) if seconds else 0.0
-    if utc and flight.has_utc:
-        found = (iso_to_utc_ns(utc.group(0))[0] - flight.start_ns) / NS_PER_S
+    time_ns = place_time_ns(place, flight.start_ns, has_utc=flight.has_utc)
+    found = 0.0 if time_ns is None else (time_ns - flight.start_ns) / NS_PER_S
     return found if 0.0 <= found <= flight.duration_s else 0.0
 
 
