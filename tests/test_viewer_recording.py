@@ -20,6 +20,7 @@ from groundstation.base.records import Column
 from groundstation.chapters import chapter_of
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, Source
+from groundstation.results.heading import HeadingResult
 from groundstation.tables.table import Flight
 from groundstation.viewer import recording
 from groundstation.viewer.recorder import Recorder
@@ -135,6 +136,16 @@ def test_every_answer_has_a_row_in_the_overview(contents: Contents, results: Fli
     told = dict(rows)
     for answer in results.answers.values():
         assert chapter_of(results, answer).headline in told[chapter_of(results, answer).title].replace("\\", "")
+
+
+def test_results_are_properties_with_both_ends_of_an_interval(contents: Contents, results: FlightResults) -> None:
+    answer = results.answer(HeadingResult)
+    assert answer is not None
+    (row,) = (batch.to_pylist()[0] for batch in contents.fixed["/__properties/heading"])
+    assert row["error_deg"] == [answer.error_deg] and row["verdict"] == [answer.verdict]
+    assert row["confidence95_low_deg"] + row["confidence95_high_deg"] == list(answer.confidence95_deg)
+    (flight,) = (batch.to_pylist()[0] for batch in contents.fixed["/__properties/flight"])
+    assert flight["source"] == [results.source.name] and flight["findings_warn"] == [1.0]
 
 
 def test_absent_is_no_gap_and_nan_of_the_device_is_one(tmp_path: Path) -> None:

@@ -36,11 +36,6 @@ class FleetRecorder(Recorder):
         self._number = {name: place + 1 for place, name in enumerate(ids[self.order].tolist())}
         super().__init__(stream, 0, self.timed > 0)
 
-    @property
-    def timeline(self) -> str:
-        """The timeline to begin on."""
-        return UTC if self.has_utc else FLIGHT_NUMBER
-
     def numbers(self, flight_ids: NDArray[np.str_]) -> Int64Array:
         """Numbers of flights."""
         return np.array([self._number[name] for name in flight_ids.tolist()], dtype=np.int64)
