@@ -16,14 +16,19 @@ from groundstation.tables.table import Flight, Table
 from groundstation.tables.wheels import contact_of
 
 MAX_OVERVIEW_ROWS = 4000
-ATTITUDE = ("roll_deg", "pitch_deg")
-DIGITS = {"latitude_deg": 7, "longitude_deg": 7, "altitude_m": 1, "pressure_altitude_m": 1}
-DIGITS |= dict.fromkeys(
-    ("time_s", "ground_speed_mps", "heading_deg", "track_deg", "climb_mps", "roll_deg", "pitch_deg"), 2
-) | {"true_airspeed_mps": 2, "indicated_airspeed_mps": 2}
 GAP_PERIODS = 5.0
 LARGEST_QUIET_GAP_S = 3.0
 NEAR_NS = 1_000_000_000  # a value this near in time stands for a row that lacks it
+# Also drawn where a topic of the kind has it: name, kind, and the columns in whose place it stands when they are empty.
+ALSO = (
+    ("roll_deg", "ins", ()),
+    ("pitch_deg", "ins", ()),
+    ("magnetic_heading_deg", "ins", ("heading_deg",)),
+    ("true_airspeed_mps", "air", ()),
+    ("indicated_airspeed_mps", "air", ("true_airspeed_mps",)),
+    ("pressure_altitude_m", "baro", ("altitude_m",)),
+    ("height_above_airfield_m", "baro", ("altitude_m", "pressure_altitude_m")),
+)
 MODE = "mode "  # what the names of events that change the flight mode begin with
 
 
@@ -75,10 +80,14 @@ def gnss_lanes(flight: Flight, geometry_limit: float) -> FigureData | None:
 
 
 def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_topic: str | None) -> FigureData | None:
-    """Thinned flight for the map and profiles, on the times of GNSS (of INS where there is no GNSS), NaN at gaps."""
+    """Thinned flight for the map and profiles, on the times of GNSS, else of INS, else of the barometer; NaN at gaps.
+
+    Position, altitude, ground speed, climb, heading and track are always there; the columns of :data:`ALSO` where they
+    are known.
+    """
     gnss = first_of_kind(flight, "gnss", "latitude_deg", "longitude_deg")
-    ins = first_of_kind(flight, "ins", "latitude_deg", "longitude_deg") or ins_topic
-    base = gnss or ins or first_of_kind(flight, "ins", *ATTITUDE)
+    base = gnss or first_of_kind(flight, "ins", "latitude_deg", "longitude_deg") or ins_topic
+    base = base or first_of_kind(flight, "ins") or first_of_kind(flight, "baro")
     if base is None or not len(flight[base]):
         return None
     every = flight[base]
@@ -94,33 +103,15 @@ def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_t
         "heading_deg": _nearest_heading(flight, time_ns, true_heading_deg, ins_topic),
         "track_deg": _at(every, _track(every), rows[keep]),
         "climb_mps": _at(every, -every.values("velocity_down_mps"), rows[keep]),
-        **_attitude(flight, time_ns, ins_topic),
     }
-    columns |= _airspeed(flight, time_ns)
-    baro = first_of_kind(flight, "baro", "pressure_altitude_m")
-    if baro is not None and not np.isfinite(columns["altitude_m"]).any():
-        pressure_altitude = flight[baro].values("pressure_altitude_m")
-        columns["pressure_altitude_m"] = _nearest(flight[baro].time_ns, pressure_altitude, time_ns)
+    for name, kind, instead_of in ALSO:
+        source = first_of_kind(flight, kind, name)
+        is_wanted = all(not np.isfinite(columns[other]).any() for other in instead_of if other in columns)
+        if source is not None and is_wanted:
+            columns[name] = _nearest(flight[source].time_ns, flight[source].values(name), time_ns)
     columns = _break_at_gaps(columns, flight.duration_s / MAX_OVERVIEW_ROWS)
-    return FigureData("overview", columns, DIGITS)
-
-
-def _attitude(flight: Flight, time_ns: Int64Array, ins_topic: str | None) -> dict[str, NDArray[np.float64]]:
-    """Roll and pitch, those of the INS that gives the heading where it has them; nothing where no INS has."""
-    own = ins_topic if ins_topic is not None and flight[ins_topic].has(*ATTITUDE) else None
-    topic = own or first_of_kind(flight, "ins", *ATTITUDE)
-    if topic is None:
-        return {}
-    return {name: _nearest(flight[topic].time_ns, flight[topic].values(name), time_ns) for name in ATTITUDE}
-
-
-def _airspeed(flight: Flight, time_ns: Int64Array) -> dict[str, NDArray[np.float64]]:
-    """True airspeed, else indicated; nothing where neither is logged."""
-    for name in ("true_airspeed_mps", "indicated_airspeed_mps"):
-        topic = first_of_kind(flight, "air", name)
-        if topic is not None:
-            return {name: _nearest(flight[topic].time_ns, flight[topic].values(name), time_ns)}
-    return {}
+    places = {"latitude_deg": 7, "longitude_deg": 7, "altitude_m": 1, "pressure_altitude_m": 1}
+    return FigureData("overview", columns, {name: places.get(name, 2) for name in columns})
 
 
 def _rows_with_motion(table: Table) -> NDArray[np.intp]:

@@ -60,7 +60,7 @@ def flight_space(
 
 def _height_m(figure: FigureData) -> FloatArray:
     """Height above the lowest place; 0 where none is logged."""
-    for name in ("altitude_m", "pressure_altitude_m"):
+    for name in ("altitude_m", "pressure_altitude_m", "height_above_airfield_m"):
         if name in figure.columns and np.isfinite(numbers(figure, name)).any():
             height = np.where(np.abs(numbers(figure, name)) < MOST_HEIGHT_M, numbers(figure, name), np.nan)
             return np.asarray(height - np.nanmin(height))
@@ -68,11 +68,13 @@ def _height_m(figure: FigureData) -> FloatArray:
 
 
 def _attitude(figure: FigureData) -> FloatArray | None:
-    """Quaternions x y z w; without a heading the nose points along the track, without either to the north."""
+    """Quaternions x y z w; without a true heading along the track, else by the compass, else to the north."""
     if not {"roll_deg", "pitch_deg"} <= set(figure.columns):
         return None
     roll, pitch = numbers(figure, "roll_deg"), numbers(figure, "pitch_deg")
-    directions = (numbers(figure, name) for name in ("heading_deg", "track_deg") if name in figure.columns)
+    directions = (
+        numbers(figure, name) for name in ("heading_deg", "track_deg", "magnetic_heading_deg") if name in figure.columns
+    )
     heading = next((one for one in directions if np.isfinite(one).any()), np.zeros(len(roll)))
     turn = quaternion_enu_from_flu_xyzw(roll, pitch, heading)
     return turn if np.isfinite(turn).any() else None

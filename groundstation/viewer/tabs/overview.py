@@ -20,10 +20,19 @@ from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
 
 LANE_SHARE = 0.35  # height of a lane, of that of a plot
 MARGIN_DEG = 10.0  # beyond 0 and 360: a nose that points north would be drawn on the frame
-CIRCULAR = ("heading_deg", "track_deg")
+CIRCULAR = ("heading_deg", "magnetic_heading_deg", "track_deg")
 # Rows of plots: entity, unit, columns of the figure with their names, range of the axis.
 PLOTS: tuple[tuple[str, str, dict[str, str], tuple[float, float] | None], ...] = (
-    ("height", "m", {"altitude_m": "altitude", "pressure_altitude_m": "pressure altitude"}, None),
+    (
+        "height",
+        "m",
+        {
+            "altitude_m": "altitude",
+            "pressure_altitude_m": "pressure altitude",
+            "height_above_airfield_m": "height above the airfield",
+        },
+        None,
+    ),
     (
         *("speed", "m/s"),
         {
@@ -36,14 +45,15 @@ PLOTS: tuple[tuple[str, str, dict[str, str], tuple[float, float] | None], ...] =
     ("climb", "m/s", {"climb_mps": "climb"}, None),
     (
         *("directions", "deg"),
-        {"heading_deg": "INS true heading", "track_deg": "GNSS track"},
+        {"heading_deg": "INS true heading", "magnetic_heading_deg": "INS magnetic heading", "track_deg": "GNSS track"},
         (-MARGIN_DEG, 360.0 + MARGIN_DEG),
     ),
     ("attitude", "deg", {"roll_deg": "roll, right wing down", "pitch_deg": "pitch, nose up"}, None),
 )
 SHADES = {
-    **dict.fromkeys(("altitude_m", "pressure_altitude_m", "heading_deg", "climb_mps", "roll_deg"), colours.INS),
+    **dict.fromkeys(("altitude_m", "heading_deg", "climb_mps", "roll_deg"), colours.INS),
     **dict.fromkeys(("ground_speed_mps", "track_deg", "pitch_deg"), colours.GNSS),
+    **dict.fromkeys(("pressure_altitude_m", "height_above_airfield_m", "magnetic_heading_deg"), colours.HONEST),
     **dict.fromkeys(("true_airspeed_mps", "indicated_airspeed_mps"), colours.ANSWER),
 }
 
