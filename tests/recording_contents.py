@@ -30,6 +30,11 @@ class Contents:
         time_ns, middle = self._column(entity, "Measurements:values")
         return time_ns, middle[:, 0], np.sqrt(self._column(entity, "Measurements:variances")[1][:, 0])
 
+    def times(self, entity: str) -> np.ndarray:
+        """Times of the rows of an entity, as of :meth:`scalars`, shape (n,)."""
+        timeline = next(name for name in ("flight_time", "flight_number") if name in self.timelines)
+        return np.concatenate([np.asarray(batch.column(timeline).cast(pa.int64())) for batch in self.batches[entity]])
+
     def _column(self, entity: str, name: str) -> tuple[np.ndarray, np.ndarray]:
         timeline = next(name for name in ("flight_time", "flight_number") if name in self.timelines)
         times, values = [], []

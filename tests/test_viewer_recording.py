@@ -148,6 +148,23 @@ def test_results_are_properties_with_both_ends_of_an_interval(contents: Contents
     assert flight["source"] == [results.source.name] and flight["findings_warn"] == [1.0]
 
 
+def test_a_taxi_in_a_long_flight_has_a_time_axis_of_its_own(
+    tmp_path: Path, contents: Contents, flight: Flight, results: FlightResults
+) -> None:
+    assert not any("/heading/run/" in entity for entity in contents.fixed), "here it fills most of the flight"
+    write_recording(tmp_path / "a.rrd", flight, replace(results, duration_s=3600.0))
+    long = Contents(tmp_path / "a.rrd")
+    samples = results.figure("heading_samples")
+    assert samples is not None
+    (drawn,) = (
+        batch.column("Points2D:positions").to_pylist()[0] for batch in long.fixed["/heading/run/1/difference/samples"]
+    )
+    assert len(drawn) == np.isfinite(samples["difference_deg"][samples["used"]]).sum()
+    ground_s = samples["time_s"][samples["gate"] != "airborne"]
+    cursor_s = np.sort(long.times("/heading/run/1/speed/cursor")) / 1e9
+    assert cursor_s[0] == pytest.approx(ground_s[0]) and cursor_s[-2] == pytest.approx(ground_s[-1])
+
+
 def test_absent_is_no_gap_and_nan_of_the_device_is_one(tmp_path: Path) -> None:
     time_s = np.arange(0.0, 100.0, 0.1)
     slow = np.arange(len(time_s)) % 10 == 0
