@@ -125,3 +125,15 @@ def test_only_remarks_on_raw_topics_are_joined(severity: str) -> None:
 def test_a_log_without_taxi_is_told_what_the_method_needs() -> None:
     assert WHAT_HEADING_NEEDS in explained("heading", "ground speed never above 6 m/s before lift-off: highest 1.4 m/s")
     assert explained("magnetic", "no straight taxi") == "no straight taxi"
+
+
+def test_a_log_of_attitude_alone_has_an_overview() -> None:
+    time_s = np.arange(0.0, 30.0, 0.1)
+    ins = table("ins", time_s, roll_deg=np.full(300, 4.0), magnetic_heading_deg=np.full(300, 90.0))
+    baro = table("baro", time_s[::5], height_above_airfield_m=np.full(60, 120.0))
+    figure = overview(flight_of(ins, baro), None, None)
+    assert figure is not None and len(figure) == 300
+    assert np.isnan(figure["latitude_deg"]).all()
+    for name, value in (("roll_deg", 4.0), ("magnetic_heading_deg", 90.0), ("height_above_airfield_m", 120.0)):
+        np.testing.assert_allclose(figure[name], value)
+    assert "pitch_deg" not in figure.columns
