@@ -13,7 +13,8 @@ from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.known import AircraftData
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import HeadingResult
-from groundstation.simulation.taxi import Family, TaxiCase, draw_case, simulate_taxi, taxi_flight
+from groundstation.simulation.taxi import Family, TaxiCase, draw_run, taxi_flight
+from groundstation.simulation.taxi_disturbance import KINDS
 
 BoolArray = NDArray[np.bool_]
 Progress = Callable[[str], None]
@@ -57,9 +58,8 @@ class RunOutcome:
 
 def run_once(family: Family, seed: int, number: int, settings: HeadingSettings | None = None) -> RunOutcome:
     """Draw run ``number`` of a seed, pass it through tables and estimator, and compare with the truth."""
-    rng = np.random.default_rng((seed, number))
-    case = draw_case(rng, family)
-    run = simulate_taxi(case, rng)
+    run = draw_run(family, seed, number)
+    case = run.case
     aircraft = AircraftData(
         antenna_arm_m=case.antenna_arm_m if case.is_arm_known else None, antenna_arm_sigma_m=NAMED_ARM_SIGMA_M
     )
@@ -150,6 +150,9 @@ def _cells(outcomes: Sequence[RunOutcome]) -> Iterable[Cell]:
 
     cases = [outcome.case for outcome in outcomes]
     yield "all", np.ones(len(outcomes), dtype=bool)
+    kinds = np.array([case.disturbance.kind for case in cases])
+    if len(set(kinds)) > 1:
+        yield from ((kind, kinds == kind) for kind in KINDS)
     yield from split("sway damping", (case.sway_damping for case in cases), (0.0, 0.05, 0.15, 0.3, 1.0), "")
     yield from split("GNSS correlated over", (case.correlation_s for case in cases), (0.0, 2.0, 5.0, 20.0), " s")
     lengths = [round(sum(case.segments_s), 6) for case in cases]
