@@ -33,6 +33,8 @@ class RunOutcome:
     error_deg: float
     low_deg: float
     high_deg: float
+    low_measured_deg: float
+    high_measured_deg: float
     paper_error_deg: float
     precision_deg: float
     quality_deg: float
@@ -45,6 +47,15 @@ class RunOutcome:
     def is_inside(self) -> bool:
         """Whether our interval holds the truth (ends are given relative to it)."""
         return self.low_deg <= 0.0 <= self.high_deg
+
+    @property
+    def is_inside_measured(self) -> bool:
+        """Whether the interval without steady sideslip and mounting holds the truth."""
+        return self.low_measured_deg <= 0.0 <= self.high_measured_deg
+
+    @property
+    def half_width_measured_deg(self) -> float:
+        return 0.5 * (self.high_measured_deg - self.low_measured_deg)
 
     @property
     def is_inside_paper(self) -> bool:
@@ -74,12 +85,15 @@ def outcome_of(number: int, case: TaxiCase, result: HeadingResult, truth_deg: fl
     above = np.flatnonzero(~(running["precision_deg"] <= limit))
     reached = int(above[-1]) + 1 if len(above) else 0
     step_s = float(np.median(np.diff(running["time_s"])))
+    measured_deg = result.confidence95_measured_deg or result.confidence95_deg
     return RunOutcome(
         number=number,
         case=case,
         error_deg=result.error_deg - truth_deg,
         low_deg=result.confidence95_deg[0] - truth_deg,
         high_deg=result.confidence95_deg[1] - truth_deg,
+        low_measured_deg=measured_deg[0] - truth_deg,
+        high_measured_deg=measured_deg[1] - truth_deg,
         paper_error_deg=result.paper_error_deg - truth_deg,
         precision_deg=result.precision_deg,
         quality_deg=result.quality_deg,

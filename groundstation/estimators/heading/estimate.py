@@ -13,6 +13,7 @@ from groundstation.estimators.heading.samples import HeadingOf, OnGround, Sample
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.heading.solution import solve
 from groundstation.estimators.heading.standstill import find_standstill
+from groundstation.estimators.heading.steady import steady_prior
 from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.results.heading import HeadingResult
 from groundstation.results.latency import Latencies
@@ -93,8 +94,10 @@ def estimate_heading_error(
     if antenna.is_used.sum() < 2:
         raise NotAssessableError("heading", _why_nothing_is_used(antenna, settings))
     standstill = find_standstill(antenna, settings)
-    solution = solve(antenna, standstill, aircraft, delay.narrowed(settings) if delay else settings)
-    result = build_answer(flight, (ins_topic, gnss_topic), solution, standstill, settings, aircraft, site)
+    span_s = tuple(float(time_s) for time_s in antenna.time_s[antenna.is_used][[0, -1]])
+    steady = steady_prior(flight, span_s, aircraft, settings)
+    solution = solve(antenna, standstill, aircraft, delay.narrowed(settings) if delay else settings, steady)
+    result = build_answer(flight, (ins_topic, gnss_topic), solution, standstill, settings, aircraft, site, steady)
     if delay is None:
         return result
     return replace(

@@ -74,6 +74,10 @@ class HeadingSettings:
     offset_prior_sigma_s: float = number(0.1, 0.0)
     offset_observable_sigma_s: float = number(0.05, 0.0)
 
+    # Steady sideslip and mounting, where the aircraft file does not state them
+    sideslip_sigma_deg: float = number(0.25, 0.0)  # of a crosswind; at 10 m/s where the wind is logged
+    mounting_sigma_deg: float = number(0.1, 0.0)
+
     # Honest interval
     posterior_draws: int = number(400, LEAST_DRAWS)
     posterior_seed: int = number(2015, 0)

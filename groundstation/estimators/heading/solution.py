@@ -17,11 +17,13 @@ from groundstation.estimators.heading.interval import (
     error_posterior,
     fixed_noise_estimate,
     sample_weights,
+    without_apart,
 )
 from groundstation.estimators.heading.recursion import Running, run_recursion
 from groundstation.estimators.heading.samples import Samples, without_arm
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.standstill import StandstillData
+from groundstation.estimators.heading.steady import SteadyPrior
 from groundstation.estimators.known import AircraftData
 from groundstation.results.heading import TaxiSegment
 
@@ -93,31 +95,39 @@ def take_samples(samples: Samples, mask: BoolArray | NDArray[np.intp]) -> Sample
     return replace(samples, **arrays)
 
 
-def _differences(used: Samples, knowledge: ArmKnowledge) -> Differences:
+def _differences(used: Samples, knowledge: ArmKnowledge, steady: SteadyPrior) -> Differences:
     difference = _centred(used.difference_deg)
+    direction = wrap_360(used.heading_deg - np.median(difference))
     return Differences(
         time_s=used.time_s,
         difference_deg=difference,
-        direction_deg=wrap_360(used.heading_deg - np.median(difference)),
+        direction_deg=direction,
         speed_mps=used.speed_mps,
-        regressors=straight_regressors(used, knowledge),
+        regressors=(*straight_regressors(used, knowledge), *steady.regressors(direction)),
+        segment=used.segment,
     )
 
 
-def solve(antenna: Samples, standstill: StandstillData, aircraft: AircraftData, settings: HeadingSettings) -> Solution:
+def solve(
+    antenna: Samples,
+    standstill: StandstillData,
+    aircraft: AircraftData,
+    settings: HeadingSettings,
+    steady: SteadyPrior,
+) -> Solution:
     """Find the error from gated samples with the velocities of the antenna."""
     knowledge = know_arm(antenna, aircraft, settings)
     uncorrected = _centred(antenna.difference_deg[antenna.is_used])
     samples = without_arm(antenna, knowledge.applied_arm_m, float(np.median(uncorrected)))
     used = take_samples(samples, samples.is_used)
-    differences = _differences(used, knowledge)
+    differences = _differences(used, knowledge, steady)
     thinning = -(-len(used) // MOST_SAMPLES)
     thinned = _part(differences, slice(None, None, thinning))
     velocities = _velocities(antenna, standstill, float(used.time_s[0]), settings)
     posterior = error_posterior(thinned, velocities, draws=settings.posterior_draws, seed=settings.posterior_seed)
     weight = sample_weights(differences, posterior.typical())
     reference_time_s = float(np.sum(weight * used.time_s))
-    draws = posterior.even_draws(DRAWS_FOR_PARTS)
+    draws = posterior.draws_of_one_piece(DRAWS_FOR_PARTS)
     drift, drift_sigma = _drift(thinned, reference_time_s, draws)
     segments = tuple(_segment(differences, used, used.segment == number, draws) for number in np.unique(used.segment))
     full_weight = np.zeros(len(samples))
@@ -148,6 +158,7 @@ def _part(differences: Differences, index: slice | BoolArray) -> Differences:
         direction_deg=differences.direction_deg[index],
         speed_mps=differences.speed_mps[index],
         regressors=tuple(replace(item, values=item.values[index]) for item in differences.regressors),
+        segment=None if differences.segment is None else differences.segment[index],
     )
 
 
@@ -183,7 +194,7 @@ def _drift(differences: Differences, reference_time_s: float, draws: FloatArray)
 
 
 def _segment(differences: Differences, used: Samples, mask: BoolArray, draws: FloatArray) -> TaxiSegment:
-    mean, sigma = fixed_noise_estimate(_part(differences, mask), draws)
+    mean, sigma = fixed_noise_estimate(without_apart(_part(differences, mask)), draws)
     return TaxiSegment(
         start_s=float(used.time_s[mask][0]),
         end_s=float(used.time_s[mask][-1]),
