@@ -114,7 +114,10 @@ def test_parking_heading_is_corrected_and_compared() -> None:
     site = SiteData(stands=(Stand("7", 310.0, 0.02),))
     found = estimate(taxi_flight(run), site=site)
     assert found.parking_ins_heading_deg == pytest.approx(310.8, abs=0.01)
-    assert found.parking_heading_deg == pytest.approx(310.8 - found.error_deg, abs=1e-3)
+    assert found.parking_heading_deg == pytest.approx(310.8 - found.error_deg, abs=0.03)  # an INS of no known class
+    known = estimate(taxi_flight(run), aircraft=AircraftData(antenna_arm_m=4.0, ins_class="navigation"))
+    assert known.parking_heading_deg == pytest.approx(310.8 - known.error_deg, abs=2e-3)
+    assert known.parking_sigma_deg < found.parking_sigma_deg
     assert found.reference_residual_arcmin == pytest.approx((found.parking_heading_deg or 0.0) * 60 - 310.0 * 60)
     flown = replace(taxi_flight(run), metadata={"reference.parking_heading_deg": "-49.0"})
     both, logged = estimate(flown, site=site), estimate(flown)

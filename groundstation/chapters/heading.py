@@ -40,7 +40,7 @@ def heading(results: FlightResults) -> Section:
         headline = f"{NOT_ASSESSABLE.symbol} Heading not assessable"
         return Section("heading", TITLE, LEAD, (note, *_figures(()), *STANDSTILL_FIGURES), headline)
     parts = (
-        *(gate_grid(answer.gates), _estimates(answer)),
+        *(gate_grid(answer.gates), _estimates(answer), _spread(answer)),
         *_figures(answer.segments),
         *(_onboard(answer), _runway(answer), _geometry(answer), _standstill(answer.standstill)),
         *STANDSTILL_FIGURES,
@@ -77,7 +77,14 @@ def _estimates(answer: HeadingResult) -> Grid:
             "Heading error, robust and weighted by speed",
             number(answer.error_deg, 4, "°", signed=True),
             interval(answer.confidence95_deg, 3, "°"),
-            "the estimate corrected by; its interval allows for errors correlated over seconds",
+            "the estimate corrected by; its interval allows for errors correlated over seconds, and for steady "
+            "sideslip and mounting",
+        ),
+        (
+            "The same by this taxi alone",
+            number(answer.error_deg, 4, "°", signed=True),
+            interval(answer.confidence95_measured_deg, 3, "°"),
+            "without steady sideslip and mounting, which no taxi one way shows",
         ),
         (
             "Heading error, running mean of the paper",
@@ -198,6 +205,23 @@ def _geometry(answer: HeadingResult) -> Facts:
         ("Azimuth drift", drift, slope),
     )
     return Facts("Lever arm, time offset, drift", pairs)
+
+
+def _spread(answer: HeadingResult) -> Facts | None:
+    """What parts of the taxi have of their own, what is added for steady terms, and steps."""
+    if not is_number(answer.steady_sigma_deg):
+        return None
+    wander = f"over {number(answer.wander_s, 0, 's')}"
+    pairs = (
+        ("Own error of a segment, σ", number(answer.segment_spread_deg, 3, "°"), "from what segments say"),
+        ("Wander of INS heading minus path, σ", number(answer.wander_spread_deg, 3, "°"), wander),
+        ("Steady sideslip and mounting left, σ", number(answer.steady_sigma_deg, 3, "°"), answer.steady_origin),
+        *(
+            ("Step of the INS heading", number(step.size_deg, 2, "°", signed=True), f"at {clock(step.time_s)}")
+            for step in answer.steps
+        ),
+    )
+    return Facts("Segments, minutes and steady terms", pairs)
 
 
 def _with_sigma(value: float | None, sigma: float | None, places: int, unit: str) -> str:

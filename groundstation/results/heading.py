@@ -74,6 +74,14 @@ class TaxiSegment:
 
 
 @dataclass(frozen=True)
+class HeadingStep:
+    """A step of the INS heading: flight time of the first sample after it, heading after minus heading before."""
+
+    time_s: float
+    size_deg: float
+
+
+@dataclass(frozen=True)
 class RunwayCheck:
     """Second reference: runway true bearing on line-up or take-off run against the INS heading there."""
 
@@ -123,6 +131,8 @@ class HeadingResult(Answer):
     segment_spread_deg, wander_spread_deg, wander_s
         Error that each segment has of its own, and wander of INS heading minus path: sigmas and correlation time, as
         their spread shows.
+    steps : tuple of HeadingStep
+        Steps of the INS heading before or on taxi; the error is that after the last.
     precision_deg : float
         The paper's e: 1.96 sqrt(s^2 / (n - 1)).
     quality_deg : float
@@ -190,6 +200,7 @@ class HeadingResult(Answer):
     segment_spread_deg: float | None = None
     wander_spread_deg: float | None = None
     wander_s: float | None = None
+    steps: tuple[HeadingStep, ...] = ()
     reference_time_s: float | None = None
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()

@@ -15,6 +15,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.heading import HeadingResult
 from groundstation.simulation.taxi import Family, TaxiCase, draw_run, taxi_flight
 from groundstation.simulation.taxi_disturbance import KINDS
+from groundstation.tables.phases import flight_phases
 
 BoolArray = NDArray[np.bool_]
 Progress = Callable[[str], None]
@@ -74,7 +75,8 @@ def run_once(family: Family, seed: int, number: int, settings: HeadingSettings |
     aircraft = AircraftData(
         antenna_arm_m=case.antenna_arm_m if case.is_arm_known else None, antenna_arm_sigma_m=NAMED_ARM_SIGMA_M
     )
-    result = estimate_heading_error(taxi_flight(run), aircraft=aircraft, settings=settings)
+    flight = taxi_flight(run)
+    result = estimate_heading_error(flight, aircraft=aircraft, settings=settings, phases=flight_phases(flight))
     return outcome_of(number, case, result, run.error_at(result.reference_time_s or 0.0))
 
 

@@ -6,9 +6,10 @@ import numpy as np
 
 from groundstation.base.angles import wrap_180
 from groundstation.estimators.heading import figures as drawn
-from groundstation.estimators.heading.checks import normality, variance_ratio
+from groundstation.estimators.heading.checks import disagreement, normality, variance_ratio
 from groundstation.estimators.heading.interval import ErrorPosterior
 from groundstation.estimators.heading.references import (
+    drift_prior,
     mode_changes,
     onboard_comparison,
     parking_heading,
@@ -21,7 +22,7 @@ from groundstation.estimators.heading.steady import SteadyPrior
 from groundstation.estimators.heading.verdict import Figures, build_gates, decide, explain, round_to_step
 from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.results.figures import FigureData
-from groundstation.results.heading import HeadingResult, Standstill, TaxiSegment
+from groundstation.results.heading import HeadingResult, Standstill
 from groundstation.tables.table import Flight
 
 
@@ -87,10 +88,13 @@ def build_answer(
         segment_spread_deg=solution.posterior.parameter("segment_deg"),
         wander_spread_deg=solution.posterior.parameter("wander_deg"),
         wander_s=solution.posterior.parameter("wander_s"),
+        steps=solution.steps,
         settings=_settings_of(settings, aircraft),
         figures=_figures_of(solution, standstill, settings),
     )
-    return _with_references(_with_arm(plain, solution), flight, solution, standstill, settings, site)
+    drift_prior_deg_per_h = drift_prior(aircraft.ins_class, flight.metadata.get("ins_class", ""))
+    with_arm = _with_arm(plain, solution)
+    return _with_references(with_arm, flight, solution, standstill, settings, site, drift_prior_deg_per_h)
 
 
 def _error_of(solution: Solution, steady: SteadyPrior) -> _Error:
@@ -141,17 +145,9 @@ def _judged_figures(
         drift_deg_per_h=solution.drift_deg_per_h,
         drift_sigma_deg_per_h=solution.drift_sigma_deg_per_h,
         mode_changes=mode_changes(flight, ins_topic, begin_s, float(used.time_s[-1])),
-        segments_chi2=_segments_chi2(solution.segments),
+        disagreement=disagreement(solution.parts, settings.disagreement_probability),
+        steps=solution.steps,
     )
-
-
-def _segments_chi2(segments: tuple[TaxiSegment, ...]) -> float | None:
-    if len(segments) < 2:
-        return None
-    errors = np.array([segment.error_deg for segment in segments])
-    weights = 1.0 / np.maximum(np.array([segment.sigma_deg for segment in segments]), 1e-9) ** 2
-    mean = float(np.sum(weights * errors) / np.sum(weights))
-    return float(np.sum(weights * (errors - mean) ** 2) / (len(errors) - 1))
 
 
 def _with_arm(result: HeadingResult, solution: Solution) -> HeadingResult:
@@ -175,6 +171,7 @@ def _with_references(
     standstill: StandstillData,
     settings: HeadingSettings,
     site: SiteData,
+    drift_prior_deg_per_h: float,
 ) -> HeadingResult:
     error, sigma = result.error_deg, result.standard_error_deg
     parking = parking_heading(
@@ -182,8 +179,9 @@ def _with_references(
         standstill.in_interval,
         flight,
         site,
-        (error, sigma, solution.reference_time_s),
+        (error - _stepped_deg(solution, standstill), sigma, solution.reference_time_s),
         (solution.drift_deg_per_h, solution.drift_sigma_deg_per_h),
+        drift_prior_deg_per_h,
     )
     return replace(
         result,
@@ -195,6 +193,14 @@ def _with_references(
         runway=runway_checks(solution.samples, site, error, sigma, settings),
         onboard=onboard_comparison(flight, float(solution.used.time_s[-1]), error),
     )
+
+
+def _stepped_deg(solution: Solution, standstill: StandstillData) -> float:
+    """What the steps after the standstill added to the error."""
+    if not standstill.in_interval.any():
+        return 0.0
+    parked_s = float(solution.samples.time_s[standstill.in_interval][-1])
+    return sum(step.size_deg for step in solution.steps if step.time_s > parked_s)
 
 
 def _settings_of(settings: HeadingSettings, aircraft: AircraftData) -> dict[str, float | str | bool]:

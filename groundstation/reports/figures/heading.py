@@ -281,7 +281,8 @@ def forest(results: FlightResults) -> Drawing | None:
     whole = interval(answer.confidence95_deg, 3, "°")
     caption = (
         "Dot: estimate; bar: ± 1.96 σ. Green: straight segments; blue: directions of travel; black: the whole run with "
-        f"its 95 % interval {whole}. Opposite directions that disagree point to side-slip or mounting.{more} "
+        f"its 95 % interval {whole}, thick what this taxi shows by itself. "
+        f"Opposite directions that disagree point to side-slip or mounting.{more} "
         "Numbers: summary.json, results.heading."
     )
     alt = "Forest plot of the heading error by segment and by direction."
@@ -295,7 +296,10 @@ def _overall(axes: Any, answer: HeadingResult, place: int) -> None:
     axes.axvline(error, color=d.INK, linewidth=0.6)
     if all(map(is_number, bounds)):
         axes.axvspan(bounds[0], bounds[1], color=d.INK, alpha=0.08, linewidth=0)
-        axes.plot(bounds, [place, place], color=d.INK, linewidth=1.8, solid_capstyle="butt")
+        axes.plot(bounds, [place, place], color=d.INK, linewidth=0.8, solid_capstyle="butt")
+    measured = answer.confidence95_measured_deg or bounds
+    if all(map(is_number, measured)):
+        axes.plot(measured, [place, place], color=d.INK, linewidth=2.4, solid_capstyle="butt")
     axes.plot([error], [place], "D", color=d.INK, markersize=4.5)
 
 
