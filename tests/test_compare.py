@@ -38,7 +38,7 @@ from tests.inertial_example import inertial_result
 from tests.recording_contents import Contents
 from tests.saved import load
 from tests.viewer_example import make_flight, make_results
-from tests.viewer_shots import colourful, pages, picture, settled
+from tests.viewer_shots import colourful, pages, picture
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 SCENARIOS = Path(__file__).parents[1] / "groundstation" / "simulation" / "scenarios"
@@ -413,4 +413,4 @@ def test_every_view_of_the_recording_draws_both(
 
 
 def _is_drawn(client: Any, view: Any) -> bool:
-    return view.view_class != "TextDocument" and colourful(picture(settled(client, view.view_id))) > LEAST_PIXELS
+    return view.view_class != "TextDocument" and colourful(picture(client.take_screenshot(view.view_id))) > LEAST_PIXELS

@@ -127,7 +127,7 @@ def _setup(flight: Flight, buses: Buses) -> list[str]:
         channels.append((ARINC_CHANNEL, "ARINC", "429IN", ["ATF-{n}:0", count, *names]))
     lines = [f"G\\PN:{_text(facts.get('flight', ''))}", f"G\\TA:{_text(facts.get('aircraft', ''))}", "G\\106:17"]
     lines += ["G\\DSI\\N:1", "G\\DSI-1:RECORDER", "G\\DST-1:STO"]
-    lines += [f"G\\COM:{_text(key)}={_text(value)}" for key, value in sorted(facts.items())]
+    lines.append(f"G\\COM:{_text(', '.join(f'{key}={value}' for key, value in sorted(facts.items())))}")
     lines += ["R-1\\ID:RECORDER", f"R-1\\N:{len(channels)}"]
     for number, (channel, name, kind, more) in enumerate(channels, start=1):
         common = ["TK1-{n}:" + str(channel), "TK4-{n}:" + str(channel), "CHE-{n}:T", f"CDT-{{n}}:{kind}"]

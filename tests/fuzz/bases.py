@@ -117,6 +117,26 @@ def mcap_starts(data: bytes) -> Iterator[int]:
         at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
 
 
+def chapter10() -> bytes:
+    """The beginning of a simulated flight as Chapter 10: 1553, ARINC 429 and time, some 150 kB."""
+    from groundstation.simulation.chapter10_writer import write_chapter10
+    from groundstation.simulation.flight import simulate
+    from groundstation.simulation.scenario import load_scenario
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "flight.ch10"
+        write_chapter10(path, simulate(load_scenario("taxi-short")).flight)
+        return _cut(path.read_bytes(), "chapter10", BINARY_BYTES)
+
+
+def chapter10_starts(data: bytes) -> Iterator[int]:
+    """Where packets begin."""
+    at = 0
+    while at + 24 <= len(data):
+        yield at
+        at += int.from_bytes(data[at + 4 : at + 8], "little")
+
+
 def line_starts(data: bytes) -> Iterator[int]:
     """Where lines begin."""
     at = 0
@@ -138,6 +158,7 @@ _STARTS: dict[str, Callable[[bytes], Iterator[int]]] = {
     "csv-profile": line_starts,
     "ulog": ulog_starts,
     "dataflash": dataflash_starts,
+    "chapter10": chapter10_starts,
     "mcap": mcap_starts,
     "gzip": lambda data: iter(range(min(18, len(data)))),
     "zstd": lambda data: iter(range(min(18, len(data)))),
@@ -148,6 +169,7 @@ _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
     "csv-profile": (g1000,),
     "ulog": (ulog,),
     "dataflash": (dataflash,),
+    "chapter10": (chapter10,),
     "mcap": (lambda: _converted(SAMPLES / "taxi-short.csv"),),
     "gzip": (lambda: gzip.compress(_noisy_csv(), mtime=0), lambda: gzip.compress(dataflash(), mtime=0)),
     "zstd": (lambda: zstandard.compress(_noisy_csv()), lambda: zstandard.compress(ulog())),
@@ -156,6 +178,7 @@ _RECORDED = {
     "csv-profile": ("g1000/log_220502_135932_EGPN.csv", "fixedwing/umn_thor_flight75.csv"),
     "ulog": ("ulog/sample_px4_events.ulg", "ulog/pyulog_sample_log_small_vtol.ulg"),
     "dataflash": ("damaged/erle_tiny_no_gps.BIN", "dataflash/TestLog2_REENCODED_plane.BIN"),
+    "chapter10": ("ch10/kc135_429_1553_1MB.c10", "ch10/iliad_1553.c10"),
     "mcap": ("g1000/log_220416_161856_LFQA.csv",),
 }
 

@@ -65,10 +65,10 @@ def _is_header(data: Any, at: int, size: int) -> bool:
 
 
 @compiled
-def _header_inside(data: Any, start: int, end: int) -> int:
-    """Where a header stands between two places; NOWHERE when none does."""
-    for at in range(start, end - HEADER_BYTES + 1):
-        if data[at] == 0x25 and _is_header(data, at, end):
+def _header_inside(data: Any, start: int, end: int, size: int) -> int:
+    """Where a header begins between two places; NOWHERE when none does."""
+    for at in range(start, min(end, size - HEADER_BYTES + 1)):
+        if data[at] == 0x25 and _is_header(data, at, size):
             return at
     return NOWHERE
 
@@ -136,7 +136,7 @@ def scan(data: Any, halves: Any, words: Any, size: int, is_last: bool, packets: 
         verdict, resume = WHOLE, end
         is_right = end <= size and has_checksum and _checksum_is_right(data, halves, words, at, body, end)
         if end > size or not (is_right or end == size or _is_header(data, end, size)):
-            inner = _header_inside(data, at + header, min(end, size))
+            inner = _header_inside(data, at + header, end, size)
             if inner != NOWHERE:
                 verdict, resume = TORN, inner
             elif end > size:

@@ -108,6 +108,8 @@ def _bits(one: Element1553) -> list[str]:
 
 def _common(one: Element, holders: tuple[str, ...]) -> list[str]:
     facts = [f"desc: {_text(one.description)}", f"uom: {_text(one.unit)}", "class: 0"]
+    if isinstance(one, Element429) and one.fine_of:
+        return facts
     if one.signal is None:  # said aloud where the name alone would make it one
         return facts if by_name(one, holders).signal is None else [*facts, "signal: ''"]
     if one.is_by_name:

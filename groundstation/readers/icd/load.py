@@ -352,8 +352,10 @@ class _Checker:
     def signal(self, element: AnyElement, table: dict[str, Value], place: str, holders: tuple[str, ...]) -> AnyElement:
         """The element with the signal that the ICD states, else with what its name makes plain."""
         signal = self.text(table, "signal", place)
+        if "fine_of" in table and signal:
+            self.fail(f"{place}: signal", repr(signal), "none beside fine_of: it is that of the word it is added to")
         if not signal:
-            return by_name(element, holders) if "signal" not in table else element
+            return by_name(element, holders) if not {"signal", "fine_of"} & table.keys() else element
         wanted = unit_of(signal)
         if wanted is None or kind_of(signal) == "truth":
             self.fail(f"{place}: signal", repr(signal), "<topic>.<field> of the canonical list that is a number")

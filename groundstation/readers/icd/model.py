@@ -56,7 +56,7 @@ class Element429(Element):
 
     The sign bit of a signed one is its highest and counts. ``status`` says how the sign/status matrix is read;
     ``step`` is the value of the last digit of BCD. ``fine_of`` names the word whose values are cut off downwards and to
-    which those of this one are added.
+    which those of this one, in the same unit, are added; its signal is that word's.
     """
 
     lsb: int = 11
