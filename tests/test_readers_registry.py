@@ -182,8 +182,6 @@ def test_our_own_entry_point_is_not_a_plug_in(plug_ins: list[Any]) -> None:
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
-        ("gnss/ublox_ins_drive_pvat.ubx", "UBX"),
-        ("gnss/pygpsdata-NMEA.log", "NMEA"),
         ("damaged/wrong_rmw_test_0.mcap", "MCAP"),
         ("damaged/log_220414_065328______EMPTY.csv", "empty"),
         ("inertial/gv_rf15_attitude_error.csv", "no reader claims"),  # PROVENANCE: not in the flat CSV

@@ -22,6 +22,9 @@ from groundstation.readers import (
     flightdata_hdf5,
     magic,
     miluv,
+    receiver,
+    rtklib_pos,
+    sbet,
     ulog,
     utias,
 )
@@ -32,8 +35,8 @@ if TYPE_CHECKING:
     from groundstation.readers.icd import Icd
 
 ENTRY_POINT_GROUP = "groundstation.readers"
-_OF_TEXT: tuple[Reader, ...] = (csv_profile, flat_csv, miluv, utias)
-_BUILT_IN: tuple[Reader, ...] = (chapter10, dataflash, ulog, flightdata_hdf5, *_OF_TEXT)
+_OF_TEXT: tuple[Reader, ...] = (csv_profile, flat_csv, miluv, rtklib_pos, utias)
+_BUILT_IN: tuple[Reader, ...] = (chapter10, dataflash, ulog, flightdata_hdf5, receiver, sbet, *_OF_TEXT)
 
 
 @dataclass(frozen=True)
