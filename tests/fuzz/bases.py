@@ -158,10 +158,10 @@ _STARTS: dict[str, Callable[[bytes], Iterator[int]]] = {
     "csv-profile": line_starts,
     "ulog": ulog_starts,
     "dataflash": dataflash_starts,
-    "chapter10": chapter10_starts,
     "mcap": mcap_starts,
     "gzip": lambda data: iter(range(min(18, len(data)))),
     "zstd": lambda data: iter(range(min(18, len(data)))),
+    "chapter10": chapter10_starts,
 }
 FORMATS = tuple(_STARTS)
 _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {

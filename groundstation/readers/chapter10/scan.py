@@ -1,8 +1,8 @@
 """Compiled loops over the bytes of a recording: packets, and the messages in them.
 
 A header counts when its sync pattern and its checksum are right: 32 bits that noise does not meet. Its packet counts
-where another header (or the end of the file) follows; else its data checksum must be right, or no other header may
-begin inside it: what lost bytes must not pass for whole.
+where its data checksum is right, or it has none and another header (or the end of the file) follows; else no other
+header may begin inside it: what lost bytes must not pass for whole.
 """
 
 from typing import Any
@@ -135,13 +135,14 @@ def scan(data: Any, halves: Any, words: Any, size: int, is_last: bool, packets: 
         has_checksum = data[at + 14] & 3 != 0
         verdict, resume = WHOLE, end
         is_right = end <= size and has_checksum and _checksum_is_right(data, halves, words, at, body, end)
-        if end > size or not (is_right or end == size or _is_header(data, end, size)):
+        is_wrong = has_checksum and not is_right
+        if end > size or is_wrong or not (is_right or end == size or _is_header(data, end, size)):
             inner = _header_inside(data, at + header, end, size)
             if inner != NOWHERE:
                 verdict, resume = TORN, inner
             elif end > size:
                 verdict, resume = CUT, size
-        if verdict == WHOLE and has_checksum and not is_right:
+        if verdict == WHOLE and is_wrong:
             verdict = WRONG_CHECKSUM
         if skip != NOWHERE:
             spans[state[SPANS], 0], spans[state[SPANS], 1], spans[state[SPANS], 2] = skip, at, count

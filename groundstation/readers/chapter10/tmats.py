@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import date
 
+YEARS = range(1970, 2200)  # of recordings; others are damage
 MOST_CHARACTERS = 4 << 20  # of attributes; real ones have some 100 thousand
 _VALUE_CHARACTERS = 200
 _ATTRIBUTE = re.compile(r"([A-Za-z]{1,4}(?:-\d+)?\\[^:;\r\n]{1,60}):([^;]*);")
@@ -127,6 +128,6 @@ def _date_of(text: str) -> date | None:
     else:
         return None
     try:
-        return date(year, month, day)
+        return date(year, month, day) if year in YEARS else None
     except ValueError:
         return None
