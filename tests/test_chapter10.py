@@ -243,3 +243,28 @@ def test_messages_that_a_packet_lacks_are_told(tmp_path: Path) -> None:
     items = read(tmp_path, made.packet(4, 0x19, bytes(data), 0))
     assert len(rows(items, "raw.bus.1553.4")["word_count"]) == 2
     assert [item.count for item in items if isinstance(item, Damage)] == [3]
+
+
+def test_tmats_that_is_missing_contradicts_the_packets_or_describes_frames(tmp_path: Path) -> None:
+    words = made.packet(7, 0x38, made.words_429([(0, 0, 1)]), 0)
+    assert "no_tmats" in codes(read(tmp_path, words))
+    setup = made.tmats(
+        "R-1\\TK1-1:7;R-1\\CDT-1:1553IN;R-1\\TK1-2:2;R-1\\CDT-2:PCMIN;R-1\\CDLN-2:P1;P-1\\DLN:P1;P-1\\F1:16;"
+    )
+    packet = bytearray(made.packet(0, 0x01, setup, 0, checksum=2))
+    packet[-1] ^= 1
+    items = read(tmp_path, bytes(packet) + words)
+    told = [item.text for item in items if isinstance(item, Remark) and item.code == "tmats_contradicted"]
+    assert told == ["channel 7 is 1553IN by TMATS and has 1 ARINC-429 packets: they are believed"]
+    header = items[0]
+    assert isinstance(header, LogHeader) and header.metadata["pcm.2"] == "F1=16"
+    assert [item.loses_data for item in items if isinstance(item, Damage)] == [False]
+    kept = rows(items, "raw.tmats.0")
+    assert kept["size"][0] == len(setup) - 4 and int(kept["bytes_00"][0]).to_bytes(8, "little") == setup[4:12]
+
+
+def test_stamps_that_are_not_read_are_told(tmp_path: Path) -> None:
+    data = made.messages_1553([(99, 0, [0x37A0, 1])])
+    one = made.packet(4, 0x19, data, COUNTS_PER_S, secondary=made.secondary_1588(1_000, 0), flags=0x40)
+    items = read(tmp_path, one)
+    assert rows(items, "raw.bus.1553.4")["time_s"].tolist() == [1.0] and "clock_disagrees" in codes(items)

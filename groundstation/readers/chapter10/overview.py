@@ -8,8 +8,9 @@ import numpy as np
 
 from groundstation.readers.chapter10 import scan
 from groundstation.readers.chapter10.bus_words import TOPIC_429, TOPIC_1553
+from groundstation.readers.chapter10.kinds import ARINC_429, MIL_STD_1553, TIME, TMATS
 from groundstation.readers.chapter10.naming import Seen
-from groundstation.readers.chapter10.packets import ARINC_429, MIL_STD_1553, NS_PER_COUNT, TIME, TMATS, Block, Walk
+from groundstation.readers.chapter10.packets import NS_PER_COUNT, Block, Walk
 from groundstation.readers.chapter10.timing import Reading, dates_in, reading
 from groundstation.readers.chapter10.tmats import Tmats, parse
 from groundstation.readers.source import Source

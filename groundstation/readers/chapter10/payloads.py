@@ -12,7 +12,8 @@ import numpy as np
 
 from groundstation.base.records import Column, Int64Array, RecordBatch
 from groundstation.readers.chapter10 import scan
-from groundstation.readers.chapter10.packets import DISCRETE, EVENT, NS_PER_COUNT, TIME, Block
+from groundstation.readers.chapter10.kinds import DISCRETE, EVENT, TIME, TMATS, USER
+from groundstation.readers.chapter10.packets import NS_PER_COUNT, Block
 from groundstation.readers.chapter10.timing import reading
 from groundstation.readers.chapter10.tmats import Tmats
 
@@ -43,7 +44,15 @@ _STAMPED: Mapping[int, _Stamped] = MappingProxyType(
 )
 # Types of which the data of a packet are kept as they are, with their specific word.
 _WHOLE: Mapping[int, str] = MappingProxyType(
-    {0x08: "pcm", 0x09: "pcm", 0x1A: "16pp194", 0x21: "analog", 0x60: "parallel"}
+    {
+        USER: "user",
+        TMATS: "tmats",
+        0x08: "pcm",
+        0x09: "pcm",
+        0x1A: "16pp194",
+        0x21: "analog",
+        0x60: "parallel",
+    }
 )
 
 

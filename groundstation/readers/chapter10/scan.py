@@ -17,6 +17,7 @@ LAST_COMPUTER_TYPE = 7
 AT, END, BODY, BODY_END, CHANNEL, TYPE, FLAGS, SEQUENCE, RTC, STATE, COLUMNS = range(11)
 WHOLE, WRONG_CHECKSUM, TORN, CUT = range(4)
 BETWEEN_TERMINALS = 0x0800  # of a 1553 message's block status
+IEEE_1588 = 1  # format of a secondary header's time
 HAS_SECONDARY, STAMPS_ARE_SECONDARY, RTC_UNSYNCED, OVERFLOW = 0x80, 0x40, 0x20, 0x10
 
 # Places in the state array.
@@ -168,8 +169,7 @@ def _stamp(data: Any, at: int, packet: Any) -> int:
     if not flags & STAMPS_ARE_SECONDARY or not flags & HAS_SECONDARY:
         return _u48(data, at)
     first = packet[BODY] - 4 - SECONDARY_BYTES
-    kind = (flags >> 2) & 3
-    if kind == 1:  # IEEE 1588: nanoseconds, seconds
+    if (flags >> 2) & 3 == IEEE_1588:  # nanoseconds, seconds
         seconds = _u32(data, at + 4) - _u32(data, first + 4)
         return int(packet[RTC] + seconds * 10_000_000 + (_u32(data, at) - _u32(data, first)) // 100)
     return int(packet[RTC])
