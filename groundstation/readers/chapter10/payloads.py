@@ -1,7 +1,8 @@
 """What is recorded beside bus words: bytes of messages and frames, discretes, events, the times of time packets.
 
 Bytes stand in records of up to 64, eight in a number of 64 bits, the first in its lowest eight: ``bytes_00``,
-``bytes_08`` ...; ``piece`` counts the records of one message from 0, ``size`` is that of the message.
+``bytes_08`` ...; ``piece`` counts the records of one message from 0, ``size`` is that of the message. Each is a
+nanosecond later than the one before, less than the counter can tell.
 """
 
 from collections.abc import Mapping
@@ -116,7 +117,7 @@ def _bytes(
         if present.any():
             name = f"bytes_{number * _PER_NUMBER:02d}"
             columns[name] = Column(numbers[:, number].copy(), None if present.all() else present)
-    return RecordBatch(topic, start + block.base, Column(times[which] * NS_PER_COUNT), columns)
+    return RecordBatch(topic, start + block.base, Column(times[which] * NS_PER_COUNT + piece), columns)
 
 
 def _discretes(block: Block, channel: int, packets: Int64Array) -> RecordBatch | None:

@@ -89,7 +89,7 @@ class Tally:
             text += f"; {self.unsynced} packets say that their counter was not in step with its source"
         yield Remark("packets", text)
         if self.unread_stamps:
-            text = f"{self.unread_stamps} packets stamp their messages with a time that is not read here: theirs is the packet's"
+            text = f"{self.unread_stamps} packets stamp messages in a form that is not read: their time is the packet's"
             yield Remark("clock_disagrees", text)
         if not tmats.attributes:
             yield Remark("no_tmats", "no TMATS: buses have no names, and nothing says what the recording is of")
