@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Int64Array, RecordBatch
+from groundstation.base.signals import BUS_PREFIX
 from groundstation.readers.chapter10 import scan
 from groundstation.readers.chapter10.packets import NS_PER_COUNT, Block
 
-TOPIC_1553, TOPIC_429 = "raw.bus.1553.", "raw.bus.429."
+TOPIC_1553, TOPIC_429 = f"{BUS_PREFIX}1553.", f"{BUS_PREFIX}429."
 MOST_WORDS = 36  # two commands, 32 data words, two statuses
 _PER_NUMBER = 4
 PACKS = tuple(f"words_{at:02d}" for at in range(0, MOST_WORDS, _PER_NUMBER))

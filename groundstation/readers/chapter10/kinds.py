@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-USER, TMATS, EVENT, TIME, MIL_STD_1553, DISCRETE, ARINC_429 = 0x00, 0x01, 0x02, 0x11, 0x19, 0x29, 0x38
+TMATS, EVENT, TIME, MIL_STD_1553, DISCRETE, ARINC_429 = 0x01, 0x02, 0x11, 0x19, 0x29, 0x38
 NAMES: Mapping[int, str] = MappingProxyType(
     {
         0x00: "user-defined",

@@ -1,8 +1,8 @@
 """What is recorded beside bus words: bytes of messages and frames, discretes, events, the times of time packets.
 
-Bytes stand in records of up to 64, eight in a number of 64 bits, the first in its lowest eight: ``bytes_00``,
-``bytes_08`` ...; ``piece`` counts the records of one message from 0, ``size`` is that of the message. Each is a
-nanosecond later than the one before, less than the counter can tell.
+Bytes, ``raw.bytes.<kind>.<channel>``, stand in records of up to 64, eight in a number of 64 bits, the first in its
+lowest eight: ``bytes_00``, ``bytes_08`` ...; ``piece`` counts the records of one message from 0, ``size`` is that of
+the message. Each is a nanosecond later than the one before, less than the counter can tell.
 """
 
 from collections.abc import Mapping
@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.records import Column, Int64Array, RecordBatch
+from groundstation.base.signals import BYTES_PREFIX
 from groundstation.readers.chapter10 import scan
-from groundstation.readers.chapter10.kinds import DISCRETE, EVENT, TIME, TMATS, USER
+from groundstation.readers.chapter10.kinds import DISCRETE, EVENT, TIME
 from groundstation.readers.chapter10.packets import NS_PER_COUNT, Block
 from groundstation.readers.chapter10.timing import reading
 from groundstation.readers.chapter10.tmats import Tmats
@@ -46,8 +47,6 @@ _STAMPED: Mapping[int, _Stamped] = MappingProxyType(
 # Types of which the data of a packet are kept as they are, with their specific word.
 _WHOLE: Mapping[int, str] = MappingProxyType(
     {
-        USER: "user",
-        TMATS: "tmats",
         0x08: "pcm",
         0x09: "pcm",
         0x1A: "16pp194",
@@ -65,7 +64,12 @@ def batch_of(block: Block, kind: int, channel: int, packets: Int64Array, tmats: 
         starts, ends = packets[:, scan.BODY], packets[:, scan.BODY_END]
         sizes = np.maximum(ends - starts, 0)
         return _bytes(
-            f"raw.{_WHOLE[kind]}.{channel}", block, starts, sizes, packets[:, scan.RTC], _specific(block, packets)
+            f"{BYTES_PREFIX}{_WHOLE[kind]}.{channel}",
+            block,
+            starts,
+            sizes,
+            packets[:, scan.RTC],
+            _specific(block, packets),
         )
     if kind == DISCRETE:
         return _discretes(block, channel, packets)
@@ -91,7 +95,7 @@ def _messages(block: Block, form: _Stamped, channel: int, packets: Int64Array) -
         parts.append((places[:count], sizes[:count], times[:count]))
     places, sizes, times = (np.concatenate(several) for several in zip(*parts, strict=True))
     order = np.argsort(places, kind="stable")
-    return _bytes(f"raw.{form.name}.{channel}", block, places[order], sizes[order], times[order], None)
+    return _bytes(f"{BYTES_PREFIX}{form.name}.{channel}", block, places[order], sizes[order], times[order], None)
 
 
 def _bytes(
