@@ -180,13 +180,13 @@ _STARTS: dict[str, Callable[[bytes], Iterator[int]]] = {
     "csv-profile": line_starts,
     "ulog": ulog_starts,
     "dataflash": dataflash_starts,
-    "chapter10": chapter10_starts,
     "mcap": mcap_starts,
     "gzip": lambda data: iter(range(min(18, len(data)))),
     "zstd": lambda data: iter(range(min(18, len(data)))),
     "robot-mcap": mcap_starts,
     "ros1": ros1_starts,
     "sqlite3": lambda data: iter(range(0, len(data), 4096)),
+    "chapter10": chapter10_starts,
 }
 FORMATS = tuple(_STARTS)
 _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
