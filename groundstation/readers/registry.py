@@ -14,13 +14,24 @@ from typing import Any
 
 from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
 from groundstation.base.records import Item, RecordBatch, Remark
-from groundstation.readers import bags, csv_profile, dataflash, flat_csv, flightdata_hdf5, magic, miluv, ulog, utias
+from groundstation.readers import (
+    bags,
+    csv_profile,
+    dataflash,
+    flat_csv,
+    flightdata_hdf5,
+    magic,
+    miluv,
+    tlog,
+    ulog,
+    utias,
+)
 from groundstation.readers.compressed import COMPRESSIONS
 from groundstation.readers.source import Claim, Reader, Source
 
 ENTRY_POINT_GROUP = "groundstation.readers"
 _OF_TEXT: tuple[Reader, ...] = (csv_profile, flat_csv, miluv, utias)
-_BUILT_IN: tuple[Reader, ...] = (dataflash, ulog, flightdata_hdf5, bags, *_OF_TEXT)
+_BUILT_IN: tuple[Reader, ...] = (dataflash, ulog, flightdata_hdf5, bags, tlog, *_OF_TEXT)
 
 
 @dataclass(frozen=True)
