@@ -16,25 +16,10 @@ from groundstation.pipeline.one_flight.log import open_log
 from groundstation.readers import registry
 from groundstation.readers.source import Source
 from groundstation.readers.tlog.dialect import messages
+from tests.telemetry_writer import START_US, Telemetry, telemetry
 from tests.test_readers_contract import check
 
-START_US = 1_777_874_400_000_000
 FLOAT32_DEG = 3e-5  # half a step of a float at two pi radians
-
-
-class Telemetry:
-    """Writes frames as a ground station does."""
-
-    def __init__(self, dialect: Any = v2, system: int = 1) -> None:
-        self.dialect, self.data, self.count, self.times = dialect, bytearray(), 0, []
-        self.sender = dialect.MAVLink(None, srcSystem=system, srcComponent=1)
-
-    def add(self, name: str, *values: Any, time_us: int | None = None) -> None:
-        kind = getattr(self.dialect, f"MAVLink_{name}_message")
-        time = START_US + self.count * 1_000 if time_us is None else time_us
-        self.data += time.to_bytes(8, "big") + kind(*values).pack(self.sender)
-        self.times.append(time)
-        self.count += 1
 
 
 def drawn(kind: Any, rng: np.random.Generator) -> list[Any]:
@@ -111,27 +96,9 @@ def test_sizes_are_those_of_the_wire() -> None:
     }
 
 
-def flight_log() -> Telemetry:
-    log = Telemetry()
-    for row in range(200):
-        time_us = START_US + row * 100_000
-        heading = np.deg2rad((350.0 + row) % 360.0)
-        log.add("attitude", row * 100, 0.1, -0.2, heading, 0.01, 0.02, 0.03, time_us=time_us)
-        if row % 5 == 0:
-            fix = 3 if row else 0
-            place = (550_000_000 + row, 370_000_000, 200_000)
-            time = time_us + 2_000
-            log.add("gps_raw_int", row, fix, *place, 120, 65_535, 500, 9_000, 12, 214_000, 0, 0, 300, time_us=time)
-            log.add("global_position_int", row, *place, 0, 100, 200, -50, 0, time_us=time_us + 3_000)
-        if row % 10 == 0:
-            log.add("heartbeat", 2, 3, 128 if row > 100 else 0, 0, 4, 3, time_us=time_us + 4_000)
-    log.add("statustext", 6, b"Landed, safely", time_us=START_US + 30_000_000)
-    return log
-
-
 def test_a_flight_is_mapped(tmp_path: Path) -> None:
     path = tmp_path / "a.tlog"
-    path.write_bytes(flight_log().data)
+    path.write_bytes(telemetry().data)
     check(list(registry.read(path)))
     flight = read_flight(tmp_path / "a.mcap", convert_log(open_log(path), tmp_path / "a.mcap"))
     ins, gnss = flight["ins"], flight["gnss"]
@@ -148,7 +115,7 @@ def test_a_flight_is_mapped(tmp_path: Path) -> None:
 
 
 def test_damage_costs_the_frames_it_touches(tmp_path: Path) -> None:
-    log, path = flight_log(), tmp_path / "a.tlog"
+    log, path = telemetry(), tmp_path / "a.tlog"
     path.write_bytes(log.data)
     whole = sum(len(item) for item in registry.read(path) if isinstance(item, RecordBatch))
     data = bytearray(log.data)
@@ -163,7 +130,7 @@ def test_damage_costs_the_frames_it_touches(tmp_path: Path) -> None:
 
 
 def test_frames_of_others_are_told_apart(tmp_path: Path) -> None:
-    log, other, path = flight_log(), Telemetry(system=255), tmp_path / "a.tlog"
+    log, other, path = telemetry(), Telemetry(system=255), tmp_path / "a.tlog"
     other.add("heartbeat", 6, 8, 128, 0, 4, 3, time_us=START_US)
     path.write_bytes(bytes(other.data) + bytes(log.data))
     found = list(registry.read(path))
@@ -176,7 +143,7 @@ def test_blocks_do_not_change_what_is_read(tmp_path: Path, monkeypatch: pytest.M
     from groundstation.readers.tlog import reader
 
     path = tmp_path / "a.tlog"
-    path.write_bytes(b"x" * 3 + bytes(flight_log().data))
+    path.write_bytes(b"x" * 3 + bytes(telemetry().data))
     told = []
     for size in (1 << 20, 1_000):
         monkeypatch.setattr(reader, "BLOCK_BYTES", size)

@@ -15,6 +15,7 @@ from tests.bag_writer import write_ros1, write_ros2
 from tests.dataflash_writer import MAGIC as DATAFLASH_MAGIC
 from tests.dataflash_writer import flight_log
 from tests.real_logs import REAL_LOGS
+from tests.telemetry_writer import telemetry
 from tests.ulog_writer import GPS, GPS_CODE, small_flight
 
 SAMPLES = Path(__file__).parents[2] / "sample_logs"
@@ -166,6 +167,7 @@ _STARTS: dict[str, Callable[[bytes], Iterator[int]]] = {
     "robot-mcap": mcap_starts,
     "ros1": ros1_starts,
     "sqlite3": lambda data: iter(range(0, len(data), 4096)),
+    "tlog": lambda data: iter(range(0, len(data), 48)),
 }
 FORMATS = tuple(_STARTS)
 _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
@@ -179,6 +181,7 @@ _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
     "robot-mcap": (lambda: _bag("mcap"),),
     "ros1": (lambda: _bag("ros1"),),
     "sqlite3": (lambda: _bag("sqlite3"),),
+    "tlog": (lambda: bytes(telemetry().data),),
 }
 _RECORDED = {
     "csv-profile": ("g1000/log_220502_135932_EGPN.csv", "fixedwing/umn_thor_flight75.csv"),

@@ -12,7 +12,7 @@ from groundstation.readers.parts import Part, bounded, merged, occupied
 from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 from groundstation.readers.tlog.canonical import ARMED, INSTEAD, RULES, Rule
-from groundstation.readers.tlog.dialect import Message, crc_extras, messages
+from groundstation.readers.tlog.dialect import MOST_IDS, Message, crc_extras, messages
 
 BLOCK_BYTES = 4 << 20
 AUTOPILOT = 1  # component
@@ -100,9 +100,8 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
         canonical: dict[str, list[Part]] = {}
         for system in np.unique(block.frames[:, 2]).tolist():
             of_system = np.flatnonzero(block.frames[:, 2] == system)
-            for number in np.unique(block.frames[of_system, 1]).tolist():
+            for number, which in _by_number(block, of_system):
                 message = known[number]
-                which = of_system[block.frames[of_system, 1] == number]
                 part = _part(block, which, message)
                 suffix = "" if system == vehicle else f".{system >> 8}_{system & 255}"
                 yield from bounded(
@@ -118,14 +117,22 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
     yield from frames.damages()
 
 
+def _by_number(block: _Block, rows: Int64Array) -> Iterator[tuple[int, Int64Array]]:
+    """Each message that occurs among frames, by its number, and which of the block's frames are of it."""
+    order = rows[np.argsort(block.frames[rows, 1], kind="stable")]
+    numbers = block.frames[order, 1]
+    for which in np.split(order, np.flatnonzero(np.diff(numbers)) + 1):
+        yield int(block.frames[which[0], 1]), which
+
+
 def _survey(source: Source) -> tuple[int, set[str]]:
     """The vehicle (system x 256 + component) whose attitude is in the log most often, and its messages."""
     known = messages()
     counts: dict[tuple[int, int], int] = {}
     for block in _Frames(source):
-        pairs, times = np.unique(block.frames[:, 1:3], axis=0, return_counts=True)
-        for (number, system), count in zip(pairs.tolist(), times.tolist(), strict=True):
-            counts[system, number] = counts.get((system, number), 0) + count
+        pairs, times = np.unique(block.frames[:, 2] * MOST_IDS + block.frames[:, 1], return_counts=True)
+        for pair, count in zip(pairs.tolist(), times.tolist(), strict=True):
+            counts[divmod(pair, MOST_IDS)] = counts.get(divmod(pair, MOST_IDS), 0) + count
     own: dict[int, int] = {}
     for (system, number), count in counts.items():
         own[system] = own.get(system, 0) + count * (1_000 if known[number].name == "ATTITUDE" else 1)
