@@ -16,6 +16,7 @@ from tests.dataflash_writer import MAGIC as DATAFLASH_MAGIC
 from tests.dataflash_writer import flight_log
 from tests.real_logs import REAL_LOGS
 from tests.receiver_writer import nmea_log, novatel_log, ubx_log
+from tests.telemetry_writer import telemetry
 from tests.trajectory_writer import PLACE, VELOCITY, pos_rows, sbet
 from tests.ulog_writer import GPS, GPS_CODE, small_flight
 
@@ -208,6 +209,7 @@ _STARTS: dict[str, Callable[[bytes], Iterator[int]]] = {
     "novatel": starts_with(b"\xaaD"),
     "pos": line_starts,
     "sbet": lambda data: iter(range(0, len(data), 136)),
+    "tlog": lambda data: iter(range(0, len(data), 48)),
 }
 FORMATS = tuple(_STARTS)
 _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
@@ -227,6 +229,7 @@ _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
     "novatel": (novatel_log,),
     "pos": (pos,),
     "sbet": (lambda: sbet(count=300).tobytes(),),
+    "tlog": (lambda: bytes(telemetry().data),),
 }
 _RECORDED = {
     "csv-profile": ("g1000/log_220502_135932_EGPN.csv", "fixedwing/umn_thor_flight75.csv"),
