@@ -25,9 +25,9 @@ def chapter(**changes: Any) -> Section:
 
 def test_everything_has_its_place() -> None:
     assert titles(chapter()) == [
-        *(FIGURES, "States", "inertial.state position", "inertial.state velocity", "inertial.tilt_and_drift"),
-        *("inertial.radial", "Outages in the log", "Consistency of the filter"),
-        *("inertial.innovations", "inertial.observability", "Model, noise and gates as used"),
+        *("inertial.state position", "inertial.state velocity", "inertial.radial", "States", "Outages in the log"),
+        *(FIGURES, "inertial.tilt_and_drift", "Consistency of the filter"),
+        *("inertial.innovations", "inertial.observability", "Settings: [inertial]"),
     ]
     assert grid(chapter(), "States").numbers == ("inertial_states",)
 
@@ -146,21 +146,11 @@ def test_reopening_and_other_ins_are_told() -> None:
     assert not [note for note in notes(chapter()) if "was opened to it again" in note]
 
 
-def test_units_of_the_settings_are_read_from_their_names() -> None:
-    settings: dict[str, float | str | bool] = {
-        "noise.velocity_walk_mps_per_sqrt_s": 0.004,
-        "noise.tilt_walk_deg_per_sqrt_h": 0.0044,
-        "noise.drift_walk_dph_per_sqrt_h": 0.5,
-        "noise.drift_rate_walk_dphph_per_sqrt_h": 0.25,
-        "noise.tilt_rad": 0.0002,
-    }
-    assert facts(chapter(settings=settings), "Model, noise and gates as used") == {
-        "noise.velocity walk": ("0.004 m/s/√s", ""),
-        "noise.tilt walk": ("0.0044 °/√h", ""),
-        "noise.drift walk": ("0.5 °/h/√h", ""),
-        "noise.drift rate walk": ("0.25 °/h²/√h", ""),
-        "noise.tilt": ("0.0002 rad", ""),
-    }
+def test_settings_are_spelled_as_in_the_file_and_noise_of_the_class_stands_apart() -> None:
+    settings: dict[str, float | str | bool] = {"transition": "exact", "noise.tilt_rad": 0.0002}
+    section = chapter(settings=settings)
+    assert facts(section, "Settings: [inertial]") == {"transition": ('"exact"', "")}
+    assert facts(section, "Noise of the INS class") == {"tilt_rad": ("0.0002", "")}
 
 
 def with_share(share: float, *, raised: bool) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What the chapter on the forecast comes to, in sentences: skill, honesty of the sigma, the paper's windows."""
+"""What the chapter on the forecast comes to, in sentences: skill, honesty of the sigma, windows."""
 
 from collections.abc import Mapping, Sequence
 
@@ -107,7 +107,7 @@ def _too_few(answer: ForecastResult) -> set[float]:
 
 
 def _windows(answer: ForecastResult) -> Note | None:
-    """Whether the paper's windows help on this flight."""
+    """Whether the windows of Neusypin 2003 help on this flight."""
     windows, last = rows_of(answer, "windows"), rows_of(answer, "last_estimate")
     shared = sorted(set(windows) & set(last))
     if not shared:
@@ -116,7 +116,9 @@ def _windows(answer: ForecastResult) -> Note | None:
     helped = [lead for lead, (ours, theirs) in pairs.items() if ours < (1.0 - SAME) * theirs]
     hurt = [lead for lead, (ours, theirs) in pairs.items() if ours > (1.0 + SAME) * theirs]
     told = [_at(verb, leads, pairs) for verb, leads in (("help", helped), ("hurt", hurt)) if leads]
-    sentence = "The paper's long-period windows " + (" and ".join(told) if told else "change nothing on this flight")
+    sentence = "The long-period windows of Neusypin 2003 " + (
+        " and ".join(told) if told else "change nothing on this flight"
+    )
     return Note(f"{sentence}. One flight decides nothing: starts overlap.", "plain")
 
 

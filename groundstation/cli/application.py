@@ -89,6 +89,15 @@ Profile = Annotated[
         "--profile", help="Profile (TOML) that describes the columns of a CSV.", metavar="FILE", readable=False
     ),
 ]
+IcdFiles = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--icd",
+        help="ICD (DTS YAML) that tells what the words of 1553 and ARINC-429 buses mean, or the name of a shipped one; "
+        "may be repeated.",
+        metavar="FILE",
+    ),
+]
 ConfigFile = Annotated[Path | None, typer.Option("--config", help="Settings (TOML).", metavar="FILE", readable=False)]
 AircraftFile = Annotated[
     Path | None,

@@ -17,6 +17,7 @@ from groundstation.cli.application import (
     ConfigFile,
     FailOn,
     Force,
+    IcdFiles,
     IntervalsFile,
     Json,
     NoPdf,
@@ -56,15 +57,23 @@ def common(
 def info(
     log: Annotated[Path, typer.Argument(help="A recorded log or an MCAP.", metavar="LOG", readable=False)],
     profile: Profile = None,
+    icd: IcdFiles = None,
+    suggest_icd: Annotated[
+        bool, typer.Option("--suggest-icd", help="Print the beginning of an ICD for what is on its buses.")
+    ] = False,
     json: Json = False,
     verbose: Verbose = False,
 ) -> int | None:
-    """Tell what a log is: format, clock, span, topics with rows, rates and fields."""
+    """Tell what a log is: format, clock, span, topics with rows, rates, fields; its buses (word by word with -v)."""
     from groundstation.cli import printing
-    from groundstation.pipeline.verbs.describe import describe
+    from groundstation.pipeline.verbs import describe
 
-    description = describe(log, profile)
-    typer.echo(printing.as_json(description.to_dict()) if json else printing.description(description))
+    if suggest_icd:
+        typer.echo(describe.suggest_icd(log))
+        return DONE
+    description = describe.describe(log, profile, tuple(icd or ()))
+    shown = printing.as_json(description.to_dict()) if json else printing.description(description, everything=verbose)
+    typer.echo(shown)
     return DATA_LOST if description.has_lost_data else DONE
 
 
@@ -75,6 +84,7 @@ def check(
     thresholds: ThresholdsFile = None,
     config: ConfigFile = None,
     profile: Profile = None,
+    icd: IcdFiles = None,
     fail_on: FailOn = "none",
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -87,7 +97,7 @@ def check(
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.check import check_many
 
-    configuration = load_configuration(config, profile=profile, thresholds=thresholds)
+    configuration = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
     with listener("none" if quiet else progress) as listen:
         checked = check_many(logs, configuration, fail_on=fail_on, listen=listen)
     check_table.show(checked, as_json_text=json, quiet=quiet, everything=verbose)
@@ -99,11 +109,18 @@ def check(
 def convert(
     logs: Annotated[list[Path], typer.Argument(help="Recorded logs.", metavar="LOG", readable=False)],
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="MCAP to write; a folder for several logs.", metavar="FILE")
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            help="MCAP to write; a folder for several logs. A name *.ch10 writes Chapter 10 with its ICD.",
+            metavar="FILE",
+        ),
     ],
     thresholds: ThresholdsFile = None,
     config: ConfigFile = None,
     profile: Profile = None,
+    icd: IcdFiles = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -116,7 +133,7 @@ def convert(
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.conversions import convert_many
 
-    configuration = load_configuration(config, profile=profile, thresholds=thresholds)
+    configuration = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
     with listener("none" if quiet else progress) as listen:
         outcomes = convert_many(logs, output, configuration=configuration, force=force, listen=listen)
     printing.outcomes(outcomes, as_json_text=json, quiet=quiet)
@@ -134,6 +151,7 @@ def run(
     intervals: IntervalsFile = None,
     thresholds: ThresholdsFile = None,
     profile: Profile = None,
+    icd: IcdFiles = None,
     jobs: Annotated[int, typer.Option("-j", "--jobs", help="Processes; 0: one per core.", min=0)] = 0,
     scheduler: Annotated[
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
@@ -177,7 +195,8 @@ def run(
     from groundstation.pipeline.many_flights.batch import plan_many, run_many
     from groundstation.pipeline.one_flight.configuration import applying, load_configuration
 
-    configuration = applying(load_configuration(config, aircraft, site, intervals, profile, thresholds), apply)
+    settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd)
+    configuration = applying(settings, apply)
     if dry_run:
         planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet)
@@ -257,6 +276,9 @@ def simulate(
     scenario: Annotated[str, typer.Argument(help="Name of a shipped scenario, or a TOML file.", metavar="SCENARIO")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the log.", metavar="DIR")],
     seed: Annotated[int | None, typer.Option("--seed", help="Seed in place of the scenario's own.")] = None,
+    form: Annotated[
+        Literal["csv", "ch10"], typer.Option("--format", help="csv, or ch10: IRIG 106 Chapter 10 with its ICD.")
+    ] = "csv",
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -265,7 +287,7 @@ def simulate(
     """Simulate a flight as a flat CSV, with the truth beside it. `groundstation list` names the scenarios."""
     from groundstation.pipeline.verbs.synthesis import simulate_to
 
-    tell_written(simulate_to(scenario, output, seed=seed, force=force), as_json_text=json, quiet=quiet)
+    tell_written(simulate_to(scenario, output, seed=seed, form=form, force=force), as_json_text=json, quiet=quiet)
     return DONE
 
 

@@ -1,6 +1,7 @@
 """How results look on stdout: lines for people, JSON for programs."""
 
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from pathlib import PurePath
 from typing import Any
 
@@ -9,13 +10,15 @@ import typer
 from groundstation.chapters.terminal import columns
 from groundstation.cli.text import as_json, printable
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
-from groundstation.pipeline.verbs.describe import Description
+from groundstation.pipeline.verbs.describe import BusWord, Description
+
+NAMED_SHOWN = 6  # words of a bus that an ICD names, told one by one
 
 __all__ = ["as_json", "catalogue", "description", "outcomes", "worst_code"]
 
 
-def description(what: Description) -> str:
-    """Text of ``info``."""
+def description(what: Description, *, everything: bool = False) -> str:
+    """Text of ``info``; with ``everything`` each word of the buses has a line, else each bus."""
     head = [[f"{key}:", printable(value)] for key, value in what.facts.items()]
     parts = [columns(head)]
     if what.topics:
@@ -33,10 +36,34 @@ def description(what: Description) -> str:
                 ]
             )
         parts.append(columns(rows, right=(1, 2, 3)))
+    if what.buses:
+        parts.append(_every_word(what.buses) if everything else _every_bus(what.buses))
     if what.findings:
         rows = [[finding.severity, printable(finding.text)] for finding in what.findings]
         parts.append("findings\n" + columns(rows))
     return "\n\n".join(parts)
+
+
+def _every_word(buses: Sequence[BusWord]) -> str:
+    """A line for each terminal and subaddress, or label."""
+    rows = [["channel", "bus", "what", "count", "rate Hz", "ICD"]]
+    for one in buses:
+        rate = "" if one.rate_hz is None else f"{one.rate_hz:.4g}"
+        rows.append([one.place, printable(one.bus), one.what, str(one.count), rate, printable(", ".join(one.names))])
+    return columns(rows, right=(3, 4))
+
+
+def _every_bus(buses: Sequence[BusWord]) -> str:
+    """A line for each bus, with what the ICD names on it."""
+    rows = [["channel", "bus", "words", "kinds", "named", "by the ICD"]]
+    for place, found in groupby(buses, key=lambda one: one.place):
+        words = list(found)
+        named = [one for one in words if one.names]
+        listed = ", ".join(f"{one.what}: {' '.join(one.names)}" for one in named[:NAMED_SHOWN])
+        listed += f" and {len(named) - NAMED_SHOWN} more" if len(named) > NAMED_SHOWN else ""
+        total = sum(one.count for one in words)
+        rows.append([place, printable(words[0].bus), str(total), str(len(words)), str(len(named)), printable(listed)])
+    return columns(rows, right=(2, 3, 4))
 
 
 def outcomes(

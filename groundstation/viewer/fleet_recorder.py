@@ -36,11 +36,6 @@ class FleetRecorder(Recorder):
         self._number = {name: place + 1 for place, name in enumerate(ids[self.order].tolist())}
         super().__init__(stream, 0, self.timed > 0)
 
-    @property
-    def timeline(self) -> str:
-        """The timeline to begin on."""
-        return UTC if self.has_utc else FLIGHT_NUMBER
-
     def numbers(self, flight_ids: NDArray[np.str_]) -> Int64Array:
         """Numbers of flights."""
         return np.array([self._number[name] for name in flight_ids.tolist()], dtype=np.int64)
@@ -89,11 +84,7 @@ class FleetRecorder(Recorder):
             columns.append(rr.TimeColumn(UTC, timestamp=[known[-1] + margin]))
         return columns
 
-    def _scalars(self, path: str, time_ns: Int64Array, values: FloatArray) -> None:
-        for part in self._parts(time_ns):
-            super()._scalars(path, time_ns[part], values[part])
-
-    def _parts(self, numbers: Int64Array) -> list[Int64Array]:
+    def _parts(self, time_ns: Int64Array) -> list[Int64Array]:
         """Rows of flights with a time, and of those without."""
-        has_time = numbers <= self.timed
+        has_time = time_ns <= self.timed
         return [rows for rows in (np.flatnonzero(has_time), np.flatnonzero(~has_time)) if len(rows)]

@@ -176,8 +176,6 @@ def forecast_text(fleet: FleetResults) -> str:
 
 def failed_text(fleet: FleetResults) -> str:
     """Table of the logs that gave no flight, and why."""
-    if not fleet.not_in_fleet:
-        return "Every log gave a flight."
     rows = [[one.kind, markdown_text(one.source), markdown_text(one.reason)] for one in fleet.not_in_fleet[:MOST_ROWS]]
     more = len(fleet.not_in_fleet) - len(rows)
     rest = [f"{more} more stand in index.csv."] if more else []

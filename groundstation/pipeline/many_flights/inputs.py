@@ -6,6 +6,7 @@ from pathlib import Path
 
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.one_flight.deviation_to_apply import CORRECTED
+from groundstation.pipeline.one_flight.log import as_log
 from groundstation.reports.index import INDEX_CSV, INDEX_JSON
 from groundstation.results.files import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY
 
@@ -30,7 +31,7 @@ def collect(paths: Sequence[Path], out: Path | None = None) -> tuple[Input, ...]
     """List the files that ``paths`` (files or folders, recursive) stand for, in a stable order, each once.
 
     OUT and folders that groundstation made (they hold its manifest or index) are never inputs of a folder walk; nor
-    are hidden files and settings (TOML).
+    are hidden files and settings (TOML). A folder that is a bag of ROS 2 is one log, named by its metadata.
 
     Raises
     ------
@@ -113,6 +114,8 @@ def _finished_folders(out: Path) -> list[Path]:
 def _walk(folder: Path, out: Path | None) -> list[Path]:
     if folder.resolve() == out or is_ours(folder):
         return []
+    if (bag := as_log(folder)) != folder:
+        return [bag]
     files: list[Path] = []
     try:
         entries = sorted(folder.iterdir())

@@ -17,8 +17,8 @@ from groundstation.pipeline.one_flight.analyse import Given, analyse
 from groundstation.pipeline.one_flight.apply_deviation import apply_deviation, corrected_name, write_corrected
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
-from groundstation.pipeline.one_flight.identity import flight_id, sha256_of
-from groundstation.pipeline.one_flight.log import Log, open_log
+from groundstation.pipeline.one_flight.identity import flight_id
+from groundstation.pipeline.one_flight.log import Log, digest_of, open_log
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
@@ -84,7 +84,7 @@ class Job:
     def asked(self) -> tuple[str, Keys] | None:
         """Digest of its log and the keys of what is asked for; None when only its run can tell what is wrong."""
         try:
-            source = open_log(self.path, self.configuration.profile_path).source
+            source = open_log(self.path, self.configuration.profile_path, self.configuration.icds).source
             return source.sha256, keys_of(source, self.configuration, with_pdf=self.with_pdf)
         except Exception:
             return None
@@ -108,7 +108,7 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
         if job.finished is not None and job.step in ("nothing", "reports"):
             return _run_reports(job, job.finished, watch)
         version = _version(job.path)
-        log = open_log(job.path, job.configuration.profile_path)
+        log = open_log(job.path, job.configuration.profile_path, job.configuration.icds)
         sha256 = log.source.sha256
         job.out.mkdir(parents=True, exist_ok=True)
         partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=job.out))
@@ -131,7 +131,7 @@ def _version(path: Path) -> tuple[int, int]:
 
 def _require_unchanged(log: Log, version: tuple[int, int]) -> None:
     """Refuse a log that was written to while it was read: the digest is not of what was converted."""
-    if _version(log.path) != version and (log.is_store or sha256_of(log.path) != log.source.sha256):
+    if _version(log.path) != version and (log.is_store or digest_of(log.path) != log.source.sha256):
         raise UnreadableLogError(log.path.name, "changed while it was read", "", "run it again once it is complete")
 
 

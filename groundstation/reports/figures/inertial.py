@@ -176,10 +176,12 @@ def innovations(results: FlightResults) -> Drawing | None:
             axes = d.place(figure, 18, bottom, 174, bottom + 28)
             values = numbers(data, f"{channel}_normalised_innovation")
             d.dots(axes, numbers(data, "time_s"), values, d.INS, 1.6, MOST_DOTS, zorder=2)
-            for limit, text in ((NORMAL_95, "+1.96"), (-NORMAL_95, "−1.96")):
+            for limit, text in ((NORMAL_95, "± 1.96 σ"), (-NORMAL_95, "")):
                 d.limit_line(axes, limit, text)
             axes.set_ylim(*_symmetric(values))
             axes.set_ylabel(f"{channel} innovation, σ")
+            if channel == "north":
+                d.legend_above(axes)
             d.time_axis(axes, low, high, title=channel == "east")
 
     caption = (
