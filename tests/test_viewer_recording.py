@@ -226,6 +226,28 @@ def test_lists_are_tables_and_the_clock_of_a_topic_is_not_drawn(tmp_path: Path) 
     assert drawn == {"/raw/raw.ATT/accel_m", "/raw/raw.ATT/Flags"}
 
 
+def test_units_of_the_source_stand_in_titles_and_counts_are_stepped(tmp_path: Path) -> None:
+    seconds = np.arange(0.0, 100.0, 1.0)
+    rows = table("raw.IMU.0", seconds, acc_x=seconds, acc_y=seconds, T=seconds, mode_no=np.arange(100) // 30)
+    metadata = {"units.raw.IMU": "acc_x m/s/s, acc_y m/s/s, T deg C"}
+    logged = Flight({"raw.IMU.0": rows}, metadata, START_NS, True, "a.BIN")
+    with rr.RecordingStream("a") as stream:
+        stream.save(tmp_path / "a.rrd")
+        tab = raw.raw(Recorder(stream, logged.start_ns, True), logged, _bare_results(logged))
+        stream.disconnect()
+    assert tab is not None
+    titles = {view.name for page in tab.contents[0].contents for view in page.contents}
+    assert titles == {"IMU.0 acc, m/s/s", "IMU.0 T, deg C", "IMU.0 mode_no"}
+    styles = Contents(tmp_path / "a.rrd").fixed
+    stepped = {
+        path
+        for path, batches in styles.items()
+        for batch in batches
+        if "SeriesLines:interpolation_mode" in batch.schema.names
+    }
+    assert stepped == {"/raw/raw.IMU.0/mode_no"}
+
+
 def test_a_state_is_held_over_rows_of_other_sources(tmp_path: Path) -> None:
     seconds = np.arange(0.0, 100.0, 0.5)
     is_own = np.arange(200) % 4 == 0

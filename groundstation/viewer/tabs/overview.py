@@ -18,7 +18,7 @@ from groundstation.viewer.series import gap_after, wraps_after
 from groundstation.viewer.tabs.track import track
 from groundstation.viewer.views import document, figure_of, lanes, numbers, plot, told_by_colour
 
-LANE_SHARE = 0.35  # height of a lane, of that of a plot
+LANE_SHARE = 0.45  # height of a lane, of that of a plot
 MARGIN_DEG = 10.0  # beyond 0 and 360: a nose that points north would be drawn on the frame
 CIRCULAR = ("heading_deg", "magnetic_heading_deg", "track_deg")
 # Rows of plots: entity, unit, columns of the figure with their names, range of the axis.
@@ -64,7 +64,7 @@ def overview(recorder: Recorder, results: FlightResults) -> rrb.Container:
     summary = document("Flight", "summary")
     figure = figure_of(results, "overview", "time_s")
     ground = None if figure is None else track(recorder, results, figure)
-    left = summary if ground is None else rrb.Vertical(contents=[ground, summary], row_shares=[2.0, 1.0])
+    left = summary if ground is None else rrb.Vertical(contents=[ground, summary], row_shares=[1.5, 1.0])
     right: list[rrb.View] = [] if figure is None else _plots(recorder, figure)
     shares = [1.0] * len(right)
     lane_paths = [
