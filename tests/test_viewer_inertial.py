@@ -16,7 +16,7 @@ from groundstation.tables.table import Flight
 from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.recording import write_recording
-from tests.inertial_example import inertial_result
+from tests.inertial_example import AIDED, aided_figures, inertial_result
 from tests.recording_contents import Contents
 from tests.viewer_example import START_NS, make_flight, make_results
 
@@ -96,11 +96,22 @@ def test_figures_asked_first_stand_in_the_panels(contents: Contents) -> None:
     assert "| windows of the drift alone (shipped) | **✓ 24** |" in skill and "| Starts | 43 |" in skill
 
 
-def test_an_aided_ins_is_told_in_both_panels(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
-    aided = inertial_result(flight.duration_s, kind="gnss_aided")
-    contents = written(tmp_path, flight, replace(results, answers={**results.answers, **by_analysis(aided)}))
-    for entity in ("/inertial/answer", "/forecast/answer"):
-        assert plain(contents.text(entity)).startswith("# This INS is aided by GNSS: a forecast from it means nothing")
+def test_of_an_aided_ins_differences_and_its_filter_are_shown(
+    tmp_path: Path, flight: Flight, results: FlightResults
+) -> None:
+    aided = inertial_result(flight.duration_s, **AIDED, figures=aided_figures(flight.duration_s))
+    reason = NotAssessable("forecast", "GNSS corrects this INS already")
+    kept = tuple(item for item in results.figures if not item.name.startswith(("inertial", "forecast")))
+    changed = replace(results, answers=by_analysis(aided), figures=(*kept, *aided.figures), not_assessable=(reason,))
+    contents = written(tmp_path, flight, changed)
+    assert plain(contents.text("/inertial/answer")).startswith("# GNSS corrects this INS: within 3.0 m of it")
+    drawn = {entity for entity in contents.batches if entity.startswith("/inertial/")}
+    assert drawn == {
+        f"/inertial/{kind}/{channel}_{quantity}"
+        for kind in ("differences", "own_innovations")
+        for channel in ("north", "east")
+        for quantity in ("position", "velocity")
+    }
 
 
 def test_reasons_stand_in_the_overview_and_make_no_tab(tmp_path: Path, flight: Flight, results: FlightResults) -> None:

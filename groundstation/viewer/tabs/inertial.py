@@ -12,6 +12,7 @@ from groundstation.results.inertial import InertialResult
 from groundstation.viewer import colours
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after, runs
+from groundstation.viewer.tabs.aided_ins import aided_pages
 from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
 
 CHANNELS = ("north", "east")
@@ -42,9 +43,9 @@ def inertial(recorder: Recorder, results: FlightResults) -> rrb.Container | None
     if section is None or results.answer(InertialResult) is None:
         return None
     recorder.document("inertial/answer", markdown(section))
-    right: list[rrb.View] = [document("How good this INS is", "inertial/answer")]
+    right: list[rrb.View] = [document("What GNSS says of this INS", "inertial/answer")]
     states = figure_of(results, "inertial_states", "time_s", "north_position_m", "east_position_m")
-    pages: list[rrb.Container] = []
+    pages = aided_pages(recorder, results)
     if states is not None:
         pages = _pages(recorder, results, states)
     right += _radial(recorder, results)
