@@ -3,11 +3,8 @@
 import numpy as np
 import rerun.blueprint as rrb
 
-from groundstation.chapters import chapter_of
-from groundstation.chapters.findings import not_assessable
 from groundstation.chapters.front import front
-from groundstation.chapters.markdown import front_markdown, part_markdown
-from groundstation.chapters.parts import Grid, Head
+from groundstation.chapters.markdown import front_markdown
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.viewer import colours
@@ -60,7 +57,7 @@ SHADES = {
 
 def overview(recorder: Recorder, results: FlightResults) -> rrb.Container:
     """Log the overview: whatever there is of track, plots and lanes, and always the summary."""
-    recorder.document("summary", _summary(results))
+    recorder.document("summary", front_markdown(front(results)))
     summary = document("Flight", "summary")
     figure = figure_of(results, "overview", "time_s")
     ground = None if figure is None else track(recorder, results, figure)
@@ -123,17 +120,3 @@ def _plots(recorder: Recorder, figure: FigureData) -> list[rrb.View]:
             paths = [f"overview/{path}/{name}" for name in known]
             views.append(plot(title, paths, axis_range=axis_range, legend=False))
     return views
-
-
-def _summary(results: FlightResults) -> str:
-    """The front of the report, a row for each answer, and what could not be assessed."""
-    told = Grid("Answers", (Head("Chapter"), Head("What was found")), answer_rows(results))
-    parts = [part for part in (told if told.rows else None, not_assessable(results)) if part is not None]
-    return "\n\n".join([front_markdown(front(results)), *(part_markdown(part) for part in parts)])
-
-
-def answer_rows(results: FlightResults) -> list[tuple[str, str]]:
-    """Title and headline of the chapter of each answer, a row each, in the order of the report."""
-    sections = [chapter_of(results, answer) for answer in results.answers.values()]
-    rows = {section.title: section.headline or section.lead for section in sections}
-    return list(rows.items())
