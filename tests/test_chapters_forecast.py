@@ -176,17 +176,6 @@ def test_rows_of_the_smaller_tables() -> None:
     assert row(section, "Coupled model", "60 min") == ("537", "+2%")
 
 
-def test_the_forecast_of_an_aided_ins_is_not_praised() -> None:
-    section = chapter("gnss_aided")
-    assert section.headline == "This INS is aided by GNSS: a forecast from it means nothing"
-    assert notes(section) == [
-        "The INS is aided by GNSS: what follows shows how it follows GNSS, and nothing about a forecast."
-    ]
-    assert tones(section) == ["warn"]
-    shown = " ".join(every_text(section))
-    assert "honest on this flight" not in shown and "beats the raw INS" not in shown
-
-
 def test_the_forecast_of_an_ins_of_unknown_kind_says_so() -> None:
     section = chapter("unknown")
     assert notes(section)[0] == (

@@ -49,6 +49,24 @@ def test_fields_of_other_rows_are_taken_from_the_nearest_one() -> None:
     assert "pressure_altitude_m" not in figure.columns
 
 
+def test_attitude_climb_and_airspeed_stand_beside_the_track() -> None:
+    time_s = np.arange(0.0, 60.0, 0.1)
+    ins = table(
+        *("ins", time_s), roll_deg=0.5 * time_s, pitch_deg=-0.1 * time_s, true_heading_deg=np.full(len(time_s), 45.0)
+    )
+    slow = np.arange(0.0, 60.0, 1.0)
+    place = {"latitude_deg": 56.0 + 1e-5 * slow, "longitude_deg": np.full(60, 38.0)}
+    gnss = table("gnss", slow, **place, velocity_down_mps=np.full(60, -2.0))
+    air = table("air", slow, indicated_airspeed_mps=np.full(60, 40.0))
+    figure = overview(flight_of(ins, gnss, air), ins.values("true_heading_deg"), "ins")
+    assert figure is not None and len(figure) == 60
+    np.testing.assert_allclose(figure["roll_deg"], 0.5 * slow)
+    np.testing.assert_allclose(figure["pitch_deg"], -0.1 * slow)
+    np.testing.assert_allclose(figure["climb_mps"], 2.0)
+    np.testing.assert_allclose(figure["indicated_airspeed_mps"], 40.0)
+    assert "true_airspeed_mps" not in figure.columns
+
+
 def test_what_is_missing_for_long_stays_missing() -> None:
     time_s = np.arange(0.0, 30.0, 0.5)
     known = (time_s < 10.0) | (time_s > 20.0)

@@ -29,8 +29,8 @@ from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import MANIFEST, example, figure, heading_result
 from tests.saved import load, write_flight_report
 
-LARGEST_REPORT_BYTES = 1_500_000  # mailed and opened on old machines
-LARGEST_LONG_REPORT_BYTES = 2_500_000  # with the figures of INS errors and forecast
+LARGEST_REPORT_BYTES = 2_000_000  # mailed and opened on old machines
+LARGEST_LONG_REPORT_BYTES = 3_000_000  # with the figures of INS errors and forecast
 VOID = {"meta", "col", "link", "br", "hr", "img", "input", "path", "use"}
 HOSTILE = "<script>alert(1)</script>\"'><img src=x onerror=alert(1)>=cmd|' /C calc'!A0&amp;{{7*7}}$\\frac$-->]]>"
 

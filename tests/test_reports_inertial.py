@@ -20,7 +20,7 @@ from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.inertial import InertialResult
-from tests.inertial_example import forecast_result, inertial_result
+from tests.inertial_example import AIDED, aided_figures, forecast_result, inertial_result
 from tests.report_example import MANIFEST, example
 from tests.saved import load
 
@@ -78,6 +78,18 @@ def test_drift_and_error_after_an_hour_stand_on_the_front(tmp_path: Path) -> Non
     (tile,) = told.others
     assert tile.claim.value.replace("\u202f", " ") == "483 m"
     assert "raw INS 1790 m" in tile.claim.remark.replace("\u202f", " ")
+
+
+def test_of_an_aided_ins_differences_and_its_own_filter_are_drawn() -> None:
+    answer = inertial_result(**AIDED, figures=aided_figures(3600.0))
+    results = example(answer)
+    section = inertial(results)
+    assert section is not None
+    found = [part for part in with_drawings(section, results).parts if isinstance(part, Drawing)]
+    assert [drawing.title for drawing in found] == [
+        *("INS − GNSS, position", "INS − GNSS, velocity", "Innovations of the INS's own filter"),
+    ]
+    assert "Shaded" in found[2].caption
 
 
 @pytest.mark.parametrize("kind", ["unknown", "gnss_aided"])

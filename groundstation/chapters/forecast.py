@@ -4,7 +4,6 @@ from collections.abc import Iterable
 
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.forecast_conclusions import conclusions, rows_of, title_of
-from groundstation.chapters.inertial import AIDED
 from groundstation.chapters.inertial_claim import forecast_claim
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Part, Section, Tone, kept
 from groundstation.chapters.wording import clock, is_number, number, percent, words
@@ -46,7 +45,7 @@ def forecast(results: FlightResults) -> Section | None:
     workings: tuple[Part | None, ...] = (
         *(_default_in_detail(answer), *_calibration(answer), _phases(answer.phases), _coupled(answer.coupled)),
     )
-    headline = AIDED if kind == "gnss_aided" else f"Shipped method: {title_of(answer.default_method)}"
+    headline = f"Shipped method: {title_of(answer.default_method)}"
     tone: Tone = "warn" if any(note.tone == "warn" for note in notes) else "good"
     told = None
     if kind == "unaided":

@@ -13,9 +13,6 @@ HEADLINE_MIN = 60.0  # the horizon the conclusion quotes, or the longest there i
 
 def conclusions(answer: ForecastResult, kind: str) -> list[Note]:
     """A sentence or two for skill, honesty and windows; ``kind`` is that of the INS."""
-    if kind == "gnss_aided":
-        text = "The INS is aided by GNSS: what follows shows how it follows GNSS, and nothing about a forecast."
-        return [Note(text, "warn")]
     text = "Whether GNSS corrects this INS already cannot be told: if it does, what follows says nothing of a forecast."
     notes = [
         Note(text, "unknown") if kind == "unknown" else None,

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
+from groundstation.chapters.aided_ins import aided
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.gates import setting_facts
 from groundstation.chapters.inertial_claim import inertial_claim
@@ -33,7 +34,6 @@ PLACES = {"m": 1, "mps": 3, "arcsec": 1, "dph": 4, "dphph": 4}
 CONSISTENT = (0.93, 0.97)  # shares of innovations inside their 95 % band that pass for it
 TITLE = "INS errors"
 LEAD = "A Kalman filter finds the errors of the INS against GNSS, north and east apart. Error = INS − truth."
-AIDED = "This INS is aided by GNSS: a forecast from it means nothing"
 
 
 def inertial(results: FlightResults) -> Section | None:
@@ -41,6 +41,8 @@ def inertial(results: FlightResults) -> Section | None:
     answer = results.answer(InertialResult)
     if answer is None:
         return without_answer(results, "inertial", TITLE, LEAD)
+    if answer.kind == "gnss_aided":
+        return aided(answer)
     parts: tuple[Part | None, ...] = (
         *_conclusions(answer),
         Figure("inertial.state", of="position"),
@@ -64,8 +66,6 @@ def inertial(results: FlightResults) -> Section | None:
 
 
 def _headline(answer: InertialResult) -> str:
-    if answer.kind == "gnss_aided":
-        return AIDED
     if answer.kind == "unknown":
         return "Whether GNSS corrects this INS cannot be told"
     rate = number(answer.radial_error_rate_50_nmiph, 2, "nmi/h")
@@ -74,11 +74,9 @@ def _headline(answer: InertialResult) -> str:
 
 def _conclusions(answer: InertialResult) -> list[Note]:
     """The chapter in a few sentences: what the INS is like, and whether the filter can be trusted."""
-    reason = typeset(answer.kind_reason).strip().rstrip(".")
-    if answer.kind == "gnss_aided":
-        return [Note(f"This INS is aided by GNSS, and a forecast from it means nothing: {reason}.", "warn")]
     notes = []
     if answer.kind == "unknown":
+        reason = typeset(answer.kind_reason).strip().rstrip(".")
         text = f"Whether GNSS corrects this INS already cannot be told: {reason or 'the log does not show it'}."
         notes.append(Note(f"{text} If it does, its errors and any forecast mean nothing.", "unknown"))
     notes.append(_quality(answer))

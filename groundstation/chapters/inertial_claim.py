@@ -10,15 +10,11 @@ HOUR_MIN = 60.0  # the horizon a forecast is judged by at a glance, or the longe
 
 
 def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -> Claim:
-    """Drift of an unaided INS; of another one that there is none to tell.
+    """Drift of an INS that GNSS does not correct, or of which that cannot be told.
 
     ``quality`` says in a sentence whether the filter can be trusted; ``is_doubtful`` that its sigmas are too small.
     """
     reason = typeset(answer.kind_reason).strip().rstrip(".")
-    if answer.kind == "gnss_aided":
-        headline = "This INS is corrected by GNSS: it shows no drift of its own"
-        sentences = (f"{reason[:1].upper()}{reason[1:]}.",) if reason else ()
-        return Claim(Rank.INERTIAL_OPEN, Mark("unknown", "Aided"), headline, "", "corrected by GNSS", sentences)
     rate, most = answer.radial_error_rate_50_nmiph, number(answer.radial_error_rate_95_nmiph, 2, "nmi/h")
     drift = number(rate, 2, "nmi/h")
     headline = (

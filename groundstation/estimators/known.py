@@ -33,6 +33,8 @@ class AircraftData:
         How much later GNSS velocities are logged than the INS shows the same motion, known; None: estimated.
     ins_class : str
         For the record.
+    ins_kind : str
+        Whether GNSS corrects the INS already, ``gnss_aided`` or ``unaided``; empty: the log shows it.
     """
 
     antenna_arm_m: float | None = number(None, -50.0, 50.0)
@@ -43,6 +45,7 @@ class AircraftData:
     gnss_latency_s: float | None = number(None, -10.0, 10.0)
     gnss_latency_sigma_s: float = number(0.01, 0.0, 10.0)
     ins_class: str = ""
+    ins_kind: Literal["", "unaided", "gnss_aided"] = ""
 
     def __post_init__(self) -> None:
         check_ranges(self)

@@ -24,7 +24,8 @@ ALSO = (
     ("roll_deg", "ins", ()),
     ("pitch_deg", "ins", ()),
     ("magnetic_heading_deg", "ins", ("heading_deg",)),
-    ("true_airspeed_mps", "air", ("ground_speed_mps",)),
+    ("true_airspeed_mps", "air", ()),
+    ("indicated_airspeed_mps", "air", ("true_airspeed_mps",)),
     ("pressure_altitude_m", "baro", ("altitude_m",)),
     ("height_above_airfield_m", "baro", ("altitude_m", "pressure_altitude_m")),
 )
@@ -81,8 +82,8 @@ def gnss_lanes(flight: Flight, geometry_limit: float) -> FigureData | None:
 def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_topic: str | None) -> FigureData | None:
     """Thinned flight for the map and profiles, on the times of GNSS, else of INS, else of the barometer; NaN at gaps.
 
-    Position, altitude, ground speed, heading and track are always there; the columns of :data:`ALSO` where they are
-    known.
+    Position, altitude, ground speed, climb, heading and track are always there; the columns of :data:`ALSO` where they
+    are known.
     """
     gnss = first_of_kind(flight, "gnss", "latitude_deg", "longitude_deg")
     base = gnss or first_of_kind(flight, "ins", "latitude_deg", "longitude_deg") or ins_topic
@@ -101,6 +102,7 @@ def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_t
         "ground_speed_mps": _at(every, ground_speed(every), rows[keep]),
         "heading_deg": _nearest_heading(flight, time_ns, true_heading_deg, ins_topic),
         "track_deg": _at(every, _track(every), rows[keep]),
+        "climb_mps": _at(every, -every.values("velocity_down_mps"), rows[keep]),
     }
     for name, kind, instead_of in ALSO:
         source = first_of_kind(flight, kind, name)

@@ -47,6 +47,8 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "inertial.radial": inertial.radial,
     "inertial.innovations": inertial.innovations,
     "inertial.observability": inertial.observability,
+    "inertial.differences": inertial.differences,
+    "inertial.own_innovations": inertial.own_innovations,
     "landing_beacons.deviations": landing_beacons.deviations,
     "landing_ranges.space": landing_ranges.space,
     "landing_ranges.accuracy": landing_ranges.accuracy,
