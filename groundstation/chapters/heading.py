@@ -72,6 +72,12 @@ def _segments(segments: Sequence[TaxiSegment]) -> Grid | None:
 
 
 def _estimates(answer: HeadingResult) -> Grid:
+    alone = (
+        "The same by this taxi alone",
+        number(answer.error_deg, 4, "°", signed=True),
+        interval(answer.confidence95_measured_deg, 3, "°"),
+        "without steady sideslip and mounting, which no taxi one way shows",
+    )
     rows = (
         (
             "Heading error, robust and weighted by speed",
@@ -80,12 +86,7 @@ def _estimates(answer: HeadingResult) -> Grid:
             "the estimate corrected by; its interval allows for errors correlated over seconds, and for steady "
             "sideslip and mounting",
         ),
-        (
-            "The same by this taxi alone",
-            number(answer.error_deg, 4, "°", signed=True),
-            interval(answer.confidence95_measured_deg, 3, "°"),
-            "without steady sideslip and mounting, which no taxi one way shows",
-        ),
+        *((alone,) if answer.confidence95_measured_deg else ()),
         (
             "Heading error, running mean of the paper",
             number(answer.paper_error_deg, 4, "°", signed=True),
