@@ -14,7 +14,7 @@ from groundstation.tables.table import Flight
 from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.recording import send_flight, stream_recording
 from tests.viewer_example import make_flight, make_results
-from tests.viewer_shots import colourful, open_recording, pages, picture, settled
+from tests.viewer_shots import colourful, open_recording, pages, picture
 
 pytestmark = pytest.mark.viewer
 
@@ -71,12 +71,14 @@ def _write_both(path: Path, blank: Path, flight: Flight, results: FlightResults)
 
 
 def _shots(client: ViewerClient) -> dict[str, tuple[str, str, np.ndarray]]:
-    """Each view's own picture: view id -> class, title, pixels."""
-    return {
-        view.view_id: (view.view_class, f"{page}: {view.name}", picture(settled(client, view.view_id)))
-        for page, views in pages(client)
-        for view in views
-    }
+    """Each view's own picture: view id -> class, title, pixels. A view that stands on several pages is taken once."""
+    shots: dict[str, tuple[str, str, np.ndarray]] = {}
+    for page, views in pages(client):
+        for view in views:
+            if view.view_id not in shots:
+                pixels = picture(client.take_screenshot(view.view_id))  # the page has come to rest
+                shots[view.view_id] = (view.view_class, f"{page}: {view.name}", pixels)
+    return shots
 
 
 def test_every_view_of_every_tab_shows_data_and_complains_of_nothing(opened: Opened) -> None:

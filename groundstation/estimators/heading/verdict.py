@@ -8,6 +8,7 @@ from groundstation.estimators.heading.checks import Disagreement, Normality, Var
 from groundstation.estimators.heading.gating import NOT_TAXI, is_straight_and_fast
 from groundstation.estimators.heading.samples import Samples
 from groundstation.estimators.heading.settings import HeadingSettings
+from groundstation.estimators.heading.wording import told
 from groundstation.results.heading import Gate, HeadingStep, Sense, Standstill, Verdict
 
 # Required gates whose failure more data may cure; the failure of any other required gate rejects.
@@ -172,14 +173,18 @@ def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings) -
         ),
         _gate(
             "gnss_rate",
-            "GNSS rate (10 Hz in the paper)",
+            "GNSS rate (10 Hz in Markelov 2015)",
             1.0 / samples.interval_s if samples.interval_s > 0 else None,
             low=9.0,
             unit="Hz",
             required=False,
         ),
         _gate(
-            "precision", "precision e of the paper", figures.precision_deg, high=settings.precision_max_deg, unit="deg"
+            "precision",
+            "precision e of Markelov 2015",
+            figures.precision_deg,
+            high=settings.precision_max_deg,
+            unit="deg",
         ),
         _gate("quality", "spread of the running mean", figures.quality_deg, high=settings.quality_max_deg, unit="deg"),
         _gate(
@@ -260,7 +265,7 @@ def _steadiness_gates(figures: Figures, settings: HeadingSettings) -> tuple[Gate
             "steps of the INS heading",
             float(len(figures.steps)),
             high=0.0,
-            reason="; ".join(f"{step.size_deg:+.2f} deg at {step.time_s:.1f} s" for step in figures.steps),
+            reason=", ".join(f"{step.size_deg:+.2f} deg at {step.time_s:.1f} s" for step in figures.steps),
         ),
     )
 
@@ -276,15 +281,14 @@ def _is_curable(gate: Gate, standstill: Standstill | None, settings: HeadingSett
 def decide(
     gates: tuple[Gate, ...], standstill: Standstill | None, settings: HeadingSettings
 ) -> tuple[Verdict, tuple[Gate, ...]]:
-    """The verdict and the gates it rests on.
+    """The verdict and every gate that stands against a correction.
 
     reject: a required gate failed that more data cannot cure; extend: only such failed as more data may cure;
     undecided: nothing failed, but a required gate could not be measured; accept: every required gate passed.
     """
     failed = tuple(gate for gate in gates if gate.required and gate.state == "failed")
-    grave = tuple(gate for gate in failed if not _is_curable(gate, standstill, settings))
-    if grave:
-        return "reject", grave
+    if any(not _is_curable(gate, standstill, settings) for gate in failed):
+        return "reject", failed
     if failed:
         return "extend", failed
     missing = tuple(gate for gate in gates if gate.required and gate.state == "not_measured")
@@ -306,24 +310,7 @@ def round_to_step(value: float, step: float) -> float:
 
 
 def explain(verdict: Verdict, gates: tuple[Gate, ...], error_deg: float, step_deg: float) -> str:
-    """One line for people: why, and what the number would be; a number not to be entered is said not to be."""
-    number = round_to_step(-error_deg, step_deg)
+    """One line for people: every gate the verdict rests on, the plainest first; a number not to be entered says so."""
     if verdict == "accept":
-        return f"every gate passed: enter {number:+g} deg"
-    parts = [f"{gate.title} {_figure(gate)}{_told(gate)}" for gate in gates[:3]]
-    if len(gates) > 3:
-        parts.append(f"{len(gates) - 3} more")
-    return f"{'; '.join(parts)}. Not to be entered: {number:+g} deg"
-
-
-def _told(gate: Gate) -> str:
-    """Why parts of the taxi speak against each other: which, where and by how much."""
-    return f" ({gate.reason})" if gate.name in ("segments", "steps") and gate.state == "failed" else ""
-
-
-def _figure(gate: Gate) -> str:
-    if gate.value is None:
-        return f"not measured ({gate.reason})"
-    limit = gate.limit if isinstance(gate.limit, tuple) else (gate.limit,)
-    unit = f" {gate.unit}" if gate.unit else ""
-    return f"{gate.value:.3g} against {' to '.join(f'{value:g}' for value in limit)}{unit}"
+        return f"every required gate passed: enter {round_to_step(-error_deg, step_deg):+g} deg"
+    return f"{told(gates)}. Not to be entered: {round_to_step(-error_deg, step_deg):+g} deg"

@@ -96,6 +96,15 @@ class Now(NamedTuple):
     in_a_row: Int64Array  # (kinds,) rejections
 
 
+class Room(NamedTuple):
+    """What the filter works in; contents mean nothing before and after."""
+
+    w: FloatArray  # (n, n)
+    g: FloatArray  # (n,)
+    K: FloatArray  # (n,)
+    moved: FloatArray  # (c,)
+
+
 class Record(NamedTuple):
     """What a run writes down; an array of no length is left out (but not y, S, mark).
 
