@@ -18,7 +18,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.heading import Gate, HeadingResult
 from groundstation.simulation.taxi import TaxiCase, TaxiRun, noiseless, simulate_taxi, table_of, taxi_flight
 from groundstation.simulation.taxi_disturbance import Disturbance
-from groundstation.tables.phases import flight_phases
+from groundstation.tables.phases import flight_phases, ground_mask
 from groundstation.tables.table import Flight, Table
 
 NOISELESS_DEG = 1e-6  # rounding of headings and positions
@@ -525,3 +525,15 @@ def test_parking_heading_of_an_ins_that_drifts_holds_the_truth(drift_deg_per_h: 
     truth = float(np.mean(run.heading_deg[(run.ins_time_s > 150.0) & (run.ins_time_s < 198.0)]))
     assert found.parking_heading_deg == pytest.approx(truth, abs=2.0 * (found.parking_sigma_deg or 0.0))
     assert found.parking_heading_deg == pytest.approx(truth, abs=0.15)
+
+
+def test_a_car_is_always_on_the_ground(flight: Flight) -> None:
+    """Without a flag that proves contact, and faster than any taxi for a while: the log says what it is."""
+    bare = replace(flight, tables={name: table for name, table in flight.tables.items() if name != "discrete"})
+    car = replace(bare, metadata={**bare.metadata, "always_on_ground": "true"})
+    proof, phases = ground_mask(car, car["gnss"].time_ns), flight_phases(car)
+    assert proof.mask.all() and proof.method == "said to be always on the ground"
+    assert {part.phase for part in phases.intervals} == {"standstill", "taxi"}
+    found = estimate(car, on_ground=lambda time_ns: ground_mask(car, time_ns), phases=phases)
+    assert found.error_deg == pytest.approx(estimate(flight).error_deg, abs=1e-6)
+    assert gate_of(found, "ground").state == "passed"
