@@ -46,7 +46,7 @@ def expect_nothing_goes_to_stderr(executed: Any) -> None:
 
 def expect_a_flight_shows_its_verdict(executed: Any) -> None:
     card = outputs_of(executed, "flight = groundstation.open(log)")["text/html"]
-    assert "Accept" in card and "enter −1.2°" in card
+    assert "Accept" in card and "Enter −1.2°" in card
     assert card == outputs_of(executed, "again = groundstation.open")["text/html"]
 
 
