@@ -394,8 +394,8 @@ def test_onboard_figures_stand_beside_ours() -> None:
 
 
 def test_drift_of_taxi_is_shrunk_to_what_an_ins_can_drift() -> None:
-    assert shrunk_drift(None, None) == (0.0, 0.1)
-    drift, sigma = shrunk_drift(0.1, 0.01)
+    assert shrunk_drift(0.1) == pytest.approx((0.0, 0.1))
+    drift, sigma = shrunk_drift(0.1, (0.1, 0.01))
     assert drift == pytest.approx(0.1, rel=0.02)
     assert sigma == pytest.approx(0.01, rel=0.01)
 

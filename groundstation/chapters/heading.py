@@ -49,7 +49,7 @@ def heading(results: FlightResults) -> Section:
         _by_hand(results.chosen),
     )
     workings = (
-        *(_estimates(answer), _geometry(answer), _standstill_facts(answer.standstill)),
+        *(_estimates(answer), _spread(answer), _geometry(answer), _standstill_facts(answer.standstill)),
         *(Figure(f"heading.{name}") for name in WORKINGS),
         *_settings(answer.settings),
     )
@@ -77,12 +77,18 @@ def _estimates(answer: HeadingResult) -> Grid:
         name: number(getattr(answer, f"{name}_deg"), places, "°", signed=name.endswith("error"))
         for name, places in (("error", 4), ("paper_error", 4), ("precision", 4), ("uncorrected_error", 4))
     }
+    alone = interval(answer.confidence95_measured_deg, 3, "°")
     rows = (
         (
             "Heading error, robust and weighted by speed",
             value["error"],
             interval(answer.confidence95_deg, 3, "°"),
-            "corrected by; allows for errors correlated over seconds",
+            "corrected by; allows for errors correlated over seconds, steady sideslip and mounting",
+        ),
+        *(
+            (("The same by this taxi alone", value["error"], alone, "without steady sideslip and mounting"),)
+            if answer.confidence95_measured_deg
+            else ()
         ),
         (
             "Heading error, running mean of Markelov 2015",
@@ -197,6 +203,23 @@ def _geometry(answer: HeadingResult) -> Facts:
         ("Azimuth drift", drift, slope),
     )
     return Facts("Lever arm, time offset, drift", pairs)
+
+
+def _spread(answer: HeadingResult) -> Facts | None:
+    """What parts of the taxi have of their own, what is added for steady terms, and steps."""
+    if not is_number(answer.steady_sigma_deg):
+        return None
+    wander = f"over {number(answer.wander_s, 0, 's')}"
+    pairs = (
+        ("Own error of a segment, σ", number(answer.segment_spread_deg, 3, "°"), "from what segments say"),
+        ("Wander of INS heading minus path, σ", number(answer.wander_spread_deg, 3, "°"), wander),
+        ("Steady sideslip and mounting left, σ", number(answer.steady_sigma_deg, 3, "°"), answer.steady_origin),
+        *(
+            ("Step of the INS heading", number(step.size_deg, 2, "°", signed=True), f"at {clock(step.time_s)}")
+            for step in answer.steps
+        ),
+    )
+    return Facts("Segments, minutes and steady terms", pairs)
 
 
 def _with_sigma(value: float | None, sigma: float | None, places: int, unit: str) -> str:

@@ -51,7 +51,21 @@ def reasons(heading: HeadingResult) -> tuple[str, ...]:
     """Why the verdict is what it is, what failed beside it, and the error in words."""
     why = typeset(re.split(r": enter |\. Not to be entered", heading.verdict_reason)[0])  # told by the headline
     each = (sentence(part) for part in why.split("; "))
-    return tuple(filter(None, (*each, failed_to_inform(heading.gates), _in_words(heading))))
+    found = failed_to_inform(heading.gates), _in_words(heading), steady_terms(heading)
+    return tuple(filter(None, (*each, *found)))
+
+
+def steady_terms(heading: HeadingResult) -> str:
+    """What of the interval this taxi shows, and what steady sideslip and mounting add; empty where not known."""
+    measured, sigma = heading.confidence95_measured_deg, heading.steady_sigma_deg
+    if measured is None or not all(map(is_number, measured)) or not is_number(sigma):
+        return ""
+    driven = "the directions driven leave" if heading.directions else "one direction cannot show"
+    origin = "as the aircraft file states" if heading.steady_origin == "aircraft file" else "shipped figures"
+    return (
+        f"95 % interval {interval(measured, 3, '°')} by this taxi alone, {interval(heading.confidence95_deg, 3, '°')} "
+        f"with the steady sideslip and mounting that {driven} (σ {number(sigma, 2, '°')}, {origin})."
+    )
 
 
 def sentence(text: str) -> str:
@@ -84,9 +98,12 @@ def figures(heading: HeadingResult) -> tuple[tuple[str, str, str], ...]:
     """The figures that decide, each with what it rests on."""
     samples, taxi = number(heading.samples, 0), number(heading.taxi_seconds, 0, "s")
     shown, sigma = number(heading.parking_ins_heading_deg, 2, "°"), number(heading.parking_sigma_deg, 2, "°")
-    interval95 = interval(heading.confidence95_deg, 3, "°")
+    measured = heading.confidence95_measured_deg or heading.confidence95_deg
+    remark = f"95 % interval {interval(heading.confidence95_deg, 3, '°')}"
+    if measured != heading.confidence95_deg:
+        remark += f"; without steady sideslip and mounting {interval(measured, 3, '°')}"
     found = (
-        ("Heading error", number(heading.error_deg, 3, "°", signed=True), f"95 % interval {interval95}"),
+        ("Heading error", number(heading.error_deg, 3, "°", signed=True), remark),
         ("Precision e", number(heading.precision_deg, 3, "°"), f"{samples} samples, {taxi} of straight taxi"),
         ("Parking heading, corrected", number(heading.parking_heading_deg, 2, "°"), f"INS showed {shown}; σ {sigma}"),
         _against_reference(heading),

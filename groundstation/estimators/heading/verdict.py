@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from groundstation.estimators.heading.checks import Normality, VarianceRatio
-from groundstation.estimators.heading.gating import is_straight_and_fast
+from groundstation.estimators.heading.checks import Disagreement, Normality, VarianceRatio, normality_limits
+from groundstation.estimators.heading.gating import NOT_TAXI, is_straight_and_fast
 from groundstation.estimators.heading.samples import Samples
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.wording import told
-from groundstation.results.heading import Gate, Sense, Standstill, Verdict
+from groundstation.results.heading import Gate, HeadingStep, Sense, Standstill, Verdict
 
 # Required gates whose failure more data may cure; the failure of any other required gate rejects.
 CURED_BY_MORE_DATA = frozenset({"standstill_duration", "taxi_seconds", "precision", "half_width"})
@@ -29,7 +29,8 @@ class Figures:
     drift_deg_per_h: float | None
     drift_sigma_deg_per_h: float | None
     mode_changes: int | None
-    segments_chi2: float | None
+    disagreement: Disagreement | None
+    steps: tuple[HeadingStep, ...]
 
 
 def _gate(
@@ -61,7 +62,7 @@ def build_gates(
         *_throughout_gates(samples, figures, settings),
         *_standstill_gates(standstill, settings),
         *_taxi_gates(samples, figures, settings),
-        *_normality_gates(figures.normality, settings),
+        *_normality_gates(figures.normality, int(samples.is_used.sum()), settings),
         *_steadiness_gates(figures, settings),
     )
 
@@ -145,7 +146,16 @@ def _standstill_gates(standstill: Standstill | None, settings: HeadingSettings) 
 def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings) -> tuple[Gate, ...]:
     outliers, used = int(np.sum(samples.gate == "outlier")), int(samples.is_used.sum())
     later = int(samples.is_after_lift_off[samples.is_used].sum())
+    run = is_straight_and_fast(samples, settings) & np.isin(samples.gate, NOT_TAXI)
     return (
+        _gate(
+            "not_taxi",
+            "share of the straight epochs that take-off run and landing roll have (not used: they crab the aircraft)",
+            float(run.sum()) / max(int(run.sum()) + used, 1),
+            high=1.0,
+            reason=f"{run.sum()} epochs" if run.any() else "",
+            required=False,
+        ),
         _gate(
             "before_take_off",
             "share of used samples before take-off",
@@ -187,19 +197,19 @@ def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings) -
     )
 
 
-def _normality_gates(normal: Normality | None, settings: HeadingSettings) -> tuple[Gate, ...]:
+def _normality_gates(normal: Normality | None, count: int, settings: HeadingSettings) -> tuple[Gate, ...]:
     few = "too few samples, or no spread"
 
     def p_value(value: float) -> str:
         return f"p = {value:.2g} for independent samples, not gated"
 
-    low, high = settings.excess_kurtosis_range
+    skewness, (low, high), distance = normality_limits(settings, max(count, 1))
     return (
         _gate(
             "skewness",
             "skewness of the differences, absolute",
             None if normal is None else abs(normal.skewness),
-            high=settings.skewness_max,
+            high=skewness,
             reason=few if normal is None else p_value(normal.skewness_p),
         ),
         _gate(
@@ -214,14 +224,14 @@ def _normality_gates(normal: Normality | None, settings: HeadingSettings) -> tup
             "normal_distance",
             "distance to the fitted normal distribution",
             None if normal is None else normal.distance,
-            high=settings.normal_distance_max,
+            high=distance,
             reason=few if normal is None else p_value(normal.distance_p),
         ),
     )
 
 
 def _steadiness_gates(figures: Figures, settings: HeadingSettings) -> tuple[Gate, ...]:
-    variance = figures.variance
+    variance, parts = figures.variance, figures.disagreement
     drift, sigma = figures.drift_deg_per_h, figures.drift_sigma_deg_per_h
     low, high = settings.variance_ratio_range
     return (
@@ -244,11 +254,18 @@ def _steadiness_gates(figures: Figures, settings: HeadingSettings) -> tuple[Gate
         ),
         _gate(
             "segments",
-            "disagreement of the segments, chi-square per degree of freedom",
-            figures.segments_chi2,
-            high=4.0,
-            reason="one segment" if figures.segments_chi2 is None else "",
-            required=False,
+            "disagreement of segments and minutes, chi-square per degree of freedom",
+            None if parts is None else parts.chi2,
+            high=1.0 if parts is None else parts.limit,
+            reason="one part" if parts is None else parts.told,
+            required=parts is not None,
+        ),
+        _gate(
+            "steps",
+            "steps of the INS heading",
+            float(len(figures.steps)),
+            high=0.0,
+            reason=", ".join(f"{step.size_deg:+.2f} deg at {step.time_s:.1f} s" for step in figures.steps),
         ),
     )
 

@@ -13,6 +13,8 @@ FAILED = {
     "ground": "ground contact proven for {value} of the samples, {limit} needed",
     "ins_mode": "{value} changes of the INS mode during the taxi",
     "outliers": "{value} of the samples are outliers, at most {limit}",
+    "steps": "{value} steps of the INS heading during the taxi ({reason})",
+    "segments": "parts of the taxi disagree: chi-square {value} per part, at most {limit} ({reason})",
     "half_width": "heading error known to +- {value} only, +- {limit} needed",
     "precision": "precision e {value}, at most {limit}",
     "quality": "running mean not settled: spread {value}, at most {limit}",
@@ -55,7 +57,7 @@ def _told(gate: Gate) -> str:
     limits = gate.limit if isinstance(gate.limit, tuple) else (gate.limit,)
     limit = " to ".join(_figure(gate, value) for value in limits)
     form = FAILED.get(gate.name, f"{gate.title} {{value}} against {{limit}}")
-    return form.format(value=_figure(gate, gate.value), limit=limit)
+    return form.format(value=_figure(gate, gate.value), limit=limit, reason=gate.reason)
 
 
 def _figure(gate: Gate, value: float) -> str:

@@ -278,8 +278,8 @@ def forest(results: FlightResults) -> Drawing | None:
     whole = interval(answer.confidence95_deg, 3, "°")
     blue = "; blue: directions of travel" if answer.directions else ""
     caption = (
-        f"Bar: ± 1.96 σ. Green: straight segments{blue}; black: the whole run, 95 % interval {whole}. Opposite "
-        f"directions that disagree point to side-slip or mounting.{more}"
+        f"Bar: ± 1.96 σ. Green: straight segments{blue}; black: the whole run, 95 % interval {whole}, thick what this "
+        f"taxi shows by itself. Opposite directions that disagree point to side-slip or mounting.{more}"
     )
     alt = "Forest plot of the heading error by segment and by direction."
     return Drawing("Estimates by segment and direction", caption, alt, d.draw("forest", height, paint))
@@ -292,7 +292,10 @@ def _overall(axes: Any, answer: HeadingResult, place: int) -> None:
     axes.axvline(error, color=d.INK, linewidth=0.6)
     if all(map(is_number, bounds)):
         axes.axvspan(bounds[0], bounds[1], color=d.INK, alpha=0.08, linewidth=0)
-        axes.plot(bounds, [place, place], color=d.INK, linewidth=1.8, solid_capstyle="butt")
+        axes.plot(bounds, [place, place], color=d.INK, linewidth=0.8, solid_capstyle="butt")
+    measured = answer.confidence95_measured_deg or bounds
+    if all(map(is_number, measured)):
+        axes.plot(measured, [place, place], color=d.INK, linewidth=2.4, solid_capstyle="butt")
     axes.plot([error], [place], "D", color=d.INK, markersize=4.5)
 
 
