@@ -51,7 +51,7 @@ def expect_a_flight_shows_its_verdict(executed: Any) -> None:
 
 
 def expect_tables_and_figures_are_shown(executed: Any) -> None:
-    assert "precision e of the paper" in outputs_of(executed, 'to_frame("gates")')["text/html"]
+    assert "precision e of Markelov 2015" in outputs_of(executed, 'to_frame("gates")')["text/html"]
     for name in ("density", "growth"):
         assert len(outputs_of(executed, f'figure("{name}")')["image/png"]) > 10_000
 
