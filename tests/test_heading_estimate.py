@@ -483,6 +483,7 @@ def test_back_taxi_shows_the_sideslip_of_a_crosswind_and_takes_it_out() -> None:
     assert one_way.error_deg == pytest.approx(CASE.heading_error_deg + 0.5, abs=0.1), "nothing shows it"
     assert one_way.confidence95_deg[0] < CASE.heading_error_deg < one_way.confidence95_measured_deg[0]
     assert back.steady_sigma_deg < 0.6 * one_way.steady_sigma_deg
+    assert gate_of(one_way, "whole_half_width").state == "failed"
     gate = gate_of(back, "segments")
     assert (gate.state, back.verdict) == ("failed", "reject")
     assert "farthest off" in gate.reason and "farthest off" in back.verdict_reason
@@ -537,3 +538,11 @@ def test_a_car_is_always_on_the_ground(flight: Flight) -> None:
     found = estimate(car, on_ground=lambda time_ns: ground_mask(car, time_ns), phases=phases)
     assert found.error_deg == pytest.approx(estimate(flight).error_deg, abs=1e-6)
     assert gate_of(found, "ground").state == "passed"
+
+
+def test_steady_terms_decide_where_the_settings_say_so(flight: Flight, result: HeadingResult) -> None:
+    strict = estimate(flight, settings=HeadingSettings(whole_decides=True))
+    known = AircraftData(antenna_arm_m=4.0, sideslip_sigma_deg=0.03, mounting_sigma_deg=0.03)
+    stated = estimate(flight, settings=HeadingSettings(whole_decides=True), aircraft=known)
+    assert (result.verdict, strict.verdict, stated.verdict) == ("accept", "extend", "accept")
+    assert (result.steady_origin, stated.steady_origin) == ("shipped figures", "aircraft file")
