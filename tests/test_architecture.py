@@ -12,8 +12,8 @@ PACKAGE = Path(__file__).parents[1] / "groundstation"
 
 MAY_IMPORT: dict[str, set[str]] = {
     "base": set(),
-    "readers": {"base"},
     "store": {"base"},
+    "readers": {"base", "store"},
     "integrity": {"base"},
     "tables": {"base"},
     "results": {"base"},

@@ -157,6 +157,7 @@ TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
         "truth": _INS,
     }
 )
+_FIELD_NAMES = frozenset(field.name for fields in TOPICS.values() for field in fields)
 INS_MODES = ("align", "nav", "attitude", "gnss_aided")
 FIXES = ("none", "2d", "3d", "dgnss", "rtk_float", "rtk_fixed", "ppp", "gnss_ins", "dead_reckoning", "other")
 RAW_PREFIX = "raw."
@@ -205,6 +206,17 @@ def field_of(topic: str, name: str) -> Field | None:
     'deg'
     """
     return next((field for field in TOPICS.get(kind_of(topic), ()) if field.name == name), None)
+
+
+def is_field_name(name: str) -> bool:
+    """Whether some canonical topic has a field of that name.
+
+    Examples
+    --------
+    >>> is_field_name("roll_deg"), is_field_name("roll")
+    (True, False)
+    """
+    return name in _FIELD_NAMES
 
 
 def topics_of_kind(kind: str, topics: "list[str] | tuple[str, ...]") -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from groundstation.cli import fleets, flights, plans
 from groundstation.cli.application import (
     DATA_LOST,
     DONE,
+    INTERRUPTED,
     AircraftFile,
     ConfigFile,
     FailOn,
@@ -28,6 +29,7 @@ from groundstation.cli.application import (
     Verbose,
     answers_with_exit_code,
     app,
+    examples,
     say,
     tell_written,
 )
@@ -50,7 +52,7 @@ def common(
     """Options before the verb."""
 
 
-@app.command()
+@app.command(epilog=examples("info"))
 @answers_with_exit_code
 def info(
     log: Annotated[Path, typer.Argument(help="A recorded log or an MCAP.", metavar="LOG", readable=False)],
@@ -75,7 +77,7 @@ def info(
     return DATA_LOST if description.has_lost_data else DONE
 
 
-@app.command()
+@app.command(epilog=examples("check"))
 @answers_with_exit_code
 def check(
     logs: Annotated[list[Path], typer.Argument(help="Recorded logs or MCAPs.", metavar="LOG", readable=False)],
@@ -102,7 +104,7 @@ def check(
     return printing.worst_code(tuple(one.outcome for one in checked))
 
 
-@app.command()
+@app.command(epilog=examples("convert"))
 @answers_with_exit_code
 def convert(
     logs: Annotated[list[Path], typer.Argument(help="Recorded logs.", metavar="LOG", readable=False)],
@@ -138,7 +140,7 @@ def convert(
     return printing.worst_code(outcomes)
 
 
-@app.command()
+@app.command(epilog=examples("run"))
 @answers_with_exit_code
 def run(
     paths: Annotated[list[str], typer.Argument(help="Logs or folders of logs, or URLs of them.", metavar="PATH")],
@@ -196,28 +198,32 @@ def run(
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd)
     configuration = applying(settings, apply)
     if dry_run:
-        planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo)
+        planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet)
         return DONE
-    with listener("none" if quiet else progress) as listen:
-        outcomes = run_many(
-            paths,
-            output,
-            configuration,
-            jobs=jobs,
-            scheduler=scheduler,
-            force=force,
-            fail_on=fail_on,
-            with_pdf=not no_pdf,
-            redo=redo,
-            stations=stations,
-            listen=listen,
-        )
+    try:
+        with listener("none" if quiet else progress) as listen:
+            outcomes = run_many(
+                paths,
+                output,
+                configuration,
+                jobs=jobs,
+                scheduler=scheduler,
+                force=force,
+                fail_on=fail_on,
+                with_pdf=not no_pdf,
+                redo=redo,
+                stations=stations,
+                listen=listen,
+            )
+    except KeyboardInterrupt:
+        say(f"interrupted: {output} keeps what is finished; the same command again goes on with the rest")
+        return INTERRUPTED
     printing.outcomes(outcomes, as_json_text=json, quiet=quiet, with_times=verbose)
     return printing.worst_code(outcomes)
 
 
-@app.command()
+@app.command(epilog=examples("report"))
 @answers_with_exit_code
 def report(
     out: Annotated[Path, typer.Argument(help="A folder that `run` made, or one flight folder in it.", metavar="OUT")],
@@ -237,7 +243,7 @@ def report(
     return printing.worst_code(problems)
 
 
-@app.command()
+@app.command(epilog=examples("view"))
 @answers_with_exit_code
 def view(
     flight: Annotated[
@@ -264,7 +270,7 @@ def view(
     return DONE
 
 
-@app.command()
+@app.command(epilog=examples("simulate"))
 @answers_with_exit_code
 def simulate(
     scenario: Annotated[str, typer.Argument(help="Name of a shipped scenario, or a TOML file.", metavar="SCENARIO")],
@@ -285,7 +291,7 @@ def simulate(
     return DONE
 
 
-@app.command()
+@app.command(epilog=examples("study"))
 @answers_with_exit_code
 def study(
     name: Annotated[
@@ -315,7 +321,7 @@ def study(
     return DONE
 
 
-@app.command(name="list")
+@app.command(name="list", epilog=examples("list"))
 @answers_with_exit_code
 def list_(
     log: Annotated[
@@ -337,7 +343,7 @@ def list_(
     return DONE
 
 
-@app.command()
+@app.command(epilog=examples("cooperative"))
 @answers_with_exit_code
 def cooperative(
     logs: Annotated[

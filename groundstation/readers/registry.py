@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
 from groundstation.base.records import Item, RecordBatch, Remark
 from groundstation.readers import (
+    bags,
     chapter10,
     csv_profile,
     dataflash,
@@ -35,8 +36,9 @@ if TYPE_CHECKING:
     from groundstation.readers.icd import Icd
 
 ENTRY_POINT_GROUP = "groundstation.readers"
+FLAT_CSV = f"the flat CSV ({flat_csv.PAGE})"
 _OF_TEXT: tuple[Reader, ...] = (csv_profile, flat_csv, miluv, rtklib_pos, utias)
-_BUILT_IN: tuple[Reader, ...] = (chapter10, dataflash, ulog, flightdata_hdf5, receiver, sbet, *_OF_TEXT)
+_BUILT_IN: tuple[Reader, ...] = (chapter10, dataflash, ulog, flightdata_hdf5, receiver, sbet, bags, *_OF_TEXT)
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,7 @@ def identify(path: str | Path, profile: Path | None = None) -> Claim:
     ----------
     path : path of the log
     profile : path of a profile (TOML), optional
-        With it, the file is a table of that layout whatever it looks like.
+        With it, the file is a table of that layout whatever it looks like; of a bag it explains messages.
 
     Raises
     ------
@@ -129,8 +131,8 @@ def read(path: str | Path | Source, profile: Path | None = None, icds: "Sequence
     source = path if isinstance(path, Source) else Source(Path(path))
     claim, troubles = _claim(source, profile)
     reader = _readers()[claim.reader]
-    if reader is csv_profile:
-        items = csv_profile.read(source, profile)
+    if reader in (bags, csv_profile):
+        items = reader.read(source, profile)
     elif reader is chapter10:
         items = chapter10.read(source, icds)
     else:
@@ -162,7 +164,8 @@ def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]
     if source.is_empty:
         raise UnclaimedLogError(source.name, "an empty file", "a recorded log", "check how it was copied")
     if profile is not None:
-        return csv_profile.claim_by(source, profile), plug_in_failures()
+        by_profile = bags if bags.sniff(source) else csv_profile
+        return by_profile.claim_by(source, profile), plug_in_failures()
     claims: list[Claim] = []
     refusals: list[GroundstationError] = []
     troubles = list(plug_in_failures())
@@ -227,11 +230,12 @@ def _unclaimed(source: Source, refusals: list[GroundstationError], troubles: lis
         return UnclaimedLogError(source.name, f"{known} data that cannot be decompressed")
     if known is not None:
         return UnclaimedLogError(
-            source.name, f"recognised as {known}, not readable in this version", "", "convert it to the flat CSV"
+            source.name, f"recognised as {known}, not readable in this version", "", f"convert it to {FLAT_CSV}"
         )
     if refusals:
         return refusals[0]
     found = "binary data of an unknown format" if magic.is_binary(source) else "text that no reader claims"
     names = ", ".join(reader for reader in _readers())
     found += f" ({'; '.join(troubles)})" if troubles else ""
-    return UnclaimedLogError(source.name, found, f"one of {names}", "describe a table by a profile (--profile FILE)")
+    next_step = f"write {FLAT_CSV}, or describe a table by a profile (--profile FILE)"
+    return UnclaimedLogError(source.name, found, f"one of {names}", next_step)

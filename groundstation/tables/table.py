@@ -1,6 +1,6 @@
 """A table: the samples of one topic as named numpy columns on the corrected clock."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, Self
@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.errors import NotAssessableError
+from groundstation.base.errors import NotAssessableError, UnknownNameError
 from groundstation.base.records import BoolArray, Column, Int64Array, frozen
-from groundstation.base.signals import field_of
+from groundstation.base.signals import TOPICS, field_of, is_canonical, is_field_name, kind_of
 from groundstation.base.units import NS_PER_S
 
 if TYPE_CHECKING:
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Table:
-    """Samples of one topic, in order of corrected time.
+    """Samples of one topic, in order of corrected time. ``table["roll_deg"]`` is a column, ``"gdop" in table`` asks.
 
     Parameters
     ----------
@@ -56,17 +56,44 @@ class Table:
     def __contains__(self, name: str) -> bool:
         return name in self.columns
 
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """A column of the log as it is read: numbers as of :meth:`values`, text as of :meth:`text`, shape (n,).
+
+        Raises
+        ------
+        UnknownNameError
+            When the log has none of that name, with the names that are near.
+        """
+        if name not in self.columns:
+            raise UnknownNameError(f"table {self.topic}", name, self.columns)
+        return self.text(name) if self.columns[name].values.dtype.kind == "U" else self.values(name)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.topic}: {len(self)} rows of {', '.join(self.columns)}>"
+
+    def _absent(self, name: str) -> None:
+        """Refuse a name that no field has; one that this log merely lacks is absent throughout."""
+        if not is_field_name(name):
+            names = dict.fromkeys((*self.columns, *(field.name for field in TOPICS.get(kind_of(self.topic), ()))))
+            raise UnknownNameError(f"table {self.topic}", name, names)
+
     def has(self, *names: str) -> bool:
         """Whether every named field is there with at least one present value."""
         return all(name in self.columns and bool(self.columns[name].mask.any()) for name in names)
 
     def values(self, name: str) -> FloatArray:
-        """Field as float64, shape (n,), NaN where absent (also where the device wrote NaN, and for no such field).
+        """Field as float64, shape (n,), NaN where absent (also where the device wrote NaN, and if the log lacks it).
 
         NaN also where a measured quantity is further outside its physical range than that range is wide (1e308 m/s,
         infinity): nothing is computed with it. Quality figures (dilutions, sigmas) are given as they are.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is neither in the log nor that of any signal.
         """
         if name not in self.columns:
+            self._absent(name)
             return np.full(len(self), np.nan)
         column = self.columns[name]
         out = np.asarray(column.values, dtype=np.float64)
@@ -87,8 +114,9 @@ class Table:
         return mask
 
     def text(self, name: str) -> NDArray[np.str_]:
-        """Text field, shape (n,), empty where absent."""
+        """Text field, shape (n,), empty where absent; raises as :meth:`values`."""
         if name not in self.columns:
+            self._absent(name)
             return np.full(len(self), "", dtype="U1")
         column = self.columns[name]
         return np.where(column.mask, column.values.astype(np.str_), "")
@@ -135,7 +163,7 @@ class Table:
         return pd.DataFrame(data, index=pd.Index(self.time_ns, name="time_ns"))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class TimedTable(Table):
     """A table that knows the flight's clock, so that its frame is indexed by time.
 
@@ -149,6 +177,24 @@ class TimedTable(Table):
 
     start_ns: int = 0
     has_utc: bool = False
+
+    @property
+    def flight_time_s(self) -> FloatArray:
+        """Seconds since the start of the flight, shape (n,)."""
+        return (self.time_ns - self.start_ns) / NS_PER_S
+
+    @property
+    def utc(self) -> NDArray[np.datetime64]:
+        """UTC of every row, datetime64[ns], shape (n,).
+
+        Raises
+        ------
+        NotAssessableError
+            When the flight has none.
+        """
+        if not self.has_utc:
+            raise NotAssessableError(self.topic, "no UTC in this flight", "flight_time_s")
+        return self.time_ns.astype("datetime64[ns]")
 
     def to_frame(self, index: Literal["auto", "utc", "flight_time"] = "auto") -> "pd.DataFrame":
         """Pandas frame as of :meth:`Table.to_frame`, indexed by time.
@@ -182,7 +228,7 @@ class TimedTable(Table):
         return frame.set_index(pd.DatetimeIndex(self.time_ns.astype("datetime64[ns]"), tz="UTC", name="utc"))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Flight:
     """The tables of one flight on one clock.
 
@@ -213,7 +259,13 @@ class Flight:
         return topic in self.tables
 
     def __getitem__(self, topic: str) -> Table:
+        if topic not in self.tables:
+            raise UnknownNameError(f"flight of {self.source_name or 'no log'}", topic, self.topics())
         return self.tables[topic]
+
+    def __repr__(self) -> str:
+        clock = "UTC" if self.has_utc else "no UTC"
+        return f"<Flight {self.source_name}: {self.duration_s:.1f} s, {clock}, {_rows(self.tables)}>"
 
     def topics(self) -> tuple[str, ...]:
         """Topics in alphabetical order."""
@@ -232,6 +284,36 @@ class Flight:
         """Seconds from the first to the last sample of any topic."""
         ends = [int(table.time_ns[-1]) for table in self.tables.values() if len(table)]
         return (max(ends) - self.start_ns) / NS_PER_S if ends else 0.0
+
+
+class Tables(Mapping[str, TimedTable]):
+    """The tables of a flight by topic, each with the flight's clock. An unknown topic is told with those near to it."""
+
+    def __init__(self, flight: Flight) -> None:
+        self._flight = flight
+        self._tables = {topic: timed(flight, topic) for topic in flight.topics()}
+
+    def __getitem__(self, topic: str) -> TimedTable:
+        if topic not in self._tables:
+            raise UnknownNameError("tables", topic, self._tables)
+        return self._tables[topic]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._tables)
+
+    def __len__(self) -> int:
+        return len(self._tables)
+
+    def __repr__(self) -> str:
+        return f"<Tables of {self._flight.source_name}: {_rows(self._tables)}>"
+
+
+def _rows(tables: Mapping[str, Table]) -> str:
+    """Topics with their number of rows, canonical ones first, the rest counted."""
+    shown = [topic for topic in sorted(tables) if is_canonical(topic)]
+    told = [f"{topic} ({len(tables[topic])})" for topic in shown]
+    others = len(tables) - len(shown)
+    return ", ".join([*told, *([f"{others} raw topics"] if others else [])]) or "no topic"
 
 
 def timed(flight: Flight, topic: str) -> TimedTable:

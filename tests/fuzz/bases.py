@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import zstandard
 
+from tests.bag_writer import small_flight as small_flight_of_a_robot
+from tests.bag_writer import write_ros1, write_ros2
 from tests.dataflash_writer import MAGIC as DATAFLASH_MAGIC
 from tests.dataflash_writer import flight_log
 from tests.real_logs import REAL_LOGS
@@ -83,6 +85,26 @@ def ulog() -> bytes:
         log.row(2, GPS_CODE, time_us, *place, 0.05, 1.0, 5.0, 3.0, 4.0, 0.0, 0.1, 3, 1, 12)
         log.row(3, "Q6f8s", time_us + 9, *range(6), b"abc")
     return bytes(log.dropout(30).data)
+
+
+def _bag(form: str) -> bytes:
+    """Messages of a robot in one of their containers, some 60 kB."""
+    with tempfile.TemporaryDirectory() as folder:
+        if form == "ros1":
+            return write_ros1(
+                Path(folder) / "a.bag", small_flight_of_a_robot(is_ros1=True, rows=60), "lz4"
+            ).read_bytes()
+        bag = write_ros2(Path(folder) / "bag", small_flight_of_a_robot(rows=60), form)
+        return next(path for path in bag.iterdir() if path.suffix != ".yaml").read_bytes()
+
+
+def ros1_starts(data: bytes) -> Iterator[int]:
+    """Where records begin outside of chunks."""
+    at = 13
+    while at + 8 <= len(data):
+        yield at
+        at += 4 + int.from_bytes(data[at : at + 4], "little")
+        at += 4 + int.from_bytes(data[at : at + 4], "little")
 
 
 def dataflash() -> bytes:
@@ -162,6 +184,9 @@ _STARTS: dict[str, Callable[[bytes], Iterator[int]]] = {
     "gzip": lambda data: iter(range(min(18, len(data)))),
     "zstd": lambda data: iter(range(min(18, len(data)))),
     "chapter10": chapter10_starts,
+    "robot-mcap": mcap_starts,
+    "ros1": ros1_starts,
+    "sqlite3": lambda data: iter(range(0, len(data), 4096)),
 }
 FORMATS = tuple(_STARTS)
 _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
@@ -173,6 +198,9 @@ _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
     "mcap": (lambda: _converted(SAMPLES / "taxi-short.csv"),),
     "gzip": (lambda: gzip.compress(_noisy_csv(), mtime=0), lambda: gzip.compress(dataflash(), mtime=0)),
     "zstd": (lambda: zstandard.compress(_noisy_csv()), lambda: zstandard.compress(ulog())),
+    "robot-mcap": (lambda: _bag("mcap"),),
+    "ros1": (lambda: _bag("ros1"),),
+    "sqlite3": (lambda: _bag("sqlite3"),),
 }
 _RECORDED = {
     "csv-profile": ("g1000/log_220502_135932_EGPN.csv", "fixedwing/umn_thor_flight75.csv"),
@@ -180,6 +208,8 @@ _RECORDED = {
     "dataflash": ("damaged/erle_tiny_no_gps.BIN", "dataflash/TestLog2_REENCODED_plane.BIN"),
     "chapter10": ("ch10/kc135_429_1553_1MB.c10", "ch10/iliad_1553.c10"),
     "mcap": ("g1000/log_220416_161856_LFQA.csv",),
+    "robot-mcap": ("foreign/husky_100s_ros1msg_lz4.mcap", "foreign/pntos_120s_json_lz4.mcap"),
+    "ros1": ("foreign/pntos_120s_ros1.bag",),
 }
 
 

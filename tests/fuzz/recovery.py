@@ -141,7 +141,9 @@ def of_mcap(data: bytes) -> Expected:
         elif type(record).__name__ == "Chunk":
             at, end = next(chunks)
             for message in breakup_chunk(record):
-                if type(message).__name__ == "Message" and not topics[message.channel_id].startswith("location_fix"):
+                if type(message).__name__ == "Message" and not topics[message.channel_id].startswith(
+                    ("location_fix.", "pose.", "log")
+                ):
                     rows.append((at, end, (topics[message.channel_id], message.log_time), 0))
     return _expected(rows, [[]])
 

@@ -75,6 +75,9 @@ def suffix_of(format_name: str) -> str:
         "dataflash": ".BIN",
         "chapter10": ".ch10",
         "mcap": ".mcap",
+        "robot-mcap": ".mcap",
+        "ros1": ".bag",
+        "sqlite3": ".db3",
         "gzip": ".gz",
         "zstd": ".zst",
     }.get(format_name, ".csv")

@@ -105,6 +105,16 @@ class Room(NamedTuple):
     moved: FloatArray  # (c,)
 
 
+class Back(NamedTuple):
+    """What a smoother works in, see ``smoother_runs``; contents mean nothing before and after."""
+
+    a: FloatArray  # (c, n)
+    A: FloatArray  # (n, n)
+    C: FloatArray  # (n, n)
+    w: FloatArray  # (n, n)
+    u: FloatArray  # (n,)
+
+
 class Record(NamedTuple):
     """What a run writes down; an array of no length is left out (but not y, S, mark).
 

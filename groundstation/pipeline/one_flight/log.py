@@ -67,6 +67,32 @@ class Log:
         return LogFile(self.path)
 
 
+def as_log(path: Path) -> Path:
+    """The file by which a log is opened: of a folder that is a bag of ROS 2 its metadata, else the path itself."""
+    from groundstation.readers.bags.bag import METADATA, is_bag_folder
+
+    return path / METADATA if path.is_dir() and is_bag_folder(path) else path
+
+
+def log_name(path: Path) -> str:
+    """Name of a log: that of its file, or of the folder that is a bag of ROS 2."""
+    return path.resolve().parent.name if _files_of(path)[1:] else path.name
+
+
+def digest_of(path: Path) -> str:
+    """SHA-256 of a log, over all its files."""
+    return sha256_of(*_files_of(path))
+
+
+def _files_of(path: Path) -> tuple[Path, ...]:
+    """The files of a log: of a bag of ROS 2 its metadata and what that names."""
+    from groundstation.readers.bags.bag import METADATA, files_of, is_bag_folder
+
+    if path.name != METADATA or not is_bag_folder(path.parent):
+        return (path,)
+    return (path, *(file for file in files_of(path) if file.is_file()))
+
+
 def open_log(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()) -> Log:
     """Find out who can read a file. ``icds``, files or names, tell what the words of its buses mean.
 
@@ -78,6 +104,7 @@ def open_log(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()
     from groundstation.readers.registry import identify
     from groundstation.store.reader import read_info
 
+    path = as_log(path)
     if not path.is_file():
         raise UnreadableLogError(str(path), "no regular file", "a recorded log")
     size = path.stat().st_size
@@ -88,7 +115,8 @@ def open_log(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()
         is_renamed = bool(icds) and any(topic.startswith(BUS_PREFIX) for topic in info.ledger.topics)
         return Log(path, source, not is_renamed, profile, icds, has_new_names=is_renamed)
     claim = identify(path, profile)
-    return Log(path, Source(path.name, sha256_of(path), size, claim.title), False, profile, icds)
+    size = sum(file.stat().st_size for file in _files_of(path))
+    return Log(path, Source(log_name(path), digest_of(path), size, claim.title), False, profile, icds)
 
 
 def _is_store(path: Path, profile: Path | None) -> bool:

@@ -15,7 +15,7 @@ from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import census_of, has_other_limits, recounted
-from groundstation.pipeline.one_flight.log import Log, open_log
+from groundstation.pipeline.one_flight.log import Log, as_log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.verbs.describe import facts_of
@@ -71,6 +71,7 @@ def check_many(
     UsageError
         When a log is missing, is a folder, or a threshold is wrong.
     """
+    paths = [as_log(path) for path in paths]
     for path in paths:
         if not path.exists():
             raise UsageError(str(path), "no such file")

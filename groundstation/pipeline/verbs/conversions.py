@@ -11,7 +11,7 @@ from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
-from groundstation.pipeline.one_flight.log import Log, open_log
+from groundstation.pipeline.one_flight.log import Log, as_log, log_name, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
@@ -35,6 +35,7 @@ def convert_many(
         When a log is missing, the target exists and ``force`` is not given, or a threshold is wrong.
     """
     configuration = configuration or Configuration()
+    logs = [as_log(log) for log in logs]
     for log in logs:
         if not log.exists():
             raise UsageError(str(log), "no such file")
@@ -43,7 +44,7 @@ def convert_many(
     if len(logs) > 1 and output.is_file():
         raise UsageError(str(output), "a file", "a folder for several logs")
     into_folder = len(logs) > 1 or output.is_dir()
-    targets = [output / f"{log.stem}.mcap" for log in logs] if into_folder else [output]
+    targets = [output / f"{Path(log_name(log)).stem}.mcap" for log in logs] if into_folder else [output]
     if len(set(targets)) < len(targets):
         raise UsageError(str(output), "two logs of one name", "names that differ")
     for log, target in zip(logs, targets, strict=True):

@@ -10,7 +10,7 @@ from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.pipeline.many_flights.inputs import no_log
-from groundstation.pipeline.one_flight.log import Log, open_log
+from groundstation.pipeline.one_flight.log import Log, as_log, open_log
 from groundstation.store.info import StoreInfo
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class Description:
 
 
 def describe(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()) -> Description:
-    """Describe a recorded log, a groundstation MCAP, or an MCAP of another program; ``icds`` name its bus words.
+    """Describe a recorded log or a groundstation MCAP; ``icds`` name the words of its buses.
 
     Raises
     ------
@@ -70,27 +70,11 @@ def describe(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()
 
     if not path.exists():
         raise UsageError(str(path), "no such file")
+    path = as_log(path)
     if path.is_dir():
         raise no_log(path)
-    if _is_foreign(path, profile):
-        return _foreign(path)
     log = open_log(path, profile, icds)
     return _stored(log) if log.is_store else _recorded(log)
-
-
-def _is_foreign(path: Path, profile: Path | None) -> bool:
-    """Whether a file is an MCAP of another program, and not another log whose first bytes are damaged."""
-    from groundstation.base.errors import GroundstationError
-    from groundstation.readers.registry import identify
-    from groundstation.store.recognition import is_groundstation_mcap, is_mcap
-
-    if not is_mcap(path) or is_groundstation_mcap(path):
-        return False
-    try:
-        identify(path, profile)
-    except GroundstationError:
-        return True
-    return False
 
 
 def _recorded(log: Log) -> Description:
@@ -196,14 +180,3 @@ def _topics(ledger: Ledger, fields: dict[str, dict[str, None]]) -> tuple[TopicDe
         TopicDescription(name, entry.rows, entry.nominal_rate_hz, entry.span_s, tuple(fields.get(name, ())))
         for name, entry in sorted(ledger.topics.items())
     )
-
-
-def _foreign(path: Path) -> Description:
-    from groundstation.store.foreign import describe_foreign
-
-    found = describe_foreign(path)
-    facts = {"file": path.name, "format": "MCAP of another program (no reader for it in this version)", **found.facts}
-    topics = tuple(
-        TopicDescription(channel.topic, channel.messages, None, None, (channel.schema,)) for channel in found.channels
-    )
-    return Description(facts, topics, (), found.is_damaged)
