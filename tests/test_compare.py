@@ -267,12 +267,12 @@ def test_the_recording_holds_both_on_the_clock_of_a(folders: dict[str, Path], tm
     assert contents.timelines == {"flight_time"}, "the clock of B is moved: it is no UTC"
     for letter, name, offset_s in (("A", "good", 0.0), ("B", "later", comparison.alignment.offset_s)):
         figure = load(folders[name]).figures["overview"]
-        time_ns, values = contents.scalars(f"/{letter}/overview/ground_speed_mps/b_line")
+        time_ns, values = contents.scalars(f"/{letter}/overview/ground_speed_mps")
         known = np.isfinite(values[:, 0])
         expected = np.isfinite(figure["ground_speed_mps"])
         assert np.array_equal(values[known, 0], figure["ground_speed_mps"][expected])
         assert np.abs(time_ns[known] / 1e9 - figure["time_s"][expected] - offset_s).max() < 1e-6
-    speeds = [contents.scalars(f"/{letter}/overview/ground_speed_mps/b_line") for letter in "AB"]
+    speeds = [contents.scalars(f"/{letter}/overview/ground_speed_mps") for letter in "AB"]
     grid_ns = np.arange(70, 240) * 10**9
     a, b = (np.interp(grid_ns, time_ns, values[:, 0]) for time_ns, values in speeds)
     assert np.sqrt(np.mean((a - b) ** 2)) < 0.5, "the same taxi does not lie over itself"
@@ -282,7 +282,7 @@ def test_runs_of_one_log_keep_utc(folders: dict[str, Path], tmp_path: Path) -> N
     compare_to(folders["good"], folders["part"], tmp_path / "out")
     contents = Contents(tmp_path / "out" / "compare.rrd")
     assert contents.timelines == {"flight_time", "utc"}
-    batch = contents.batches["/B/overview/ground_speed_mps/b_line"][0]
+    batch = contents.batches["/B/overview/ground_speed_mps"][0]
     flight_ns, utc_ns = (np.asarray(batch.column(name).cast(pa.int64())) for name in ("flight_time", "utc"))
     assert flight_ns[0] == 30 * 10**9
     assert (utc_ns - flight_ns == 1_777_874_400_000_000_000).all()  # 2026-05-04T06:00:00Z
@@ -294,11 +294,10 @@ def test_every_figure_of_every_analysis_is_laid_over(tmp_path: Path) -> None:
     comparison = compare_to(tmp_path / "a", tmp_path / "b", tmp_path / "out", "start")
     entities = set(Contents(tmp_path / "out" / "compare.rrd").batches)
     for letter in "AB":
-        overlays = (
-            *("overview/altitude_m", "overview/ground_speed_mps", "overview/heading_deg"),
+        for path in (
+            *("overview/altitude_m", "overview/ground_speed_mps", "overview/heading_deg", "phase", "plan/now"),
             *("heading_running/mean_deg", "inertial_states/north_position_m", "inertial_track/ins_error_m"),
-        )
-        for path in ("phase", "plan/now", *(f"{overlay}/b_line" for overlay in overlays)):
+        ):
             assert f"/{letter}/{path}" in entities
     html = comparison_html(comparison, a, b)
     for title in ("Tracks", "Altitude", "Heading error, running mean", "North position error", "Forecast"):

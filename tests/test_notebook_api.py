@@ -102,6 +102,7 @@ def test_tables_are_indexed_by_utc_and_by_flight_time(flight: OpenLog) -> None:
     assert frame.index.as_unit("ns").asi8.tolist() == table.time_ns.tolist()
     assert isinstance(since.index, pd.TimedeltaIndex)
     assert np.allclose(since.index.total_seconds(), flight.flight.time_s("ins"), atol=1e-9, rtol=0.0)
+    assert frame.attrs["units"]["true_heading_deg"] == since.attrs["units"]["true_heading_deg"] == "deg"
     assert table.take(slice(3, 5)).to_frame().index.equals(frame.index[3:5])
 
 

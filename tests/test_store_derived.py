@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
@@ -132,6 +133,22 @@ def test_findings_and_events_are_one_log_in_order_of_time(tmp_path: Path) -> Non
         (3, "no data (gnss, at 1.5 s)"),
     ]
     assert [line.name for _, line in found] == ["header.odd", "clock.reset", "event", "gaps.long"]
+
+
+def test_the_source_s_units_are_the_comments_of_the_fields(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    info = StoreInfo(has_utc=True, metadata={"units.raw.IMU": "Gyr X rad/s, T deg C"})
+    with StoreWriter(path, info) as writer:
+        writer.write(batch("raw.IMU.1", 3, **{"Gyr X": np.zeros(3), "N": np.arange(3), "T": np.zeros(3)}))
+    with path.open("rb") as file:
+        (schema,) = make_reader(file).get_summary().schemas.values()
+    (described,) = FileDescriptorSet.FromString(schema.data).file
+    fields = described.message_type[0].field
+    comments = {
+        fields[place.path[3]].name: place.leading_comments.strip() for place in described.source_code_info.location
+    }
+    assert comments == {"Gyr_X": "rad/s", "T": "deg C"}
+    assert [item.columns["T"].values.tolist() for item in read(path) if isinstance(item, RecordBatch)] == [[0.0] * 3]
 
 
 def test_reading_skips_them_and_a_copy_has_them_again(tmp_path: Path) -> None:

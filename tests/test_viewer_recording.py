@@ -17,7 +17,7 @@ import rerun as rr
 from groundstation.base.attitude import quaternion_enu_from_flu_xyzw
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Column
-from groundstation.chapters import chapter_of
+from groundstation.chapters.front import front
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.heading import HeadingResult
@@ -132,10 +132,13 @@ def test_the_aircraft_moves_and_turns_along_its_track(contents: Contents, result
 
 
 def test_every_answer_has_a_row_in_the_overview(contents: Contents, results: FlightResults) -> None:
-    rows = re.findall(r"^\| (.+?) \| (.+?) \|$", contents.text("/summary"), re.MULTILINE)
-    told = dict(rows)
-    for answer in results.answers.values():
-        assert chapter_of(results, answer).headline in told[chapter_of(results, answer).title].replace("\\", "")
+    told = contents.text("/summary").replace("\\", "")
+    top = front(results)
+    assert top.others
+    for title, line in ((top.subject, top.line), *((tile.title, tile.claim.line) for tile in top.others)):
+        assert f"| {title} | {line} |" in told
+    for subject, reason in top.missing:
+        assert f"**{subject}**: {reason}" in told
 
 
 def test_results_are_properties_with_both_ends_of_an_interval(contents: Contents, results: FlightResults) -> None:
@@ -224,6 +227,28 @@ def test_lists_are_tables_and_the_clock_of_a_topic_is_not_drawn(tmp_path: Path) 
     assert "| P\\_7 | 7 |" in text and "50 rows" in text
     drawn = {entity for entity in contents.batches if entity.startswith("/raw/raw.")}
     assert drawn == {"/raw/raw.ATT/accel_m", "/raw/raw.ATT/Flags"}
+
+
+def test_units_of_the_source_stand_in_titles_and_counts_are_stepped(tmp_path: Path) -> None:
+    seconds = np.arange(0.0, 100.0, 1.0)
+    rows = table("raw.IMU.0", seconds, acc_x=seconds, acc_y=seconds, T=seconds, mode_no=np.arange(100) // 30)
+    metadata = {"units.raw.IMU": "acc_x m/s/s, acc_y m/s/s, T deg C"}
+    logged = Flight({"raw.IMU.0": rows}, metadata, START_NS, True, "a.BIN")
+    with rr.RecordingStream("a") as stream:
+        stream.save(tmp_path / "a.rrd")
+        tab = raw.raw(Recorder(stream, logged.start_ns, True), logged, _bare_results(logged))
+        stream.disconnect()
+    assert tab is not None
+    titles = {view.name for page in tab.contents[0].contents for view in page.contents}
+    assert titles == {"IMU.0 acc, m/s/s", "IMU.0 T, deg C", "IMU.0 mode_no"}
+    styles = Contents(tmp_path / "a.rrd").fixed
+    stepped = {
+        path
+        for path, batches in styles.items()
+        for batch in batches
+        if "SeriesLines:interpolation_mode" in batch.schema.names
+    }
+    assert stepped == {"/raw/raw.IMU.0/mode_no"}
 
 
 def test_a_state_is_held_over_rows_of_other_sources(tmp_path: Path) -> None:

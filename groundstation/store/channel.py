@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
+from groundstation.base.source_units import source_units
 from groundstation.base.units import NS_PER_S
 from groundstation.store.messages import ByteArray
 from groundstation.store.schema import GrowingType, WireField, columns_text
@@ -61,8 +63,8 @@ class ChannelWriter:
         """Values of a batch as they are written, in order of their field numbers."""
         raise NotImplementedError
 
-    def definition(self) -> tuple[Schema, Channel]:
-        """Schema and channel records, for all that was written."""
+    def definition(self, metadata: Mapping[str, str] = MappingProxyType({})) -> tuple[Schema, Channel]:
+        """Schema and channel records, for all that was written; ``metadata`` of the file may tell units."""
         raise NotImplementedError
 
     def write(self, batch: RecordBatch) -> None:
@@ -154,12 +156,12 @@ class TopicWriter(ChannelWriter):
         where = f"topic {self.topic}, column {field.column}"
         raise GroundstationError(where, f"values of {values.dtype}", f"{field.dtype} as in the batches before")
 
-    def definition(self) -> tuple[Schema, Channel]:
+    def definition(self, metadata: Mapping[str, str] = MappingProxyType({})) -> tuple[Schema, Channel]:
         """Schema and channel records, with every column that was written."""
-        message = self._type.message_type()
-        metadata = {COLUMNS_KEY: columns_text(self._type.own_fields)}
+        units = source_units(metadata, self.topic, [field.column for field in self._type.own_fields])
+        message = self._type.message_type(units)
         schema = Schema(id=self.id, name=message.name, encoding="protobuf", data=message.descriptor_set)
-        return schema, channel_record(self.id, self.topic, metadata)
+        return schema, channel_record(self.id, self.topic, {COLUMNS_KEY: columns_text(self._type.own_fields)})
 
 
 def channel_record(channel_id: int, topic: str, metadata: Mapping[str, str]) -> Channel:

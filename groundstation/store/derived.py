@@ -5,7 +5,8 @@ Messages of Foxglove's schemas, which Foxglove and Rerun's own loader draw by th
 Sources: https://docs.foxglove.dev/docs/sdk/schemas; protobuf encoding, https://protobuf.dev/programming-guides/encoding.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 
 import numpy as np
 from foxglove_schemas_protobuf import LocationFix_pb2, Log_pb2, PoseInFrame_pb2
@@ -53,7 +54,7 @@ class DerivedWriter(ChannelWriter):
         """The timestamp behind its tag, on an absolute clock."""
         return [Slot(prefix + b"\x0c", _timestamps(time_ns))] if self._has_utc and time_ns is not None else []
 
-    def definition(self) -> tuple[Schema, Channel]:
+    def definition(self, metadata: Mapping[str, str] = MappingProxyType({})) -> tuple[Schema, Channel]:
         """Foxglove's schema; the channel's metadata says that reading skips it."""
         files = FileDescriptorSet()
         for descriptor in _with_imports(self._message.file, {}).values():

@@ -217,7 +217,7 @@ class StoreWriter:
 
     def _finish(self, file: BinaryIO) -> None:
         """Write the whole file: definitions, chunks, facts again, summary."""
-        definitions = [channel.definition() for channel in self._channels.values() if channel.count]
+        definitions = [channel.definition(self.info.metadata) for channel in self._channels.values() if channel.count]
         schemas: list[McapRecord] = [schema for schema, _ in definitions]
         channels: list[McapRecord] = [channel for _, channel in definitions]
         checksums = {f"schema {schema.id}": zlib.crc32(to_bytes(schema)) for schema, _ in definitions}

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from groundstation.base.errors import NotAssessableError, UnknownNameError
 from groundstation.base.records import BoolArray, Column, Int64Array, frozen
-from groundstation.base.signals import TOPICS, field_of, is_canonical, is_field_name, kind_of
+from groundstation.base.signals import RAW_PREFIX, TOPICS, field_of, is_canonical, is_field_name, kind_of
+from groundstation.base.source_units import source_units
+from groundstation.base.unit_names import split_unit
 from groundstation.base.units import NS_PER_S
 
 if TYPE_CHECKING:
@@ -132,10 +134,17 @@ class Table:
         )
 
     def unique_times(self) -> Self:
-        """The table without repeated times: of several samples of one time the first is kept."""
+        """The table without repeated times: of several samples of one time the first present value of each field.
+
+        Two messages of a log may give parts of one topic at the same time.
+        """
         keep = np.ones(len(self), dtype=bool)
         keep[1:] = np.diff(self.time_ns) > 0
-        return self if keep.all() else self.take(keep)
+        if keep.all():
+            return self
+        first, group = np.flatnonzero(keep), np.cumsum(keep) - 1
+        columns = {name: _first_present(column, first, group) for name, column in self.columns.items()}
+        return replace(self.take(first), columns=columns)
 
     def to_frame(self) -> "pd.DataFrame":
         """Pandas frame of the columns, index ``time_ns`` (int64 nanoseconds).
@@ -173,10 +182,13 @@ class TimedTable(Table):
         Corrected time of flight time zero.
     has_utc : bool
         Whether corrected time is UTC.
+    units : mapping of str to str
+        Units by column, where the name or the log tells one; ``frame.attrs["units"]`` has them too.
     """
 
     start_ns: int = 0
     has_utc: bool = False
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def flight_time_s(self) -> FloatArray:
@@ -222,6 +234,7 @@ class TimedTable(Table):
         if index == "utc" and not self.has_utc:
             raise NotAssessableError(self.topic, "no UTC in this flight", "index='flight_time'")
         frame = super().to_frame()
+        frame.attrs["units"] = dict(self.units)
         if index == "flight_time" or not self.has_utc:
             since = (self.time_ns - self.start_ns).astype("timedelta64[ns]")
             return frame.set_index(pd.TimedeltaIndex(since, name="flight_time"))
@@ -286,6 +299,17 @@ class Flight:
         return (max(ends) - self.start_ns) / NS_PER_S if ends else 0.0
 
 
+def _first_present(column: Column, first: NDArray[np.intp], group: NDArray[np.intp]) -> Column:
+    """The first present value of each group of rows, whose first rows are ``first``; absent where there is none."""
+    if column.present is None:
+        return column.take(first)
+    rows = np.flatnonzero(column.present)
+    groups, places = np.unique(group[rows], return_index=True)
+    index = first.copy()
+    index[groups] = rows[places]
+    return column.take(index)
+
+
 class Tables(Mapping[str, TimedTable]):
     """The tables of a flight by topic, each with the flight's clock. An unknown topic is told with those near to it."""
 
@@ -319,6 +343,7 @@ def _rows(tables: Mapping[str, Table]) -> str:
 def timed(flight: Flight, topic: str) -> TimedTable:
     """The table of a topic with the flight's clock."""
     table = flight[topic]
+    named = {name: unit.spelled for name in table.columns if (unit := split_unit(name)[1]) is not None}
     return TimedTable(
         topic,
         table.time_ns,
@@ -327,4 +352,5 @@ def timed(flight: Flight, topic: str) -> TimedTable:
         table.device_time_ns,
         start_ns=flight.start_ns,
         has_utc=flight.has_utc,
+        units=source_units(flight.metadata, topic, table.columns) if topic.startswith(RAW_PREFIX) else named,
     )

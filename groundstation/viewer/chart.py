@@ -141,7 +141,7 @@ class Chart:
         ]
         strips = np.stack([np.column_stack([WIDTH * places, end]) for end in ends], axis=1)
         filled = strips[np.isfinite(strips).all(axis=(1, 2))]
-        radius = 0.5 * WIDTH / (BAND_COLUMNS - 1)
+        radius = 0.75 * WIDTH / (BAND_COLUMNS - 1)  # more than half of the distance: no seams
         drawn = rr.LineStrips2D(list(filled), colors=[faint(colour)] * len(filled), radii=radius, draw_order=FILLING)
         self._log(name, drawn, at_s)
 

@@ -133,12 +133,12 @@ def _overlay(
         if half_width is not None and half_width[0] in figure.columns:
             width = half_width[1] * numbers(figure, half_width[0])
             edges += [values - width, values + width]
-            name_of_band = Line(f"{half.letter}: 95 %", half.colour, THIN)
-            recorder.band(f"{path}/a_band", time_ns, values, width, name_of_band, breaks)
+            recorder.band(path, time_ns, values, width, Line(f"{half.letter}: ± 95 %", half.colour, half.width), breaks)
+        else:
+            line = Line(f"{half.letter}: {title}", half.colour, half.width)
+            recorder.lines(path, time_ns, values[:, None], [line], breaks)
         paths.append(path)
         shown.append(values)
-        line = Line(f"{half.letter}: {title}", half.colour, half.width)
-        recorder.lines(f"{path}/b_line", time_ns, values[:, None], [line], breaks)
     if not paths:
         return None
     axis_range = (-MARGIN_DEG, 360.0 + MARGIN_DEG) if is_direction else _range(shown, edges)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 from numpy.typing import ArrayLike, NDArray
-from rerun.components import AggregationPolicy
+from rerun.components import AggregationPolicy, InterpolationMode
 
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
@@ -73,10 +73,13 @@ class Recorder:
         values: FloatArray,
         lines: Sequence[Line],
         breaks: BoolArray | None = None,
+        *,
+        is_stepped: bool = False,
     ) -> None:
         """Log series that share their rows: ``values`` of shape (n, k), NaN where a line is interrupted.
 
-        ``breaks``, shape (n - 1,), tells after which rows the lines end; a row of NaN is put there.
+        ``breaks``, shape (n - 1,), tells after which rows the lines end; a row of NaN is put there. Stepped lines hold
+        each value until the next one.
         """
         if breaks is not None:
             time_ns, values = break_line(time_ns, values, breaks)
@@ -85,6 +88,7 @@ class Recorder:
             colors=[line.colour for line in lines],
             widths=[line.width for line in lines],
             aggregation_policy=AggregationPolicy.MinMax,  # averages would hide spikes until one zooms in
+            interpolation_mode=InterpolationMode.StepAfter if is_stepped else None,
         )
         self.static(path, style)
         self._scalars(path, time_ns, values)

@@ -18,6 +18,7 @@ LINE, SHADOW, MARK = 1.4, 0.5, 5.0  # radii in points of the screen
 SHARE = 0.06  # length of the aircraft, of the longer side of its track: at its own size it would not be seen
 LEAST_LENGTH_M = 4.0
 MOST_HEIGHT_M = 1e6  # beyond it is none
+EYE = np.array([-0.45, -0.6, 0.5])  # from the middle of the track, in its lengths
 # Forward, left, up of a body one long: nose, wing tips, tail, tips of the tailplane, top of the fin.
 CORNERS = np.array(
     [
@@ -53,9 +54,15 @@ def flight_space(
     if points_m is not None:
         _track(recorder, place, pieces, shades)
     _aircraft(recorder, recorder.time_ns(numbers(figure, "time_s")), place, known, attitude, size_m)
-    name = "Aircraft along its track" if points_m is not None else "Attitude of the aircraft"
-    told = "" if attitude is not None else ", attitude not logged"
-    return rrb.Spatial3DView(name=f"{name}, m east, north, up; not to scale{told}", origin="/space")
+    name = "Aircraft, not to scale" if attitude is not None else "In space, attitude not logged"
+    return rrb.Spatial3DView(name=name, origin="/space", eye_controls=_eye(place[known], size_m))
+
+
+def _eye(place: FloatArray, size_m: float) -> rrb.EyeControls3D:
+    """An eye that sees the whole track from the south-west and above."""
+    low, high = place.min(axis=0), place.max(axis=0)
+    middle, across = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 3.0 * size_m)
+    return rrb.EyeControls3D(position=middle + across * EYE, look_target=middle, eye_up=(0.0, 0.0, 1.0))
 
 
 def _height_m(figure: FigureData) -> FloatArray:

@@ -119,7 +119,7 @@ def _starts(
             low, high = band
             chart.band("claimed", minutes[rows], low[rows], high[rows], CLAIMED.colour, at_s)
         chart.curves("latest", [(minutes[rows], values[rows], line) for values, line in curves], at_s)
-        chart.note("start", f"GNSS taken away at {_clock(start)}; the playhead chooses the start", at_s)
+        chart.note("start", f"GNSS taken away at {_clock(start)}", at_s)
 
 
 # ---------------------------------------------------------------------------------------------------- skill

@@ -61,20 +61,19 @@ def _difference(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
         _running(recorder, f"{path}/running", running)
     if samples is None and running is None:
         return []
-    name = "Heading difference d = INS heading − GNSS track, deg"
-    return [plot(name, path, axis_range=None if samples is None else range_of_used(samples))]
+    name = "d = INS heading − GNSS track, deg: samples grey, mean ± honest 95 % green, ± e yellow"
+    return [plot(name, path, axis_range=None if samples is None else range_of_used(samples), legend=False)]
 
 
 def _running(recorder: Recorder, path: str, running: FigureData) -> None:
     time_ns, mean = recorder.time_ns(numbers(running, "time_s")), numbers(running, "mean_deg")
     gaps = gap_after(time_ns)
-    for column, part, name, colour in (
-        ("honest_half_width_deg", "a_honest", "mean ± honest 95 % interval, deg", colours.HONEST),
-        ("precision_deg", "b_precision", "mean ± e (the paper's precision), deg", colours.PAPER),
+    for column, part, line in (
+        ("precision_deg", "a_precision", Line("mean ± e (the paper's precision), deg", colours.PAPER, THIN)),
+        ("honest_half_width_deg", "b_honest", Line("mean ± honest 95 % interval, deg", colours.ANSWER, BOLD)),
     ):
         if column in running.columns:
-            recorder.band(f"{path}/{part}", time_ns, mean, numbers(running, column), Line(name, colour, THIN), gaps)
-    recorder.lines(f"{path}/c_mean", time_ns, mean[:, None], [Line("running mean, deg", colours.ANSWER, BOLD)], gaps)
+            recorder.band(f"{path}/{part}", time_ns, mean, numbers(running, column), line, gaps)
 
 
 def _taxi(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
@@ -98,8 +97,8 @@ def _taxi(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     lines = [Line("GNSS ground speed, m/s", colours.GNSS), Line(f"threshold {limit:g} m/s", colours.LIMIT, THIN)]
     recorder.lines("heading/speed", time_ns, np.column_stack([speed, limits]), lines, gaps)
     return [
-        plot("INS heading and GNSS track on the ground, deg", "heading/taxi"),
-        plot("Ground speed on the ground, m/s", "heading/speed"),
+        plot("On the ground: INS heading (blue), GNSS track (orange), deg", "heading/taxi", legend=False),
+        plot(f"GNSS ground speed (orange), threshold {limit:g} m/s (red)", "heading/speed", legend=False),
     ]
 
 
@@ -116,4 +115,4 @@ def _standstill(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     values: FloatArray = np.column_stack([numbers(figure, "velocity_north_mps"), numbers(figure, "velocity_east_mps")])
     lines = [Line("GNSS velocity north, m/s", colours.BLUE), Line("GNSS velocity east, m/s", colours.GNSS)]
     recorder.lines("heading/standstill", time_ns, values, lines, gap_after(time_ns))
-    return [plot("GNSS velocity at standstill, m/s", "heading/standstill")]
+    return [plot("GNSS velocity at standstill, m/s: north dark blue, east orange", "heading/standstill", legend=False)]

@@ -17,6 +17,7 @@ from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
 
 CHANNELS = ("north", "east")
 THIN, BOLD, DOT = 1.0, 2.0, 1.6
+ESTIMATE = Line("estimate ± 95 %", colours.ANSWER, BOLD)
 MARGIN = 0.12
 BAND_QUANTILES = (10.0, 90.0)  # the band of the first minutes and of long outages may leave the picture
 FAST = (  # state, unit, whether GNSS measures it and the smoother is drawn
@@ -69,7 +70,10 @@ def _pages(recorder: Recorder, results: FlightResults, states: FigureData) -> li
         first.append(rrb.Vertical(contents=[view for view in fast if view is not None]))
         second.append(rrb.Vertical(contents=[view for view in slow if view is not None]))
     return [
-        rrb.Horizontal(contents=first, name="Position, velocity, tilt, drift"),
+        rrb.Horizontal(
+            contents=first,
+            name="Position, velocity, tilt, drift: estimate ± 95 % green, INS − GNSS grey, smoothed yellow",
+        ),
         rrb.Horizontal(contents=second, name="Slow drifts, innovations, observability"),
     ]
 
@@ -100,12 +104,14 @@ def _state(
     if sigma in states.columns:
         half = NORMAL_95 * numbers(states, sigma)
         band = [estimate + half, estimate - half]
-        recorder.band(f"{path}/a_band", time_ns, estimate, half, Line(f"95 %, {unit}", colours.HONEST, THIN), gaps)
-    series.append(estimate)  # last: drawn over the others
-    lines.append(Line(f"estimate, {unit}", colours.ANSWER, BOLD))
-    recorder.lines(f"{path}/b_lines", time_ns, np.column_stack(series), lines, gaps)
+        recorder.band(f"{path}/b_band", time_ns, estimate, half, ESTIMATE, gaps)  # over the others
+    else:
+        series.append(estimate)
+        lines.append(ESTIMATE)
+    if series:
+        recorder.lines(f"{path}/a_lines", time_ns, np.column_stack(series), lines, gaps)
     title = f"{channel.capitalize()} {TITLES[name]}, {unit}"
-    return plot(title, path, axis_range=_range(shown, band), legend=channel == CHANNELS[-1])
+    return plot(title, path, axis_range=_range(shown, band), legend=False)
 
 
 def _range(shown: list[FloatArray], band: list[FloatArray]) -> tuple[float, float] | None:

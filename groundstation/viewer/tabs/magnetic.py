@@ -142,7 +142,8 @@ def _errors(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     for name, title, shade in (("error_before_deg", "before", colours.SAMPLES), (column, "after", colours.ANSWER)):
         values = numbers(figure, name)[mine]
         recorder.dots(f"magnetic/error/{title}", time_ns, values, Line(f"{title}, deg", shade, DOT))
-    return [plot("Error of magnetic heading where no fit has seen, deg", "magnetic/error")]
+    title = "Error of magnetic heading where no fit has seen, deg: before grey, after green"
+    return [plot(title, "magnetic/error", legend=False)]
 
 
 def _applied(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
@@ -157,7 +158,8 @@ def _applied(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     time_ns = recorder.time_ns(numbers(figure, "time_s"))
     for column, (title, shade) in shown.items():
         recorder.dots(f"magnetic/heading/{title}", time_ns, numbers(figure, column), Line(f"{title}, deg", shade, DOT))
-    return [plot("Magnetic heading with the deviation applied, deg", "magnetic/heading")]
+    title = "Magnetic heading, deg: as read grey, with the deviation applied green"
+    return [plot(title, "magnetic/heading", legend=False)]
 
 
 def _modulus(recorder: Recorder, results: FlightResults) -> list[rrb.View]:

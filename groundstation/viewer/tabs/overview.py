@@ -3,11 +3,8 @@
 import numpy as np
 import rerun.blueprint as rrb
 
-from groundstation.chapters import chapter_of
-from groundstation.chapters.findings import not_assessable
 from groundstation.chapters.front import front
-from groundstation.chapters.markdown import front_markdown, part_markdown
-from groundstation.chapters.parts import Grid, Head
+from groundstation.chapters.markdown import front_markdown
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.viewer import colours
@@ -18,7 +15,7 @@ from groundstation.viewer.series import gap_after, wraps_after
 from groundstation.viewer.tabs.track import track
 from groundstation.viewer.views import document, figure_of, lanes, numbers, plot, told_by_colour
 
-LANE_SHARE = 0.35  # height of a lane, of that of a plot
+LANE_SHARE = 0.45  # height of a lane, of that of a plot
 MARGIN_DEG = 10.0  # beyond 0 and 360: a nose that points north would be drawn on the frame
 CIRCULAR = ("heading_deg", "magnetic_heading_deg", "track_deg")
 # Rows of plots: entity, unit, columns of the figure with their names, range of the axis.
@@ -60,11 +57,11 @@ SHADES = {
 
 def overview(recorder: Recorder, results: FlightResults) -> rrb.Container:
     """Log the overview: whatever there is of track, plots and lanes, and always the summary."""
-    recorder.document("summary", _summary(results))
+    recorder.document("summary", front_markdown(front(results)))
     summary = document("Flight", "summary")
     figure = figure_of(results, "overview", "time_s")
     ground = None if figure is None else track(recorder, results, figure)
-    left = summary if ground is None else rrb.Vertical(contents=[ground, summary], row_shares=[2.0, 1.0])
+    left = summary if ground is None else rrb.Vertical(contents=[ground, summary], row_shares=[1.5, 1.0])
     right: list[rrb.View] = [] if figure is None else _plots(recorder, figure)
     shares = [1.0] * len(right)
     lane_paths = [
@@ -123,17 +120,3 @@ def _plots(recorder: Recorder, figure: FigureData) -> list[rrb.View]:
             paths = [f"overview/{path}/{name}" for name in known]
             views.append(plot(title, paths, axis_range=axis_range, legend=False))
     return views
-
-
-def _summary(results: FlightResults) -> str:
-    """The front of the report, a row for each answer, and what could not be assessed."""
-    told = Grid("Answers", (Head("Chapter"), Head("What was found")), answer_rows(results))
-    parts = [part for part in (told if told.rows else None, not_assessable(results)) if part is not None]
-    return "\n\n".join([front_markdown(front(results)), *(part_markdown(part) for part in parts)])
-
-
-def answer_rows(results: FlightResults) -> list[tuple[str, str]]:
-    """Title and headline of the chapter of each answer, a row each, in the order of the report."""
-    sections = [chapter_of(results, answer) for answer in results.answers.values()]
-    rows = {section.title: section.headline or section.lead for section in sections}
-    return list(rows.items())

@@ -79,7 +79,7 @@ def _plan(
     )
     bounds = rrb.VisualBounds2D(x_range=[low[0], high[0]], y_range=[low[1], high[1]])
     unit = grid_unit(float((high - low).max()))[0]
-    name = f"Track by flight phase, {unit} east and north of the first position"
+    name = f"Plan, {unit} east and north"
     return rrb.Spatial2DView(name=name, origin="/plan", visual_bounds=bounds)
 
 
@@ -149,7 +149,7 @@ def _map(
     recorder.static("map/now", rr.GeoPoints.from_fields(colors=[colours.PAPER], radii=rr.Radius.ui_points(MARK)))
     rows = recorder.time_ns(time_s[known])
     recorder.stream.send_columns("map/now", recorder.indexes(rows), rr.GeoPoints.columns(positions=positions[known]))
-    name = "Map (asks openstreetmap.org for this area)"
+    name = "Map (asks openstreetmap.org)"
     return rrb.MapView(name=name, origin="/map", zoom=zoom_of(positions[known]))
 
 
