@@ -28,7 +28,7 @@ def frozen(array: NDArray[Any]) -> NDArray[Any]:
     return view
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Column:
     """Values of one field and where they are present.
 
@@ -51,6 +51,9 @@ class Column:
 
     def __len__(self) -> int:
         return len(self.values)
+
+    def __repr__(self) -> str:
+        return f"<Column of {len(self)} {self.values.dtype}, {len(self) - np.count_nonzero(self.mask)} absent>"
 
     @property
     def mask(self) -> BoolArray:
@@ -79,7 +82,7 @@ class RecordBatch:
         Corrected recorder time, set once the clock is known: UTC nanoseconds since 1970 when the clock is absolute,
         else nanoseconds since the log's zero. Readers leave it out; the store yields it.
     validity_time_ns : ndarray of int64, shape (n,), optional
-        Time at which the values were true, where it is not ``time_ns``.
+        Time at which the values were true, where it is not ``time_ns``. Readers give it by the device's clock.
     """
 
     topic: str

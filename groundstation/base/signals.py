@@ -157,9 +157,11 @@ TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
         "truth": _INS,
     }
 )
+_FIELD_NAMES = frozenset(field.name for fields in TOPICS.values() for field in fields)
 INS_MODES = ("align", "nav", "attitude", "gnss_aided")
 FIXES = ("none", "2d", "3d", "dgnss", "rtk_float", "rtk_fixed", "ppp", "gnss_ins", "dead_reckoning", "other")
 RAW_PREFIX = "raw."
+BUS_PREFIX, BYTES_PREFIX = "raw.bus.", "raw.bytes."  # words and bytes as recorded: no numbers to look at
 
 
 def kind_of(topic: str) -> str:
@@ -184,6 +186,17 @@ def is_canonical(topic: str) -> bool:
     return kind_of(topic) in TOPICS
 
 
+def has_values(topic: str) -> bool:
+    """Whether the columns of a topic are values, not words or bytes that mean something only by an ICD or the like.
+
+    Examples
+    --------
+    >>> has_values("ins"), has_values("raw.irig_time.1"), has_values("raw.bus.429.7")
+    (True, True, False)
+    """
+    return not topic.startswith((BUS_PREFIX, BYTES_PREFIX))
+
+
 def field_of(topic: str, name: str) -> Field | None:
     """The canonical field of a topic, None when there is none of that name.
 
@@ -193,6 +206,17 @@ def field_of(topic: str, name: str) -> Field | None:
     'deg'
     """
     return next((field for field in TOPICS.get(kind_of(topic), ()) if field.name == name), None)
+
+
+def is_field_name(name: str) -> bool:
+    """Whether some canonical topic has a field of that name.
+
+    Examples
+    --------
+    >>> is_field_name("roll_deg"), is_field_name("roll")
+    (True, False)
+    """
+    return name in _FIELD_NAMES
 
 
 def topics_of_kind(kind: str, topics: "list[str] | tuple[str, ...]") -> tuple[str, ...]:

@@ -110,15 +110,15 @@ class ClockModel:
         return np.asarray(time, dtype=np.int64)
 
     def correct(self, batch: RecordBatch) -> RecordBatch:
-        """The batch with ``time_ns`` set, its rows in the order of the source."""
-        return RecordBatch(
-            batch.topic,
-            batch.record_index,
-            batch.device_time_ns,
-            batch.columns,
-            self.time_ns(batch.record_index, batch.device_time_ns),
-            batch.validity_time_ns,
-        )
+        """The batch with ``time_ns`` set, its rows in the order of the source.
+
+        Times of validity, which readers give by the device's clock, are moved as its times are.
+        """
+        time_ns, device_ns = self.time_ns(batch.record_index, batch.device_time_ns), batch.device_time_ns
+        validity_ns = batch.validity_time_ns
+        if validity_ns is not None:
+            validity_ns = np.where(device_ns.mask, validity_ns + (time_ns - device_ns.values), time_ns)
+        return RecordBatch(batch.topic, batch.record_index, device_ns, batch.columns, time_ns, validity_ns)
 
     def text(self, time_ns: int) -> str:
         """A time for people: ISO UTC, or ``+mm:ss`` from the log's zero."""

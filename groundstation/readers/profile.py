@@ -97,21 +97,31 @@ def load(path: Path) -> Profile:
     SettingsError
         Naming the file and the key: not TOML, an unknown key, unit, field or method, a wrong dimension ...
     """
+    return _Checker(path).profile(read_table(path))
+
+
+def read_table(path: Path) -> dict[str, Any]:
+    """The TOML of a profile, not checked yet.
+
+    Raises
+    ------
+    SettingsError
+        When it cannot be read or is no TOML.
+    """
     import tomllib
 
     try:
         text = path.read_bytes().decode("utf-8")
-        table = tomllib.loads(text)
+        return tomllib.loads(text)
     except OSError as error:
         reason = (error.strerror or type(error).__name__).lower()
         raise SettingsError(str(path), f"no readable profile ({reason})", "", "check the path") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise SettingsError(str(path), f"no valid TOML ({error})", "a profile as docs/profiles.md describes") from error
-    return _Checker(path).profile(table)
 
 
-class _Checker:
-    """Turns the TOML tables into rules; every complaint names the file and the key."""
+class Checker:
+    """Checks the values of a profile; every complaint names the file and the key."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -144,6 +154,37 @@ class _Checker:
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < float("inf"):
             self.fail(key, repr(value), "a finite number")
         return float(value)
+
+    def canonical(self, value: Any, key: str) -> tuple[str, Field]:
+        topic, _, name = self.text(value, key).rpartition(".")
+        known = field_of(topic, name)
+        if known is None:
+            expected = "a field of that topic" if is_canonical(topic) else "<topic>.<field> of the canonical list"
+            self.fail(key, repr(value), expected)
+        return topic, known
+
+    def unit(self, value: Any, key: str, wanted: str) -> float:
+        units = [name for name, (base, _factor) in CONVERSIONS.items() if base == wanted and name]
+        expected = f"a unit of {wanted}: {', '.join(units)}" if wanted else "no unit"
+        if not isinstance(value, str) or value not in CONVERSIONS or CONVERSIONS[value][0] != wanted:
+            self.fail(key, repr(value), expected)
+        return CONVERSIONS[value][1]
+
+    def column(self, name: str, key: str, topic: str, known: Field, table: dict[str, Any]) -> ColumnRule:
+        if known.kind != "double":
+            self.table(table, key, ("field",))
+            return ColumnRule(name, topic, known)
+        factor = self.unit(table.get("unit", ""), f"{key}.unit", known.unit)
+        scale = self.number(table.get("scale", 1.0), f"{key}.scale")
+        sign = self.number(table.get("sign", 1), f"{key}.sign")
+        if sign not in (1.0, -1.0) or scale == 0.0:
+            self.fail(f"{key}.sign" if scale else f"{key}.scale", f"{sign:g}" if scale else "0", "1 or -1, scale not 0")
+        offset = self.number(table.get("offset", 0.0), f"{key}.offset")
+        return ColumnRule(name, topic, known, scale * sign * factor, offset * factor)
+
+
+class _Checker(Checker):
+    """Turns the TOML tables into the rules of a table's columns."""
 
     def profile(self, table: dict[str, Any]) -> Profile:
         allowed = ("name", "description", "raw_topic", "recognise", "time", "metadata", "columns", "derived")
@@ -237,33 +278,6 @@ class _Checker:
                 self.fail(f"{key}.field", target, f"a field that {rules[target].name!r} does not feed already")
             rules[target] = self.column(name, key, topic, known, table)
         return tuple(rules.values())
-
-    def column(self, name: str, key: str, topic: str, known: Field, table: dict[str, Any]) -> ColumnRule:
-        if known.kind != "double":
-            self.table(table, key, ("field",))
-            return ColumnRule(name, topic, known)
-        factor = self.unit(table.get("unit", ""), f"{key}.unit", known.unit)
-        scale = self.number(table.get("scale", 1.0), f"{key}.scale")
-        sign = self.number(table.get("sign", 1), f"{key}.sign")
-        if sign not in (1.0, -1.0) or scale == 0.0:
-            self.fail(f"{key}.sign" if scale else f"{key}.scale", f"{sign:g}" if scale else "0", "1 or -1, scale not 0")
-        offset = self.number(table.get("offset", 0.0), f"{key}.offset")
-        return ColumnRule(name, topic, known, scale * sign * factor, offset * factor)
-
-    def canonical(self, value: Any, key: str) -> tuple[str, Field]:
-        topic, _, name = self.text(value, key).rpartition(".")
-        known = field_of(topic, name)
-        if known is None:
-            expected = "a field of that topic" if is_canonical(topic) else "<topic>.<field> of the canonical list"
-            self.fail(key, repr(value), expected)
-        return topic, known
-
-    def unit(self, value: Any, key: str, wanted: str) -> float:
-        units = [name for name, (base, _factor) in CONVERSIONS.items() if base == wanted and name]
-        expected = f"a unit of {wanted}: {', '.join(units)}" if wanted else "no unit"
-        if not isinstance(value, str) or value not in CONVERSIONS or CONVERSIONS[value][0] != wanted:
-            self.fail(key, repr(value), expected)
-        return CONVERSIONS[value][1]
 
     def derivations(self, value: Any, columns: tuple[ColumnRule, ...], raw_topic: str) -> tuple[DerivedRule, ...]:
         if not isinstance(value, list):

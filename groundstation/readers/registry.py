@@ -5,16 +5,18 @@ Built-in readers are listed here; third parties add theirs through entry points 
 fails never hides the others.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
 from groundstation.base.records import Item, RecordBatch, Remark
 from groundstation.readers import (
+    bags,
+    chapter10,
     csv_profile,
     dataflash,
     flat_csv,
@@ -24,15 +26,23 @@ from groundstation.readers import (
     receiver,
     rtklib_pos,
     sbet,
+    tlog,
     ulog,
     utias,
 )
 from groundstation.readers.compressed import COMPRESSIONS
 from groundstation.readers.source import Claim, Reader, Source
 
+if TYPE_CHECKING:
+    from groundstation.readers.icd import Icd
+
 ENTRY_POINT_GROUP = "groundstation.readers"
+FLAT_CSV = f"the flat CSV ({flat_csv.PAGE})"
 _OF_TEXT: tuple[Reader, ...] = (csv_profile, flat_csv, miluv, rtklib_pos, utias)
-_BUILT_IN: tuple[Reader, ...] = (dataflash, ulog, flightdata_hdf5, receiver, sbet, *_OF_TEXT)
+_BUILT_IN: tuple[Reader, ...] = (
+    *(chapter10, dataflash, ulog, flightdata_hdf5, receiver, sbet, bags, tlog),
+    *_OF_TEXT,
+)
 
 
 @dataclass(frozen=True)
@@ -104,7 +114,7 @@ def identify(path: str | Path, profile: Path | None = None) -> Claim:
     ----------
     path : path of the log
     profile : path of a profile (TOML), optional
-        With it, the file is a table of that layout whatever it looks like.
+        With it, the file is a table of that layout whatever it looks like; of a bag it explains messages.
 
     Raises
     ------
@@ -116,20 +126,27 @@ def identify(path: str | Path, profile: Path | None = None) -> Claim:
     return _claim(Source(Path(path)), profile)[0]
 
 
-def read(path: str | Path | Source, profile: Path | None = None) -> Iterator[Item]:
+def read(path: str | Path | Source, profile: Path | None = None, icds: "Sequence[Icd]" = ()) -> Iterator[Item]:
     """Iterate over the items of a file, with the reader that claims it.
 
     Raises at once as :func:`identify` does, not at the first item. Parameters as there; a :class:`Source` that is read
-    again is not decompressed again.
+    again is not decompressed again. ``icds`` name the bus words of a recording that has any.
     """
     source = path if isinstance(path, Source) else Source(Path(path))
     claim, troubles = _claim(source, profile)
     reader = _readers()[claim.reader]
-    if reader is csv_profile:
-        items = csv_profile.read(source, profile)
+    if reader in (bags, csv_profile):
+        items = reader.read(source, profile)
+    elif reader is chapter10:
+        items = chapter10.read(source, icds)
     else:
         items = reader.read(source) if reader in _BUILT_IN else _guarded(reader, claim, source)
-    return chain(items, _of_the_source(source), (Remark("plug_in", trouble) for trouble in troubles))
+    unused = [Remark("icd_of_another", "the ICD is not used: the log holds no bus words")]
+    remarks = [
+        *(Remark("plug_in", trouble) for trouble in troubles),
+        *(unused if icds and reader is not chapter10 else []),
+    ]
+    return chain(items, _of_the_source(source), remarks)
 
 
 def _of_the_source(source: Source) -> Iterator[Item]:
@@ -151,7 +168,8 @@ def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]
     if source.is_empty:
         raise UnclaimedLogError(source.name, "an empty file", "a recorded log", "check how it was copied")
     if profile is not None:
-        return csv_profile.claim_by(source, profile), plug_in_failures()
+        by_profile = bags if bags.sniff(source) else csv_profile
+        return by_profile.claim_by(source, profile), plug_in_failures()
     claims: list[Claim] = []
     refusals: list[GroundstationError] = []
     troubles = list(plug_in_failures())
@@ -216,11 +234,12 @@ def _unclaimed(source: Source, refusals: list[GroundstationError], troubles: lis
         return UnclaimedLogError(source.name, f"{known} data that cannot be decompressed")
     if known is not None:
         return UnclaimedLogError(
-            source.name, f"recognised as {known}, not readable in this version", "", "convert it to the flat CSV"
+            source.name, f"recognised as {known}, not readable in this version", "", f"convert it to {FLAT_CSV}"
         )
     if refusals:
         return refusals[0]
     found = "binary data of an unknown format" if magic.is_binary(source) else "text that no reader claims"
     names = ", ".join(reader for reader in _readers())
     found += f" ({'; '.join(troubles)})" if troubles else ""
-    return UnclaimedLogError(source.name, found, f"one of {names}", "describe a table by a profile (--profile FILE)")
+    next_step = f"write {FLAT_CSV}, or describe a table by a profile (--profile FILE)"
+    return UnclaimedLogError(source.name, found, f"one of {names}", next_step)

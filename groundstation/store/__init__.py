@@ -1,6 +1,6 @@
 """The store: records as MCAP with protobuf channels, written and read in bulk, and recovered when damaged.
 
 ``writer.StoreWriter`` writes, ``reader.read`` and ``reader.read_info`` read, ``info.StoreInfo`` says what a file is of,
-``foreign.describe_foreign`` lists an MCAP of another program. Nothing is imported here: protobuf, MCAP and zstd take
+``foreign.ForeignMcap`` reads the messages of any MCAP. Nothing is imported here: protobuf, MCAP and zstd take
 a tenth of a second that ``--help`` need not spend.
 """

@@ -1,196 +1,264 @@
-"""What an MCAP of another program holds: channels, schemas, counts and times. Its messages are not decoded."""
+"""Messages of an MCAP of any program: of every chunk that is intact, of messages outside chunks, as far as they go.
 
-import os
-from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
+A cut file gives what stands before the cut, the beginning of its last chunk among it. Where no record can be recognised
+the next chunk is searched for; a chunk whose checksum is wrong is lost.
+"""
+
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
-from types import MappingProxyType
-from typing import BinaryIO
+from typing import BinaryIO, TypeAlias
 
+import lz4.frame
+import numpy as np
+import zstandard
 from mcap.opcode import Opcode
 from mcap.records import Channel, Header, Schema
 
-from groundstation.base.errors import UnreadableLogError
-from groundstation.base.timescales import duration_text, utc_ns_to_iso
-from groundstation.base.units import NS_PER_S
 from groundstation.store.framing import (
     MAGIC,
+    MAX_CHUNK_BYTES,
     MAX_RECORD_BYTES,
     ChunkError,
+    ChunkHead,
     Summary,
     decompress,
+    ends_whole,
     parse_record,
     parse_records,
     read_chunk_head,
     read_summary,
 )
-from groundstation.store.messages import HEAD, RECORD_PREFIX
+from groundstation.store.messages import HEAD, RECORD_PREFIX, ByteArray, Messages
+from groundstation.store.walk import find_messages
 
-MAX_UTC_NS = 1 << 62  # year 2116: times past it are no times
+PEEK_BYTES = 64
+SEARCH_BYTES = 1 << 20
+_CHUNK = re.compile(rb"\x06(?=[\0-\xff]{5}\0{3})")  # opcode and a length below 2**40
+_MESSAGE = re.compile(rb"\x05(?=[\0-\xff]{3}\0{5})")
+_KNOWN_OPCODES = frozenset(range(Opcode.HEADER, Opcode.DATA_END + 1))
+
+
+@dataclass(frozen=True, eq=False)
+class ForeignMessages:
+    """Messages of one channel that stand together. ``first`` (n,) are their places among those of the file."""
+
+    channel: Channel
+    schema: Schema | None
+    messages: Messages
+    places: "np.ndarray[tuple[int], np.dtype[np.int64]]"
 
 
 @dataclass(frozen=True)
-class ForeignChannel:
-    """One channel: topic, name of its schema, encoding of its messages, how many there are."""
+class ForeignLost:
+    """What could not be used in the bytes ``start`` to ``end``: ``count`` of ``what``, before message ``before``."""
 
-    topic: str
-    schema: str
-    encoding: str
+    start: int
+    end: int
+    what: str
+    count: int
+    before: int
+    is_cut: bool = False
+
+
+@dataclass(frozen=True)
+class UnknownChannel:
+    """Messages of a channel that no record of the file defines."""
+
     messages: int
 
 
-@dataclass(frozen=True)
-class ForeignMcap:
-    """What an MCAP of another program holds.
-
-    Parameters
-    ----------
-    facts : mapping of str to str
-        For people: library, profile, messages, start, duration, where known.
-    channels : tuple of ForeignChannel
-        In order of topic.
-    is_damaged : bool
-        The file is cut or its summary is not intact.
-    start_ns, end_ns : int, optional
-        First and last log time.
-    """
-
-    facts: Mapping[str, str]
-    channels: tuple[ForeignChannel, ...]
-    is_damaged: bool
-    start_ns: int | None = None
-    end_ns: int | None = None
+Found: TypeAlias = ForeignMessages | ForeignLost | UnknownChannel
 
 
-class _Census:
-    """Definitions and messages met while walking a file that has no usable summary."""
-
-    def __init__(self) -> None:
-        self.found = Summary()
-        self.counts: dict[int, int] = {}
-        self.start_ns: int | None = None
-        self.end_ns: int | None = None
-        self.is_damaged = False
-
-    def add(self, opcode: int, raw: bytes) -> None:
-        """Count a message, or take in a definition."""
-        if opcode == Opcode.MESSAGE and len(raw) >= HEAD.itemsize:
-            channel_id = int.from_bytes(raw[9:11], "little")
-            time_ns = int.from_bytes(raw[15:23], "little")
-            self.counts[channel_id] = self.counts.get(channel_id, 0) + 1
-            self.start_ns = time_ns if self.start_ns is None else min(self.start_ns, time_ns)
-            self.end_ns = time_ns if self.end_ns is None else max(self.end_ns, time_ns)
-        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            record = parse_record(opcode, raw[RECORD_PREFIX:])
-            if record is not None:
-                self.found.add(record, b"")
-
-
-def describe_foreign(path: str | os.PathLike[str]) -> ForeignMcap:
-    """Channels, schemas, message counts and time span of any MCAP file.
-
-    From its summary where that is intact, else by walking its records as far as they go.
-
-    Raises
-    ------
-    UnreadableLogError
-        When the file cannot be opened or is not an MCAP at all.
-    """
-    with _opened(path) as file:
-        size = os.fstat(file.fileno()).st_size
-        header = _header(file)
-        summary = read_summary(file, size)
-        statistics = summary.statistics if summary is not None and summary.is_intact else None
-        if summary is not None and statistics is not None and (summary.channels or not statistics.channel_count):
-            times = (statistics.message_start_time, statistics.message_end_time) if statistics.message_count else None
-            counts = statistics.channel_message_counts
-            return _described(header, summary, counts, times, is_damaged=False)
-        census = _walk(file, size)
-        times = None if census.start_ns is None or census.end_ns is None else (census.start_ns, census.end_ns)
-        return _described(header, census.found, census.counts, times, is_damaged=census.is_damaged)
-
-
-@contextmanager
-def _opened(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
-    try:
-        with closing(Path(path).open("rb")) as file:
-            if file.read(len(MAGIC)) != MAGIC:
-                raise UnreadableLogError(str(path), "no MCAP magic number", "an MCAP file")
-            yield file
-    except OSError as error:
-        raise UnreadableLogError(str(path), f"cannot be read ({error.strerror})") from error
-
-
-def _header(file: BinaryIO) -> Header | None:
-    file.seek(len(MAGIC))
-    start = file.read(RECORD_PREFIX)
-    length = min(int.from_bytes(start[1:], "little"), MAX_RECORD_BYTES)
-    record = parse_record(Opcode.HEADER, file.read(length)) if start[:1] == bytes([Opcode.HEADER]) else None
+def read_header(head: bytes) -> Header | None:
+    """The header in the first bytes of an MCAP."""
+    start = len(MAGIC) + RECORD_PREFIX
+    length = int.from_bytes(head[len(MAGIC) + 1 : start], "little")
+    is_header = head.startswith(MAGIC + bytes([Opcode.HEADER])) and start + length <= len(head)
+    record = parse_record(Opcode.HEADER, head[start : start + length]) if is_header else None
     return record if isinstance(record, Header) else None
 
 
-def _walk(file: BinaryIO, size: int) -> _Census:
-    """Count what stands in the file, up to its end or the first record that is not whole."""
-    census = _Census()
-    at = len(MAGIC)
-    while True:
-        file.seek(at)
-        start = file.read(RECORD_PREFIX)
-        end = at + RECORD_PREFIX + int.from_bytes(start[1:], "little")
-        if len(start) < RECORD_PREFIX or end > size:
-            census.is_damaged = True
-            return census
-        if start[0] == Opcode.CHUNK:
-            _walk_chunk(file, at, end, census)
-        elif start[0] in (Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL):
-            census.add(start[0], start + file.read(min(end - at - RECORD_PREFIX, MAX_RECORD_BYTES)))
-        elif start[0] in (Opcode.DATA_END, Opcode.FOOTER):
-            return census
-        at = end
+class ForeignMcap:
+    """Iterates over what a file holds, in its order.
+
+    Parameters
+    ----------
+    file : binary file
+    size : int
+    """
+
+    def __init__(self, file: BinaryIO, size: int) -> None:
+        self._file, self._size = file, size
+        self._known = Summary()
+        self._count = self._unknown = 0
+
+    def __iter__(self) -> Iterator[Found]:
+        summary = read_summary(self._file, self._size)
+        if summary is not None:
+            self._known = summary  # definitions whose first copy is damaged
+        has_end = ends_whole(self._file, self._size)
+        at = len(MAGIC)
+        loose = bytearray()  # messages outside chunks, until there are enough to be worth a block
+        while at < self._size:
+            peek = self._read(at, PEEK_BYTES)
+            head = read_chunk_head(peek)
+            end = at + RECORD_PREFIX + int.from_bytes(peek[1:RECORD_PREFIX], "little")
+            if head is not None and (head.length <= MAX_CHUNK_BYTES + PEEK_BYTES):
+                yield from self._chunk(at, head)
+                if at + head.length > self._size:
+                    return
+                at += head.length
+            elif len(peek) < RECORD_PREFIX or peek[0] not in _KNOWN_OPCODES or end > self._size:
+                place = self.find_chunk(at + 1)
+                is_cut = place == self._size and not has_end
+                yield ForeignLost(at, place, "bytes that are no record", place - at, self._count, is_cut)
+                if is_cut:
+                    break
+                at = place
+            elif peek[0] == Opcode.DATA_END:
+                break
+            else:
+                if peek[0] in (Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL) and end - at <= MAX_RECORD_BYTES:
+                    loose += self._read(at, end - at)
+                at = end
+                if len(loose) < SEARCH_BYTES and at < self._size:
+                    continue
+            if loose:
+                yield from self._records(np.frombuffer(bytes(loose), np.uint8), at - len(loose), at)
+                loose.clear()
+        if loose:
+            yield from self._records(np.frombuffer(bytes(loose), np.uint8), at - len(loose), at)
+        if not has_end:
+            yield ForeignLost(self._size, self._size, "file that ends without its summary", 1, self._count, True)
+        if self._unknown:
+            yield UnknownChannel(self._unknown)
+
+    def _read(self, at: int, length: int) -> bytes:
+        self._file.seek(at)
+        return self._file.read(length)
+
+    def find_chunk(self, start: int) -> int:
+        """Place of the next chunk from ``start`` on, the size of the file when there is none."""
+        at = start
+        while at < self._size:
+            block = self._read(at, SEARCH_BYTES + PEEK_BYTES)
+            for match in _CHUNK.finditer(block, 0, SEARCH_BYTES):
+                head = read_chunk_head(block[match.start() : match.start() + PEEK_BYTES])
+                if head is not None and at + match.start() + head.data_at < self._size:
+                    return at + match.start()
+            at += SEARCH_BYTES
+        return self._size
+
+    def _chunk(self, at: int, head: ChunkHead) -> Iterator[Found]:
+        data = self._read(at + head.data_at, head.length - head.data_at)
+        end = at + head.length
+        if end > self._size:
+            raw = _beginning(head.compression, data, head.uncompressed_size)
+            yield from self._records(raw[: _whole_records(raw.tobytes())], at, end)
+            what = f"bytes of a chunk that is cut; {len(raw)} bytes of its content are kept"
+            yield ForeignLost(at, self._size, what, self._size - at, self._count, True)
+            return
+        try:
+            raw = decompress(head.compression, data, head.uncompressed_size, head.crc or None)
+        except ChunkError as error:
+            yield ForeignLost(at, end, f"bytes of a chunk that is lost: {error}", end - at, self._count)
+            return
+        yield from self._records(raw, at, end)
+
+    def _stretches(self, raw: ByteArray, at: int, end: int) -> Iterator[Found]:
+        """Records that stand one after the other, searched for behind what is none; of a chunk without a checksum."""
+        data, start = raw.tobytes(), 0
+        while start < len(data):
+            whole = start + _whole_records(data[start:])
+            yield from self._records(raw[start:whole], at, end)
+            if whole == len(data):
+                return
+            start = _next_message(data, whole + 1)
+            yield ForeignLost(at, end, "bytes of a chunk's content that are no record", start - whole, self._count)
+
+    def _records(self, raw: ByteArray, at: int, end: int) -> Iterator[Found]:
+        """Messages among records that stand one after the other, definitions taken in."""
+        found = find_messages(raw)
+        if found is None:
+            yield from self._stretches(raw, at, end)
+            return
+        starts, sizes = found
+        self._define(raw, starts, sizes)
+        if not len(starts):
+            return
+        everything = Messages(raw, 0, starts, sizes, 0)
+        ids = everything.head("channel_id")
+        places = np.arange(self._count, self._count + len(starts), dtype=np.int64)
+        self._count += len(starts)
+        for number in np.unique(ids).tolist():
+            rows = np.flatnonzero(ids == number)
+            channel = self._known.channels.get(number)
+            if channel is None:
+                self._unknown += len(rows)
+                continue
+            schema = self._known.schemas.get(channel.schema_id)
+            messages = Messages(raw, number, starts[rows], sizes[rows], 0)
+            yield ForeignMessages(channel, schema, messages, places[rows])
+
+    def _define(self, raw: ByteArray, starts: "np.ndarray", sizes: "np.ndarray") -> None:
+        """Take in the definitions that stand between messages."""
+        if int(sizes.sum()) == len(raw):
+            return
+        ends = np.concatenate(([0], starts + sizes))
+        for start, end in zip(ends, np.append(starts, len(raw)), strict=True):
+            if end > start:
+                for opcode, record in parse_records(raw[start:end].tobytes()):
+                    if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                        parsed = parse_record(opcode, record[RECORD_PREFIX:])
+                        if isinstance(parsed, Schema | Channel) and not self._is_sure_of(parsed):
+                            self._known.add(parsed, b"")
+
+    def _is_sure_of(self, found: Schema | Channel) -> bool:
+        """Whether an intact summary defines the same id: it has a checksum, which the definition here may lack."""
+        known = self._known.schemas if isinstance(found, Schema) else self._known.channels
+        return self._known.is_intact and found.id in known
 
 
-def _walk_chunk(file: BinaryIO, at: int, end: int, census: _Census) -> None:
-    if end - at > MAX_RECORD_BYTES:
-        census.is_damaged = True
-        return
-    file.seek(at)
-    data = file.read(end - at)
-    head = read_chunk_head(data)
+def _whole_records(data: bytes) -> int:
+    """Bytes of the whole records that stand one after the other at the beginning."""
+    whole = 0
+    for opcode, record in parse_records(data):
+        if opcode == Opcode.MESSAGE and len(record) < HEAD.itemsize:
+            break
+        whole += len(record)
+    return whole
+
+
+def _next_message(data: bytes, start: int) -> int:
+    """Place of the next message behind damage: two whole messages must stand there, or one that ends the data."""
+    for match in _MESSAGE.finditer(data, start):
+        at = match.start()
+        for _number in range(2):
+            at += RECORD_PREFIX + int.from_bytes(data[at + 1 : at + RECORD_PREFIX], "little")
+            if at >= len(data) or data[at] != Opcode.MESSAGE:
+                break
+        if at == len(data) or (at < len(data) and data[at] == Opcode.MESSAGE):
+            return match.start()
+    return len(data)
+
+
+def _beginning(compression: str, data: bytes, size: int) -> ByteArray:
+    """What the beginning of a chunk's data gives."""
+    limit = min(size, MAX_CHUNK_BYTES)
+    raw = b""
     try:
-        if head is None:
-            raise ChunkError("is no chunk")
-        raw = decompress(head.compression, memoryview(data)[head.data_at :], head.uncompressed_size, head.crc or None)
-    except ChunkError:
-        census.is_damaged = True
-        return
-    for opcode, record in parse_records(raw.tobytes()):
-        census.add(opcode, record)
-
-
-def _described(
-    header: Header | None,
-    found: Summary,
-    counts: Mapping[int, int],
-    times: tuple[int, int] | None,
-    *,
-    is_damaged: bool,
-) -> ForeignMcap:
-    facts = {} if header is None else {"library": header.library, "profile": header.profile}
-    facts["messages"] = str(sum(counts.values()))
-    if times is not None and 0 <= times[0] <= times[1] < MAX_UTC_NS:
-        facts["start"] = utc_ns_to_iso(times[0])
-        facts["duration"] = duration_text((times[1] - times[0]) / NS_PER_S)
-    channels = (_channel(channel, found.schemas, counts) for channel in found.channels.values())
-    return ForeignMcap(
-        MappingProxyType({key: value for key, value in facts.items() if value}),
-        tuple(sorted(channels, key=lambda channel: (channel.topic, channel.schema))),
-        is_damaged,
-        *(times or (None, None)),
-    )
-
-
-def _channel(channel: Channel, schemas: Mapping[int, Schema], counts: Mapping[int, int]) -> ForeignChannel:
-    schema = schemas.get(channel.schema_id)
-    name = schema.name if schema is not None else ""
-    return ForeignChannel(channel.topic, name, channel.message_encoding, counts.get(channel.id, 0))
+        if compression == "zstd":
+            reader = zstandard.ZstdDecompressor(max_window_size=128 << 20).decompressobj()
+            for at in range(0, len(data), 1 << 14):
+                raw += reader.decompress(data[at : at + (1 << 14)])
+                if len(raw) > limit:
+                    break
+        elif compression == "lz4":
+            raw = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=limit)
+        else:
+            raw = data
+    except (zstandard.ZstdError, RuntimeError, ValueError, EOFError):
+        pass  # what came before is kept
+    return np.frombuffer(raw[:limit], np.uint8)

@@ -39,11 +39,6 @@ def is_groundstation_mcap(source: str | os.PathLike[str] | bytes) -> bool:
         return False
 
 
-def is_mcap(source: str | os.PathLike[str] | bytes) -> bool:
-    """Whether a file, or the first bytes of one, is an MCAP of any program."""
-    return _head(source).startswith(MAGIC) or is_groundstation_mcap(source)
-
-
 def is_mostly_mcap(path: str | os.PathLike[str]) -> bool:
     """Whether a file that :func:`is_groundstation_mcap` is one to its end, or much of it is chunks.
 

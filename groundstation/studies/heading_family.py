@@ -13,7 +13,9 @@ from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.known import AircraftData
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import HeadingResult
-from groundstation.simulation.taxi import Family, TaxiCase, draw_case, simulate_taxi, taxi_flight
+from groundstation.simulation.taxi import Family, TaxiCase, draw_run, taxi_flight
+from groundstation.simulation.taxi_disturbance import KINDS
+from groundstation.tables.phases import flight_phases
 
 BoolArray = NDArray[np.bool_]
 Progress = Callable[[str], None]
@@ -32,6 +34,8 @@ class RunOutcome:
     error_deg: float
     low_deg: float
     high_deg: float
+    low_measured_deg: float
+    high_measured_deg: float
     paper_error_deg: float
     precision_deg: float
     quality_deg: float
@@ -46,6 +50,15 @@ class RunOutcome:
         return self.low_deg <= 0.0 <= self.high_deg
 
     @property
+    def is_inside_measured(self) -> bool:
+        """Whether the interval without steady sideslip and mounting holds the truth."""
+        return self.low_measured_deg <= 0.0 <= self.high_measured_deg
+
+    @property
+    def half_width_measured_deg(self) -> float:
+        return 0.5 * (self.high_measured_deg - self.low_measured_deg)
+
+    @property
     def is_inside_paper(self) -> bool:
         """Whether the paper's mean +- e holds the truth."""
         return abs(self.paper_error_deg) <= self.precision_deg
@@ -57,13 +70,13 @@ class RunOutcome:
 
 def run_once(family: Family, seed: int, number: int, settings: HeadingSettings | None = None) -> RunOutcome:
     """Draw run ``number`` of a seed, pass it through tables and estimator, and compare with the truth."""
-    rng = np.random.default_rng((seed, number))
-    case = draw_case(rng, family)
-    run = simulate_taxi(case, rng)
+    run = draw_run(family, seed, number)
+    case = run.case
     aircraft = AircraftData(
         antenna_arm_m=case.antenna_arm_m if case.is_arm_known else None, antenna_arm_sigma_m=NAMED_ARM_SIGMA_M
     )
-    result = estimate_heading_error(taxi_flight(run), aircraft=aircraft, settings=settings)
+    flight = taxi_flight(run)
+    result = estimate_heading_error(flight, aircraft=aircraft, settings=settings, phases=flight_phases(flight))
     return outcome_of(number, case, result, run.error_at(result.reference_time_s or 0.0))
 
 
@@ -74,12 +87,15 @@ def outcome_of(number: int, case: TaxiCase, result: HeadingResult, truth_deg: fl
     above = np.flatnonzero(~(running["precision_deg"] <= limit))
     reached = int(above[-1]) + 1 if len(above) else 0
     step_s = float(np.median(np.diff(running["time_s"])))
+    measured_deg = result.confidence95_measured_deg or result.confidence95_deg
     return RunOutcome(
         number=number,
         case=case,
         error_deg=result.error_deg - truth_deg,
         low_deg=result.confidence95_deg[0] - truth_deg,
         high_deg=result.confidence95_deg[1] - truth_deg,
+        low_measured_deg=measured_deg[0] - truth_deg,
+        high_measured_deg=measured_deg[1] - truth_deg,
         paper_error_deg=result.paper_error_deg - truth_deg,
         precision_deg=result.precision_deg,
         quality_deg=result.quality_deg,
@@ -123,6 +139,9 @@ def runs_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
         "standstill_s": column(lambda run: run.case.standstill_s),
         "arm_known": column(lambda run: run.case.is_arm_known),
         "error_arcmin": column(lambda run: run.error_deg * ARCMIN_PER_DEG),
+        "kind": column(lambda run: run.case.disturbance.kind),
+        "low_measured_arcmin": column(lambda run: run.low_measured_deg * ARCMIN_PER_DEG),
+        "high_measured_arcmin": column(lambda run: run.high_measured_deg * ARCMIN_PER_DEG),
         "low_arcmin": column(lambda run: run.low_deg * ARCMIN_PER_DEG),
         "high_arcmin": column(lambda run: run.high_deg * ARCMIN_PER_DEG),
         "paper_error_arcmin": column(lambda run: run.paper_error_deg * ARCMIN_PER_DEG),
@@ -150,6 +169,9 @@ def _cells(outcomes: Sequence[RunOutcome]) -> Iterable[Cell]:
 
     cases = [outcome.case for outcome in outcomes]
     yield "all", np.ones(len(outcomes), dtype=bool)
+    kinds = np.array([case.disturbance.kind for case in cases])
+    if len(set(kinds)) > 1:
+        yield from ((kind, kinds == kind) for kind in KINDS)
     yield from split("sway damping", (case.sway_damping for case in cases), (0.0, 0.05, 0.15, 0.3, 1.0), "")
     yield from split("GNSS correlated over", (case.correlation_s for case in cases), (0.0, 2.0, 5.0, 20.0), " s")
     lengths = [round(sum(case.segments_s), 6) for case in cases]
@@ -170,7 +192,10 @@ def coverage_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
     paper_error = np.array([outcome.paper_error_deg for outcome in outcomes]) * ARCMIN_PER_DEG
     half_width = np.array([outcome.half_width_deg for outcome in outcomes]) * ARCMIN_PER_DEG
     inside = np.array([outcome.is_inside for outcome in outcomes])
+    inside_measured = np.array([outcome.is_inside_measured for outcome in outcomes])
     inside_paper = np.array([outcome.is_inside_paper for outcome in outcomes])
+    half_measured = np.array([outcome.half_width_measured_deg for outcome in outcomes]) * ARCMIN_PER_DEG
+    accepted = np.array([outcome.verdict == "accept" for outcome in outcomes])
     cells = [(label, mask) for label, mask in _cells(outcomes) if mask.any()]
 
     def column(value: Callable[[BoolArray], float]) -> NDArray[np.float64]:
@@ -180,6 +205,7 @@ def coverage_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
         "cell": np.array([label for label, _mask in cells]),
         "runs": np.array([int(mask.sum()) for _label, mask in cells]),
         "coverage": column(lambda mask: float(np.mean(inside[mask]))),
+        "measured_coverage": column(lambda mask: float(np.mean(inside_measured[mask]))),
         "coverage_sigma": column(lambda mask: float(np.sqrt(0.95 * 0.05 / mask.sum()))),
         "paper_coverage": column(lambda mask: float(np.mean(inside_paper[mask]))),
         "rms_arcmin": column(lambda mask: float(np.sqrt(np.mean(error[mask] ** 2)))),
@@ -187,6 +213,9 @@ def coverage_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
         "max_arcmin": column(lambda mask: float(np.max(np.abs(error[mask])))),
         "paper_rms_arcmin": column(lambda mask: float(np.sqrt(np.mean(paper_error[mask] ** 2)))),
         "half_width_arcmin": column(lambda mask: float(np.median(half_width[mask]))),
+        "measured_half_width_arcmin": column(lambda mask: float(np.median(half_measured[mask]))),
+        "accepted": column(lambda mask: float(np.sum(accepted[mask]))),
+        "accepted_max_arcmin": column(lambda mask: float(np.max(np.abs(error[mask & accepted]), initial=0.0))),
     }
     return FigureData(name, columns, {key: 3 if "coverage" in key else 1 for key in columns})
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.base.units import NS_PER_S
-from groundstation.tables.detector import Detection, GroundSettings, detect_ground
+from groundstation.tables.detector import Detection, GroundSettings, detect_ground, lasting
 from groundstation.tables.motion import (
     RATE_HZ,
     Motion,
@@ -34,7 +34,10 @@ LEAST_COVERAGE = 0.5  # share of the flight for which a flag must speak
 RUN_SHARE = 0.25  # a run begins and a roll ends at this share of the speed at lift-off and touch-down
 SLOWEST_RUN_MPS = 3.0  # what lifts off slower made no run
 LIFTED_M = 1.5  # height at which a lift-off is seen, in smoothed altitudes
+CARRIED_M, CARRIED_S = 5.0, 5.0  # up to that height what is too slow to fly for so long is carried
 SHORTEST_STANDSTILL_S = 3.0
+ALWAYS_ON_GROUND = "always_on_ground"  # metadata of a car's log, from a profile, the log or the aircraft file
+YES = ("true", "yes", "1")
 
 
 @dataclass(frozen=True)
@@ -103,8 +106,9 @@ class Phases:
 def ground_mask(flight: Flight, time_ns: Int64Array, *, settings: GroundSettings | None = None) -> GroundProof:
     """Prove ground contact at given times.
 
-    Weight on wheels (or an autopilot's landed flag) decides where it is logged often enough and is plausible: a flag
-    that stays on the wheels high above the ground at speed is not believed. Else the motion has to prove it, see
+    A log whose metadata say ``always_on_ground`` (a car's) is on the ground throughout. Weight on wheels (or an
+    autopilot's landed flag) decides where it is logged often enough and is plausible: a flag that stays on the wheels
+    high above the ground at speed is not believed. Else the motion has to prove it, see
     :func:`groundstation.tables.detector.detect_ground`.
 
     Parameters
@@ -148,6 +152,7 @@ class _Evidence:
     def __init__(self, flight: Flight, settings: GroundSettings) -> None:
         self.flight, self.settings = flight, settings
         self.contact = contact_of(flight)
+        self.is_always_on_ground = flight.metadata.get(ALWAYS_ON_GROUND, "").strip().lower() in YES
 
     @cached_property
     def grid_ns(self) -> Int64Array:
@@ -173,6 +178,8 @@ class _Evidence:
 
     @property
     def method(self) -> str:
+        if self.is_always_on_ground:
+            return "said to be always on the ground"
         if self.contact is not None and not self.against_flag:
             return self.contact.name
         if not len(self.grid_ns):
@@ -183,6 +190,8 @@ class _Evidence:
         return f"detector: standstills and rolling that adjoins them below {limit:.1f} m/s ({self.against_flag})"
 
     def proof(self, time_ns: Int64Array) -> GroundProof:
+        if self.is_always_on_ground:
+            return GroundProof(np.ones(len(time_ns), dtype=bool), self.method)
         if self.contact is not None and not self.against_flag:
             return GroundProof(held(self.contact, time_ns)[0], self.method)
         size = len(self.grid_ns)
@@ -196,6 +205,8 @@ class _Evidence:
     @property
     def ground(self) -> BoolArray:
         """Proven contact on the grid."""
+        if self.is_always_on_ground:
+            return np.ones(len(self.grid_ns), dtype=bool)
         if self.contact is None:
             return self.detection.ground
         proves, denies = held(self.contact, self.grid_ns)
@@ -207,9 +218,11 @@ class _Evidence:
     @property
     def airborne(self) -> BoolArray:
         """Flight on the grid, from lift-off to touch-down."""
+        if self.is_always_on_ground:
+            return np.zeros(len(self.grid_ns), dtype=bool)
         if self.contact is not None and not self.against_flag:
             return _up_to_the_ground(held(self.contact, self.grid_ns)[1], self.ground)
-        return _between_lift_off_and_touch_down(self.motion, self.ground, self.detection.airborne)
+        return _between_lift_off_and_touch_down(self.motion, self.ground, self.detection)
 
 
 def _labels(evidence: _Evidence) -> NDArray[np.int64]:
@@ -254,8 +267,12 @@ def _up_to_the_ground(denied: BoolArray, ground: BoolArray) -> BoolArray:
     return airborne
 
 
-def _between_lift_off_and_touch_down(motion: Motion, ground: BoolArray, sure: BoolArray) -> BoolArray:
-    """Widen sure flight to where the altitude leaves and meets that of the ground proven before and after."""
+def _between_lift_off_and_touch_down(motion: Motion, ground: BoolArray, detection: Detection) -> BoolArray:
+    """Widen sure flight to where the altitude leaves and meets that of the ground proven before and after.
+
+    A little above it, and slower than it ever was in sure flight, it does not fly yet: it is carried to its launch.
+    """
+    sure, slow = detection.airborne, lasting(motion.speed_mps < detection.speed_limit_mps, CARRIED_S)
     airborne = np.zeros(len(ground), dtype=bool)
     altitude = running_mean(motion.all_altitudes_m, 1.0)
     near = round(5.0 * RATE_HZ)
@@ -265,15 +282,18 @@ def _between_lift_off_and_touch_down(motion: Motion, ground: BoolArray, sure: Bo
             continue
         lift_off, touch_down = int(flying[0]), int(flying[-1]) + 1
         if start > 0:
-            low = _is_low(altitude[:, start:lift_off], altitude[:, max(start - near, 0) : start])
+            low = _low_rows(
+                altitude[:, start:lift_off], altitude[:, max(start - near, 0) : start], slow[start:lift_off]
+            )
             lift_off = start + (int(low[-1]) + 1 if low.size else 0)
         if end < len(ground):
-            low = _is_low(altitude[:, touch_down:end], altitude[:, end : end + near])
+            low = _low_rows(altitude[:, touch_down:end], altitude[:, end : end + near], slow[touch_down:end])
             touch_down = touch_down + int(low[0]) if low.size else end
         airborne[lift_off:touch_down] = True
     return airborne
 
 
-def _is_low(altitude_m: FloatArray, ground_m: FloatArray) -> NDArray[np.intp]:
-    """Rows no more than LIFTED_M above the mean altitude of the ground."""
-    return np.flatnonzero(largest_over_sources(altitude_m - known_mean(ground_m)[:, None]) <= LIFTED_M)
+def _low_rows(altitude_m: FloatArray, ground_m: FloatArray, slow: BoolArray) -> NDArray[np.intp]:
+    """Rows no more than LIFTED_M above the mean altitude of the ground, CARRIED_M where they are slow."""
+    height_m = largest_over_sources(altitude_m - known_mean(ground_m)[:, None])
+    return np.flatnonzero(height_m <= np.where(slow, CARRIED_M, LIFTED_M))

@@ -70,9 +70,17 @@ def content_of(base: Base, other: Base, edits: Sequence[Edit]) -> bytes:
 
 def suffix_of(format_name: str) -> str:
     """A file's suffix; readers look at the content alone."""
-    return {"ulog": ".ulg", "dataflash": ".BIN", "mcap": ".mcap", "gzip": ".gz", "zstd": ".zst"}.get(
-        format_name, ".csv"
-    )
+    return {
+        "ulog": ".ulg",
+        "dataflash": ".BIN",
+        "chapter10": ".ch10",
+        "mcap": ".mcap",
+        "robot-mcap": ".mcap",
+        "ros1": ".bag",
+        "sqlite3": ".db3",
+        "gzip": ".gz",
+        "zstd": ".zst",
+    }.get(format_name, ".csv")
 
 
 def check_items(items: Sequence[Any]) -> None:

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from groundstation.base.atmosphere import REFUSED
 from groundstation.base.records import (
-    MAX_BATCH_ROWS,
-    BoolArray,
     Column,
     Damage,
     Int64Array,
@@ -21,6 +19,7 @@ from groundstation.base.records import (
     Remark,
 )
 from groundstation.base.signals import EVENT_SEPARATOR
+from groundstation.readers.parts import Part, bounded, merged, occupied
 from groundstation.readers.source import Source
 from groundstation.readers.ulog.blocks import NOT_SUBSCRIBED, Topic, Walk
 from groundstation.readers.ulog.canonical import MODE_NAMES, MODES, Rows
@@ -121,7 +120,7 @@ class _RawTopics:
             for column in rows.dtype.names
             if column != TIMESTAMP or layout.timestamp_offset is None or len(rows.dtype.names) == 1
         }
-        yield from _bounded(RecordBatch(name, index, time, columns))
+        yield from bounded(RecordBatch(name, index, time, columns))
 
     def _name(self, topic: Topic) -> str:
         if topic.number not in self._names:
@@ -136,21 +135,12 @@ class _RawTopics:
         return self._names[topic.number]
 
 
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """Canonical columns that one PX4 topic gave in a block."""
-
-    index: Int64Array
-    time: Column
-    columns: dict[str, Column]
-
-
 class _CanonicalTopics:
     """Gathers canonical columns of a block, and puts those of several sources in the order of the log."""
 
     def __init__(self, losses: _Losses, found: Overview) -> None:
         self._losses, self._found = losses, found
-        self._parts: dict[str, list[_Part]] = {}
+        self._parts: dict[str, list[Part]] = {}
         self._armed: bool | None = None
         self._flight_mode: float | None = None
         self._mode = "gnss_aided" if found.has_gnss else "attitude"
@@ -167,7 +157,7 @@ class _CanonicalTopics:
                 columns["mode"] = Column(np.full(len(rows), self._mode), columns[_WITH_MODE].present)
             if _OF_PRESSURE in columns:
                 self._note_refused(name, columns[_OF_PRESSURE])
-            part = _occupied(_Part(index, time, columns))
+            part = occupied(Part(index, time, columns))
             if part is not None:
                 self._parts.setdefault(name, []).append(part)
         if self._found.arming and topic.instance == 0 and topic.name == self._found.arming[0]:
@@ -187,7 +177,7 @@ class _CanonicalTopics:
         if changed.any():
             names = np.array([f"mode {MODE_NAMES.get(mode) or format(mode, 'g')}" for mode in modes[changed].tolist()])
             self._parts.setdefault("event", []).append(
-                _Part(index[changed], time.take(changed), {"name": Column(names)})
+                Part(index[changed], time.take(changed), {"name": Column(names)})
             )
 
     def _note_arming(self, index: Int64Array, time: Column, values: Rows) -> None:
@@ -203,15 +193,15 @@ class _CanonicalTopics:
         self._armed = bool(armed[-1])
         if changed.any():
             names = np.where(armed[changed], "armed", "disarmed")
-            part = _Part(index[changed], time.take(changed), {"name": Column(names)})
+            part = Part(index[changed], time.take(changed), {"name": Column(names)})
             self._parts.setdefault("event", []).append(part)
 
     def batches(self) -> Iterator[RecordBatch]:
         """Batches of what was taken since the last call."""
         parts, self._parts = self._parts, {}
         for topic, several in parts.items():
-            batch = _merged(topic, several)
-            yield from _bounded(_one_row_each(batch) if topic == "event" else batch)
+            batch = merged(topic, several)
+            yield from bounded(_one_row_each(batch) if topic == "event" else batch)
 
     def remarks(self) -> Iterator[Remark]:
         """What serves as what."""
@@ -229,45 +219,6 @@ class _CanonicalTopics:
             yield Remark("derived", text, "ins", ("mode",))
 
 
-def _occupied(part: _Part) -> _Part | None:
-    """The rows that have any value; None when there are none."""
-    columns = part.columns.values()
-    if not part.columns or any(column.present is None for column in columns):
-        return part if part.columns else None
-    rows: BoolArray = np.logical_or.reduce([column.mask for column in columns])
-    if rows.all():
-        return part
-    if not rows.any():
-        return None
-    kept = {name: column.take(rows) for name, column in part.columns.items()}
-    return _Part(part.index[rows], part.time.take(rows), kept)
-
-
-def _merged(topic: str, parts: list[_Part]) -> RecordBatch:
-    """One batch of parts from different messages, in the order of the log; each row has the fields of its source."""
-    if len(parts) == 1:
-        return RecordBatch(topic, parts[0].index, parts[0].time, parts[0].columns)
-    index = np.concatenate([part.index for part in parts])
-    order = np.argsort(index, kind="stable")
-    time = Column(
-        np.concatenate([part.time.values for part in parts])[order],
-        np.concatenate([part.time.mask for part in parts])[order],
-    )
-    columns = {}
-    for name in dict.fromkeys(name for part in parts for name in part.columns):
-        having = [part.columns.get(name) for part in parts]
-        dtype = np.result_type(*(column.values.dtype for column in having if column is not None))
-        values, present = np.zeros(len(index), dtype=dtype), np.zeros(len(index), dtype=bool)
-        start = 0
-        for part, column in zip(parts, having, strict=True):
-            rows = slice(start, start + len(part.index))
-            start += len(part.index)
-            if column is not None:
-                values[rows], present[rows] = column.values, column.mask
-        columns[name] = Column(values[order], present[order])
-    return RecordBatch(topic, index[order], time, columns)
-
-
 def _one_row_each(events: RecordBatch) -> RecordBatch:
     """Events of one message as one row, their names joined: a message may both arm and change the mode."""
     first = np.flatnonzero(np.diff(events.record_index, prepend=-1) > 0)
@@ -276,8 +227,3 @@ def _one_row_each(events: RecordBatch) -> RecordBatch:
     names = np.split(events.columns["name"].values, first[1:])
     joined = Column(np.array([EVENT_SEPARATOR.join(part.tolist()) for part in names]))
     return RecordBatch(events.topic, events.record_index[first], events.device_time_ns.take(first), {"name": joined})
-
-
-def _bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
-    for start in range(0, len(batch), MAX_BATCH_ROWS):
-        yield batch if len(batch) <= MAX_BATCH_ROWS else batch.take(slice(start, start + MAX_BATCH_ROWS))

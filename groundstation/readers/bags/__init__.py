@@ -1,0 +1,37 @@
+"""Robots' logs: MCAP of other programs, ROS 1 bags (.bag), ROS 2 bags (sqlite3, MCAP, split ones by their folder)."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from groundstation.base.records import Item
+from groundstation.readers.bags.bag import kind_of
+from groundstation.readers.source import Claim, Source
+
+NAME = "bag"
+
+
+def sniff(source: Source) -> Claim | None:
+    """Claim a file by its first bytes, and the metadata of a bag of ROS 2."""
+    kind = kind_of(source)
+    return Claim(NAME, kind) if kind else None
+
+
+def claim_by(source: Source, profile: Path) -> Claim:
+    """Claim of a bag whose messages the user's profile explains.
+
+    Raises
+    ------
+    SettingsError
+        When the profile cannot be used.
+    """
+    from groundstation.readers.bags.profile import load
+
+    return Claim(NAME, f"{kind_of(source)} {load(profile).name}")
+
+
+def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
+    """Yield the header, batches of every topic (raw and canonical), remarks and damages."""
+    from groundstation.readers.bags.profile import load
+    from groundstation.readers.bags.reader import items
+
+    yield from items(source, NAME, load(profile) if profile is not None else None)

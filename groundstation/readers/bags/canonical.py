@@ -1,0 +1,203 @@
+"""Messages of robots as canonical signals: which fields a message gives, in which unit and frame.
+
+Units and frames are those of the message definitions and of REP 103, 105 and 145: metres, radians, tesla; east-north-up
+and forward-left-up.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from groundstation.base.angles import wrap_360
+from groundstation.base.records import Column
+from groundstation.base.units import DEG_PER_RAD
+from groundstation.readers.bags.values import Columns, Values, attitude, body, level, rotated
+from groundstation.readers.layout import velocity_from_track
+
+NT_PER_TESLA = 1e9
+RATES = ("rate_x_dps", "rate_y_dps", "rate_z_dps")
+ACCEL = ("accel_x_mps2", "accel_y_mps2", "accel_z_mps2")
+FIELD = ("field_forward_nt", "field_right_nt", "field_down_nt")
+VELOCITY = ("velocity_north_mps", "velocity_east_mps", "velocity_down_mps")
+POSITION = ("position_north_m", "position_east_m", "position_down_m")
+EARTH_FRAMES = frozenset({"map", "earth", "enu", "world", "utm", "ned", "local_enu", "local_ned"})  # x is east
+
+
+@dataclass(frozen=True)
+class Message:
+    """What a message type gives.
+
+    Parameters
+    ----------
+    role : str
+        ``imu``, ``fix``, ``odometry``, ``pose``, ``twist``, ``magnetometer``.
+    needs : tuple of str
+        Columns without which nothing is mapped.
+    columns : callable
+        Values to canonical columns.
+    """
+
+    role: str
+    needs: tuple[str, ...]
+    columns: Callable[[Values], Columns]
+
+
+def is_ned(values: Values) -> bool:
+    """Whether a message names a frame that is north-east-down already (REP 103: its name ends with ``_ned``)."""
+    return _frame(values) == "ned" or _frame(values).endswith("_ned")
+
+
+def is_earth_frame(values: Values) -> bool:
+    """Whether a message names a frame whose axes are those of the earth (REP 105: ``odom`` begins anywhere)."""
+    return _frame(values) in EARTH_FRAMES or _frame(values).endswith(("_enu", "_ned"))
+
+
+def _frame(values: Values) -> str:
+    return (values.text("header.frame_id") or values.text("frame_id")).strip("/").rpartition("/")[2]
+
+
+def imu(values: Values) -> Columns:
+    """Attitude, rates and specific force; a covariance that begins with -1 says that a driver has no such value."""
+    known = {name: _is_known(values, f"{name}_covariance[0]") for name in _IMU_PARTS}
+    columns: Columns = {}
+    if values.has_triple("orientation"):
+        columns |= attitude(values, "orientation", known["orientation"])
+    columns |= body(values, "angular_velocity", RATES, DEG_PER_RAD, known["angular_velocity"])
+    return columns | body(values, "linear_acceleration", ACCEL, 1.0, known["linear_acceleration"])
+
+
+_IMU_PARTS = ("orientation", "angular_velocity", "linear_acceleration")
+
+
+def _is_known(values: Values, covariance: str) -> np.ndarray | None:
+    return values[covariance] != -1.0 if covariance in values else None
+
+
+def navsatfix(values: Values) -> Columns:
+    """Position where the receiver has a fix; an altitude that is NaN is none."""
+    has_fix = values["status.status"] >= 0.0
+    altitude = values["altitude"]
+    return {
+        "latitude_deg": Column(values["latitude"], has_fix),
+        "longitude_deg": Column(values["longitude"], has_fix),
+        "altitude_ellipsoid_m": _where(altitude, has_fix & ~np.isnan(altitude)),
+        "integrity_ok": Column(has_fix),
+    }
+
+
+def location_fix(values: Values) -> Columns:
+    """Position of Foxglove's LocationFix; an altitude of exactly 0 is one that was not set."""
+    columns = {"latitude_deg": values["latitude"], "longitude_deg": values["longitude"]}
+    found = {name: Column(part, ~np.isnan(part)) for name, part in columns.items()}
+    if "altitude" in values:
+        altitude = values["altitude"]
+        found["altitude_ellipsoid_m"] = _where(altitude, np.isfinite(altitude) & (altitude != 0.0))
+    return found
+
+
+def gps_fix(values: Values) -> Columns:
+    """Position, velocity and dilution of gps_msgs/GPSFix (gpsd); NaN is a value that it does not have."""
+    has_fix = values["status.status"] >= 0.0
+    track, speed = values["track"], values["speed"]
+    has_track = has_fix & np.isfinite(track) & np.isfinite(speed)
+    north, east = velocity_from_track(np.where(has_track, track, 0.0), np.where(has_track, speed, 0.0))
+    columns = {
+        name: _where(values[source] * sign, has_fix & np.isfinite(values[source]))
+        for name, (source, sign) in _GPS_FIX.items()
+        if source in values
+    }
+    columns["track_deg"] = Column(np.asarray(wrap_360(np.where(has_track, track, 0.0))), has_track)
+    columns["velocity_north_mps"], columns["velocity_east_mps"] = Column(north, has_track), Column(east, has_track)
+    columns["integrity_ok"] = Column(has_fix)
+    if "status.satellites_used" in values:
+        columns["satellites_used"] = Column(values["status.satellites_used"])
+    return columns
+
+
+_GPS_FIX: Mapping[str, tuple[str, float]] = MappingProxyType(
+    {
+        "latitude_deg": ("latitude", 1.0),
+        "longitude_deg": ("longitude", 1.0),
+        "altitude_ellipsoid_m": ("altitude", 1.0),
+        "ground_speed_mps": ("speed", 1.0),
+        "velocity_down_mps": ("climb", -1.0),
+        "gdop": ("gdop", 1.0),
+        "pdop": ("pdop", 1.0),
+        "hdop": ("hdop", 1.0),
+    }
+)
+
+
+def _where(values: np.ndarray, present: np.ndarray) -> Column:
+    return Column(np.where(present, values, 0.0), present)
+
+
+def magnetic_field(values: Values) -> Columns:
+    """Magnetic field along the body's axes."""
+    return body(values, "magnetic_field", FIELD, NT_PER_TESLA, None)
+
+
+def wheel_odometry(values: Values) -> Columns:
+    """Speed forward and rate of turn to the right, of odometry whose frame begins anywhere."""
+    return {
+        "speed_mps": Column(values["twist.twist.linear.x"]),
+        "turn_rate_dps": Column(-values["twist.twist.angular.z"] * DEG_PER_RAD),
+    }
+
+
+def odometry(values: Values) -> Columns:
+    """Attitude, local position and velocity of an odometry whose frame has the axes of the earth."""
+    x, y, z = rotated(values, "pose.pose.orientation", "twist.twist.linear")
+    velocity = _ned(values, x, y, z, VELOCITY)
+    rates = body(values, "twist.twist.angular", RATES, DEG_PER_RAD, None, is_turned=not is_ned(values))
+    has_rates = any(np.any(column.values != 0.0) for column in rates.values())
+    return _pose(values, "pose.pose") | velocity | (rates if has_rates else {})
+
+
+def _pose(values: Values, name: str) -> Columns:
+    columns = attitude(values, f"{name}.orientation", None, is_turned=not is_ned(values))
+    position = values.triple(f"{name}.position")
+    if any(np.any(part != 0.0) for part in position):  # a driver that has none writes zeros
+        columns |= _ned(values, *position, POSITION)
+    return columns
+
+
+def _ned(values: Values, x: np.ndarray, y: np.ndarray, z: np.ndarray, fields: tuple[str, str, str]) -> Columns:
+    return level(y, x, -z, fields) if is_ned(values) else level(x, y, z, fields)
+
+
+def pose(name: str) -> Callable[[Values], Columns]:
+    """Rule of a pose that stands in the field ``name``."""
+    return lambda values: _pose(values, name)
+
+
+def twist(name: str) -> Callable[[Values], Columns]:
+    """Rule of a velocity along the axes of the earth that stands in the field ``name``."""
+    return lambda values: _ned(values, *values.triple(f"{name}.linear"), VELOCITY)
+
+
+_FIX = ("latitude", "longitude")
+_ROS_FIX = Message("fix", (*_FIX, "altitude", "status.status"), navsatfix)
+_FOXGLOVE_FIX = Message("fix", _FIX, location_fix)
+_GPSD_FIX = Message("fix", (*_FIX, "track", "speed", "status.status"), gps_fix)
+_POSE = Message("pose", ("pose.orientation.w", "pose.position.x"), pose("pose"))
+MESSAGES: Mapping[str, Message] = MappingProxyType(
+    {
+        "sensor_msgs/Imu": Message("imu", ("angular_velocity.x", "linear_acceleration.x"), imu),
+        "sensor_msgs/MagneticField": Message("magnetometer", ("magnetic_field.x",), magnetic_field),
+        "sensor_msgs/NavSatFix": _ROS_FIX,
+        "gps_msgs/GPSFix": _GPSD_FIX,
+        "gps_common/GPSFix": _GPSD_FIX,
+        "foxglove.LocationFix": _FOXGLOVE_FIX,
+        "foxglove_msgs/LocationFix": _FOXGLOVE_FIX,
+        "foxglove.PoseInFrame": _POSE,
+        "foxglove_msgs/PoseInFrame": _POSE,
+        "geometry_msgs/PoseStamped": _POSE,
+        "geometry_msgs/PoseWithCovarianceStamped": Message("pose", ("pose.pose.orientation.w",), pose("pose.pose")),
+        "geometry_msgs/TwistStamped": Message("twist", ("twist.linear.x",), twist("twist")),
+        "geometry_msgs/TwistWithCovarianceStamped": Message("twist", ("twist.twist.linear.x",), twist("twist.twist")),
+        "nav_msgs/Odometry": Message("odometry", ("pose.pose.orientation.w", "twist.twist.linear.x"), odometry),
+    }
+)

@@ -1,0 +1,228 @@
+"""Columns of a block of messages, by the encoding of its connection."""
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from groundstation.base.records import MAX_TEXT_CHARACTERS, Column, Int64Array
+from groundstation.base.units import NS_PER_S
+from groundstation.readers.bags.definitions import Definition, DefinitionError, known, parse
+from groundstation.readers.bags.messages import Block, Connection
+from groundstation.readers.bags.shapes import (
+    CDR,
+    COUNT,
+    MOST_COLUMNS,
+    MOST_NUMBERS,
+    MOST_PARTS,
+    ROS1,
+    Shape,
+    ShapeError,
+    walk,
+)
+
+BYTES = "bytes"  # column of messages that cannot be read: how long they are
+MOST_SHAPES = 64  # of a connection that are kept: messages of ever new lengths are walked one by one
+
+
+@dataclass(frozen=True, eq=False)
+class Decoded:
+    """Columns of the messages ``rows`` of a block; those of one block do not overlap."""
+
+    rows: Int64Array
+    columns: dict[str, Column]
+
+
+@dataclass
+class Decoder:
+    """Decodes the messages of one connection.
+
+    Attributes
+    ----------
+    reason : str
+        Why no message of the connection can be read; empty where some can.
+    unreadable : int
+        Messages that could not be read so far.
+    shortened : dict of str to None
+        Arrays of which only the length is kept, in the order they were met.
+    """
+
+    connection: Connection
+    reason: str = ""
+    unreadable: int = 0
+    shortened: dict[str, None] = field(default_factory=dict)
+    _shapes: dict[tuple[int, tuple[tuple[int, int], ...]], Shape] = field(default_factory=dict)
+    _definition: Definition | None = None
+    _object: Callable[[bytes], Any] | None = None
+    _kinds: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        connection = self.connection
+        if connection.encoding in ("cdr", "ros1"):
+            self._definition, self.reason = _definition(connection)
+        elif connection.encoding == "json":
+            self._object = json.loads
+        elif connection.encoding == "protobuf":
+            from groundstation.store.foreign_protobuf import message_reader
+
+            self._object = message_reader(connection.type, connection.schema)
+            self.reason = "" if self._object else f"a definition of {connection.type} that cannot be used"
+        else:
+            self.reason = f"encoding {connection.encoding!r}"
+
+    def decode(self, block: Block) -> Iterator[Decoded]:
+        """Columns of the messages; those that cannot be read have their length alone."""
+        bad: list[Int64Array] = []
+        if self.reason:
+            bad.append(np.arange(len(block), dtype=np.int64))
+        elif self._object is not None:
+            yield from self._objects(block, self._object, bad)
+        else:
+            yield from self._shaped(block, bad)
+        rows = np.sort(np.concatenate(bad)) if bad else np.zeros(0, dtype=np.int64)
+        if len(rows):
+            self.unreadable += len(rows)
+            yield _sizes(block, rows)
+
+    def _shaped(self, block: Block, bad: list[Int64Array]) -> Iterator[Decoded]:
+        order = np.argsort(block.sizes, kind="stable")
+        sizes = block.sizes[order]
+        for group in np.split(order, np.flatnonzero(np.diff(sizes)) + 1):
+            left = np.sort(group)
+            for known_shape in [one for one in self._shapes.values() if one.size == int(block.sizes[left[0]])]:
+                fits = known_shape.holds(block.buffer, block.starts[left])
+                if fits.any():
+                    yield _read(block, known_shape, left[fits])
+                    left = left[~fits]
+            while len(left):
+                shape = self._walked(block.payload(int(left[0])))
+                if shape is None:
+                    bad.append(left[:1])
+                    left = left[1:]
+                    continue
+                fits = shape.holds(block.buffer, block.starts[left])
+                yield _read(block, shape, left[fits])
+                left = left[~fits]
+
+    def _walked(self, message: bytes) -> Shape | None:
+        assert self._definition is not None
+        how = ROS1 if self.connection.encoding == "ros1" else CDR.get(message[:2])
+        if how is None:
+            return None
+        try:
+            shape = walk(self._definition, message, how)
+        except ShapeError:
+            return None
+        self.shortened.update(dict.fromkeys(shape.shortened))
+        if len(self._shapes) < MOST_SHAPES:
+            self._shapes[shape.size, shape.guards] = shape
+        return shape
+
+    def _objects(self, block: Block, read: Callable[[bytes], Any], bad: list[Int64Array]) -> Iterator[Decoded]:
+        """Messages that a library reads one by one."""
+        found: list[dict[str, Any]] = []
+        rows: list[int] = []
+        for row in range(len(block)):
+            try:
+                flat: dict[str, Any] = {}
+                _flatten(read(block.payload(row)), "", flat, self.shortened)
+            except (ValueError, RecursionError, TypeError):
+                bad.append(np.array([row], dtype=np.int64))
+                continue
+            found.append(flat)
+            rows.append(row)
+        if not rows:
+            return
+        yield from self._laid_out(block, np.array(rows, dtype=np.int64), found)
+
+    def _laid_out(self, block: Block, rows: Int64Array, found: list[dict[str, Any]]) -> Iterator[Decoded]:
+        """Columns of flat objects; those without a value have their length."""
+        columns: dict[str, Column] = {}
+        for name in dict.fromkeys(name for one in found for name in one):
+            values = [one.get(name) for one in found]
+            kind = self._kinds.setdefault(name, _kind(next(value for value in values if value is not None)))
+            if kind == "i" and self.connection.encoding == "json" and not name.endswith("_ns"):
+                kind = self._kinds[name] = "f"  # text tells no integers from other numbers
+            columns[name] = _column(values, kind)
+        has_any = np.zeros(len(rows), dtype=bool)
+        for column in columns.values():
+            has_any |= column.mask
+        if has_any.any():
+            yield Decoded(rows[has_any], {name: column.take(has_any) for name, column in columns.items()})
+        if not has_any.all():
+            yield _sizes(block, rows[~has_any])
+
+
+def _read(block: Block, shape: Shape, rows: Int64Array) -> Decoded:
+    columns = shape.columns(block.buffer, block.starts[rows])
+    return Decoded(rows, columns) if columns else _sizes(block, rows)
+
+
+def _sizes(block: Block, rows: Int64Array) -> Decoded:
+    return Decoded(rows, {BYTES: Column(block.sizes[rows].astype(np.uint32))})
+
+
+def _definition(connection: Connection) -> tuple[Definition | None, str]:
+    """Definition of a connection, or why there is none."""
+    usual = {"ros1": "ros1msg", "cdr": "ros2msg"}[connection.encoding]
+    try:
+        found = known(connection.type) if connection.encoding == "cdr" else None
+        if connection.schema_encoding == usual and (connection.schema or found is None):  # a type may have no field
+            return parse(connection.type, connection.schema.decode("utf-8", "replace")), ""
+    except DefinitionError as error:
+        return None, f"a definition of {connection.type} that cannot be used ({error})"
+    what = f"in {connection.schema_encoding}" if connection.schema else "without a definition in the file"
+    return found, "" if found else f"type {connection.type} {what}"
+
+
+def _flatten(value: Any, path: str, found: dict[str, Any], shortened: dict[str, None]) -> None:
+    """Numbers and texts of nested objects by their paths; a time of two numbers becomes one."""
+    if isinstance(value, dict):
+        seconds, rest = value.get("sec"), value.get("nsec", value.get("nanos"))
+        if len(value) == 2 and isinstance(seconds, int) and isinstance(rest, int):
+            found[f"{path}_ns"] = seconds * NS_PER_S + rest
+            return
+        for name, part in value.items():
+            _flatten(part, f"{path}.{name}" if path else str(name), found, shortened)
+    elif isinstance(value, list):
+        is_plain = not value or not isinstance(value[0], dict | list)
+        if len(value) > (MOST_NUMBERS if is_plain else MOST_PARTS):
+            shortened[path] = None
+            found[path + COUNT] = len(value)
+            return
+        for number, part in enumerate(value):
+            _flatten(part, f"{path}[{number}]", found, shortened)
+    elif value is not None and len(found) < MOST_COLUMNS:
+        found[path or "value"] = value
+
+
+def _kind(value: Any) -> str:
+    """Kind of a column by its first value: b, i, f or U as numpy has them."""
+    if isinstance(value, bool):
+        return "b"
+    return {int: "i", float: "f"}.get(type(value), "U")
+
+
+def _column(values: list[Any], kind: str) -> Column:
+    """A column of one kind; a value that is none of it is absent."""
+    if kind == "U":
+        present = np.array([value is not None for value in values])
+        texts = [str(value)[:MAX_TEXT_CHARACTERS] if value is not None else "" for value in values]
+        return Column(np.array(texts), None if present.all() else present)
+    fits = np.array([_fits(value, kind) for value in values])
+    filled = [value if is_fit else 0 for value, is_fit in zip(values, fits.tolist(), strict=True)]
+    dtype = {"b": np.bool_, "i": np.int64, "f": np.float64}[kind]
+    return Column(np.array(filled, dtype=dtype), None if fits.all() else fits)
+
+
+def _fits(value: Any, kind: str) -> bool:
+    """Whether a value can stand in a column of flags, integers of 64 bits or other numbers."""
+    if kind == "b" or isinstance(value, bool) or value is None:
+        return kind == "b" and isinstance(value, bool)
+    if not isinstance(value, int | float):
+        return False
+    if kind == "f":
+        return isinstance(value, float) or abs(value) < 2**1023
+    return isinstance(value, int) and -(2**63) <= value < 2**63

@@ -1,0 +1,169 @@
+"""Message definitions of ROS 1 and ROS 2 as a bag carries them: the text of the type, then those of its parts.
+
+Source: http://wiki.ros.org/msg (ROS 1); https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html (ROS 2).
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from groundstation.readers.bags.known_types import KNOWN_TYPES
+
+MOST_FIELDS = 4_000  # of one definition with all its parts: a longer text is no definition
+_SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)
+_PART = re.compile(r"\s*MSG:\s*(\S+)\s*\n")
+_CONSTANT = re.compile(r"[\w/<=]+\s+\w+\s*=")
+_FIELD = re.compile(
+    r"(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?P<array>\[(?P<bound><=)?(?P<count>\d*)\])?\s+(?P<name>\w+)(?:\s.*)?$"
+)
+
+TEXT, WIDE_TEXT = "string", "wstring"
+PRIMITIVES: Mapping[str, np.dtype] = {
+    "bool": np.dtype("?"),
+    "byte": np.dtype("u1"),
+    "char": np.dtype("u1"),
+    **{f"{sign}int{bits}": np.dtype(f"{sign or 'i'}{bits // 8}") for sign in ("", "u") for bits in (8, 16, 32, 64)},
+    "float32": np.dtype("f4"),
+    "float64": np.dtype("f8"),
+}
+# Times are two numbers that belong together: whole seconds and nanoseconds.
+TIMES: Mapping[str, tuple[np.dtype, np.dtype]] = {
+    "time": (np.dtype("u4"), np.dtype("u4")),
+    "duration": (np.dtype("i4"), np.dtype("i4")),
+    "builtin_interfaces/Time": (np.dtype("i4"), np.dtype("u4")),
+    "builtin_interfaces/Duration": (np.dtype("i4"), np.dtype("u4")),
+}
+
+
+class DefinitionError(Exception):
+    """A definition that cannot be used; the text says why."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of a message.
+
+    Parameters
+    ----------
+    name : str
+    type : str
+        ``float64``, ``string``, or the full name of a type: ``std_msgs/Header``.
+    count : int, optional
+        Elements of an array; -1 where each message tells; None for a single value.
+    """
+
+    name: str
+    type: str
+    count: int | None = None
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A message type with all its parts.
+
+    Parameters
+    ----------
+    root : str
+    types : mapping of name to tuple of Field
+    """
+
+    root: str
+    types: Mapping[str, tuple[Field, ...]]
+
+
+def plain_name(name: str) -> str:
+    """Name of a type without the ``/msg/`` of ROS 2.
+
+    Examples
+    --------
+    >>> plain_name("sensor_msgs/msg/Imu")
+    'sensor_msgs/Imu'
+    """
+    return name.replace("/msg/", "/")
+
+
+def parse(root: str, text: str) -> Definition:
+    """The definition in a text.
+
+    Raises
+    ------
+    DefinitionError
+        When a line is no field, or a part is missing.
+
+    Examples
+    --------
+    >>> text = "Header header\\nfloat64[3] x # m\\nuint8 UP=1\\n===\\nMSG: std_msgs/Header\\nstring frame_id"
+    >>> found = parse("a/B", text)
+    >>> [(field.name, field.type, field.count) for field in found.types["a/B"]]
+    [('header', 'std_msgs/Header', None), ('x', 'float64', 3)]
+    """
+    first, *others = _SEPARATOR.split(text)
+    texts = {plain_name(root): first}
+    for other in others:
+        named = _PART.match(other.lstrip())
+        if named is None:
+            raise DefinitionError("a part without a name")
+        texts.setdefault(plain_name(named.group(1)), other.lstrip()[named.end() :])
+    types: dict[str, tuple[Field, ...]] = {}
+    wanted = [plain_name(root)]
+    while wanted:
+        name = wanted.pop()
+        if name in types or name in PRIMITIVES or name in TIMES or name in (TEXT, WIDE_TEXT):
+            continue
+        content = texts.get(name, KNOWN_TYPES.get(name))
+        if content is None:
+            raise DefinitionError(f"no definition of {name}")
+        types[name] = _fields(content, name, texts)
+        wanted += [field.type for field in types[name]]
+        if sum(len(fields) for fields in types.values()) > MOST_FIELDS:
+            raise DefinitionError(f"more than {MOST_FIELDS} fields")
+    _refuse_circles(types)
+    return Definition(plain_name(root), types)
+
+
+@cache
+def known(type_name: str) -> Definition | None:
+    """Definition of a common type of ROS 2, for bags that carry none."""
+    text = KNOWN_TYPES.get(type_name)
+    return None if text is None else parse(type_name, text)
+
+
+def _fields(text: str, owner: str, texts: Mapping[str, str]) -> tuple[Field, ...]:
+    fields = []
+    for line in text.splitlines():
+        content = line.partition("#")[0].strip()
+        if not content or _CONSTANT.match(content):
+            continue
+        match = _FIELD.match(content)
+        if match is None:
+            raise DefinitionError(f"line {content[:60]!r}")
+        count = None
+        if match["array"]:
+            count = int(match["count"]) if match["count"] and not match["bound"] else -1
+        fields.append(Field(match["name"], _full_name(match["type"], owner, texts), count))
+    return tuple(fields)
+
+
+def _full_name(name: str, owner: str, texts: Mapping[str, str]) -> str:
+    name = plain_name(name)
+    if name in PRIMITIVES or name in TIMES or name in (TEXT, WIDE_TEXT) or "/" in name:
+        return name
+    if name == "Header":
+        return "std_msgs/Header"
+    sibling = f"{owner.rpartition('/')[0]}/{name}"
+    if sibling in texts or sibling in KNOWN_TYPES:
+        return sibling
+    return next((known for known in texts if known.rpartition("/")[2] == name), sibling)
+
+
+def _refuse_circles(types: Mapping[str, tuple[Field, ...]]) -> None:
+    """A type that holds itself has no end."""
+    left = {name: {field.type for field in fields} & types.keys() for name, fields in types.items()}
+    while ready := [name for name, parts in left.items() if not parts & left.keys()]:
+        for name in ready:
+            del left[name]
+    if left:
+        raise DefinitionError(f"{next(iter(left))} holds itself")

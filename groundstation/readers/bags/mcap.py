@@ -1,0 +1,66 @@
+"""MCAP of other programs, read by the store's own byte-level code."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from groundstation.base.records import Damage
+from groundstation.readers.bags.definitions import plain_name
+from groundstation.readers.bags.messages import Block, Connection, Part
+from groundstation.readers.skipped import bytes_place
+from groundstation.readers.source import Source
+
+if TYPE_CHECKING:
+    from groundstation.store.foreign import ForeignLost, ForeignMessages
+
+MAGIC = b"\x89MCAP0\r\n"
+_HEAD_BYTES = 31  # of a message record, before its payload
+
+
+class Mcap:
+    """Iterates over the messages of an MCAP.
+
+    Parameters
+    ----------
+    source : Source
+    """
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self._connections: dict[tuple[str, str, str, bytes], Connection] = {}
+
+    def __iter__(self) -> Iterator[Part]:
+        from groundstation.store.foreign import ForeignLost, ForeignMcap, ForeignMessages
+
+        with self._source.open() as stream:
+            for found in ForeignMcap(stream, self._source.size):
+                if isinstance(found, ForeignMessages):
+                    messages = found.messages
+                    yield Block(
+                        self._connection(found),
+                        messages.buffer,
+                        messages.starts + _HEAD_BYTES,
+                        messages.sizes - _HEAD_BYTES,
+                        messages.head("log_time"),
+                        messages.head("publish_time"),
+                        found.places,
+                    )
+                elif isinstance(found, ForeignLost):
+                    yield _damage(found)
+                else:
+                    what = "messages of a channel that no record of the file defines"
+                    yield Damage("dropped_channel", "the whole log", found.messages, what)
+
+    def _connection(self, found: "ForeignMessages") -> Connection:
+        channel, schema = found.channel, found.schema
+        kind, form, text = ("", "", b"") if schema is None else (plain_name(schema.name), schema.encoding, schema.data)
+        key = channel.topic, channel.message_encoding, kind, text
+        if key not in self._connections:
+            encoding = channel.message_encoding
+            self._connections[key] = Connection(len(self._connections), channel.topic, kind, encoding, form, text)
+        return self._connections[key]
+
+
+def _damage(lost: "ForeignLost") -> Damage:
+    place = bytes_place(lost.start, lost.end) if lost.end > lost.start else f"byte {lost.start}"
+    kind = "truncated" if lost.is_cut else "corrupt"
+    return Damage(kind, place, lost.count, lost.what, between_records=(lost.before - 1, lost.before))

@@ -1,0 +1,117 @@
+"""What a bag holds, whatever its container: connections, and blocks of messages that are not decoded yet."""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.records import Damage, Int64Array
+
+ByteArray = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A topic as one writer wrote it.
+
+    Parameters
+    ----------
+    number : int
+        Place among those of the log, from 0.
+    topic : str
+        As in the log: ``/ins/imu``.
+    type : str
+        Name of the message type: ``sensor_msgs/Imu`` (ROS without ``/msg/``), ``foxglove.LocationFix``.
+    encoding : str
+        Of the messages: ``cdr``, ``ros1``, ``protobuf``, ``json`` or what the log says.
+    schema_encoding : str
+        Of the definition: ``ros2msg``, ``ros1msg``, ``protobuf``, ``jsonschema`` or what the log says.
+    schema : bytes
+        The definition; empty where the log has none.
+    """
+
+    number: int
+    topic: str
+    type: str
+    encoding: str
+    schema_encoding: str
+    schema: bytes
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Messages of one connection, in the order of the log.
+
+    Parameters
+    ----------
+    connection : Connection
+    buffer : ndarray of uint8
+    starts, sizes : ndarray of int64, shape (n,)
+        Where each payload begins in the buffer, and its bytes.
+    log_time_ns, publish_time_ns : ndarray of int64, shape (n,)
+    record_index : ndarray of int64, shape (n,)
+        Place of each message among those of the log.
+    """
+
+    connection: Connection
+    buffer: ByteArray
+    starts: Int64Array
+    sizes: Int64Array
+    log_time_ns: Int64Array
+    publish_time_ns: Int64Array
+    record_index: Int64Array
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    def take(self, rows: NDArray[np.int64] | slice) -> "Block":
+        """The messages that ``rows`` selects; the buffer is shared."""
+        return Block(
+            self.connection,
+            self.buffer,
+            self.starts[rows],
+            self.sizes[rows],
+            self.log_time_ns[rows],
+            self.publish_time_ns[rows],
+            self.record_index[rows],
+        )
+
+    def payload(self, row: int) -> bytes:
+        """Bytes of one message."""
+        start = int(self.starts[row])
+        return self.buffer[start : start + int(self.sizes[row])].tobytes()
+
+
+Part: TypeAlias = Block | Damage
+
+
+def joined(gathered: dict[int, list[Block]]) -> list[Block]:
+    """One block for each connection, in the order of their numbers; all share one buffer.
+
+    Parameters
+    ----------
+    gathered : dict of connection number to list of Block
+        Those of several connections may share a buffer: they came from one chunk.
+    """
+    blocks = [block for several in gathered.values() for block in several]
+    buffers = {id(block.buffer): block.buffer for block in blocks}
+    ends = np.cumsum([0, *(len(buffer) for buffer in buffers.values())]).tolist()
+    places = dict(zip(buffers, ends[:-1], strict=True))
+    buffer = (
+        next(iter(buffers.values()))
+        if len(buffers) == 1
+        else np.concatenate([np.zeros(0, np.uint8), *buffers.values()])
+    )
+    return [
+        Block(
+            several[0].connection,
+            buffer,
+            np.concatenate([block.starts + places[id(block.buffer)] for block in several]),
+            np.concatenate([block.sizes for block in several]),
+            np.concatenate([block.log_time_ns for block in several]),
+            np.concatenate([block.publish_time_ns for block in several]),
+            np.concatenate([block.record_index for block in several]),
+        )
+        for _number, several in sorted(gathered.items())
+    ]

@@ -1,0 +1,159 @@
+"""The second pass over a bag: batches of every topic, raw and canonical, then remarks and damages."""
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from groundstation.base.records import Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
+from groundstation.base.signals import RAW_PREFIX
+from groundstation.base.units import NS_PER_S
+from groundstation.readers.bags.bag import Bag, kind_of
+from groundstation.readers.bags.decode import Decoded, Decoder
+from groundstation.readers.bags.messages import Block, Connection, joined
+from groundstation.readers.bags.profile import MessageProfile
+from groundstation.readers.bags.survey import LARGEST_LAG_S, Survey, survey
+from groundstation.readers.parts import Part, bounded, merged, occupied
+from groundstation.readers.source import Source
+
+GATHERED_BYTES = 8 << 20  # of messages that are decoded together
+MESSAGE_BYTES = 64  # that a message takes beside its own
+LATEST_NS = 1 << 62
+MAX_NAME_CHARACTERS = 200
+PUBLISHED = "publish_time_ns"
+_ODD = re.compile(r"[^A-Za-z0-9_\-/]")
+
+
+def items(source: Source, reader_name: str, profile: MessageProfile | None = None) -> Iterator[Item]:
+    """Items of a bag; ``profile`` says what messages of its own mean."""
+    bag = Bag(source)
+    found = survey(bag, profile)
+    names = _raw_names(found)
+    yield LogHeader(
+        f"{reader_name} {kind_of(source)}",
+        {f"type.{names[number]}": _type_text(seen.connection) for number, seen in sorted(found.seen.items())},
+        utc_of_zero_ns=0,
+        has_counting_clock=not found.steps_back,
+    )
+    topics = _Topics(found, names)
+    gathered: dict[int, list[Block]] = {}
+    size, newest = 0, -1
+    for part in bag:
+        if isinstance(part, Damage):
+            yield part
+            continue
+        if size > GATHERED_BYTES and part.record_index[0] > newest:  # a topic of several sources stays in order
+            yield from topics.batches(gathered)
+            gathered, size = {}, 0
+        gathered.setdefault(part.connection.number, []).append(part)
+        size += int(part.sizes.sum()) + MESSAGE_BYTES * len(part)
+        newest = max(newest, int(part.record_index[-1]))
+    yield from topics.batches(gathered)
+    yield from found.remarks
+    yield from topics.remarks()
+    yield from topics.damages()
+
+
+def _type_text(connection: Connection) -> str:
+    return f"{connection.type or 'unknown type'} ({connection.encoding or 'unknown encoding'})"
+
+
+def _raw_names(found: Survey) -> dict[int, str]:
+    """Raw topic of each connection; a name that clashes gets a number."""
+    names: dict[int, str] = {}
+    for number, seen in sorted(found.seen.items()):
+        plain = _ODD.sub("_", seen.connection.topic.strip("/")[:MAX_NAME_CHARACTERS]) or "_"
+        name = base = RAW_PREFIX + plain
+        copy = 1
+        while name in names.values():
+            copy += 1
+            name = f"{base}_{copy}"
+        names[number] = name
+    return names
+
+
+def _one_row_each(batch: RecordBatch) -> RecordBatch:
+    """Records of one header stamp as one row: what a unit says of one instant. Not where two have the same field."""
+    stamps = batch.validity_time_ns
+    if stamps is None:
+        return batch
+    _stamps, first, place = np.unique(stamps, return_index=True, return_inverse=True)
+    masks = {name: column.mask for name, column in batch.columns.items()}
+    if any(np.bincount(place[mask], minlength=1).max() > 1 for mask in masks.values()):
+        return batch
+    columns = {}
+    for name, column in batch.columns.items():
+        values, present = np.zeros(len(first), dtype=column.values.dtype), np.zeros(len(first), dtype=bool)
+        values[place[masks[name]]], present[place[masks[name]]] = column.values[masks[name]], True
+        columns[name] = Column(values, None if present.all() else present)
+    index, time = batch.record_index[first], batch.device_time_ns.take(first)
+    return RecordBatch(batch.topic, index, time, columns, validity_time_ns=stamps[first]).take(np.argsort(index))
+
+
+class _Topics:
+    """Decodes blocks and lays them on topics."""
+
+    def __init__(self, found: Survey, names: dict[int, str]) -> None:
+        self._found, self._names = found, names
+        self._decoders: dict[int, Decoder] = {}
+        self._far_stamps: dict[str, int] = {}
+
+    def batches(self, gathered: dict[int, list[Block]]) -> Iterator[RecordBatch]:
+        """Batches of blocks that stand together in the log."""
+        canonical: dict[str, list[Part]] = {}
+        for block in joined(gathered):
+            number = block.connection.number
+            decoder = self._decoders.setdefault(number, Decoder(block.connection))
+            raw: list[Part] = []
+            for decoded in decoder.decode(block):
+                part = self._part(block, decoded)
+                raw.append(part)
+                for feed in self._found.feeds.get(number, ()):
+                    of_topic = occupied(Part(part.index, part.time, feed.of(decoded.columns), part.validity_ns))
+                    if of_topic is not None:
+                        canonical.setdefault(feed.topic, []).append(of_topic)
+            yield from bounded(merged(self._names[number], raw))
+        for topic, parts in sorted(canonical.items()):
+            yield from bounded(_one_row_each(merged(topic, parts)) if len(parts) > 1 else merged(topic, parts))
+
+    def _part(self, block: Block, decoded: Decoded) -> Part:
+        """Raw columns of decoded messages, with their three times."""
+        log_ns, publish_ns = block.log_time_ns[decoded.rows], block.publish_time_ns[decoded.rows]
+        is_time = (log_ns >= 0) & (log_ns < LATEST_NS)
+        columns = dict(decoded.columns)
+        if (publish_ns != log_ns).any():
+            columns[PUBLISHED] = Column(publish_ns)
+        time = Column(log_ns, None if is_time.all() else is_time)
+        return Part(block.record_index[decoded.rows], time, columns, self._validity(block.connection, decoded, log_ns))
+
+    def _validity(self, connection: Connection, decoded: Decoded, log_ns: Int64Array) -> Int64Array | None:
+        """Header stamps where they are believed, log time where one is far from it."""
+        is_stamped = connection.number in self._found.stamped
+        stamp_ns = self._found.seen[connection.number].stamp_of(decoded.columns) if is_stamped else None
+        if stamp_ns is None:
+            return None
+        is_far = np.abs(log_ns - stamp_ns) > LARGEST_LAG_S * NS_PER_S
+        if is_far.any():
+            name = self._names[connection.number]
+            self._far_stamps[name] = self._far_stamps.get(name, 0) + int(is_far.sum())
+        return np.where(is_far, log_ns, stamp_ns)
+
+    def remarks(self) -> Iterator[Remark]:
+        """What was not kept as columns, and stamps that were not believed."""
+        for number, decoder in sorted(self._decoders.items()):
+            if decoder.shortened:
+                names = ", ".join(list(decoder.shortened)[:5])
+                text = f"arrays too long for columns: of {names} the number of elements is kept"
+                yield Remark("shortened", text, self._names[number])
+        for topic, count in self._far_stamps.items():
+            text = f"{count} header stamps more than {LARGEST_LAG_S:g} s from the log time: log time is used for them"
+            yield Remark("clock_used", text, topic)
+
+    def damages(self) -> Iterator[Damage]:
+        """Messages that could not be read; their time and length are kept."""
+        for number, decoder in sorted(self._decoders.items()):
+            if decoder.unreadable:
+                why = f"of {decoder.reason}" if decoder.reason else "that their definition does not describe"
+                what = f"messages {why}: time and length are kept"
+                kind = "dropped_channel" if decoder.reason else "corrupt"
+                yield Damage(kind, "the whole log", decoder.unreadable, what, self._names[number])
