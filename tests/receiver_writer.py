@@ -73,12 +73,15 @@ def novatel_frame(
 
 
 def novatel(name: str, week_ms: int, status: int = 180, *, is_short: bool = False, **members: int | float) -> bytes:
-    """A message of week 2417 by the members of its structure."""
+    """A message of week 2417 by the members of its structure; ``week_ms`` above a week is UTC in nanoseconds."""
     record = np.zeros(1, layout(NOVATEL_LAYOUTS[name]).head.dtype)
     for member, value in members.items():
         record[member] = value
     number = next(number for number, known in NAMES.items() if known == name)
-    return novatel_frame(number, record.tobytes(), 2417, week_ms, status, is_short=is_short)
+    week = 2417
+    if week_ms > 604_800_000:
+        week, week_ms = divmod((week_ms - GPS_EPOCH_NS + LEAP_S * NS_PER_S) // 1_000_000, 604_800_000)
+    return novatel_frame(number, record.tobytes(), week, week_ms, status, is_short=is_short)
 
 
 def week_ms(utc: str) -> int:

@@ -1,4 +1,5 @@
-"""One simulated flight as flat CSV, PX4 ULog, ArduPilot DataFlash and Chapter 10 gives equal tables and answers.
+"""One simulated flight as flat CSV, PX4 ULog, ArduPilot DataFlash, Chapter 10, UBX, NMEA, NovAtel, .pos and SBET gives
+equal tables, and equal answers where the format has what they need.
 
 Each signal agrees within the step that the format stores it in (``RESOLUTION``); the heading error within what those
 steps can move it.
@@ -12,11 +13,12 @@ import numpy as np
 import pytest
 
 from groundstation.base.angles import wrap_180
-from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.base.timescales import iso_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.log import open_log
+from groundstation.readers.sbet import RECORD
 from groundstation.results.heading import HeadingResult
 from groundstation.simulation.chapter10_buses import WORD_TIME_NS
 from groundstation.simulation.chapter10_writer import write_chapter10
@@ -25,6 +27,8 @@ from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
 from groundstation.tables.table import Flight
 from tests.dataflash_writer import DataFlash
+from tests.receiver_writer import nmea, novatel, pvt, rmc, ubx
+from tests.trajectory_writer import pos_rows
 from tests.ulog_writer import ATTITUDE, GPS, GPS_CODE, UlogWriter
 
 BOOT_US = 5_000_000  # both autopilots have run for five seconds when the log begins
@@ -64,6 +68,43 @@ RESOLUTION: Mapping[str, Mapping[str, float]] = {
         "gnss.longitude_deg": 0.51e-7,
         "gnss.altitude_msl_m": 0.0051,
     },
+    "ubx": {
+        "ins.true_heading_deg": 0.51e-5,
+        "ins.roll_deg": 0.51e-5,
+        "gnss.velocity_north_mps": 0.51e-3,
+        "gnss.velocity_east_mps": 0.51e-3,
+        "gnss.latitude_deg": 0.51e-7,
+        "gnss.longitude_deg": 0.51e-7,
+        "gnss.altitude_ellipsoid_m": 0.51e-3,
+    },
+    "nmea": {
+        "ins.true_heading_deg": 0.51e-4,
+        "ins.pitch_deg": 0.51e-4,
+        "gnss.velocity_north_mps": 1e-4,
+        "gnss.velocity_east_mps": 1e-4,
+        "gnss.latitude_deg": 0.51e-9,
+        "gnss.longitude_deg": 0.51e-9,
+        "gnss.altitude_ellipsoid_m": 0.51e-3,
+    },
+    "novatel": {
+        "ins.true_heading_deg": 1e-9,
+        "ins.velocity_north_mps": 1e-9,
+        "gnss.velocity_east_mps": 1e-9,
+        "gnss.latitude_deg": 1e-12,
+        "gnss.altitude_ellipsoid_m": 1e-9,
+    },
+    "pos": {
+        "gnss.velocity_north_mps": 0.51e-5,
+        "gnss.latitude_deg": 0.51e-9,
+        "gnss.longitude_deg": 0.51e-9,
+        "gnss.altitude_ellipsoid_m": 0.51e-4,
+    },
+    "sbet": {
+        "ins.true_heading_deg": 1e-9,
+        "ins.pitch_deg": 1e-9,
+        "ins.velocity_north_mps": 1e-9,
+        "ins.velocity_east_mps": 1e-9,
+    },
     "chapter10": {  # ins by 1553, all else by ARINC 429
         **dict.fromkeys(("ins.true_heading_deg", "ins.roll_deg", "ins.pitch_deg"), HALF * 180 / 2**15),
         **dict.fromkeys(("ins.velocity_north_mps", "ins.velocity_east_mps"), HALF * 0.3048 / 2**18),
@@ -84,6 +125,7 @@ RESOLUTION: Mapping[str, Mapping[str, float]] = {
 }
 # GPS time is told to 1 ms; the words of a sample follow each other on their bus, up to seven of them.
 LATE_NS = {"ulog": 1_000_000, "dataflash": 1_000_000, "chapter10": 7 * WORD_TIME_NS, "arinc429": 7 * WORD_TIME_NS}
+LATE_NS |= dict.fromkeys(("ubx", "nmea", "novatel", "pos", "sbet"), 1_000_000)
 # Heading steps of 0.01 deg, and speed steps of 0.06 m/s, average out over a thousand samples.
 ANSWER_DEG = {"ulog": 1e-3, "dataflash": 3e-3, "chapter10": 1e-3, "arinc429": 1e-3}
 
@@ -172,6 +214,100 @@ def as_dataflash(path: Path) -> None:
     path.write_bytes(log.content)
 
 
+PLACE = ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m")
+MOTION = ("velocity_north_mps", "velocity_east_mps")
+ATTITUDE_FIELDS = ("roll_deg", "pitch_deg", "true_heading_deg")
+
+
+def timed(topic: str, *names: str) -> list[tuple[int, tuple[float, ...]]]:
+    """Rows of a topic: UTC nanoseconds and values."""
+    time_us, *values = columns(topic, *names)
+    utc_ns = start_utc_ns() + (time_us - BOOT_US) * 1000
+    return [(int(at), tuple(row)) for at, *row in zip(utc_ns.tolist(), *(one.tolist() for one in values), strict=True)]
+
+
+def week_ms(utc_ns: int) -> int:
+    return (utc_ns - GPS_EPOCH_NS + GPS_UTC_LEAP_NS + 500_000) // 1_000_000 % 604_800_000
+
+
+def hhmmss(utc_ns: int) -> str:
+    return utc_ns_to_iso(utc_ns)[11:23].replace(":", "")
+
+
+def in_order(path: Path, rows: list[tuple[int, bytes]]) -> None:
+    path.write_bytes(b"".join(content for _utc_ns, content in sorted(rows, key=lambda row: row[0])))
+
+
+def as_ubx(path: Path) -> None:
+    rows = []
+    for at, (lat, lon, height, north, east) in timed("gnss", *PLACE, *MOTION):
+        place = {"lat": round(lat * 1e7), "lon": round(lon * 1e7), "height": round(height * 1e3)}
+        motion = {"velN": round(north * 1e3), "velE": round(east * 1e3)}
+        second = utc_ns_to_iso(at // NS_PER_S * NS_PER_S, 0)
+        rows.append((at, pvt(second, at % NS_PER_S, week_ms(at), **place, **motion)))
+    for at, angles in timed("ins", *ATTITUDE_FIELDS):
+        roll, pitch, heading = (round(angle * 1e5) for angle in angles)
+        known = {"accRoll": 1, "accPitch": 1, "accHeading": 1}
+        rows.append((at, ubx("NAV-ATT", iTOW=week_ms(at), roll=roll, pitch=pitch, heading=heading, **known)))
+    in_order(path, rows)
+
+
+def minutes(degrees: float, letters: str) -> str:
+    size = abs(degrees)
+    return f"{int(size):03d}{size % 1 * 60:012.9f},{letters[degrees < 0]}"
+
+
+def as_nmea(path: Path) -> None:
+    rows = []
+    for at, (lat, lon, height, north, east) in timed("gnss", *PLACE, *MOTION):
+        track = float(np.rad2deg(np.arctan2(east, north)) % 360.0)
+        date = utc_ns_to_iso(at)
+        gga = f"GNGGA,{hhmmss(at)},{minutes(lat, 'NS')},{minutes(lon, 'EW')},1,12,0.80,{height:.3f},M,0.0,M,,"
+        moved = rmc(hhmmss(at), date[8:10] + date[5:7] + date[2:4], float(np.hypot(north, east)), track)
+        rows.append((at, nmea(gga) + moved))
+    for at, (roll, pitch, heading) in timed("ins", *ATTITUDE_FIELDS):
+        text = f"PASHR,{hhmmss(at)},{heading:.4f},T,{roll:.4f},{pitch:.4f},0.00,0.1,0.1,0.1,2,1"
+        rows.append((at, nmea(text)))
+    in_order(path, rows)
+
+
+def as_novatel(path: Path) -> None:
+    rows = []
+    for at, (lat, lon, height, north, east) in timed("gnss", *PLACE, *MOTION):
+        track = float(np.rad2deg(np.arctan2(east, north)) % 360.0)
+        place = {"latitude": lat, "longitude": lon, "orthometric_height": height, "position_type": 50}
+        moved = {"horizontal_speed": float(np.hypot(north, east)), "ground_track": track}
+        both = novatel("BESTPOS", at, **place) + novatel("BESTVEL", at, **moved)
+        rows.append((at, both))
+    for at, (roll, pitch, heading, north, east) in timed("ins", *ATTITUDE_FIELDS, *MOTION):
+        since_s = ((at - GPS_EPOCH_NS + GPS_UTC_LEAP_NS) % (604_800 * NS_PER_S)) / 1e9
+        angles = {"roll": roll, "pitch": pitch, "azimuth": heading, "north_vel": north, "east_vel": east}
+        week = (at - GPS_EPOCH_NS + GPS_UTC_LEAP_NS) // (604_800 * NS_PER_S)
+        rows.append((at, novatel("INSPVA", at, week=week, seconds=since_s, ins_solution_status=3, **angles)))
+    in_order(path, rows)
+
+
+def as_pos(path: Path) -> None:
+    rows = []
+    for at, (lat, lon, height, north, east) in timed("gnss", *PLACE, *MOTION):
+        time = utc_ns_to_iso(at + GPS_UTC_LEAP_NS).replace("-", "/").replace("T", " ").rstrip("Z")
+        place = f"{lat:.9f} {lon:.9f} {height:.4f} 1 12 .1 .1 .1 .0 .0 .0 0.0 9.9"
+        rows.append(f"{time}  {place} {north:.5f} {east:.5f} 0.0 .1 .1 .1 .0 .0 .0")
+    path.write_bytes(pos_rows(rows))
+
+
+def as_sbet(path: Path) -> None:
+    known = timed("ins", *ATTITUDE_FIELDS, *MOTION)
+    records = np.zeros(len(known), RECORD)
+    utc_ns = np.array([at for at, _values in known])
+    records["time"] = ((utc_ns - GPS_EPOCH_NS + GPS_UTC_LEAP_NS) % (604_800 * NS_PER_S)) / 1e9
+    names = ("roll", "pitch", "platform_heading", "x_velocity", "y_velocity")
+    for name, values in zip(names, np.array([values for _at, values in known]).T, strict=True):
+        records[name] = values if "velocity" in name else np.deg2rad(values)
+    records["latitude"], records["longitude"] = np.deg2rad(55.0), np.deg2rad(37.0)
+    path.write_bytes(records.tobytes())
+
+
 def as_chapter10(path: Path) -> None:
     write_chapter10(path, simulated().flight)
 
@@ -183,6 +319,8 @@ WRITERS = {
     "chapter10": (as_chapter10, "x.ch10"),
     "arinc429": (as_chapter10, "y.ch10"),
 }
+WRITERS |= {"ubx": (as_ubx, "x.ubx"), "nmea": (as_nmea, "x.nmea"), "novatel": (as_novatel, "x.gps")}
+WRITERS |= {"pos": (as_pos, "x.pos"), "sbet": (as_sbet, "sbet_{day}.out")}
 ICDS = {"chapter10": ("x.icd.yaml",), "arinc429": ("arinc429_inertial", "arinc429_gnss")}
 
 
@@ -190,7 +328,9 @@ ICDS = {"chapter10": ("x.icd.yaml",), "arinc429": ("arinc429_inertial", "arinc42
 def flights(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Flight]:
     folder = tmp_path_factory.mktemp("formats")
     found = {}
-    for name, (write, file_name) in WRITERS.items():
+    day = utc_ns_to_iso(start_utc_ns())[:10].replace("-", "")
+    for name, (write, pattern) in WRITERS.items():
+        file_name = pattern.format(day=day)
         write(folder / file_name)
         mcap = folder / f"{name}.mcap"
         icds = tuple(str(folder / icd) if icd.endswith(".yaml") else icd for icd in ICDS.get(name, ()))
@@ -237,6 +377,6 @@ def test_the_heading_error_is_the_same(flights: dict[str, Flight], form: str) ->
 
 
 def test_every_format_has_the_same_absolute_time(flights: dict[str, Flight]) -> None:
-    starts = {form: flight["gnss"].time_ns[0] for form, flight in flights.items()}
+    starts = {form: flight["gnss"].time_ns[0] for form, flight in flights.items() if "gnss" in flight.topics()}
     assert all(flight.has_utc for flight in flights.values())
     assert max(starts.values()) - min(starts.values()) <= max(LATE_NS.values())

@@ -36,7 +36,8 @@ _ACCURACIES = "time north_m east_m down_m north_mps east_mps down_mps roll_arcmi
 ACCURACY = np.dtype([(name, "<f8") for name in _ACCURACIES.split()])
 S_PER_WEEK = 604_800
 _LOOKED_AT, _FEWEST, _FIRST, _ENOUGH = 200, 5, 20, 0.9
-_IN_A_ROW, _SEARCHED = 3, 1 << 16
+_IN_A_ROW, _SEARCHED, _MOST_TRIED, _JUDGED = 3, 256, 500, 4_096
+_NO_PLACE = 1e-12  # radians: bytes that are no latitude are often a number next to zero
 _LONGEST_STEP_S, _FASTEST_MPS = 10.0, 1_000.0
 _DATE = re.compile(r"(?<!\d)(20\d\d)[-_.]?([01]\d)[-_.]?([0-3]\d)(?!\d)")
 _MODE = "gnss_aided"
@@ -109,20 +110,24 @@ class _Walk:
 
     def _of(self, data: bytes, base: int) -> Generator[NDArray[Any], None, int]:
         """Records of the data at hand; returns how many bytes are done with."""
-        at = 0
+        at, origin, records = 0, 1, np.zeros(0, RECORD)
         while len(data) - at >= RECORD.itemsize:
-            records = np.frombuffer(data, RECORD, (len(data) - at) // RECORD.itemsize, at)
-            sound = _is_sound(records)
-            count = len(records) if sound.all() else int(np.argmin(sound))
+            if (at - origin) % RECORD.itemsize or at >= origin + records.nbytes:  # others than those judged already
+                count = min((len(data) - at) // RECORD.itemsize, _JUDGED)
+                origin, records = at, np.frombuffer(data, RECORD, count, at)
+                damaged = np.append(np.flatnonzero(~_is_sound(records)), len(records))
+            first = (at - origin) // RECORD.itemsize
+            count = int(damaged[np.searchsorted(damaged, first)]) - first
             for start in range(0, count, MAX_BATCH_ROWS):
-                yield records[start : min(start + MAX_BATCH_ROWS, count)]
+                yield records[first + start : first + min(start + MAX_BATCH_ROWS, count)]
             self._count += count
             at += count * RECORD.itemsize
-            if len(data) - at < RECORD.itemsize:
-                break
+            if len(data) - at < RECORD.itemsize or first + count == len(records):
+                continue
             found = _next_start(data, at + 1)
             if found is None:  # what is left may begin a record that the next block ends
-                found = max(at + 1, len(data) - (_IN_A_ROW + 1) * RECORD.itemsize)
+                tail = len(data) - (_IN_A_ROW + 1) * RECORD.itemsize
+                found = tail if at < tail else len(data)
             self._skipped.add(base + at, base + found, self._count)
             self._skipped_to = base + found
             at = found
@@ -139,15 +144,16 @@ def _next_start(data: bytes, at: int) -> int | None:
     """The next byte at which several sound records in a row begin, one step of time apart from each other."""
     span = _IN_A_ROW * RECORD.itemsize
     aligned = at - 1 + RECORD.itemsize  # most often one record alone is damaged
+    width = _SEARCHED
     while at + span <= len(data):
-        width = min(_SEARCHED, len(data) - at - span + 1)
-        every = np.ndarray((width,), "<f8", data, at, (1,))
-        following = np.ndarray((width,), "<f8", data, at + RECORD.itemsize, (1,))
+        width = min(4 * width, len(data) - at - span + 1)
+        time, latitude, longitude = (np.ndarray((width,), "<f8", data, at + 8 * k, (1,)) for k in range(3))
         with np.errstate(invalid="ignore", over="ignore"):
-            steps = following - every
-            plausible = (every >= 0.0) & (every < 2 * S_PER_WEEK) & (steps > 0.0) & (steps < _LONGEST_STEP_S)
+            steps = np.ndarray((width,), "<f8", data, at + RECORD.itemsize, (1,)) - time
+            plausible = (time >= 0.0) & (time < 2 * S_PER_WEEK) & (steps > 0.0) & (steps < _LONGEST_STEP_S)
+            plausible &= (np.abs(latitude) <= np.pi / 2) & (np.abs(longitude) <= np.pi) & (np.abs(latitude) > _NO_PLACE)
         candidates = at + np.flatnonzero(plausible)
-        for place in sorted(candidates.tolist(), key=lambda place: (place != aligned, place)):
+        for place in sorted(candidates[:_MOST_TRIED].tolist(), key=lambda place: (place != aligned, place)):
             if _follow(np.frombuffer(data, RECORD, _IN_A_ROW, place)).all():
                 return int(place)
         at += width

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from groundstation.base.records import Int64Array, Remark
+from groundstation.base.records import Damage, Int64Array, Remark
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.receiver import nmea, novatel, novatel_messages, scan, ubx
 from groundstation.readers.receiver.messages import Block, Messages
-from groundstation.readers.receiver.sentences import FORMATTERS, sentences_of
+from groundstation.readers.receiver.sentences import FORMATTERS, Sentences, by_address
 from groundstation.readers.receiver.stream import Frames, Stream
 from groundstation.readers.receiver.times import DAY_NS, Anchors
 from groundstation.readers.receiver.ubx_canonical import ATTITUDE_SOURCES, POSITION_SOURCES, has_attitude
@@ -19,6 +19,7 @@ from groundstation.readers.source import Source
 
 NAME = "receiver"
 _VERSION = "MON-VER"
+MOST_BLOCKS_KEPT = 1
 
 
 @dataclass
@@ -35,6 +36,10 @@ class Overview:
         UBX message that leads the rows of ``gnss``; empty: sentences give them.
     attitude : str
         Message or formatter that gives ``ins``; empty where none does.
+    blocks : list of Frames and their sentences
+        Those of a stream that is one block: they need not be looked for again. Empty for a longer one.
+    damages : tuple of Damage
+        What belongs to no frame of such a stream.
     """
 
     counts: Counter[str] = field(default_factory=Counter)
@@ -44,13 +49,16 @@ class Overview:
     metadata: dict[str, str] = field(default_factory=dict)
     remarks: list[Remark] = field(default_factory=list)
     rtcm: Counter[int] = field(default_factory=Counter)
+    blocks: list[tuple[Frames, dict[str, Sentences]]] = field(default_factory=list)
+    damages: tuple[Damage, ...] = ()
 
 
 def overview(source: Source, bare: bool) -> Overview:
     """Walk through a stream once."""
     found, full_times, attitudes = Overview(), ubx.FullTimes(), Counter[str]()
     places, utc_ns = [], []
-    for frames in Stream(source, bare):
+    stream = Stream(source, bare)
+    for frames in stream:
         block = Block()
         for messages in ubx.messages_of(frames):
             found.counts[messages.name] += len(messages)
@@ -62,13 +70,19 @@ def overview(source: Source, bare: bool) -> Overview:
         attitudes.update(name for name in ATTITUDE_SOURCES if has_attitude(block, name))
         if _VERSION in block and not found.metadata:
             found.metadata = _versions(block[_VERSION])
-        by_address = {one.address: one for one in sentences_of(frames)}
-        for one in by_address.values():
+        sentences = by_address(frames)
+        for one in sentences.values():
             found.counts[one.address] += len(one)
-        told = nmea.full_times(by_address)
+        found.blocks.append((frames, sentences))
+        del found.blocks[1 + MOST_BLOCKS_KEPT :]
+        told = nmea.full_times(sentences)
         places.append(told[0])
         utc_ns.append(told[1])
         found.rtcm.update(_rtcm_numbers(frames))
+    if len(found.blocks) > MOST_BLOCKS_KEPT:
+        found.blocks.clear()
+    else:
+        found.damages = tuple(stream.damages())
     _choose(found, attitudes)
     _set_times(found, full_times, np.concatenate([*places, _NOTHING]), np.concatenate([*utc_ns, _NOTHING]))
     return found

@@ -10,7 +10,7 @@ from groundstation.readers.receiver import nmea, novatel, scan, ubx, ubx_canonic
 from groundstation.readers.receiver.messages import Block, bounded, raw_batches, text_batches
 from groundstation.readers.receiver.novatel_messages import INS_SOURCES
 from groundstation.readers.receiver.overview import NAME, Overview, overview, remarks
-from groundstation.readers.receiver.sentences import Sentences, sentences_of
+from groundstation.readers.receiver.sentences import Sentences, by_address
 from groundstation.readers.receiver.stream import Frames, Stream
 from groundstation.readers.source import Source
 
@@ -33,17 +33,16 @@ def items(source: Source) -> Iterator[Item]:
         raise UnreadableLogError(source.name, "no message or sentence of a receiver", "", "was it cut or damaged?")
     # Messages of one epoch come late and in any order, with times some microseconds apart: no step of the clock.
     yield LogHeader(NAME, found.metadata, 0 if len(found.anchors) else None, has_counting_clock=True)
-    stream = Stream(source, is_bare, _epoch_start_of(found))
-    told = _Told()
-    for frames in stream:
-        yield from _of_block(frames, found, told)
+    stream, told = Stream(source, is_bare, _epoch_start_of(found)), _Told()
+    for frames, sentences in found.blocks or ((frames, by_address(frames)) for frames in stream):
+        yield from _of_block(frames, sentences, found, told)
     yield from remarks(found)
     if told.gnss == 0:
         yield Remark("no_position", "no position in this file: " + _what_it_has(found))
     if told.bare:
         yield Remark("no_checksum", "sentences without a checksum: a damaged number is not seen")
     yield from told.items()
-    yield from stream.damages()
+    yield from found.damages if found.blocks else stream.damages()
 
 
 class _Told:
@@ -81,10 +80,10 @@ def _what_it_has(found: Overview) -> str:
 def _epoch_start_of(found: Overview) -> Callable[[Frames], int]:
     if found.leader:
         return ubx.epoch_start if found.leader in ubx_canonical.POSITION_SOURCES else novatel.epoch_start
-    return lambda frames: nmea.epoch_start(frames, {one.address: one for one in sentences_of(frames)})
+    return lambda frames: nmea.epoch_start(frames, by_address(frames))
 
 
-def _of_block(frames: Frames, found: Overview, told: _Told) -> Iterator[RecordBatch]:
+def _of_block(frames: Frames, sentences: dict[str, Sentences], found: Overview, told: _Told) -> Iterator[RecordBatch]:
     block = Block()
     for messages, time in ubx.timed(frames, found.anchors):
         batches = text_batches if messages.name.startswith("INF-") else raw_batches
@@ -93,7 +92,6 @@ def _of_block(frames: Frames, found: Overview, told: _Told) -> Iterator[RecordBa
     for timed in novatel.messages_of(frames):
         yield from raw_batches(timed, timed.time())
         block.add(timed)
-    sentences = {one.address: one for one in sentences_of(frames)}
     epochs = nmea.epochs_of(sentences)
     time = nmea.day_times(epochs, found.anchors)
     for address, one in sentences.items():

@@ -24,7 +24,7 @@ COMMA, STAR, POINT, MINUS, PLUS = 44, 42, 46, 45, 43
 CHECKSUM_BYTES = 3
 MOST_DIGITS = 18  # of a number: more do not fit 64 bits
 MOST_BEHIND = 13  # digits behind the point of an angle
-ADDRESS_BYTES = 8
+ADDRESS_BYTES = 7
 
 # Kinds of fields: n number, t time of day, d date, a latitude or longitude (its hemisphere is the next field), c text.
 _GROUP_OF_SATELLITE = " ".join(f"svid_0{k}:n elv_0{k}:n az_0{k}:n cno_0{k}:n" for k in range(1, 5))
@@ -105,6 +105,31 @@ def _numbers(data: Any, starts: Any, counts: Any, field: int, value: Any, behind
     for row in range(len(counts)):
         if field < counts[row]:
             value[row], behind[row], state[row] = _number(data, begins[row], ends[row] - 1)
+
+
+@compiled
+def _times_of_day(value: Any, behind: Any, day_ns: Any, sound: Any) -> None:
+    """Nanoseconds of the day of times written as ``hhmmss`` and digits behind the point."""
+    for row in range(len(value)):
+        unit = 10 ** behind[row]
+        whole, fraction = value[row] // unit, value[row] % unit
+        hour, minute, second = whole // 10_000, whole // 100 % 100, whole % 100
+        sound[row] = value[row] >= 0 and hour < 24 and minute < 60 and second < 61
+        if sound[row]:
+            fraction_ns = (
+                fraction * 10 ** (9 - behind[row]) if behind[row] <= 9 else fraction // 10 ** (behind[row] - 9)
+            )
+            day_ns[row] = ((hour * 60 + minute) * 60 + second) * NS_PER_S + fraction_ns
+
+
+@compiled
+def _addresses(data: Any, offsets: Any, keys: Any) -> None:
+    """Addresses as numbers: their letters are the bytes, the first the highest."""
+    for row in range(len(offsets)):
+        for k in range(offsets[row] + 1, min(offsets[row] + 1 + ADDRESS_BYTES, len(data))):
+            if data[k] == COMMA or data[k] == STAR or data[k] <= 32:
+                break
+            keys[row] = keys[row] * 256 + data[k]
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,15 +266,19 @@ class Sentences:
 def sentences_of(frames: Frames) -> Iterator[Sentences]:
     """Sentences of a block by address."""
     which = frames.of(scan.NMEA, scan.BARE_NMEA)
-    letters = frames.bytes_at(frames.offsets[which] + 1, ADDRESS_BYTES).copy()
-    ended = np.logical_or.accumulate((letters == COMMA) | (letters == STAR) | (letters < 33), axis=1)
-    letters[ended] = 0
-    keys = np.ascontiguousarray(letters).view(f"S{ADDRESS_BYTES}")[:, 0] if len(which) else np.zeros(0, dtype="S8")
-    distinct, number = np.unique(keys, return_inverse=True)
-    for at, address in enumerate(distinct.tolist()):
-        name = address.decode("ascii", errors="replace")
+    keys = np.zeros(len(which), dtype=np.int64)
+    _addresses(frames.data, frames.offsets[which], keys)
+    order = np.argsort(keys, kind="stable")
+    distinct, starts = np.unique(keys[order], return_index=True)
+    for key, rows in zip(distinct.tolist(), np.split(order, starts[1:]), strict=True) if len(which) else ():
+        name = key.to_bytes(ADDRESS_BYTES, "big").lstrip(b"\0").decode("ascii", errors="replace")
         if name.isalnum():
-            yield Sentences(name, frames, which[number == at])
+            yield Sentences(name, frames, which[rows])
+
+
+def by_address(frames: Frames) -> dict[str, Sentences]:
+    """Sentences of a block by their address."""
+    return {one.address: one for one in sentences_of(frames)}
 
 
 def time_of_day_ns(value: Int64Array, behind: Int64Array) -> tuple[Int64Array, BoolArray]:
@@ -260,14 +289,9 @@ def time_of_day_ns(value: Int64Array, behind: Int64Array) -> tuple[Int64Array, B
     >>> [array.tolist() for array in time_of_day_ns(np.array([161503500, 246000]), np.array([3, 0]))]
     [[58503500000000, 0], [True, False]]
     """
-    unit = 10 ** np.minimum(behind, 9)
-    whole, fraction = np.divmod(value, 10**behind)
-    hour, rest = np.divmod(whole, 10_000)
-    minute, second = np.divmod(rest, 100)
-    sound = (value >= 0) & (hour < 24) & (minute < 60) & (second < 61)
-    fraction_ns = fraction // 10 ** np.maximum(behind - 9, 0) * (NS_PER_S // unit)
-    day_ns = ((hour * 60 + minute) * 60 + second) * NS_PER_S + fraction_ns
-    return np.where(sound, day_ns, 0), sound
+    day_ns, sound = np.zeros(len(value), dtype=np.int64), np.zeros(len(value), dtype=bool)
+    _times_of_day(value, behind, day_ns, sound)
+    return day_ns, sound
 
 
 def _degrees(value: Int64Array, behind: Int64Array) -> NDArray[np.float64]:
