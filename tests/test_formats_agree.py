@@ -1,4 +1,4 @@
-"""One simulated flight written as flat CSV, PX4 ULog and ArduPilot DataFlash gives equal tables and equal answers.
+"""One simulated flight in every format gives equal tables and answers: flat CSV, ULog, DataFlash, bag, telemetry.
 
 Each signal agrees within the step that the format stores it in (``RESOLUTION``); the heading error within what those
 steps can move it.
@@ -22,7 +22,9 @@ from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
 from groundstation.tables.table import Flight
+from tests.bag_writer import Messages, enu_quaternion_xyzw, write_ros2
 from tests.dataflash_writer import DataFlash
+from tests.telemetry_writer import Telemetry
 from tests.ulog_writer import ATTITUDE, GPS, GPS_CODE, UlogWriter
 
 BOOT_US = 5_000_000  # both autopilots have run for five seconds when the log begins
@@ -60,8 +62,30 @@ RESOLUTION: Mapping[str, Mapping[str, float]] = {
         "gnss.longitude_deg": 0.51e-7,
         "gnss.altitude_msl_m": 0.0051,
     },
+    "ros2": {
+        **{f"ins.{name}": 1e-9 for name in ("true_heading_deg", "roll_deg", "pitch_deg")},
+        **{f"{topic}.velocity_{axis}_mps": 1e-9 for topic in ("ins", "gnss") for axis in ("north", "east")},
+        **{f"gnss.{name}": 1e-12 for name in ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m")},
+    },
+    "tlog": {
+        "ins.true_heading_deg": 3e-5,
+        "ins.roll_deg": 2e-5,
+        "ins.pitch_deg": 2e-5,
+        "ins.velocity_north_mps": 0.0051,
+        "ins.velocity_east_mps": 0.0051,
+        "gnss.ground_speed_mps": 0.0051,
+        "gnss.latitude_deg": 0.51e-7,
+        "gnss.longitude_deg": 0.51e-7,
+        "gnss.altitude_msl_m": 0.51e-3,
+    },
 }
-ANSWER_DEG = {"ulog": 1e-3, "dataflash": 3e-3}  # heading steps of 0.01 deg average out over a thousand samples
+# tlog: velocities in steps of 1 cm/s and 0.01 deg
+ANSWER_DEG = {
+    "ulog": 1e-3,
+    "dataflash": 3e-3,
+    "ros2": 1e-6,
+    "tlog": 1e-2,
+}  # heading steps of 0.01 deg average out over a thousand samples
 
 
 @cache
@@ -148,7 +172,48 @@ def as_dataflash(path: Path) -> None:
     path.write_bytes(log.content)
 
 
-WRITERS = {"csv": (as_csv, "x.csv"), "ulog": (as_ulog, "x.ulg"), "dataflash": (as_dataflash, "x.BIN")}
+def as_ros2(path: Path) -> None:
+    messages = Messages()
+    start_ns = start_utc_ns() - BOOT_US * 1_000
+    fields = ("roll_deg", "pitch_deg", "true_heading_deg", "velocity_north_mps", "velocity_east_mps")
+    for time_us, *angles, north, east in zip(*columns("ins", *fields), strict=True):
+        stamp_ns, quaternion = start_ns + int(time_us) * 1_000, enu_quaternion_xyzw(*angles)
+        messages.imu("/nav/imu", stamp_ns, quaternion)
+        messages.twist("/nav/velocity", stamp_ns, (east, north, np.nan))
+    fields = ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m", "velocity_north_mps", "velocity_east_mps")
+    for time_us, lat, lon, alt, north, east in zip(*columns("gnss", *fields), strict=True):
+        stamp_ns = start_ns + int(time_us) * 1_000
+        messages.fix("/gps/fix", stamp_ns, (lat, lon, alt))
+        messages.twist("/gps/velocity", stamp_ns, (east, north, np.nan))
+    write_ros2(path, messages)
+
+
+def as_tlog(path: Path) -> None:
+    log, start_us = Telemetry(), start_utc_ns() // 1_000 - BOOT_US
+    rows: list[tuple[int, str, tuple[float, ...]]] = []
+    for time_us, *angles in zip(*columns("ins", "roll_deg", "pitch_deg", "true_heading_deg"), strict=True):
+        rows.append((int(time_us), "attitude", (0, *np.deg2rad(angles), 0.0, 0.0, 0.0)))
+    for time_us, north, east in zip(*columns("ins", "velocity_north_mps", "velocity_east_mps"), strict=True):
+        velocity = (round(north * 100), round(east * 100), 0)
+        rows.append((int(time_us), "global_position_int", (0, 1, 1, 0, 0, *velocity, 0)))
+    fields = ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m", "velocity_north_mps", "velocity_east_mps")
+    for time_us, lat, lon, alt, north, east in zip(*columns("gnss", *fields), strict=True):
+        course = round(float(np.rad2deg(np.arctan2(east, north)) % 360.0) * 100) % 36_000
+        place = (round(lat * 1e7), round(lon * 1e7), round(alt * 1e3))
+        fix = (0, 3, *place, 100, 100, round(float(np.hypot(north, east)) * 100), course, 12)
+        rows.append((int(time_us), "gps_raw_int", fix))
+    for time_us, name, values in sorted(rows, key=lambda row: row[:2]):
+        log.add(name, *values, time_us=start_us + time_us)
+    path.write_bytes(log.data)
+
+
+WRITERS = {
+    "csv": (as_csv, "x.csv"),
+    "ulog": (as_ulog, "x.ulg"),
+    "dataflash": (as_dataflash, "x.BIN"),
+    "ros2": (as_ros2, "bag"),
+    "tlog": (as_tlog, "x.tlog"),
+}
 
 
 @pytest.fixture(scope="module")

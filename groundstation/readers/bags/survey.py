@@ -42,8 +42,11 @@ class Feed:
         """Fields of the canonical topic that messages with these columns give; those that have a value."""
         if not columns.keys() >= set(self.needs):
             return {}
-        with np.errstate(over="ignore", invalid="ignore"):  # of absurd numbers: becomes infinite or NaN
-            found = self.columns(Values(columns))
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):  # of absurd numbers: becomes infinite or NaN
+                found = self.columns(Values(columns))
+        except KeyError:  # a type of a common name whose definition lacks a field: its messages stay raw
+            return {}
         return {
             name: column
             for name, column in found.items()
