@@ -18,7 +18,15 @@ from groundstation.results.forecast import (
     PhaseRow,
     SkillRow,
 )
-from groundstation.results.inertial import AzimuthEstimate, ChannelResult, InertialResult, RealOutage, StateEstimate
+from groundstation.results.inertial import (
+    AzimuthEstimate,
+    ChannelResult,
+    Difference,
+    InertialResult,
+    OwnInnovation,
+    RealOutage,
+    StateEstimate,
+)
 
 SCHULER_S = 5064.0
 LONG_S = 16_000.0  # the paper's flight
@@ -152,6 +160,40 @@ def inertial_result(duration_s: float = LONG_S, **changes: Any) -> InertialResul
         figures=inertial_figures(duration_s),
     )
     return replace(whole, **changes)
+
+
+# Changes that make of inertial_result() the answer for an INS that GNSS corrects.
+AIDED: dict[str, Any] = {
+    "kind": "gnss_aided",
+    "kind_reason": "its own mode says so",
+    "north": None,
+    "east": None,
+    "outages": (),
+    "azimuth": None,
+    "radial_error_rate_50_nmiph": None,
+    "radial_error_rate_95_nmiph": None,
+    "velocity_error_rms_mps": None,
+    "largest_radial_error_m": None,
+    "differences": (
+        Difference("position", "north", "m", 600, 0.2, 1.0, 2.5, 9.0),
+        Difference("position", "horizontal", "m", 600, 1.3, 1.2, 3.0, 10.0),
+        Difference("velocity", "east", "mps", 600, -0.02, 0.1, 0.4, 1.5),
+    ),
+    "own_filter": "EKF3",
+    "own_innovations": (OwnInnovation("velocity", "east", "mps", 3000, -0.01, 0.1, 0.3, 0.2, 0.91, 0.04),),
+}
+
+
+def aided_figures(duration_s: float, rows: int = 200) -> tuple[FigureData, ...]:
+    """Figures of an INS that GNSS corrects: differences, and the innovations of its filter with their sigma."""
+    time, rng = np.linspace(0.0, duration_s, rows), np.random.default_rng(6)
+    columns: dict[str, Any] = {"time_s": time}
+    sigmas: dict[str, Any] = {}
+    for channel in ("north", "east"):
+        for name, suffix, size in (("position", "m", 1.5), ("velocity", "mps", 0.2)):
+            columns[f"{channel}_{name}_{suffix}"] = rng.normal(0.0, size, rows)
+            sigmas[f"{channel}_{name}_sigma_{suffix}"] = np.full(rows, size)
+    return _figure("inertial_differences", **columns), _figure("inertial_own_innovations", **columns, **sigmas)
 
 
 def _map(duration_s: float) -> FigureData:

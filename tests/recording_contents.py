@@ -23,13 +23,25 @@ class Contents:
 
     def scalars(self, entity: str) -> tuple[np.ndarray, np.ndarray]:
         """Flight time in nanoseconds (of a fleet: flight numbers) and values, shapes (n,) and (n, k), in order."""
+        return self._column(entity, "Scalars:scalars")
+
+    def band(self, entity: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Times as of :meth:`scalars`, the line in the middle of a filled band and its half width, shapes (n,)."""
+        time_ns, middle = self._column(entity, "Measurements:values")
+        return time_ns, middle[:, 0], np.sqrt(self._column(entity, "Measurements:variances")[1][:, 0])
+
+    def times(self, entity: str) -> np.ndarray:
+        """Times of the rows of an entity, as of :meth:`scalars`, shape (n,)."""
+        timeline = next(name for name in ("flight_time", "flight_number") if name in self.timelines)
+        return np.concatenate([np.asarray(batch.column(timeline).cast(pa.int64())) for batch in self.batches[entity]])
+
+    def _column(self, entity: str, name: str) -> tuple[np.ndarray, np.ndarray]:
         timeline = next(name for name in ("flight_time", "flight_number") if name in self.timelines)
         times, values = [], []
         for batch in self.batches[entity]:
-            rows = batch.num_rows
             times.append(np.asarray(batch.column(timeline).cast(pa.int64())))
-            flat = batch.column("Scalars:scalars").flatten().to_numpy(zero_copy_only=False)
-            values.append(flat.reshape(rows, -1))
+            flat = batch.column(name).flatten().to_numpy(zero_copy_only=False)
+            values.append(flat.reshape(batch.num_rows, -1))
         order = np.argsort(np.concatenate(times), kind="stable")
         return np.concatenate(times)[order], np.concatenate(values)[order]
 

@@ -11,7 +11,7 @@ def told(cell: Cell) -> str:
 
 def grid(section: Section, title: str) -> Grid:
     """The only table of that title."""
-    (found,) = (part for part in section.parts if isinstance(part, Grid) and part.title == title)
+    (found,) = (part for part in (*section.parts, *section.appendix) if isinstance(part, Grid) and part.title == title)
     return found
 
 
@@ -28,24 +28,24 @@ def row(section: Section, title: str, first: str) -> tuple[str, ...]:
 
 def facts(section: Section, title: str) -> dict[str, tuple[str, str]]:
     """Value and remark by label of the facts of that title."""
-    (found,) = (part for part in section.parts if isinstance(part, Facts) and part.title == title)
+    (found,) = (part for part in (*section.parts, *section.appendix) if isinstance(part, Facts) and part.title == title)
     return {told(label): (told(value), told(remark)) for label, value, remark in found.pairs}
 
 
 def notes(section: Section) -> list[str]:
     """The paragraphs, as shown."""
-    return [told(part.text) for part in section.parts if isinstance(part, Note)]
+    return [told(part.text) for part in (*section.parts, *section.appendix) if isinstance(part, Note)]
 
 
 def tones(section: Section) -> list[str]:
     """The tones of the paragraphs."""
-    return [part.tone for part in section.parts if isinstance(part, Note)]
+    return [part.tone for part in (*section.parts, *section.appendix) if isinstance(part, Note)]
 
 
 def titles(section: Section) -> list[str]:
     """Titles of tables and facts, names of figures, in the order they stand."""
     names = []
-    for part in section.parts:
+    for part in (*section.parts, *section.appendix):
         if isinstance(part, Figure):
             names.append(f"{part.name} {part.of}".strip())
         elif isinstance(part, Grid | Facts):
@@ -56,7 +56,7 @@ def titles(section: Section) -> list[str]:
 def every_text(section: Section) -> list[str]:
     """Every text of a chapter, as shown."""
     texts = [section.headline, section.title, section.lead, *notes(section)]
-    for part in section.parts:
+    for part in (*section.parts, *section.appendix):
         if isinstance(part, Grid):
             cells = [told(cell) for line in part.rows for cell in line]
             texts += [part.title, part.caption, *(head.title for head in part.heads), *cells]

@@ -1,7 +1,9 @@
 """What the chapters of a flight say: front, heading, overview, quality, findings, provenance."""
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -12,6 +14,7 @@ from groundstation.chapters.findings import findings
 from groundstation.chapters.front import front
 from groundstation.chapters.gates import gate_grid, limit_text
 from groundstation.chapters.heading import heading
+from groundstation.chapters.next_steps import next_steps
 from groundstation.chapters.overview import overview
 from groundstation.chapters.parts import Facts, Figure, Grid, Mark, Note, Part, Section
 from groundstation.chapters.provenance import provenance
@@ -21,13 +24,15 @@ from groundstation.reports.figures import DRAWERS, with_drawings
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.heading import Gate, HeadingResult
+from groundstation.results.latency import Latencies, Latency
+from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import example, figure, heading_result
 
 BARE = FlightResults("NOTIME_00000000", Source("a.csv", "00" * 32, 0, "flat-csv"), {}, None, 0.0, "failed")
 
 
 def grid(section: Section, title: str) -> Grid:
-    return next(part for part in section.parts if isinstance(part, Grid) and part.title == title)
+    return next(part for part in (*section.parts, *section.appendix) if isinstance(part, Grid) and part.title == title)
 
 
 def facts(parts: Sequence[Part], title: str) -> dict[str, tuple[str, str]]:
@@ -41,6 +46,12 @@ def notes(parts: Sequence[Part]) -> list[str]:
     return [part.text for part in parts if isinstance(part, Note)]
 
 
+def latency_result(**changes: Any) -> Latencies:
+    """One pair of sensors, observed where not said otherwise."""
+    values: dict[str, Any] = {"state": "observed", "reason": "turns", "latency_s": 0.12, "confidence95_s": (0.1, 0.14)}
+    return Latencies((Latency("ins", "gnss", "velocity", **values | changes),))
+
+
 # ----------------------------------------------------------------------------------------------------- front
 
 
@@ -50,7 +61,9 @@ def test_front_tells_flight_verdict_and_number_to_type() -> None:
     assert told.verdict == Mark("good", "Accept")
     assert told.headline == "Enter −1.05°" and told.to_sign
     assert told.sentences[0] == "Every required gate passed."
-    assert told.sentences[1].startswith("INS heading reads too high by 1.04°")
+    assert told.sentences[1] == "Failed, but does not decide: Excess kurtosis 2.4 (wanted −1.2 … 2)."
+    assert told.sentences[2].startswith("INS heading reads too high by 1.04°")
+    assert (told.subject, told.key) == ("Heading correction", "heading")
     pairs = dict(told.pairs)
     assert pairs["Start"] == "2026-05-04 06:00:00 UTC"
     assert pairs["Status"] == Mark("good", "ok") and pairs["Findings"] == "1 warn · 2 info"
@@ -72,7 +85,7 @@ def test_other_verdicts_give_no_number_to_type(verdict: str, mark: Mark, headlin
     results = example(heading_result(verdict=verdict, verdict_reason="a gate says so", correction_deg=None))
     told = front(results)
     assert (told.verdict, told.headline, told.to_sign) == (mark, headline, False)
-    assert told.sentences[0] == "A gate says so." and told.sentences[1].endswith("an estimate, not to be entered.")
+    assert told.sentences[0] == "A gate says so." and told.sentences[-1] == "INS heading reads too high by 1.04°."
     assert heading(results).headline == f"{mark.symbol} {mark.text} · {headline}"
 
 
@@ -85,19 +98,34 @@ def test_accepted_error_below_half_a_step_needs_nothing_typed() -> None:
     [(1.5, "too high by 1.50°"), (-0.4, "too low by 0.40°"), (0.001, "agrees"), (float("nan"), "not be estimated")],
 )
 def test_words_say_the_sense_of_the_error(error_deg: float, word: str) -> None:
-    assert word in front(example(heading_result(error_deg=error_deg))).sentences[1]
+    assert word in front(example(heading_result(error_deg=error_deg))).sentences[-1]
 
 
 def test_flight_without_heading_says_why_on_the_front() -> None:
     told = front(example(None, not_assessable=(NotAssessable("heading", "no GNSS velocity in the log"),)))
-    assert told.verdict == Mark("unknown", "Not assessable") and not told.to_sign
-    assert told.headline == "Heading correction: not assessable"
-    assert told.sentences == ("No GNSS velocity in the log.",)
+    assert told.verdict == Mark("unknown", "No answer") and not told.to_sign
+    assert told.missing == (("Heading correction", "no GNSS velocity in the log"),)
+
+
+def test_the_best_answer_stands_first_and_the_others_beside_it() -> None:
+    told = front(example(latency_result(), inertial_result(), forecast_result()))
+    assert told.subject == "INS errors" and "0.41" in told.headline
+    assert [tile.title for tile in told.others] == ["Forecast without GNSS", "Latency between sensors"]
+    decided = front(example(inertial_result(), heading_result(verdict="reject")))
+    assert decided.subject == "Heading correction" and decided.others[0].title == "INS errors"
+    open_ = front(example(heading_result(verdict="undecided"), inertial_result()))
+    assert open_.subject == "INS errors" and open_.others[0].claim.mark.text == "Undecided"
+
+
+def test_an_answer_that_came_to_nothing_is_told_among_what_could_not_be_assessed() -> None:
+    told = front(example(latency_result(latency_s=None, state="not_observable")))
+    assert told.verdict == Mark("unknown", "No answer")
+    assert told.missing[0] == ("Latency between sensors", "not observable for gnss: too little motion")
 
 
 def test_a_log_without_taxi_says_what_the_method_needs() -> None:
     reason = "no straight taxi: of 986 epochs above 6 m/s before lift-off: not proven ground 986"
-    (told,) = front(example(None, not_assessable=(NotAssessable("heading", reason),))).sentences
+    ((_, told),) = front(example(None, not_assessable=(NotAssessable("heading", reason),))).missing
     assert "ground contact not proven for 986. The method needs a straight run on the ground" in told
 
 
@@ -106,12 +134,11 @@ def test_log_without_absolute_time_names_no_date() -> None:
     pairs = dict(told.pairs)
     assert told.title == "NOTIME_9f9f9f9f"
     assert pairs["Start"] == "no absolute time"
-    assert pairs["Aircraft"] == pairs["Flight"] == "not named in the log"
 
 
 def test_bare_results_have_a_front_and_chapters() -> None:
     assert dict(front(BARE).pairs)["Status"] == Mark("bad", "failed: nothing could be computed")
-    assert findings(BARE).parts == [Note("No findings.", "good")]
+    assert findings(BARE).parts == [Note("No warnings.", "good")]
     assert overview(BARE) is None
     assert notes(heading(BARE).parts) == ["Not assessable: the log does not hold what the method needs"]
     assert notes(quality(BARE).parts) == ["No damage was found in the log: nothing lost, nothing unreadable."]
@@ -173,11 +200,11 @@ def test_runway_lever_arm_and_standstill_are_told() -> None:
     section = heading(example(heading_result(latency_used_s=0.1, latency_used_sigma_s=0.01, latency_origin="motion")))
     (runway,) = grid(section, "Runway check").rows
     assert runway == ("12", "119.72°", "120.71°", "+0.990°", "0.050°", "−0.048°")
-    arm = facts(section.parts, "Lever arm, time offset, drift")
+    arm = facts(section.appendix, "Lever arm, time offset, drift")
     assert arm["Lever arm, antenna ahead of the main gear"] == ("+4.12 m (σ 0.35 m)", "estimated")
     assert arm["GNSS latency taken out"] == ("+0.100 s (σ 0.010 s)", "from the motion")
     assert arm["Azimuth drift"][0] == "+0.80 °/h (σ 0.70 °/h)"
-    still = facts(section.parts, "GNSS at standstill")
+    still = facts(section.appendix, "GNSS at standstill")
     assert still["Interval"] == ("0:25 – 0:55", "300 samples")
     assert still["Mean velocity, north / east"][0] == "+0.0031 m/s / −0.0035 m/s"
     assert still["Length of the mean vector"] == ("0.0047 m/s", "gated; 0.97 bound 0.0094 m/s")
@@ -187,7 +214,7 @@ def test_runway_lever_arm_and_standstill_are_told() -> None:
 def test_what_is_unknown_is_an_em_dash() -> None:
     answer = heading_result(lever_arm_m=None, time_offset_s=None, drift_deg_per_h=None, error_deg=float("nan"))
     section = heading(example(answer))
-    told = facts(section.parts, "Lever arm, time offset, drift")
+    told = facts(section.appendix, "Lever arm, time offset, drift")
     assert [told[label][0] for label in ("GNSS time offset", "Azimuth drift")] == ["—", "—"]
     assert [told[label][1] for label in ("GNSS time offset", "Azimuth drift")] == ["not observable", "not measured"]
     assert grid(section, "Estimates").rows[0][1] == "—"
@@ -218,18 +245,31 @@ def test_intervals_chosen_by_hand_are_told_where_they_are_known() -> None:
 
 def test_settings_are_for_the_printed_page() -> None:
     (settings,) = [
-        part for part in heading(example(heading_result())).parts if isinstance(part, Facts) and part.compact
+        part for part in heading(example(heading_result())).appendix if isinstance(part, Facts) and part.compact
     ]
-    assert ("taxi speed min", "6\u202fm/s", "") in settings.pairs
+    assert settings.title == "Settings: [heading]" and ("taxi_speed_min_mps", "6", "") in settings.pairs
+    text = "\n".join(f"{name} = {value}" for name, value, _ in settings.pairs)
+    assert tomllib.loads(text) == heading_result().settings
+
+
+def test_a_receiver_that_holds_its_velocity_has_no_flat_lines_at_standstill() -> None:
+    still = heading_result().standstill
+    assert still is not None
+    section = heading(example(heading_result(standstill=replace(still, velocity_is_held=True))))
+    assert not [part for part in section.parts if isinstance(part, Figure) and part.name.startswith("standstill")]
+    assert notes(section.parts) == [
+        "The receiver holds its velocity when standing, so its error at standstill cannot be seen."
+    ]
 
 
 def test_every_figure_of_a_chapter_has_a_drawer() -> None:
     results = example(heading_result())
     chapters = [heading(results), overview(results), quality(results)]
-    named = [part.name for one in chapters if one for part in one.parts if isinstance(part, Figure)]
-    assert set(named) <= set(DRAWERS) and len(named) == len(set(named)) == 12
-    drawn = [part for one in chapters if one for part in with_drawings(one, results).parts if isinstance(part, Drawing)]
-    assert len(drawn) == 11, "the example has no spectrum"
+    whole = [replace(one, parts=(*one.parts, *one.appendix)) for one in chapters if one]
+    named = [part.name for one in whole for part in one.parts if isinstance(part, Figure)]
+    assert set(named) <= set(DRAWERS) and len(named) == len(set(named)) == 13
+    drawn = [part for one in whole for part in with_drawings(one, results).parts if isinstance(part, Drawing)]
+    assert len(drawn) == 12, "the example has no spectrum"
 
 
 # ---------------------------------------------------------------------- quality, findings, provenance, overview
@@ -262,12 +302,13 @@ def test_quality_begins_with_flight_status_and_log_where_there_is_no_front() -> 
 
 
 def test_clock_and_ledger_are_told_by_their_fields() -> None:
-    parts = quality(example(None, clock=Clock(nominal_period_s=0.02, is_absolute=True))).parts
+    flight = example(None, clock=Clock(nominal_period_s=0.02, is_absolute=True), ledger=Ledger(bytes_skipped=7))
+    parts = quality(flight).appendix
     clock = facts(parts, "Clock model")
     assert clock["nominal period"][0] == "0.02 s" and clock["is absolute"][0] == "yes"
     ledger = facts(parts, "Ledger of the log")
-    assert ledger["dropouts · count"][0] == "0" and ledger["truncated"][0] == "—"
-    assert not {"topics", "damages", "remarks", "spans"} & set(ledger)
+    assert ledger["bytes skipped"][0] == "7"
+    assert not {"topics", "damages", "remarks", "spans", "truncated", "dropouts · count"} & set(ledger)
 
 
 def test_losses_are_a_table_and_remarks_are_not() -> None:
@@ -283,24 +324,48 @@ def test_losses_are_a_table_and_remarks_are_not() -> None:
 def test_findings_stand_most_severe_first() -> None:
     found = tuple(Finding(severity, f"a.{severity}", f"text of {severity}") for severity in ("info", "fail", "warn"))
     results = example(None, findings=found)
-    rows = grid(findings(results), "Findings").rows
-    assert [row[0] for row in rows] == [Mark("bad", "fail"), Mark("warn", "warn"), Mark("plain", "info")]
-    assert [row[1] for row in rows] == ["text of fail", "text of warn", "text of info"]
+    section = findings(results)
+    rows = grid(section, "Findings").rows
+    assert [row[:2] for row in rows] == [(Mark("bad", "fail"), "text of fail"), (Mark("warn", "warn"), "text of warn")]
+    (remarks,) = [part for part in section.appendix if isinstance(part, Grid)]
+    assert [row[:2] for row in remarks.rows] == [(Mark("plain", "info"), "text of info")]
     assert dict(front(results).pairs)["Findings"] == "1 fail · 1 warn · 1 info"
 
 
 def test_remarks_on_raw_topics_are_one_line() -> None:
     remarks = [Finding("info", "values.nan", f"raw.t.f{n}: NaN", "raw.t", "", 2) for n in range(50)]
     results = example(None, findings=(*remarks, Finding("warn", "data.truncated", "cut", "", "byte 9", 1)))
-    table = grid(findings(results), "Findings")
-    assert table.rows[0] == (Mark("warn", "warn"), "cut", "byte 9", "1", "data.truncated")
+    section = findings(results)
+    assert grid(section, "Findings").rows == [(Mark("warn", "warn"), "cut", "byte 9", "1")]
+    (remarks,) = [part for part in section.appendix if isinstance(part, Grid)]
     joined = "50 fields of raw topics hold NaN as the device wrote it: t"
-    assert table.rows[1] == (Mark("plain", "info"), joined, "", "100", "values.nan")
-    assert len(table.rows) == 2 and "summary.json lists all 51" in table.caption
+    assert remarks.rows == [(Mark("plain", "info"), joined, "", "100")]
 
 
-def test_what_was_not_assessable_stands_with_its_reason() -> None:
-    assert grid(findings(example(None)), "Not assessable").rows == [("magnetic", "no magnetometer in the log")]
+def test_what_the_front_tells_is_not_told_again_among_the_findings() -> None:
+    codes = ("heading.reject", "heading.not_assessable", "landing.not_assessable", "data.gaps")
+    section = findings(example(None, findings=tuple(Finding("warn", code, code) for code in codes)))
+    assert [row[1] for row in grid(section, "Findings").rows] == ["data.gaps"]
+
+
+def test_next_steps_are_at_most_three_lines_by_what_they_are_for() -> None:
+    failed = (
+        Gate("taxi_seconds", "", 12.0, 20.0, "s", "failed", sense="at_least"),
+        Gate("geometry", "", None, 0.9, "", "not_measured", reason="no GDOP, PDOP or HDOP in the log"),
+        Gate("skewness", "", 0.9, 0.5, "", "failed"),
+        Gate("quality", "", 0.1, 0.3, "", "passed"),
+    )
+    results = example(heading_result(verdict="extend", gates=failed))
+    section = next_steps(results)
+    assert section is not None
+    (part,) = section.parts
+    assert isinstance(part, Facts)
+    assert [(label, text.replace("\u202f", " ")) for label, text, _ in part.pairs] == [
+        ("Fly", "For the heading correction: taxi straight for 20 s or more before take-off."),
+        ("Record", "For the heading correction: GDOP, PDOP or HDOP."),
+        ("Check", "For the heading correction: the taxiway for reflections and gusts."),
+    ]
+    assert next_steps(example(heading_result(gates=()), not_assessable=())) is None
 
 
 def test_provenance_names_log_and_files() -> None:
@@ -314,14 +379,14 @@ def test_provenance_names_log_and_files() -> None:
 def test_long_lists_of_metadata_are_left_to_the_summary() -> None:
     section = provenance(example(None, metadata={"aircraft": "A12", "parameter.X": "1", "units.y": "m"}))
     assert list(facts(section.parts, "Metadata of the log")) == ["aircraft"]
-    assert "stands in summary.json" in notes(section.parts)[0]
+    assert "summary.json" in notes(section.parts)[0]
 
 
 def test_overview_stands_where_there_is_something_to_draw() -> None:
     section = overview(example(None))
     assert section is not None
     assert [part.name for part in section.parts if isinstance(part, Figure)] == [
-        *("overview.track", "overview.profile", "overview.states")
+        *("overview.track", "overview.profile", "overview.attitude", "overview.states")
     ]
     answer = example(heading_result()).answer(HeadingResult)
     assert answer is not None and overview(example(answer, figures=answer.figures)) is None

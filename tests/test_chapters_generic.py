@@ -153,8 +153,9 @@ def test_gates_and_settings_are_told_as_in_every_chapter() -> None:
     gate = Gate("gust", "gusts", 12.0, 8.0, "mps", "failed", required=False)
     section = chapter(wind(gates=(gate,), settings={"window_s": 30.0}))
     assert rows(section, "Gates") == [("▲ failed", "Gusts", "12 m/s", "≤ 8 m/s", "informs", "")]
-    (settings,) = (part for part in section.parts if isinstance(part, Facts) and part.title == "Settings of the method")
-    assert settings.compact and list(settings.pairs) == [("window", "30\u202fs", "")]
+    (settings,) = (part for part in section.appendix if isinstance(part, Facts))
+    assert settings.title == "Settings: [wind]" and settings.compact
+    assert list(settings.pairs) == [("window_s", "30", "")]
     assert "window" not in markdown(section)
 
 

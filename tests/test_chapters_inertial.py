@@ -9,7 +9,7 @@ from groundstation.chapters.inertial import inertial
 from groundstation.chapters.parts import Section
 from groundstation.results.flight import NotAssessable
 from groundstation.results.inertial import AzimuthEstimate, ChannelResult, RealOutage
-from tests.inertial_example import inertial_result
+from tests.inertial_example import AIDED, inertial_result
 from tests.report_example import example
 from tests.section_contents import every_text, facts, grid, notes, row, rows, titles, tones
 
@@ -25,9 +25,9 @@ def chapter(**changes: Any) -> Section:
 
 def test_everything_has_its_place() -> None:
     assert titles(chapter()) == [
-        *(FIGURES, "States", "inertial.state position", "inertial.state velocity", "inertial.tilt_and_drift"),
-        *("inertial.radial", "Outages in the log", "Consistency of the filter"),
-        *("inertial.innovations", "inertial.observability", "Model, noise and gates as used"),
+        *("inertial.state position", "inertial.state velocity", "inertial.radial", "States", "Outages in the log"),
+        *(FIGURES, "inertial.tilt_and_drift", "Consistency of the filter"),
+        *("inertial.innovations", "inertial.observability", "Settings: [inertial]"),
     ]
     assert grid(chapter(), "States").numbers == ("inertial_states",)
 
@@ -123,14 +123,17 @@ def test_an_ins_of_unknown_kind_is_not_called_unaided() -> None:
     assert not [text for text in every_text(section) if "naided INS" in text]
 
 
-def test_an_aided_ins_is_told_at_once() -> None:
-    section = chapter(kind="gnss_aided", kind_reason="its error stays below 2 m for an hour")
-    assert section.headline == "This INS is aided by GNSS: a forecast from it means nothing"
-    assert notes(section)[0] == (
-        "This INS is aided by GNSS, and a forecast from it means nothing: its error stays below 2 m for an hour."
+def test_of_an_aided_ins_the_differences_are_told_and_no_state() -> None:
+    section = chapter(**AIDED)
+    assert section.headline == "GNSS corrects this INS: within 3.0\u202fm of it (95 %)"
+    assert section.claim is not None and section.claim.headline == section.headline
+    assert [figure[:2] for figure in section.claim.figures] == [("INS − GNSS, position", "3.0\u202fm")]
+    assert notes(section)[0].startswith("GNSS corrects this INS already: its own mode says so. What GNSS takes out")
+    assert row(section, "INS − GNSS", "Position north, m") == ("+0.20", "1.00", "2.50", "9.00", "600")
+    assert row(section, "Innovations of the INS's own filter", "Velocity east, m/s") == (
+        *("−0.010", "0.100", "0.300", "0.200", "91.0%", "4.0%", "3000"),
     )
-    assert tones(section)[0] == "warn"
-    assert facts(section, FIGURES)["Kind"][0] == "gnss-aided"
+    assert not [part for part in section.parts if getattr(part, "title", "") in ("States", "Consistency of the filter")]
 
 
 def test_reopening_and_other_ins_are_told() -> None:
@@ -145,21 +148,11 @@ def test_reopening_and_other_ins_are_told() -> None:
     assert not [note for note in notes(chapter()) if "was opened to it again" in note]
 
 
-def test_units_of_the_settings_are_read_from_their_names() -> None:
-    settings: dict[str, float | str | bool] = {
-        "noise.velocity_walk_mps_per_sqrt_s": 0.004,
-        "noise.tilt_walk_deg_per_sqrt_h": 0.0044,
-        "noise.drift_walk_dph_per_sqrt_h": 0.5,
-        "noise.drift_rate_walk_dphph_per_sqrt_h": 0.25,
-        "noise.tilt_rad": 0.0002,
-    }
-    assert facts(chapter(settings=settings), "Model, noise and gates as used") == {
-        "noise.velocity walk": ("0.004 m/s/√s", ""),
-        "noise.tilt walk": ("0.0044 °/√h", ""),
-        "noise.drift walk": ("0.5 °/h/√h", ""),
-        "noise.drift rate walk": ("0.25 °/h²/√h", ""),
-        "noise.tilt": ("0.0002 rad", ""),
-    }
+def test_settings_are_spelled_as_in_the_file_and_noise_of_the_class_stands_apart() -> None:
+    settings: dict[str, float | str | bool] = {"transition": "exact", "noise.tilt_rad": 0.0002}
+    section = chapter(settings=settings)
+    assert facts(section, "Settings: [inertial]") == {"transition": ('"exact"', "")}
+    assert facts(section, "Noise of the INS class") == {"tilt_rad": ("0.0002", "")}
 
 
 def with_share(share: float, *, raised: bool) -> dict[str, Any]:

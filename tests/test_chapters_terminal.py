@@ -39,7 +39,7 @@ def test_a_section_begins_with_its_answer_and_says_what_the_front_says() -> None
     text = terminal(heading(example(heading_result())))
     assert text.startswith("✓ Accept · Enter −1.05°\n\nEvery required gate passed.\n\n")
     assert "▲ failed" in text and "✗ failed" not in text
-    assert "Estimates by segment" in text and "Settings of the method" not in text
+    assert "Estimates by segment" in text and "Settings" not in text
 
 
 def test_a_log_does_not_drive_the_terminal() -> None:

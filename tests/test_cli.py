@@ -7,9 +7,10 @@ import sys
 from pathlib import Path
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
-from groundstation.cli.application import VERBS
+from groundstation.cli.application import EXAMPLES, VERBS, examples
 from groundstation.cli.main import app
 
 HEAVY = (
@@ -95,6 +96,47 @@ def test_a_foreign_file_in_a_folder_is_skipped_and_listed(tmp_path: Path) -> Non
     assert code == 0
     assert "skipped: readme.txt" in err
     assert "readme.txt" in (tmp_path / "out/index.csv").read_text(encoding="utf-8")
+
+
+def test_settings_beside_logs_are_no_logs_and_what_is_skipped_is_told_by_reason(tmp_path: Path) -> None:
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    for name in ("a.txt", "b.txt", "stations.toml", "settings.toml"):
+        (logs / name).write_text("notes", encoding="utf-8")
+    (logs / "alt.csv").write_text("time_s,baro.pressure_altitude_m\n0,1\n1,1\n2,1\n", encoding="utf-8")
+    arguments = ("run", str(logs), "-o", str(tmp_path / "out"), "--no-pdf")
+    _, planned, err = groundstation(*arguments, "--dry-run")
+    assert planned == "alt.csv  done  to run\n" and "skipped 2 files" in err and "toml" not in err
+    assert not (tmp_path / "out").exists()
+    code, first, err = groundstation(*arguments)
+    assert code == 0 and first.startswith("alt.csv  done  NOTIME_") and "not assessable: heading: " in first
+    (line,) = [line for line in err.splitlines() if line.startswith("skipped")]
+    assert line.startswith("skipped 2 files, a.txt, b.txt: found text that no reader claims")
+    _, second, err = groundstation(*arguments)
+    assert second == first.replace("  done  ", "  finished before  ")
+    assert err.splitlines()[-1].endswith("; 1 was finished before")
+
+
+def test_an_interrupted_run_says_how_to_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("groundstation.pipeline.many_flights.batch.run_many", interrupted)
+    code, out, err = groundstation("run", str(tmp_path), "-o", "out")
+    assert (code, out) == (130, "")
+    assert err == "interrupted: out keeps what is finished; the same command again goes on with the rest\n"
+
+
+@pytest.mark.parametrize("verb", [verb for verb in VERBS if verb != "plan"])
+def test_the_examples_of_every_verb_can_be_copied(verb: str) -> None:
+    command = typer.main.get_command(app)
+    assert isinstance(command, typer.core.TyperGroup)
+    found = command.commands[verb]
+    assert found.epilog == examples(verb)
+    for line in EXAMPLES[verb]:
+        name, *arguments = line.split()
+        assert name == verb
+        found.make_context(verb, arguments)  # raises where an option is not one of the verb
 
 
 def test_an_output_that_is_not_ours_needs_force(tmp_path: Path) -> None:

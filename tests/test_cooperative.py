@@ -11,12 +11,12 @@ from scipy.stats import chi2
 from groundstation.estimators.cooperative import plain
 from groundstation.estimators.cooperative.aircraft import Aircraft, aircraft_of, fleet_of
 from groundstation.estimators.cooperative.algorithms import run_algorithm
-from groundstation.estimators.cooperative.arrays import KINDS, PEER, Events
+from groundstation.estimators.cooperative.arrays import KINDS, PEER, Events, rows_for
 from groundstation.estimators.cooperative.estimate import estimate_session
 from groundstation.estimators.cooperative.events import Prepared, prepare
 from groundstation.estimators.cooperative.messages import Broadcast, decode, pairwise_bytes, report_bytes
 from groundstation.estimators.cooperative.motion import place
-from groundstation.estimators.cooperative.observation import observe, rows_for
+from groundstation.estimators.cooperative.observation import observe
 from groundstation.estimators.cooperative.plain.observation import rows_of
 from groundstation.estimators.cooperative.plain.steps import Event
 from groundstation.estimators.cooperative.settings import (

@@ -148,7 +148,7 @@ def test_the_answer_is_saved_with_the_settings_that_were_set(scratch: Scratch) -
     assert 0.01 < float(str(answer["speed_rms_mps"])) < 0.2
     assert answer["settings"] == {"standstill_min_s": 20.0, "guard_s": 1.0}
     assert answer["standstills"]
-    assert (scratch.flight / "results.parquet" / "gnss_noise_speed.parquet").exists()
+    assert (scratch.flight / "arrays" / "gnss_noise_speed.parquet").exists()
     findings = json.loads((scratch.flight / "summary.json").read_text(encoding="utf-8"))["findings"]
     assert [one["severity"] for one in findings if one["code"] == "gnss_noise.found"] == ["info"]
 

@@ -205,6 +205,21 @@ def test_by_aircraft_counts_flights_and_merges_samples() -> None:
     assert answer.by_aircraft(table(error_deg=[])) == ()
 
 
+def test_rejected_flights_enter_no_mean() -> None:
+    flights = table(
+        aircraft=["A"] * 3,
+        error_deg=[1.0, 1.2, 40.0],
+        standard_error_deg=[0.05] * 3,
+        verdict=["accept", "undecided", "reject"],
+        samples=[100.0] * 3,
+        sample_mean_deg=[1.0, 1.2, 40.0],
+        sample_m2_deg2=[25.0] * 3,
+    )
+    whole, one = answer.by_aircraft(flights)
+    assert (one.flights, one.assessed, one.averaged, one.samples) == (3, 3, 2, 200)
+    assert one.mean_deg == whole.mean_deg == pytest.approx(1.1) and one.sample_mean_deg == pytest.approx(1.1)
+
+
 def test_normals_are_those_of_all_samples_together() -> None:
     rng = np.random.default_rng(13)
     parts = [rng.normal(mean, 0.5, size) for mean, size in ((1.0, 40), (1.2, 4000), (-3.0, 70))]

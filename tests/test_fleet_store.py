@@ -85,7 +85,7 @@ def test_samples_are_those_of_the_flight(fleet: Path) -> None:
     name, path = next(iter(sample_files(fleet).items()))
     assert path.parent.name == "month=2026-05" and path.parent.parent.name == "aircraft=101"
     kept = pq.ParquetFile(path).read()
-    saved = pq.read_table(fleet / name / "results.parquet" / "heading_samples.parquet")
+    saved = pq.read_table(fleet / name / "arrays" / "heading_samples.parquet")
     assert kept.column_names == list(MEANINGS) == list(json.loads(kept.schema.metadata[b"columns"]))
     for column, source in (("heading_deg", "heading_deg"), ("heading_error_deg", "difference_deg"), ("gate", "gate")):
         expected = [None if value != value else value for value in saved[source].to_pylist()]
@@ -162,7 +162,7 @@ def test_what_cannot_be_read_is_named_and_keeps_its_samples(tmp_path: Path) -> N
         json.dumps({"rows": [{"kind": "skipped", "source": "z.bin", "reason": "no reader"}, {"kind": "flight"}, 7]})
     )
     write(tmp_path)
-    samples = folders[2] / "results.parquet" / "heading_samples.parquet"
+    samples = folders[2] / "arrays" / "heading_samples.parquet"
     samples.write_bytes(samples.read_bytes()[:4] + bytes(200) + b"PAR1")  # whole at its ends
     (folders[3] / "summary.json").write_text("[")
     results = write(tmp_path)
@@ -202,7 +202,7 @@ def test_hostile_summaries_end_in_a_row_or_a_reason(tmp_path: Path, hostile: Any
 
 def test_metadata_that_is_broken_is_told_and_stops_nothing(tmp_path: Path) -> None:
     broken, _whole = (save_flight(tmp_path, number) for number in range(2))
-    path = broken / "results.parquet" / "heading_samples.parquet"
+    path = broken / "arrays" / "heading_samples.parquet"
     for digits in (b"{", b"\xff", b"[1]", b'{"heading_deg": {}}'):
         table = pq.read_table(path).replace_schema_metadata({b"digits": digits})
         pq.write_table(table, path)

@@ -55,6 +55,7 @@ def fields(log: Read, topic: str) -> set[str]:
 def test_units_signs_and_times(tmp_path: Path) -> None:
     log = Read(plain(tmp_path / "log.hdf5"))
     assert log.header.reader == "flightdata-hdf5" and log.header.utc_of_zero_ns == START_UTC_S * NS_PER_S
+    assert log.header.metadata["units.raw.Groundspeed"] == "value kts"
     assert log.times("ins")[:2] == [750_000_000, 1_750_000_000]
     assert log.values("ins", "latitude_deg")[:2] == [60.0, pytest.approx(60.001)]
     assert log.values("ins", "longitude_deg")[0] == pytest.approx(10.0005)  # a quarter of a second on

@@ -1,4 +1,4 @@
-"""One simulated flight in every format gives equal tables and answers: flat CSV, ULog, DataFlash, bag, telemetry.
+"""One simulated flight in every format gives equal tables and answers: CSV, ULog, DataFlash, Chapter 10, bag, tlog.
 
 Each signal agrees within the step that the format stores it in (``RESOLUTION``); the heading error within what those
 steps can move it.
@@ -18,6 +18,8 @@ from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.results.heading import HeadingResult
+from groundstation.simulation.chapter10_buses import WORD_TIME_NS
+from groundstation.simulation.chapter10_writer import write_chapter10
 from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
@@ -38,6 +40,8 @@ LANDED = "vehicle_land_detected:uint64_t timestamp;bool landed;uint8_t[7] _paddi
 
 # Largest difference to the flat CSV: half a stored step and a rounding, in the unit of the field.
 FLOAT32 = 1.2e-7
+HALF = 0.5 + 1e-6
+KT_STEP_MPS = 0.125 * 0.514444  # of ARINC 429 speeds: 4096 kt in 15 bits
 RESOLUTION: Mapping[str, Mapping[str, float]] = {
     "ulog": {
         "ins.true_heading_deg": 2e-5,
@@ -78,14 +82,36 @@ RESOLUTION: Mapping[str, Mapping[str, float]] = {
         "gnss.longitude_deg": 0.51e-7,
         "gnss.altitude_msl_m": 0.51e-3,
     },
+    "chapter10": {  # ins by 1553, all else by ARINC 429
+        **dict.fromkeys(("ins.true_heading_deg", "ins.roll_deg", "ins.pitch_deg"), HALF * 180 / 2**15),
+        **dict.fromkeys(("ins.velocity_north_mps", "ins.velocity_east_mps"), HALF * 0.3048 / 2**18),
+        **dict.fromkeys(("gnss.velocity_north_mps", "gnss.velocity_east_mps"), HALF * KT_STEP_MPS),
+        **dict.fromkeys(("gnss.latitude_deg", "gnss.longitude_deg"), HALF * 180 / 2**31),
+        "gnss.altitude_ellipsoid_m": HALF * 0.3048 / 8,
+        "baro.pressure_altitude_m": HALF * 0.3048,
+        "air.true_airspeed_mps": HALF * KT_STEP_MPS / 2,
+        "discrete.weight_on_wheels": 0.0,
+    },
+    "arinc429": {  # the same file read by the labels that are shipped
+        "ins.true_heading_deg": HALF * 180 / 2**15,
+        **dict.fromkeys(("ins.roll_deg", "ins.pitch_deg"), HALF * 180 / 2**14),
+        **dict.fromkeys(("ins.velocity_north_mps", "ins.velocity_east_mps"), HALF * KT_STEP_MPS),
+        **dict.fromkeys(("gnss.velocity_north_mps", "gnss.velocity_east_mps"), HALF * KT_STEP_MPS),
+        **dict.fromkeys(("gnss.latitude_deg", "gnss.longitude_deg"), HALF * 180 / 2**31),
+    },
 }
-# tlog: velocities in steps of 1 cm/s and 0.01 deg
-ANSWER_DEG = {
-    "ulog": 1e-3,
-    "dataflash": 3e-3,
-    "ros2": 1e-6,
-    "tlog": 1e-2,
-}  # heading steps of 0.01 deg average out over a thousand samples
+# GPS time is told to 1 ms; the words of a sample follow each other on their bus, up to seven of them.
+LATE_NS = {
+    "ulog": 1_000_000,
+    "dataflash": 1_000_000,
+    "chapter10": 7 * WORD_TIME_NS,
+    "arinc429": 7 * WORD_TIME_NS,
+    "ros2": 1_000,
+    "tlog": 1_000,
+}
+# Heading steps of 0.01 deg, and speed steps of 0.06 m/s, average out over a thousand samples;
+# telemetry has velocities in steps of 0.01 m/s.
+ANSWER_DEG = {"ulog": 1e-3, "dataflash": 3e-3, "chapter10": 1e-3, "arinc429": 1e-3, "ros2": 1e-6, "tlog": 1e-2}
 
 
 @cache
@@ -207,13 +233,20 @@ def as_tlog(path: Path) -> None:
     path.write_bytes(log.data)
 
 
+def as_chapter10(path: Path) -> None:
+    write_chapter10(path, simulated().flight)
+
+
 WRITERS = {
     "csv": (as_csv, "x.csv"),
     "ulog": (as_ulog, "x.ulg"),
     "dataflash": (as_dataflash, "x.BIN"),
     "ros2": (as_ros2, "bag"),
     "tlog": (as_tlog, "x.tlog"),
+    "chapter10": (as_chapter10, "x.ch10"),
+    "arinc429": (as_chapter10, "y.ch10"),
 }
+ICDS = {"chapter10": ("x.icd.yaml",), "arinc429": ("arinc429_inertial", "arinc429_gnss")}
 
 
 @pytest.fixture(scope="module")
@@ -223,7 +256,8 @@ def flights(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Flight]:
     for name, (write, file_name) in WRITERS.items():
         write(folder / file_name)
         mcap = folder / f"{name}.mcap"
-        found[name] = read_flight(mcap, convert_log(open_log(folder / file_name), mcap))
+        icds = tuple(str(folder / icd) if icd.endswith(".yaml") else icd for icd in ICDS.get(name, ()))
+        found[name] = read_flight(mcap, convert_log(open_log(folder / file_name, icds=icds), mcap))
     return found
 
 
@@ -242,7 +276,7 @@ def test_tables_are_equal_within_the_formats_step(flights: dict[str, Flight], fo
     known = np.isfinite(table.values(field))
     values, time_ns = table.values(field)[known], table.time_ns[known]
     assert len(values) == np.isfinite(expected).sum()
-    assert np.abs(time_ns - expected_table.time_ns[np.isfinite(expected)]).max() <= 1_000_000  # GPS time to 1 ms
+    assert np.abs(time_ns - expected_table.time_ns[np.isfinite(expected)]).max() <= LATE_NS[form]
     difference = values - expected[np.isfinite(expected)]
     if field.endswith("heading_deg"):
         difference = wrap_180(difference)
@@ -268,4 +302,4 @@ def test_the_heading_error_is_the_same(flights: dict[str, Flight], form: str) ->
 def test_every_format_has_the_same_absolute_time(flights: dict[str, Flight]) -> None:
     starts = {form: flight["gnss"].time_ns[0] for form, flight in flights.items()}
     assert all(flight.has_utc for flight in flights.values())
-    assert max(starts.values()) - min(starts.values()) <= 1_000_000
+    assert max(starts.values()) - min(starts.values()) <= max(LATE_NS.values())

@@ -114,7 +114,10 @@ def test_parking_heading_is_corrected_and_compared() -> None:
     site = SiteData(stands=(Stand("7", 310.0, 0.02),))
     found = estimate(taxi_flight(run), site=site)
     assert found.parking_ins_heading_deg == pytest.approx(310.8, abs=0.01)
-    assert found.parking_heading_deg == pytest.approx(310.8 - found.error_deg, abs=1e-3)
+    assert found.parking_heading_deg == pytest.approx(310.8 - found.error_deg, abs=0.03)  # an INS of no known class
+    known = estimate(taxi_flight(run), aircraft=AircraftData(antenna_arm_m=4.0, ins_class="navigation"))
+    assert known.parking_heading_deg == pytest.approx(310.8 - known.error_deg, abs=2e-3)
+    assert known.parking_sigma_deg < found.parking_sigma_deg
     assert found.reference_residual_arcmin == pytest.approx((found.parking_heading_deg or 0.0) * 60 - 310.0 * 60)
     flown = replace(taxi_flight(run), metadata={"reference.parking_heading_deg": "-49.0"})
     both, logged = estimate(flown, site=site), estimate(flown)
@@ -163,7 +166,10 @@ def test_back_taxi_gives_both_directions() -> None:
 def test_mounting_is_taken_out_and_its_sigma_enters_the_interval(flight: Flight, result: HeadingResult) -> None:
     mounted = estimate(flight, aircraft=AircraftData(antenna_arm_m=4.0, mounting_deg=0.5, mounting_sigma_deg=0.3))
     assert mounted.error_deg == pytest.approx(result.error_deg - 0.5, abs=1e-3)
-    assert mounted.standard_error_deg == pytest.approx(np.hypot(result.standard_error_deg, 0.3), rel=1e-2)
+    without = estimate(flight, aircraft=AircraftData(antenna_arm_m=4.0, mounting_sigma_deg=0.0))
+    assert mounted.standard_error_deg == pytest.approx(np.hypot(without.standard_error_deg, 0.3), rel=1e-2)
+    assert mounted.steady_sigma_deg == pytest.approx(np.hypot(without.steady_sigma_deg, 0.3), rel=1e-2)
+    assert mounted.confidence95_measured_deg == pytest.approx(np.subtract(result.confidence95_measured_deg, 0.5))
 
 
 # Invariances
@@ -434,7 +440,7 @@ def test_figures_agree_with_the_answer(result: HeadingResult) -> None:
     assert int(samples["used"].sum()) == result.samples == len(running)
     assert float(running["mean_deg"][-1]) == pytest.approx(result.paper_error_deg)
     assert float(np.mean(samples["weight"][samples["used"]])) == pytest.approx(1.0)
-    low, high = result.confidence95_deg
+    low, high = result.confidence95_measured_deg
     assert float(running["honest_half_width_deg"][-1]) == pytest.approx(0.5 * (high - low), rel=0.1)
     bins = figures["heading_distribution"]
     width = bins["bin_high_deg"] - bins["bin_low_deg"]

@@ -1,5 +1,7 @@
 """The noise model's filter against dense matrices, and the interval made from it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -28,12 +30,13 @@ def random_differences(rng: np.random.Generator, count: int = 60) -> Differences
         direction_deg=rng.uniform(0.0, 360.0, count),
         speed_mps=speed,
         regressors=(Regressor(rng.normal(size=count), 3.0, 2.0),),
+        segment=np.sort(rng.integers(1, 4, count)),
     )
 
 
 def dense_covariance(data: Differences, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Covariance of the differences, and what each GNSS component does to them, straight from autocovariances."""
-    white, correlated, tau, sway, frequency, damping, heading_white, motion = np.exp(theta)
+    white, correlated, tau, sway, frequency, damping, heading_white, motion, own, wander, wander_s = np.exp(theta)
     natural = 2 * np.pi * frequency
     damped = natural * np.sqrt(1 - damping**2)
     lag = np.abs(data.time_s[:, None] - data.time_s[None, :])
@@ -42,12 +45,15 @@ def dense_covariance(data: Differences, theta: np.ndarray) -> tuple[np.ndarray, 
     shape = np.cos(damped * lag) + damping * natural / damped * np.sin(damped * lag)
     covariance = effect @ effect.T * (motion * correlated) ** 2 * np.exp(-lag / tau)
     covariance += sway**2 * np.exp(-damping * natural * lag) * shape
+    covariance += own**2 * (data.segment[:, None] == data.segment[None, :])
+    covariance += wander**2 * np.exp(-lag / wander_s)
     covariance += np.diag(white**2 * np.sum(effect**2, axis=1) + heading_white**2)
     return covariance, effect
 
 
 def draw_theta(rng: np.random.Generator) -> np.ndarray:
     theta = PRIOR_MEAN + 0.3 * rng.standard_normal(len(PRIOR_MEAN))
+    theta[[noise.SEGMENT, noise.WANDER]] += np.log(10.0)  # large enough to be seen beside the rest
     theta[noise.DAMPING] = min(theta[noise.DAMPING], np.log(0.9))
     return theta
 
@@ -102,7 +108,8 @@ def test_likelihood_of_standstill_and_taxi_together_is_the_dense_one() -> None:
     expected -= size * np.log(2 * np.pi)
 
     log_likelihood, estimate, variance = np.empty(1), np.empty((1, 1)), np.empty((1, 1, 1))
-    taxi = (data.time_s, np.column_stack([data.difference_deg, np.ones(len(data.time_s))]), *effect.T.copy())
+    columns = np.column_stack([data.difference_deg, np.ones(len(data.time_s))])
+    taxi = (data.time_s, columns, *effect.T.copy(), np.diff(data.segment, prepend=data.segment[0]) != 0)
     prior = (np.zeros(1), np.zeros(1))
     ends = np.array([len(data.time_s)], dtype=np.int64)
     gap_s = float(data.time_s[0] - still[-1])
@@ -187,3 +194,26 @@ def test_priors_are_broader_than_the_family() -> None:
         index = noise.PARAMETER_NAMES.index(name)
         assert PRIOR_MEAN[index] - 2.0 * PRIOR_SIGMA[index] < np.log(low)
         assert PRIOR_MEAN[index] + 2.0 * PRIOR_SIGMA[index] > np.log(high)
+
+
+def test_segments_that_disagree_widen_the_interval_and_are_seen_as_such() -> None:
+    taxi, still = simulated(np.random.default_rng(10), 80.0, 0.01)
+    segment = 1 + np.arange(800) // 200
+    apart = replace(
+        taxi, segment=segment, difference_deg=taxi.difference_deg + np.array([0.0, 0.5, 0.1, -0.4])[segment - 1]
+    )
+    alike, found = (error_posterior(data, still) for data in (replace(taxi, segment=segment), apart))
+    (low, high), (least, most) = alike.interval_deg(), found.interval_deg()
+    assert most - least > 1.5 * (high - low)
+    spread = found.parameter("segment_deg"), found.parameter("wander_deg")
+    assert max(spread) > 0.1 > max(alike.parameter("segment_deg"), alike.parameter("wander_deg"))
+
+
+def test_what_is_told_apart_widens_the_whole_interval_alone() -> None:
+    """One direction: a steady term of 0.3 deg is all in the whole interval, none of it in the measured one."""
+    taxi, still = simulated(np.random.default_rng(11), 60.0, 0.01)
+    steady = replace(taxi, regressors=(Regressor(np.ones(len(taxi.time_s)), 0.0, 0.3, is_apart=True),))
+    plain, found = error_posterior(taxi, still), error_posterior(steady, still)
+    assert found.apart_sigma_deg == pytest.approx(0.3, abs=0.003)
+    assert found.standard_error_deg == pytest.approx(np.hypot(0.3, plain.standard_error_deg), rel=0.05)
+    assert found.interval_deg(is_measured=True) == pytest.approx(plain.interval_deg(), abs=0.02)

@@ -394,8 +394,8 @@ def test_onboard_figures_stand_beside_ours() -> None:
 
 
 def test_drift_of_taxi_is_shrunk_to_what_an_ins_can_drift() -> None:
-    assert shrunk_drift(None, None) == (0.0, 0.1)
-    drift, sigma = shrunk_drift(0.1, 0.01)
+    assert shrunk_drift(0.1) == pytest.approx((0.0, 0.1))
+    drift, sigma = shrunk_drift(0.1, (0.1, 0.01))
     assert drift == pytest.approx(0.1, rel=0.02)
     assert sigma == pytest.approx(0.01, rel=0.01)
 
@@ -533,5 +533,14 @@ def test_short_standstill_that_fails_asks_for_more() -> None:
 
 
 def test_number_to_type_has_the_other_sign() -> None:
-    assert explain("accept", (), 0.83, 0.1) == "every gate passed: enter -0.8 deg"
+    assert explain("accept", (), 0.83, 0.1) == "every required gate passed: enter -0.8 deg"
     assert "Not to be entered" in explain("reject", (gate("quality", "failed"),), 0.83, 0.1)
+
+
+def test_every_failed_required_gate_is_told_the_plain_ones_first() -> None:
+    names = ("skewness", "variance_ratio", "precision", "outliers", "before_take_off")
+    verdict, against = decide(tuple(gate(name, "failed") for name in names), None, SETTINGS)
+    assert verdict == "reject" and {one.name for one in against} == set(names)
+    text = explain(verdict, against, 0.62, 0.1)
+    told = ("before take-off", "outliers", "precision e", "scatter", "skewness", "Not to be entered: -0.6 deg")
+    assert [text.index(part) for part in told] == sorted(text.index(part) for part in told)

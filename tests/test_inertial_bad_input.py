@@ -1,19 +1,26 @@
 """System 2 on what goes wrong in the air: a finding with place and count each, and no silent nonsense."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from groundstation.base.errors import NotAssessableError
+from groundstation.estimators.inertial.analysis import FORECAST, INERTIAL
 from groundstation.estimators.inertial.estimate import Estimation, estimate_ins_errors
-from groundstation.estimators.inertial.forecast import assess_forecast
 from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.estimators.known import AircraftData, Known
+from groundstation.pipeline.one_flight.analyse import Answered, run_analyses
+from groundstation.results.inertial import InertialResult
+from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight
 from tests.inertial_flights import batch_of, changed, flight_of, table_of, with_table, without_rows
 
 DURATION_S = 7200.0
 ONE_SIGMA = 1.0
+METRES_PER_DEGREE = 111_200.0  # of latitude, to a percent
 SAME_M = 1.0  # what a handful of missing samples may move an estimate by
 
 
@@ -172,14 +179,42 @@ def test_nan_in_one_channel_is_told_and_the_other_is_as_it_was(flight: Flight, c
     assert np.isfinite(found.run.x).all()
 
 
-def test_an_ins_that_never_drifts_has_no_forecast(flight: Flight) -> None:
+def answered(flight: Flight, **known: Any) -> Answered:
+    given = Known(flight_phases(flight), settings={"inertial": InertialSettings()}, **known)
+    return run_analyses((INERTIAL, FORECAST), flight, given)
+
+
+def following(flight: Flight, **more: np.ndarray) -> Flight:
+    """The flight with an INS whose position follows GNSS."""
     gnss = flight["gnss"]
-    follows = {name: gnss.values(name) + 1e-6 for name in ("latitude_deg", "longitude_deg")}
-    found = estimate_ins_errors(changed(flight, "ins", **follows))
-    assert found.result.kind == "gnss_aided"
-    assert "inertial.gnss_aided" in codes(found)
-    with pytest.raises(NotAssessableError, match="means nothing"):
-        assess_forecast(found, settings=InertialSettings())
+    position = {name: gnss.values(name) + 1e-6 for name in ("latitude_deg", "longitude_deg")}
+    return changed(flight, "ins", **position, **more)
+
+
+def test_of_an_ins_that_follows_gnss_the_differences_alone_are_told(flight: Flight) -> None:
+    found = answered(following(flight))
+    result = found.answers["inertial"]
+    assert isinstance(result, InertialResult) and result.kind == "gnss_aided"
+    assert result.channels == () and result.azimuth is None and result.radial_error_rate_50_nmiph is None
+    assert [finding.code for finding in found.findings["inertial"]] == ["inertial.gnss_aided"]
+    offset_m, shift_m = result.difference("position", "north"), 1e-6 * METRES_PER_DEGREE
+    assert offset_m is not None and offset_m.mean == pytest.approx(shift_m, rel=0.01)
+    assert offset_m.largest == pytest.approx(offset_m.median, rel=0.02)
+    assert {figure.name for figure in result.figures} == {"inertial_differences", "inertial_track"}
+    assert set(found.answers) == {"inertial"}
+    assert "GNSS corrects this INS already (it stays within" in found.reasons["forecast"]
+    assert result.to_frame("differences").axis.tolist() == ["north", "east", "horizontal"] * 2
+
+
+def test_what_is_stated_of_the_ins_decides(flight: Flight) -> None:
+    by_head = answered(replace(flight, metadata={"ins_kind": "gnss_aided"}))
+    by_aircraft = answered(following(flight), aircraft=AircraftData(ins_kind="unaided"))
+    kinds = [
+        (found.answers["inertial"].kind, found.answers["inertial"].kind_reason) for found in (by_head, by_aircraft)
+    ]
+    assert kinds == [("gnss_aided", "the head of the log says so"), ("unaided", "the aircraft file says so")]
+    assert by_aircraft.answers["inertial"].channels
+    assert answered(replace(flight, metadata={"ins_kind": "strapdown"})).answers["inertial"].kind == "unaided"
 
 
 def test_excluded_intervals_are_not_compared(flight: Flight) -> None:

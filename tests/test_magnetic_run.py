@@ -157,8 +157,9 @@ def test_index_and_front_page_tell_the_deviation(saved: SavedFlight) -> None:
         assert row[f"magnetic_{letter.lower()}_deg"] == pytest.approx(method.coefficients_deg[letter], abs=1e-4)
         sigma = row[f"magnetic_{letter.lower()}_sigma_deg"]
         assert sigma == pytest.approx(method.coefficients_sigma_deg[letter], abs=1e-4)
-    (tile,) = [figure for figure in front(saved.results).figures if figure[0] == "Magnetic heading"]
-    assert f"{found.residual_rms_deg.after:.2f}" in tile[1]
+    told = front(saved.results)
+    (value,) = [tile.claim.value for tile in told.others if tile.key == "magnetic"] or [told.figures[0][1]]
+    assert f"{found.residual_rms_deg.after:.2f}" in value
 
 
 def test_summary_obeys_the_schema(saved: SavedFlight) -> None:

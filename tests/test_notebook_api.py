@@ -102,7 +102,44 @@ def test_tables_are_indexed_by_utc_and_by_flight_time(flight: OpenLog) -> None:
     assert frame.index.as_unit("ns").asi8.tolist() == table.time_ns.tolist()
     assert isinstance(since.index, pd.TimedeltaIndex)
     assert np.allclose(since.index.total_seconds(), flight.flight.time_s("ins"), atol=1e-9, rtol=0.0)
+    assert frame.attrs["units"]["true_heading_deg"] == since.attrs["units"]["true_heading_deg"] == "deg"
     assert table.take(slice(3, 5)).to_frame().index.equals(frame.index[3:5])
+
+
+def test_tables_are_subscripted_and_short_when_printed(flight: OpenLog) -> None:
+    ins = flight.tables["ins"]
+    assert np.array_equal(ins["roll_deg"], ins.values("roll_deg"), equal_nan=True)
+    assert ins.utc.dtype == "datetime64[ns]" and ins.utc.astype(np.int64).tolist() == ins.time_ns.tolist()
+    assert np.allclose(ins.flight_time_s, flight.flight.time_s("ins"), atol=0.0, rtol=0.0)
+    assert repr(ins).startswith(f"<TimedTable ins: {len(ins)} rows of ") and len(repr(ins)) < 400
+    for shown in (flight.tables, flight.flight, flight.results, ins.columns["roll_deg"]):
+        assert len(repr(shown)) < 400, shown
+    assert f"ins ({len(ins)})" in repr(flight.tables)
+
+
+def test_an_unknown_name_is_told_with_those_near_to_it(flight: OpenLog) -> None:
+    for ask in (lambda: flight.tables["ins"]["roll"], lambda: flight.tables["ins"].values("roll")):
+        with pytest.raises(UsageError, match=r"^table ins: found no .roll., expected roll_deg$"):
+            ask()
+    for ask in (lambda: flight.tables["gns"], lambda: flight.flight["gns"]):
+        with pytest.raises(UsageError, match="found no 'gns', expected gnss"):
+            ask()
+    assert np.isnan(flight.tables["gnss"].values("gdop")).all() == ("gdop" not in flight.tables["gnss"])
+    with pytest.raises(UsageError, match="found no 'rate_x_dps'"):
+        _ = flight.tables["gnss"]["rate_x_dps"]
+    assert flight.tables.get("gns") is None
+    with pytest.raises(UsageError, match="found no 'heading_sample', expected heading_samples"):
+        flight.results.to_frame("heading_sample")
+
+
+def test_arrays_have_utc_beside_flight_seconds(flight: OpenLog) -> None:
+    samples = flight.results.to_frame("heading_samples")
+    start_ns = flight.results.start_utc_ns
+    assert start_ns is not None and str(samples["utc"].dt.tz) == "UTC"
+    since_s = (samples["utc"] - pd.Timestamp(start_ns, tz="UTC")).dt.total_seconds()
+    assert np.allclose(since_s, samples["time_s"], atol=1e-6, rtol=0.0)
+    phases = flight.results.to_frame("phases")
+    assert phases.columns[:2].tolist() == ["start_utc", "end_utc"]
 
 
 def test_without_utc_tables_are_indexed_by_flight_time() -> None:

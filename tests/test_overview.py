@@ -49,6 +49,24 @@ def test_fields_of_other_rows_are_taken_from_the_nearest_one() -> None:
     assert "pressure_altitude_m" not in figure.columns
 
 
+def test_attitude_climb_and_airspeed_stand_beside_the_track() -> None:
+    time_s = np.arange(0.0, 60.0, 0.1)
+    ins = table(
+        *("ins", time_s), roll_deg=0.5 * time_s, pitch_deg=-0.1 * time_s, true_heading_deg=np.full(len(time_s), 45.0)
+    )
+    slow = np.arange(0.0, 60.0, 1.0)
+    place = {"latitude_deg": 56.0 + 1e-5 * slow, "longitude_deg": np.full(60, 38.0)}
+    gnss = table("gnss", slow, **place, velocity_down_mps=np.full(60, -2.0))
+    air = table("air", slow, indicated_airspeed_mps=np.full(60, 40.0))
+    figure = overview(flight_of(ins, gnss, air), ins.values("true_heading_deg"), "ins")
+    assert figure is not None and len(figure) == 60
+    np.testing.assert_allclose(figure["roll_deg"], 0.5 * slow)
+    np.testing.assert_allclose(figure["pitch_deg"], -0.1 * slow)
+    np.testing.assert_allclose(figure["climb_mps"], 2.0)
+    np.testing.assert_allclose(figure["indicated_airspeed_mps"], 40.0)
+    assert "true_airspeed_mps" not in figure.columns
+
+
 def test_what_is_missing_for_long_stays_missing() -> None:
     time_s = np.arange(0.0, 30.0, 0.5)
     known = (time_s < 10.0) | (time_s > 20.0)
@@ -125,3 +143,15 @@ def test_only_remarks_on_raw_topics_are_joined(severity: str) -> None:
 def test_a_log_without_taxi_is_told_what_the_method_needs() -> None:
     assert WHAT_HEADING_NEEDS in explained("heading", "ground speed never above 6 m/s before lift-off: highest 1.4 m/s")
     assert explained("magnetic", "no straight taxi") == "no straight taxi"
+
+
+def test_a_log_of_attitude_alone_has_an_overview() -> None:
+    time_s = np.arange(0.0, 30.0, 0.1)
+    ins = table("ins", time_s, roll_deg=np.full(300, 4.0), magnetic_heading_deg=np.full(300, 90.0))
+    baro = table("baro", time_s[::5], height_above_airfield_m=np.full(60, 120.0))
+    figure = overview(flight_of(ins, baro), None, None)
+    assert figure is not None and len(figure) == 300
+    assert np.isnan(figure["latitude_deg"]).all()
+    for name, value in (("roll_deg", 4.0), ("magnetic_heading_deg", 90.0), ("height_above_airfield_m", 120.0)):
+        np.testing.assert_allclose(figure[name], value)
+    assert "pitch_deg" not in figure.columns

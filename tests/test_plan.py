@@ -63,7 +63,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_plan_has_the_files_of_a_run_and_obeys_the_schema(made: Path) -> None:
     names = {path.name for path in made.iterdir()}
     assert names == {
-        *("summary.json", "manifest.json", "report.html", "report.pdf", "tables", "results.parquet"),
+        *("summary.json", "manifest.json", "report.html", "report.pdf", "tables", "arrays"),
         *("mine.rrd", "plan.toml"),
     }
     summary = json.loads((made / "summary.json").read_text(encoding="utf-8"))

@@ -356,3 +356,20 @@ def test_long_texts_make_short_batches(write: Write, monkeypatch: pytest.MonkeyP
     assert log.damage("cut_text").count == 20
     assert len(log.values("event", "name")) == 20 and {len(text) for text in log.values("event", "name")} == {1024}
     assert max(len(batch) for batch in log.batches) == 2
+
+
+def test_the_lines_of_the_docs_are_read_as_they_stand(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[1] / "docs" / "flat-csv.md").read_text(encoding="utf-8")
+    (tmp_path / "copied.csv").write_text(page.partition("```csv\n")[2].partition("```")[0], encoding="utf-8")
+    header, *items = registry.read(tmp_path / "copied.csv")
+    assert isinstance(header, LogHeader) and header.metadata["aircraft"] == "RA-76001"
+    assert header.utc_of_zero_ns == 1_777_874_400_000_000_000
+    rows = {item.topic: len(item) for item in items if isinstance(item, RecordBatch)}
+    assert rows == {"ins": 6, "gnss": 2}
+    assert not [item for item in items if not isinstance(item, RecordBatch)], "no remark, no damage"
+
+
+def test_a_column_that_is_nearly_canonical_is_told_with_the_one_meant(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time_s,ins.roll,gnss.gdop\n0,1,2\n1,1,2\n2,1,2\n", encoding="utf-8")
+    (remark,) = [item for item in registry.read(tmp_path / "a.csv") if isinstance(item, Remark)]
+    assert remark.text.endswith("kept as raw: ins.roll (ins.roll_deg?)")

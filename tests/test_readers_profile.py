@@ -8,6 +8,7 @@ import pytest
 from groundstation.base.errors import SettingsError, UnreadableLogError
 from groundstation.base.records import Damage, RecordBatch, Remark
 from groundstation.base.signals import TOPICS
+from groundstation.base.source_units import source_units
 from groundstation.base.units import CONVERSIONS, NS_PER_S
 from groundstation.readers import profile as profiles
 from groundstation.readers import registry
@@ -46,10 +47,12 @@ FACTORS = {
     "kt": 0.5144444444444445,
     "kmh": 1 / 3.6,
     "fpm": 0.00508,
+    "fps": 0.3048,
     "dps": 1.0,
     "radps": 57.29577951308232,
     "mps2": 1.0,
     "g": 9.80665,
+    "fps2": 0.3048,
     "nt": 1.0,
     "ut": 1e3,
     "gauss": 1e5,
@@ -137,6 +140,21 @@ v = { field = "gnss.hdop" }
     assert read.values("gnss", "hdop") == [1.0, 2.0] and read.rows("gnss") == [7, 9]
     assert read.header.metadata["aircraft"] == "Il-76 RA-7" and read.header.utc_of_zero_ns == 5 * NS_PER_S
     assert "nothing" not in read.header.metadata and not read.damages[0].loses_data
+    assert read.header.metadata["units.raw.lab"] == "t s"
+
+
+def test_units_above_the_header_stay_with_the_flight(tmp_path: Path) -> None:
+    text = """
+name = "lab"
+[recognise]
+columns = ["t", "oil"]
+[time]
+kind = "seconds"
+column = "t"
+[columns]
+"""
+    read = Read(*files(tmp_path, text, "#Lab, 7\n# s,  deg C, \nt,oil,mode\n0,80,1\n"))
+    assert source_units(read.header.metadata, "raw.lab", ("t", "oil", "mode")) == {"t": "s", "oil": "deg C"}
 
 
 def test_columns_that_the_file_lacks_are_told(tmp_path: Path) -> None:

@@ -17,7 +17,6 @@ MAGICS = [
     (b"\xa3\x95\x80\x80" + bytes(20), "ArduPilot DataFlash"),
     (b"\x25\xeb\x00\x00" + bytes(20), "Chapter 10"),
     (b"\xb5\x62\x01\x07" + bytes(20), "UBX"),
-    (b"$GNGGA,103607.00,5327.03942,N*2F\r\n", "NMEA"),
     (b"#ROSBAG V1.2\n", "ROS 1 bag older"),
     (b"SQLite format 3\0" + bytes(20), "SQLite"),
     (b"PK\x03\x04" + bytes(20), "zip"),
@@ -181,9 +180,6 @@ def test_our_own_entry_point_is_not_a_plug_in(plug_ins: list[Any]) -> None:
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
-        ("ch10/kc135_429_1553_1MB.c10", "Chapter 10"),
-        ("gnss/ublox_ins_drive_pvat.ubx", "UBX"),
-        ("gnss/pygpsdata-NMEA.log", "NMEA"),
         ("damaged/log_220414_065328______EMPTY.csv", "empty"),
         ("inertial/gv_rf15_attitude_error.csv", "no reader claims"),  # PROVENANCE: not in the flat CSV
     ],

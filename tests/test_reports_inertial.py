@@ -11,32 +11,32 @@ import pytest
 
 from groundstation.chapters.forecast import forecast
 from groundstation.chapters.inertial import inertial
+from groundstation.chapters.parts import Front
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures import with_drawings
-from groundstation.reports.figures.forecast import classic
 from groundstation.reports.flight_report import flight_document
 from groundstation.results.figures import FigureData
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.inertial import InertialResult
-from tests.inertial_example import forecast_result, inertial_result
+from tests.inertial_example import AIDED, aided_figures, forecast_result, inertial_result
 from tests.report_example import MANIFEST, example
 from tests.saved import load
 
 INERTIAL = (
-    *("Position error of the INS", "Velocity error of the INS", "Platform tilt and gyro drift"),
-    *("Track error before and after correction", "Innovations", "Observability"),
+    *("Position error of the INS", "Velocity error of the INS", "Track error before and after correction"),
+    *("Platform tilt and gyro drift", "Innovations", "Observability"),
 )
-FORECAST = ("How the error grows", "Calibration of the shipped method", "Hindcast map", "The paper's four starts")
+FORECAST = ("How the error grows", "Calibration of the shipped method", "Hindcast map")
 SHOWS = {
-    "inertial_states": {INERTIAL[0], INERTIAL[1], INERTIAL[2], INERTIAL[4]},
+    "inertial_states": {INERTIAL[0], INERTIAL[1], INERTIAL[3], INERTIAL[4]},
     "inertial_observability": {"Observability"},
     "inertial_track": {"Track error before and after correction"},
     "forecast_map": {"Hindcast map"},
     "forecast_fan": set(),
     "forecast_growth": {"How the error grows"},
-    "forecast_classic": {"The paper's four starts"},
+    "forecast_classic": set(),
 }
 
 
@@ -51,18 +51,18 @@ def drawings(results: FlightResults) -> list[Drawing]:
     for chapter in (inertial, forecast):
         section = chapter(results)
         assert section is not None
-        found += [part for part in with_drawings(section, results).parts if isinstance(part, Drawing)]
+        whole = replace(section, parts=(*section.parts, *section.appendix))
+        found += [part for part in with_drawings(whole, results).parts if isinstance(part, Drawing)]
     for drawing in found:
         assert ElementTree.fromstring(drawing.svg).tag.endswith("svg")
         assert drawing.caption and drawing.alt
     return found
 
 
-def front_figures(folder: Path, **changes: Any) -> dict[str, tuple[str, str]]:
-    """Value and remark of the figures above the first chapter."""
+def told_above(folder: Path, **changes: Any) -> Front:
+    """What stands above the first chapter."""
     save(folder, flight(inertial_result(figures=(), **changes), forecast_result(figures=())), MANIFEST)
-    figures = flight_document(load(folder)).front.figures
-    return {label: (value.replace("\u202f", " "), remark.replace("\u202f", " ")) for label, value, remark in figures}
+    return flight_document(load(folder)).front
 
 
 def test_every_figure_is_drawn_in_its_order_and_names_its_arrays() -> None:
@@ -73,15 +73,30 @@ def test_every_figure_is_drawn_in_its_order_and_names_its_arrays() -> None:
 
 
 def test_drift_and_error_after_an_hour_stand_on_the_front(tmp_path: Path) -> None:
-    told = front_figures(tmp_path)
-    assert told["INS drift"][0] == "0.41 nmi/h"
-    (forecast_told,) = (text for text in told.values() if "483 m" in text[0])
-    assert "raw INS 1790 m" in forecast_told[1]
+    told = told_above(tmp_path)
+    assert told.headline.replace("\u202f", " ") == "Unaided INS, drifts 0.41 nmi/h"
+    (tile,) = told.others
+    assert tile.claim.value.replace("\u202f", " ") == "483 m"
+    assert "raw INS 1790 m" in tile.claim.remark.replace("\u202f", " ")
+
+
+def test_of_an_aided_ins_differences_and_its_own_filter_are_drawn() -> None:
+    answer = inertial_result(**AIDED, figures=aided_figures(3600.0))
+    results = example(answer)
+    section = inertial(results)
+    assert section is not None
+    found = [part for part in with_drawings(section, results).parts if isinstance(part, Drawing)]
+    assert [drawing.title for drawing in found] == [
+        *("INS − GNSS, position", "INS − GNSS, velocity", "Innovations of the INS's own filter"),
+    ]
+    assert "Shaded" in found[2].caption
 
 
 @pytest.mark.parametrize("kind", ["unknown", "gnss_aided"])
 def test_an_ins_that_may_be_aided_has_no_drift_on_the_front(tmp_path: Path, kind: str) -> None:
-    assert "INS drift" not in front_figures(tmp_path, kind=kind)
+    told = told_above(tmp_path, kind=kind)
+    assert not told.figures and not told.others
+    assert told.verdict is not None and told.verdict.tone == "unknown"
 
 
 TIMES = ("time_s", "start_s", "horizon_min")
@@ -137,12 +152,3 @@ def test_each_array_alone_gives_its_own_figures_and_its_first_column_none() -> N
         assert {drawing.title for drawing in alone} - {always} == shown, name
         first = FigureData(name, dict(list(item.columns.items())[:1]), {})
         assert [drawing.title for drawing in drawings(replace(results, figures=(first,)))] == [always], name
-
-
-def test_the_paper_has_no_titles_where_starts_do_not_agree() -> None:
-    """A table of three starts says nothing of which panel is which of four."""
-    answer = forecast_result()
-    fewer = replace(answer, classic_starts=tuple(row for row in answer.classic_starts if row.start_h < 3.0))
-    told, silent = (classic(flight(forecast=one)) for one in (answer, fewer))
-    assert told is not None and silent is not None
-    assert len(told.svg) > len(silent.svg)  # letters are drawn as paths

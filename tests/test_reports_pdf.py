@@ -119,7 +119,9 @@ def test_paper_says_everything_the_page_says(flight: Paper) -> None:
 
 def test_the_verdict_with_the_number_to_type_is_on_the_first_page(flight: Paper) -> None:
     first = flight.pages[0]
-    assert first.index("Accept") < first.index("Enter −1.05°") < first.index("Parking heading") < first.index("Gates")
+    assert (
+        first.index("Accept") < first.index("Enter −1.05°") < first.index("Parking heading") < first.index("Overview")
+    )
     assert "Signature" in first
 
 
@@ -134,7 +136,7 @@ def test_title_and_outline_are_there_and_no_time(flight: Paper) -> None:
     assert metadata["/Title"] == "Flight report · A12 · flight 17 · Accept"
     assert not {"/CreationDate", "/ModDate"} & set(metadata)
     titles = [item.title for item in flight.reader.outline if not isinstance(item, list)]
-    assert titles == [f"{place} {section.title}" for place, section in enumerate(flight.document.sections, 1)]
+    assert titles == [f"{section.number} {section.title}" for section in flight.document.sections]
     assert flight.size_bytes < LARGEST_PDF_BYTES
 
 
@@ -216,7 +218,7 @@ CHANGES = (
 @pytest.mark.parametrize("change", CHANGES)
 def test_paper_is_made_whatever_is_missing(tmp_path: Path, change: Callable[[FlightResults], FlightResults]) -> None:
     text = text_of(paper(tmp_path, change(example(heading_result()))))
-    assert "nan" not in text.lower().split() and "1 Heading correction" in text
+    assert "nan" not in text.lower().split() and "Heading correction: workings" in text
 
 
 def test_a_document_may_have_little_in_it(tmp_path: Path) -> None:

@@ -69,16 +69,26 @@ def test_summary_that_is_no_object_is_refused(tmp_path: Path, content: str) -> N
         load(tmp_path)
 
 
+def test_arrays_in_a_folder_of_the_earlier_name_are_read_and_go_with_the_next_run(tmp_path: Path) -> None:
+    save(tmp_path, example(heading_result()), MANIFEST)
+    expected = set(load(tmp_path).figures)
+    (tmp_path / "arrays").rename(tmp_path / "results.parquet")
+    saved = load(tmp_path)
+    assert set(saved.figures) == expected and len(saved.figures["heading_samples"])
+    save(tmp_path, example(heading_result()), MANIFEST)
+    assert not (tmp_path / "results.parquet").exists() and set(load(tmp_path).figures) == expected
+
+
 def test_parquet_that_is_broken_is_refused(tmp_path: Path) -> None:
     save(tmp_path, example(None), MANIFEST)
-    (tmp_path / "results.parquet" / "overview.parquet").write_bytes(b"PAR1 no")
+    (tmp_path / "arrays" / "overview.parquet").write_bytes(b"PAR1 no")
     with pytest.raises(UnreadableLogError, match=r"overview\.parquet"):
         load(tmp_path)
 
 
 def test_figures_are_read_when_they_are_asked_for(tmp_path: Path) -> None:
     save(tmp_path, example(heading_result()), MANIFEST)
-    path = tmp_path / "results.parquet" / "overview.parquet"
+    path = tmp_path / "arrays" / "overview.parquet"
     content = path.read_bytes()
     path.write_bytes(content[:4] + bytes(len(content) - 8) + content[-4:])  # whole at its ends alone
     saved = load(tmp_path)

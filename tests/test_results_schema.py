@@ -64,8 +64,9 @@ def least_inertial() -> errors.InertialResult:
     )
     azimuth = errors.AzimuthEstimate(False, None, None, 0, unknown, "no turn")
     return errors.InertialResult(
-        *("ins", "gnss", "navigation", "default", "unaided", "", "first_order", 0, 0.0, *channels),
-        *(None, None, None, None, (errors.RealOutage(0.0, 1.0, 1.0, None, None),), azimuth),
+        *("ins", "gnss", "unaided", "", 0, 0.0, "navigation", "default", "first_order", *channels),
+        outages=(errors.RealOutage(0.0, 1.0, 1.0, None, None),),
+        azimuth=azimuth,
     )
 
 
@@ -206,7 +207,7 @@ def test_schema_refuses_what_is_wrong(path: tuple[str, ...], value: object) -> N
         (("inertial", "outages", 0, "missing"), "nothing"),
         (("inertial", "reopened"), -1),
         (("inertial", "other_ins"), "ins.1"),
-        (("inertial", "north"), None),
+        (("inertial", "north"), "none"),
         (("inertial", "channels"), []),
         (("inertial", "east", "share_inside95"), 1.2),
         (("forecast", "default_method"), "best"),

@@ -47,7 +47,7 @@ def test_the_good_sample_is_accepted_with_all_its_files(good: Outcome) -> None:
     names = {path.name for path in folder.iterdir()}
     identity = good.flight_id
     assert names == {
-        *("summary.json", "manifest.json", "report.html", "report.pdf", "results.parquet", "tables"),
+        *("summary.json", "manifest.json", "report.html", "report.pdf", "arrays", "tables"),
         *(f"{identity}.mcap", f"{identity}.rrd"),
     }
     summary = load(folder).summary
@@ -281,7 +281,7 @@ def test_a_killed_run_keeps_what_was_finished_and_can_go_on(tmp_path: Path) -> N
 def test_a_broken_flight_folder_is_told_and_stops_nothing(good: Outcome, tmp_path: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(Path(good.folder), out / good.flight_id)
-    (out / good.flight_id / "results.parquet/overview.parquet").write_bytes(b"PAR1")
+    (out / good.flight_id / "arrays/overview.parquet").write_bytes(b"PAR1")
     (out / "index.json").write_text('{"rows": []}', encoding="utf-8")
     (out / "index.csv").write_text("", encoding="utf-8")
     outcomes = run_many([SAMPLES / "taxi-short.csv"], out, Configuration(), with_pdf=False)

@@ -23,11 +23,14 @@ from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.cli.main import app
 from groundstation.pipeline.verbs.serve import recordings_in, serve
 from groundstation.results.files import SUMMARY
+from groundstation.viewer.catalog_table import COLUMNS
 from groundstation.viewer.fleet import FLIGHTS_TEXT
 from groundstation.viewer.fleet_catalog import FLEET, FLIGHTS, Catalog, catalog_server, reachable
+from groundstation.viewer.properties import send_properties
 from groundstation.viewer.recorder import FLIGHT_TIME
 from groundstation.viewer.recording import save_stream, send_layout
 from groundstation.viewer.views import plot
+from tests.viewer_example import make_flight, make_results
 
 IDS = ("20260504T060000Z_A12_7", "20260505T060000Z_A12_8", "NOTIME_01234567")
 PATIENCE_S = 60.0
@@ -84,6 +87,20 @@ def test_flights_open_with_the_fullest_layout(out: Path) -> None:
     fullest = RrdReader(out / IDS[1] / f"{IDS[1]}.rrd").blueprints()[0].recording_id
     with served(out) as catalog:
         assert client_of(catalog.url).get_dataset(FLIGHTS).default_blueprint() == fullest
+
+
+def test_flights_are_a_table_of_their_results(out: Path) -> None:
+    results = make_results(make_flight(200.0, 10.0))
+    for name in IDS:
+        save_stream(out / name / f"{name}.rrd", name, lambda stream: send_properties(stream, results))
+    with served(out) as catalog:
+        dataset = client_of(catalog.url).get_dataset(FLIGHTS)
+        assert catalog.table_url == f"{catalog.url}/entry/{dataset.id}"
+        assert dataset.default_segment_table_blueprint() is not None
+        known = dataset.schema().to_arrow().names
+        listed = [f"property:{name}" for name, _ in COLUMNS if not name.startswith("magnetic")]
+        shown = [name for name in listed if name in known]
+        assert {"property:heading:verdict", "property:heading:error_deg", "property:flight:aircraft"} <= set(shown)
 
 
 def test_the_links_of_the_fleet_lead_into_the_catalog(out: Path) -> None:

@@ -143,7 +143,7 @@ def test_a_folder_of_logs_gives_its_flights_and_their_session(out: Path, logs: P
 
 def test_a_session_stands_in_the_index_behind_the_flights(out: Path) -> None:
     rows = rows_of(out)
-    assert [row["kind"] for row in rows] == ["flight"] * 3 + ["session"] + ["skipped"] * 2
+    assert [row["kind"] for row in rows] == ["flight"] * 3 + ["session"]
     row = rows[3]
     assert (row["flight_id"], row["aircraft"], row["status"]) == (IDENTITY, "A, B, C", "ok")
     assert row["report"] == f"{IDENTITY}/report.html"
@@ -165,9 +165,14 @@ def test_a_second_run_does_nothing_and_the_lines_are_the_same(
     assert (session["state"], session["flight_id"], session["exit_code"]) == ("done", IDENTITY, 0)
     assert session["text"].startswith("3 aircraft, centralised: 2 sigma_r")
     events = [json.loads(line) for line in told.err.splitlines() if line.startswith("{")]
-    assert [event["total"] for event in events if event["event"] == "begin"] == [5, 6]
+    assert [event["total"] for event in events if event["event"] == "begin"] == [3, 4]
     assert events[-1]["event"] == "end" and events[-1]["text"] == session["text"]
+    assert session["was_finished"] is True
+    assert called(*call, "--dry-run") == 0
+    (planned,) = [line for line in capsys.readouterr().out.splitlines() if "session" in line]
+    assert planned.endswith(f"finished before  {IDENTITY}  session finished, nothing to do")
     (copy / IDENTITY / "report.html").unlink()
+    assert called(*call, "--dry-run") == 0 and "session to report again" in capsys.readouterr().out
     assert called(*call) == 0
     assert (copy / IDENTITY / "report.html").read_bytes() == (out / IDENTITY / "report.html").read_bytes()
     assert "; 1 session: 1 done" in capsys.readouterr().err
@@ -216,7 +221,7 @@ def test_a_run_elsewhere_gives_the_session_too(
     summary = json.loads(far.read(f"{IDENTITY}/summary.json") or b"")
     assert summary["results"] == json.loads((out / IDENTITY / "summary.json").read_text())["results"]
     made = far.read(f"{IDENTITY}/manifest.json")
-    assert ran(logs) == [replace(session, times_s={})], "nothing is done again"
+    assert ran(logs) == [replace(session, times_s={}, was_finished=True)], "nothing is done again"
     assert far.read(f"{IDENTITY}/manifest.json") == made
     page = far.read(f"{IDENTITY}/report.html")
     far.remove(f"{IDENTITY}/report.html")
@@ -365,7 +370,7 @@ def test_logs_that_do_not_overlap_and_a_peer_without_a_log(
     told = sessions_in(outcomes)
     assert [one.state for one in told] == ["skipped", "skipped"]
     assert all("in no session: no flight of these overlaps, " in one.text for one in told)
-    assert [row["kind"] for row in rows_of(tmp_path / "out")] == ["flight"] * 2 + ["skipped"] * 2
+    assert [row["kind"] for row in rows_of(tmp_path / "out")] == ["flight"] * 2
     assert session_folders(tmp_path / "out") == []
 
 

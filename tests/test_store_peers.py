@@ -100,7 +100,7 @@ def test_rerun_finds_no_issue(mixed_rates: Path, tmp_path: Path) -> None:
     for arguments in (("mcap", "check"), ("mcap", "check", "--full")):
         report = rerun(*arguments, mixed_rates, home=tmp_path)
         rows = [line for line in report.splitlines() if line.startswith(("ok", "PROBLEM"))]
-        assert len(rows) == 7  # five topics and the positions of two once more
+        assert len(rows) == 9  # five topics, the positions of two once more, the poses of one, the log
         assert all(row.startswith("ok") for row in rows), report
 
 

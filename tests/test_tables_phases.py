@@ -231,6 +231,18 @@ def hand_launch() -> Course:
     )  # fmt: skip
 
 
+def carried_and_launched_twice() -> tuple[Course, Floats]:
+    """Stand, be carried at 2 m, fly; land, be carried again, hop to 20 m; and where it shakes in somebody's hands."""
+    truth = course(
+        (40, 0, 0, 0, 0, 0), (2, 1.5, 2, 0, 0, 0), (40, 1.5, 2, 8, 4, 90), (20, 0.2, 2, 6, 4, 90),
+        (4, 12, 8, 0, 8, 90), (20, 12, 45, 0, 4, 90), (90, 12, 45, 20, 0, 810), (25, 10, 2, 0, -3, 810),
+        (3, 8, 0, 0, 0, 810), (4, 0, 0, 0, 0, 810), (40, 0, 0, 0, 0, 810), (2, 1.5, 2, 0, 0, 810),
+        (40, 1.5, 2, 8, 4, 900), (3, 12, 6, 0, 8, 900), (8, 12, 20, 0, 4, 900), (40, 12, 20, 20, 0, 1260),
+        (12, 10, 2, 0, -3, 1260), (3, 8, 0, 0, 0, 1260), (4, 0, 0, 0, 0, 1260), (40, 0, 0, 0, 0, 1260),
+    )  # fmt: skip
+    return truth, np.where((truth.height_m > 0.0) & (truth.speed_mps < 2.0), 1.5, 0.0)
+
+
 def catapult() -> Course:
     """UAV: stands on a rail, leaves it level at 16 m/s within a second and stays two metres up for eight seconds."""
     return course(
@@ -284,6 +296,17 @@ def test_no_air_passes(make: Callable[[], Course], rates_hz: tuple[float, float]
     shaking = np.where(truth.contact, 0.0, 0.5)
     mask, _ = prove(flight_of(truth, seed=seed, rates_hz=rates_hz, shaking_deg=shaking), truth)
     assert mask[(truth.time_s > 2.0) & (truth.time_s < 25.0)].all()  # every one of them stands at the start
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_carried_does_not_fly_and_a_low_hop_does(seed: int) -> None:
+    truth, shaking_deg = carried_and_launched_twice()
+    flight = flight_of(truth, seed=seed, shaking_deg=shaking_deg)
+    label = flight_phases(flight).at(truth.time_s)
+    is_carried, is_flying = shaking_deg > 0.0, (truth.height_m > 5.0) & (truth.speed_mps > 8.0)
+    assert np.mean(label[is_flying] == "airborne") > 0.99
+    assert np.sum(label[is_carried] == "airborne") * STEP_S < 1.0
+    assert order_of(flight_phases(flight)).count("airborne") == 2
 
 
 def test_log_that_starts_in_the_air_proves_only_what_adjoins_its_last_standstill() -> None:

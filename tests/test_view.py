@@ -21,7 +21,19 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return 0
 
     monkeypatch.setattr(launch, "open_viewer", open_viewer)
+    monkeypatch.setenv("DISPLAY", ":0")
     return seen
+
+
+def test_without_a_display_one_line_names_the_browser(
+    tmp_path: Path, opened: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(launch.require_display, "__defaults__", ("linux",))
+    code, err = view(recordings(tmp_path / "out", "fleet.rrd"))
+    assert (code, err) == (1, "error: view: no display on this machine: --web shows it in a browser\n")
+    assert CliRunner().invoke(app, ["view", "--web", str(tmp_path / "out")]).exit_code == 0 and opened == ["fleet.rrd"]
 
 
 def view(what: Path | str) -> tuple[int, str]:

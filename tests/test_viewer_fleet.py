@@ -75,6 +75,9 @@ def test_every_row_is_a_flight_at_its_start(contents: Contents, fleet: FleetResu
         for batch in batches:
             places = np.asarray(batch.column("flight_number"))
             utc_ns = np.asarray(batch.column("utc").cast(pa.int64()))
+            if places[0] > FLIGHTS:
+                assert entity.endswith("/verdict") and utc_ns[0] > starts[-1], entity
+                continue
             assert (utc_ns == starts[places - 1]).all(), entity
 
 
@@ -89,10 +92,12 @@ def test_errors_and_intervals_are_those_of_the_flights(contents: Contents, fleet
     mine = flights["aircraft"] == name
     places, values = contents.scalars(f"/aircraft/{name}/heading_error/flights")
     assert (places == np.flatnonzero(mine) + 1).all() and (values[:, 0] == flights["error_deg"][mine]).all()
-    _, ends = contents.scalars(f"/aircraft/{name}/heading_error/interval95")
-    joined = np.column_stack([np.nanmax(ends[:, edge::2], axis=1) for edge in (0, 1)])
-    assert (joined[:, 0] == flights["confidence95_low_deg"][mine]).all()
-    assert (joined[:, 1] == flights["confidence95_high_deg"][mine]).all()
+    stretches = [entity for entity in contents.batches if f"/{name}/heading_error/interval95/" in entity]
+    assert len(stretches) == (2 if name == STEPPING else 1), "a band ends where the level changes"
+    bands = [contents.band(entity) for entity in sorted(stretches)]
+    middle, half = (np.concatenate([band[part] for band in bands]) for part in (1, 2))
+    assert middle - half == pytest.approx(flights["confidence95_low_deg"][mine])
+    assert middle + half == pytest.approx(flights["confidence95_high_deg"][mine])
 
 
 def test_lines_are_interrupted_where_the_level_changes(contents: Contents, fleet: FleetResults) -> None:
@@ -189,7 +194,8 @@ def test_flights_without_a_time_have_a_number_alone(fleet: FleetResults, tmp_pat
     for batches in found.batches.values():
         for batch in batches:
             places = np.asarray(batch.column("flight_number"))
-            assert ((places <= first) == ("utc" in batch.schema.names)).all()
+            behind = bool(first) & (places > FLIGHTS)  # where every lane ends, on both timelines
+            assert (((places <= first) | behind) == ("utc" in batch.schema.names)).all()
     places, _ = found.scalars(f"/aircraft/{STEADY}/heading_error/flights")
     assert len(places) == FLIGHTS // 3, "all of them have a place on flight_number"
     assert f"# {FLIGHTS - first} without absolute time" in found.text("/flights")
@@ -218,6 +224,20 @@ def test_flights_without_any_heading_leave_the_charts_out(fleet: FleetResults, t
     assert not [entity for entity in found.batches if "heading_error" in entity or "radial" in entity]
     states = found.batches[f"/aircraft/{STEADY}/verdict"][0].column("StateChange:state").to_pylist()
     assert states == [["not assessed"]] * (FLIGHTS // 3)
+
+
+def test_the_newest_verdict_of_every_aircraft_has_room_behind_it(contents: Contents) -> None:
+    lanes = [entity for entity in contents.batches if entity.endswith("/verdict")]
+    assert len(lanes) == 3
+    for entity in lanes:
+        rows = [
+            (place, state[0])
+            for batch in contents.batches[entity]
+            for place, state in zip(
+                batch.column("flight_number").to_pylist(), batch.column("StateChange:state").to_pylist(), strict=True
+            )
+        ]
+        assert max(rows) == (FLIGHTS + 1, "")
 
 
 def gather_nothing(folder: Path) -> FleetResults:

@@ -16,7 +16,7 @@ from groundstation.tables.table import Flight
 from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.recording import write_recording
-from tests.inertial_example import inertial_result
+from tests.inertial_example import AIDED, aided_figures, inertial_result
 from tests.recording_contents import Contents
 from tests.viewer_example import START_NS, make_flight, make_results
 
@@ -51,16 +51,16 @@ def plain(text: str) -> str:
 def test_states_are_those_of_the_results_with_their_band(contents: Contents, results: FlightResults) -> None:
     states = results.figure("inertial_states")
     assert states is not None
-    time_ns, values = contents.scalars("/inertial/east/tilt")
+    time_ns, middle, half = contents.band("/inertial/east/tilt/b_band")
     assert len(time_ns) == len(states)
-    estimate, sigma = states["east_tilt_arcsec"], states["east_tilt_sigma_arcsec"]
-    np.testing.assert_allclose(values, np.column_stack([estimate + 1.96 * sigma, estimate - 1.96 * sigma, estimate]))
+    np.testing.assert_array_equal(middle, states["east_tilt_arcsec"])
+    np.testing.assert_allclose(half, 1.96 * states["east_tilt_sigma_arcsec"])
 
 
 def test_nothing_is_measured_without_gnss(contents: Contents, results: FlightResults) -> None:
     states = results.figure("inertial_states")
     assert states is not None
-    measured = contents.scalars("/inertial/north/position")[1][:, 0]
+    measured = contents.scalars("/inertial/north/position/a_lines")[1][:, 0]
     assert (np.isnan(measured) == states["is_forecast"]).all()
     lane = contents.batches["/inertial/filter"]
     names = [row[0] for batch in lane for row in batch.column("StateChange:state").to_pylist()]
@@ -74,7 +74,8 @@ def test_each_forecast_stands_at_its_start(contents: Contents, results: FlightRe
     for chart in ("north", "east", "radial"):
         batches = contents.batches[f"/forecast/fan_{chart}/latest"]
         times = np.sort(np.concatenate([np.asarray(batch.column("flight_time").cast("int64")) for batch in batches]))
-        np.testing.assert_allclose(times, np.rint(starts * 1e9), atol=1)
+        assert times[0] == 0, "the first one is there when the recording opens"
+        np.testing.assert_allclose(times[1:], np.rint(starts[1:] * 1e9), atol=1)
 
 
 def test_hindcast_map_is_a_tensor_with_named_dimensions(contents: Contents, results: FlightResults) -> None:
@@ -95,23 +96,29 @@ def test_figures_asked_first_stand_in_the_panels(contents: Contents) -> None:
     assert "| windows of the drift alone (shipped) | **✓ 24** |" in skill and "| Starts | 43 |" in skill
 
 
-def test_an_aided_ins_is_told_in_both_panels(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
-    aided = inertial_result(flight.duration_s, kind="gnss_aided")
-    contents = written(tmp_path, flight, replace(results, answers={**results.answers, **by_analysis(aided)}))
-    for entity in ("/inertial/answer", "/forecast/answer"):
-        assert plain(contents.text(entity)).startswith("# This INS is aided by GNSS: a forecast from it means nothing")
+def test_of_an_aided_ins_differences_and_its_filter_are_shown(
+    tmp_path: Path, flight: Flight, results: FlightResults
+) -> None:
+    aided = inertial_result(flight.duration_s, **AIDED, figures=aided_figures(flight.duration_s))
+    reason = NotAssessable("forecast", "GNSS corrects this INS already")
+    kept = tuple(item for item in results.figures if not item.name.startswith(("inertial", "forecast")))
+    changed = replace(results, answers=by_analysis(aided), figures=(*kept, *aided.figures), not_assessable=(reason,))
+    contents = written(tmp_path, flight, changed)
+    assert plain(contents.text("/inertial/answer")).startswith("# GNSS corrects this INS: within 3.0 m of it")
+    drawn = {entity for entity in contents.batches if entity.startswith("/inertial/")}
+    assert drawn == {
+        f"/inertial/{kind}/{channel}_{quantity}"
+        for kind in ("differences", "own_innovations")
+        for channel in ("north", "east")
+        for quantity in ("position", "velocity")
+    }
 
 
-def test_reasons_stand_in_place_of_results(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
+def test_reasons_stand_in_the_overview_and_make_no_tab(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
     reasons = (NotAssessable("inertial", "GNSS for a minute only"), NotAssessable("forecast", "too short"))
     contents = written(tmp_path, flight, replace(results, answers={}, not_assessable=reasons))
-    assert "GNSS for a minute only" in contents.text("/inertial/answer")
-    assert "too short" in contents.text("/forecast/answer")
-
-
-def test_without_results_and_reasons_there_are_no_tabs(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
-    figures = tuple(item for item in results.figures if not item.name.startswith(("inertial", "forecast")))
-    contents = written(tmp_path, flight, replace(results, answers={}, figures=figures))
+    told = contents.text("/summary")
+    assert "GNSS for a minute only" in told and "too short" in told
     entities = [*contents.batches, *contents.fixed]
     assert not [entity for entity in entities if entity.startswith(("/inertial", "/forecast"))]
 

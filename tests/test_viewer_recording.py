@@ -14,10 +14,13 @@ import pyarrow as pa
 import pytest
 import rerun as rr
 
+from groundstation.base.attitude import quaternion_enu_from_flu_xyzw
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Column
+from groundstation.chapters.front import front
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, Source
+from groundstation.results.heading import HeadingResult
 from groundstation.tables.table import Flight
 from groundstation.viewer import recording
 from groundstation.viewer.recorder import Recorder
@@ -107,9 +110,62 @@ def test_a_gap_is_a_row_of_nan(contents: Contents, flight: Flight) -> None:
 
 
 def test_lines_break_where_a_heading_crosses_north(contents: Contents) -> None:
-    values = contents.scalars("/overview/directions/heading")[1][:, 0]
+    values = contents.scalars("/overview/directions/heading_deg")[1][:, 0]
     steps = np.abs(np.diff(values))
     assert np.nanmax(steps) < 180.0
+
+
+def test_the_aircraft_moves_and_turns_along_its_track(contents: Contents, results: FlightResults) -> None:
+    figure = results.figure("overview")
+    assert figure is not None
+    (batch,) = contents.batches["/space/aircraft"]
+    place, turn = (
+        np.array([row[0] for row in batch.column(f"Transform3D:{name}").to_pylist()])
+        for name in ("translation", "quaternion")
+    )
+    assert place[:, 2] == pytest.approx(figure["altitude_m"] - figure["altitude_m"].min(), abs=0.01)
+    moved_m = np.hypot(*np.diff(place[:, :2], axis=0).T)
+    steps_s = np.diff(figure["time_s"])
+    assert moved_m.sum() == pytest.approx((figure["ground_speed_mps"][1:] * steps_s).sum(), rel=0.01)
+    expected = [figure[f"{name}_deg"] for name in ("roll", "pitch", "heading")]
+    assert turn == pytest.approx(quaternion_enu_from_flu_xyzw(*expected), abs=1e-6)
+
+
+def test_every_answer_has_a_row_in_the_overview(contents: Contents, results: FlightResults) -> None:
+    told = contents.text("/summary").replace("\\", "")
+    top = front(results)
+    assert top.others
+    for title, line in ((top.subject, top.line), *((tile.title, tile.claim.line) for tile in top.others)):
+        assert f"| {title} | {line} |" in told
+    for subject, reason in top.missing:
+        assert f"**{subject}**: {reason}" in told
+
+
+def test_results_are_properties_with_both_ends_of_an_interval(contents: Contents, results: FlightResults) -> None:
+    answer = results.answer(HeadingResult)
+    assert answer is not None
+    (row,) = (batch.to_pylist()[0] for batch in contents.fixed["/__properties/heading"])
+    assert row["error_deg"] == [answer.error_deg] and row["verdict"] == [answer.verdict]
+    assert row["confidence95_low_deg"] + row["confidence95_high_deg"] == list(answer.confidence95_deg)
+    (flight,) = (batch.to_pylist()[0] for batch in contents.fixed["/__properties/flight"])
+    assert flight["source"] == [results.source.name] and flight["findings_warn"] == [1.0]
+
+
+def test_a_taxi_in_a_long_flight_has_a_time_axis_of_its_own(
+    tmp_path: Path, contents: Contents, flight: Flight, results: FlightResults
+) -> None:
+    assert not any("/heading/run/" in entity for entity in contents.fixed), "here it fills most of the flight"
+    write_recording(tmp_path / "a.rrd", flight, replace(results, duration_s=3600.0))
+    long = Contents(tmp_path / "a.rrd")
+    samples = results.figure("heading_samples")
+    assert samples is not None
+    (drawn,) = (
+        batch.column("Points2D:positions").to_pylist()[0] for batch in long.fixed["/heading/run/1/difference/samples"]
+    )
+    assert len(drawn) == np.isfinite(samples["difference_deg"][samples["used"]]).sum()
+    ground_s = samples["time_s"][samples["gate"] != "airborne"]
+    cursor_s = np.sort(long.times("/heading/run/1/speed/cursor")) / 1e9
+    assert cursor_s[0] == pytest.approx(ground_s[0]) and cursor_s[-2] == pytest.approx(ground_s[-1])
 
 
 def test_absent_is_no_gap_and_nan_of_the_device_is_one(tmp_path: Path) -> None:
@@ -171,6 +227,28 @@ def test_lists_are_tables_and_the_clock_of_a_topic_is_not_drawn(tmp_path: Path) 
     assert "| P\\_7 | 7 |" in text and "50 rows" in text
     drawn = {entity for entity in contents.batches if entity.startswith("/raw/raw.")}
     assert drawn == {"/raw/raw.ATT/accel_m", "/raw/raw.ATT/Flags"}
+
+
+def test_units_of_the_source_stand_in_titles_and_counts_are_stepped(tmp_path: Path) -> None:
+    seconds = np.arange(0.0, 100.0, 1.0)
+    rows = table("raw.IMU.0", seconds, acc_x=seconds, acc_y=seconds, T=seconds, mode_no=np.arange(100) // 30)
+    metadata = {"units.raw.IMU": "acc_x m/s/s, acc_y m/s/s, T deg C"}
+    logged = Flight({"raw.IMU.0": rows}, metadata, START_NS, True, "a.BIN")
+    with rr.RecordingStream("a") as stream:
+        stream.save(tmp_path / "a.rrd")
+        tab = raw.raw(Recorder(stream, logged.start_ns, True), logged, _bare_results(logged))
+        stream.disconnect()
+    assert tab is not None
+    titles = {view.name for page in tab.contents[0].contents for view in page.contents}
+    assert titles == {"IMU.0 acc, m/s/s", "IMU.0 T, deg C", "IMU.0 mode_no"}
+    styles = Contents(tmp_path / "a.rrd").fixed
+    stepped = {
+        path
+        for path, batches in styles.items()
+        for batch in batches
+        if "SeriesLines:interpolation_mode" in batch.schema.names
+    }
+    assert stepped == {"/raw/raw.IMU.0/mode_no"}
 
 
 def test_a_state_is_held_over_rows_of_other_sources(tmp_path: Path) -> None:
@@ -235,10 +313,11 @@ def test_findings_and_events_stand_in_the_log_with_severity_and_time(contents: C
     assert sum(batch.num_rows for batch in contents.batches["/log/events"]) == 2
 
 
-def test_without_a_heading_the_tab_says_why(tmp_path: Path, flight: Flight) -> None:
+def test_without_a_heading_the_overview_says_why_and_there_is_no_tab(tmp_path: Path, flight: Flight) -> None:
     write_recording(tmp_path / "a.rrd", flight, make_results(flight, with_heading=False))
     contents = Contents(tmp_path / "a.rrd")
-    assert "no GNSS velocity in the log" in contents.text("/heading/verdict")
+    assert "no GNSS velocity in the log" in contents.text("/summary")
+    assert "/heading/verdict" not in contents.fixed
     assert not [entity for entity in contents.batches if entity.startswith("/distribution")]
 
 

@@ -207,6 +207,10 @@ def pipeline_figures(flight: Flight) -> tuple[FigureData, ...]:
             ground_speed_mps=truth["speed_mps"],
             heading_deg=wrap_360(truth["heading_deg"] + ERROR_DEG),
             track_deg=track,
+            roll_deg=20.0 * np.sin(time_s / 30.0),
+            pitch_deg=np.where(time_s > 208.0, 8.0, 0.0),
+            climb_mps=np.gradient(truth["altitude_m"], time_s),
+            true_airspeed_mps=np.where(time_s > TAXI_S[1], truth["speed_mps"] + 4.0, np.nan),
         ),
         _figure(
             "phases",

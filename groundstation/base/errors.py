@@ -1,6 +1,6 @@
 """Errors that say where, what was found, what was expected and what to do next."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 
@@ -48,6 +48,50 @@ class UnclaimedLogError(UnreadableLogError):
 
 class UsageError(GroundstationError):
     """The call cannot be carried out as asked (exit code 2)."""
+
+
+class UnknownNameError(UsageError, KeyError):
+    """Nothing has that name; those that are near to it are told, or all where none is near.
+
+    Parameters
+    ----------
+    where : str
+        What was asked: ``"table ins"``.
+    name : str
+    known : iterable of str
+        Names there are.
+
+    Examples
+    --------
+    >>> print(UnknownNameError("table ins", "roll", ("roll_deg", "pitch_deg")))
+    table ins: found no 'roll', expected roll_deg
+    >>> print(UnknownNameError("table ins", "x", ("roll_deg", "pitch_deg")))
+    table ins: found no 'x', expected one of roll_deg, pitch_deg
+    """
+
+    def __init__(self, where: str, name: str, known: Iterable[str]) -> None:
+        names = tuple(known)
+        near = near_names(name, names) or names
+        expected = "nothing: there is none" if not names else ", ".join(near)
+        super().__init__(where, f"no {name!r}", f"one of {expected}" if len(near) > 1 else expected)
+
+    __str__ = Exception.__str__  # that of KeyError quotes the line
+
+
+def near_names(name: str, known: Iterable[str], most: int = 5) -> tuple[str, ...]:
+    """Names that begin with or hold the one asked for, else those spelled alike; at most ``most``.
+
+    Examples
+    --------
+    >>> near_names("lat", ("latitude_deg", "gdop")), near_names("tarck_deg", ("track_deg", "gdop"))
+    (('latitude_deg',), ('track_deg',))
+    """
+    from difflib import get_close_matches
+
+    names = tuple(known)
+    asked = name.lower()
+    holding = sorted((one for one in names if asked and asked in one.lower()), key=lambda one: one.lower().find(asked))
+    return tuple(holding[:most] or get_close_matches(name, names, most))
 
 
 class NotAssessableError(GroundstationError):

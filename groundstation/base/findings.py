@@ -1,9 +1,15 @@
 """Findings: what a user must know about a flight, with its place and severity."""
 
+import re
 from dataclasses import dataclass
 from typing import Literal
 
+from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.base.units import NS_PER_S
+
 Severity = Literal["info", "warn", "fail"]
+_AT_UTC = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z")
+_AT_SECONDS = re.compile(r"(?:^|\bat )\+?(\d{1,9}(?:\.\d+)?) s\b")
 SEVERITIES: tuple[Severity, ...] = ("info", "warn", "fail")
 
 
@@ -32,6 +38,22 @@ class Finding:
     topic: str = ""
     place: str = ""
     count: int | None = None
+
+
+def place_time_ns(place: str, start_ns: int, *, has_utc: bool) -> int | None:
+    """Corrected time that a finding's place names, seconds of the flight or UTC; None when it names none.
+
+    Examples
+    --------
+    >>> place_time_ns("at 12.4 s", 5, has_utc=False), place_time_ns("row 7", 5, has_utc=False)
+    (12400000005, None)
+    >>> place_time_ns("2026-05-04T06:00:01Z", 0, has_utc=True)
+    1777874401000000000
+    """
+    seconds, utc = _AT_SECONDS.search(place), _AT_UTC.search(place)
+    if utc and has_utc:
+        return int(iso_to_utc_ns(utc.group(0))[0])
+    return start_ns + round(float(seconds.group(1)) * NS_PER_S) if seconds else None
 
 
 def worst(findings: "tuple[Finding, ...]") -> Severity | None:

@@ -28,7 +28,7 @@ def frozen(array: NDArray[Any]) -> NDArray[Any]:
     return view
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Column:
     """Values of one field and where they are present.
 
@@ -51,6 +51,9 @@ class Column:
 
     def __len__(self) -> int:
         return len(self.values)
+
+    def __repr__(self) -> str:
+        return f"<Column of {len(self)} {self.values.dtype}, {len(self) - np.count_nonzero(self.mask)} absent>"
 
     @property
     def mask(self) -> BoolArray:

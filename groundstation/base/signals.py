@@ -57,6 +57,10 @@ _POSITION = (
     _double("altitude_ellipsoid_m", "m", -1_000.0, 100_000.0),
     _double("altitude_msl_m", "m", -1_000.0, 100_000.0),
 )
+_POSITION_SIGMA = (
+    _double("horizontal_sigma_m", "m", 0.0, 100_000.0),
+    _double("vertical_sigma_m", "m", 0.0, 100_000.0),
+)
 _VELOCITY = tuple(_double(f"velocity_{axis}_mps", "mps", -3_000.0, 3_000.0) for axis in ("north", "east", "down"))
 _INS = (
     *_POSITION,
@@ -71,6 +75,9 @@ _INS = (
     _flag("valid"),
     _double("ground_speed_mps", "mps", 0.0, 3_000.0),
     *(_double(f"position_{axis}_m", "m", -100_000.0, 100_000.0) for axis in ("north", "east", "down")),
+    *(_double(f"{angle}_sigma_deg", "deg", 0.0, 360.0) for angle in ("roll", "pitch", "true_heading")),
+    *_POSITION_SIGMA,
+    _double("velocity_sigma_mps", "mps", 0.0, 1_000.0),
 )
 # Protection levels by the satellite-based augmentation and by fault detection in the receiver.
 _PROTECTION = tuple((axis, by) for axis in ("horizontal", "vertical") for by in ("sbas", "fd"))
@@ -92,6 +99,8 @@ TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
             _double("satellites_used", "", 0.0, 200.0),
             _text("constellation"),
             _flag("integrity_ok"),
+            *_POSITION_SIGMA,
+            _text("fix"),
         ),
         "onboard": (
             _double("heading_error_deg", "deg", -180.0, 180.0),
@@ -148,8 +157,11 @@ TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
         "truth": _INS,
     }
 )
+_FIELD_NAMES = frozenset(field.name for fields in TOPICS.values() for field in fields)
 INS_MODES = ("align", "nav", "attitude", "gnss_aided")
+FIXES = ("none", "2d", "3d", "dgnss", "rtk_float", "rtk_fixed", "ppp", "gnss_ins", "dead_reckoning", "other")
 RAW_PREFIX = "raw."
+BUS_PREFIX, BYTES_PREFIX = "raw.bus.", "raw.bytes."  # words and bytes as recorded: no numbers to look at
 
 
 def kind_of(topic: str) -> str:
@@ -174,6 +186,17 @@ def is_canonical(topic: str) -> bool:
     return kind_of(topic) in TOPICS
 
 
+def has_values(topic: str) -> bool:
+    """Whether the columns of a topic are values, not words or bytes that mean something only by an ICD or the like.
+
+    Examples
+    --------
+    >>> has_values("ins"), has_values("raw.irig_time.1"), has_values("raw.bus.429.7")
+    (True, True, False)
+    """
+    return not topic.startswith((BUS_PREFIX, BYTES_PREFIX))
+
+
 def field_of(topic: str, name: str) -> Field | None:
     """The canonical field of a topic, None when there is none of that name.
 
@@ -183,6 +206,17 @@ def field_of(topic: str, name: str) -> Field | None:
     'deg'
     """
     return next((field for field in TOPICS.get(kind_of(topic), ()) if field.name == name), None)
+
+
+def is_field_name(name: str) -> bool:
+    """Whether some canonical topic has a field of that name.
+
+    Examples
+    --------
+    >>> is_field_name("roll_deg"), is_field_name("roll")
+    (True, False)
+    """
+    return name in _FIELD_NAMES
 
 
 def topics_of_kind(kind: str, topics: "list[str] | tuple[str, ...]") -> tuple[str, ...]:

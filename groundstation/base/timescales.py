@@ -169,3 +169,15 @@ def gps_week_to_utc_ns(week: NDArray[np.int64] | int, week_ms: NDArray[np.int64]
     leap_s = leaps[np.searchsorted(starts_s, gps_s, side="right")]
     whole_ns = (gps_s + _GPS_EPOCH_S - leap_s) * NS_PER_S
     return np.asarray(whole_ns + np.asarray(week_ms, dtype=np.int64) % 1000 * 1_000_000, dtype=np.int64)
+
+
+def gps_to_utc_ns(gps_ns: NDArray[np.int64]) -> NDArray[np.int64]:
+    """UTC nanoseconds since 1970 of moments that are written as a date and time of GPS time, less its leap seconds.
+
+    Examples
+    --------
+    >>> utc_ns_to_iso(int(gps_to_utc_ns(np.array([iso_to_utc_ns("2025-08-28T17:30:39.749Z")[0]]))[0]))
+    '2025-08-28T17:30:21.749Z'
+    """
+    week_ms, rest_ns = np.divmod(np.asarray(gps_ns, dtype=np.int64) - _GPS_EPOCH_S * NS_PER_S, 1_000_000)
+    return np.asarray(gps_week_to_utc_ns(0, week_ms) + rest_ns, dtype=np.int64)

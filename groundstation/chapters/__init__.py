@@ -10,7 +10,7 @@ from groundstation.chapters.landing import landing
 from groundstation.chapters.landing_beacons import landing_beacons
 from groundstation.chapters.latency import latency
 from groundstation.chapters.magnetic import magnetic
-from groundstation.chapters.parts import Section
+from groundstation.chapters.parts import Rank, Section
 from groundstation.chapters.plan import PLAN_CHAPTERS, is_plan
 from groundstation.results.answer import Answer
 from groundstation.results.cooperative import CooperativeResult
@@ -37,8 +37,19 @@ FLIGHT_CHAPTERS: tuple[Chapter, ...] = (
 SESSION_CHAPTERS: tuple[Chapter, ...] = (Chapter((CooperativeResult,), cooperative),)
 
 
+def answer_chapters(results: FlightResults) -> tuple[Section, ...]:
+    """The chapters of a flight that have an answer, the best first: the order of a report."""
+    listed = [chapter for chapter in FLIGHT_CHAPTERS if any(map(results.answer, chapter.answers))]
+    own = [section for section in (chapter.build(results) for chapter in listed) if section is not None]
+    every = (*own, *(generic(results, answer) for answer in without_chapter(results)))
+    return tuple(sorted(every, key=lambda one: Rank.OTHER if one.claim is None else one.claim.rank))
+
+
 def chapters_of(results: FlightResults) -> tuple[Section, ...]:
-    """The chapters on the answers of a flight, a session or a plan: their own, then a generic one for every other."""
+    """The chapters on the answers of a flight, a session or a plan: their own, then a generic one for every other.
+
+    A chapter of a flight without its answer says why there is none.
+    """
     listed = PLAN_CHAPTERS if is_plan(results) else SESSION_CHAPTERS if is_session(results) else FLIGHT_CHAPTERS
     own = [chapter.build(results) for chapter in listed]
     return (

@@ -1,14 +1,37 @@
-"""A chapter without an answer: the reason why there is none."""
+"""What could not be assessed: subjects and reasons in plain words."""
 
+from groundstation.chapters.generic import titled
 from groundstation.chapters.parts import Note, Section
+from groundstation.chapters.wording import typeset, words
 from groundstation.results.flight import FlightResults
 from groundstation.results.reasons import explained
+
+# By the name of the analysis; others are called by their name.
+SUBJECTS = {
+    "heading": "Heading correction",
+    "inertial": "INS errors",
+    "forecast": "Forecast without GNSS",
+    "latency": "Latency between sensors",
+    "magnetic": "Magnetic deviation",
+    "magnetic_ground": "Heading sensor on the ground",
+    "landing": "Approaches",
+    "landing_beacons": "Landing by locators",
+    "cooperative": "Navigation between aircraft",
+}
 
 
 def reason_of(results: FlightResults, analysis: str) -> str:
     """Why an analysis could not be carried out, in plain words; empty where nothing is said about it."""
     reasons = results.reasons(analysis)
     return explained(analysis, reasons[0]) if reasons else ""
+
+
+def not_assessed(results: FlightResults) -> tuple[tuple[str, str], ...]:
+    """Subject and reason of every analysis that could not be carried out."""
+    return tuple(
+        (SUBJECTS.get(one.analysis) or titled(words(one.analysis)), typeset(explained(one.analysis, one.reason)))
+        for one in results.not_assessable
+    )
 
 
 def without_answer(results: FlightResults, analysis: str, title: str, lead: str) -> Section | None:

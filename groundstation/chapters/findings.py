@@ -1,5 +1,8 @@
 """Chapter: what a user must know about the flight, most severe first, and what could not be assessed."""
 
+from collections.abc import Sequence
+
+from groundstation.base.findings import Finding
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Part, Section
 from groundstation.chapters.wording import number
 from groundstation.results.flight import FlightResults
@@ -7,18 +10,25 @@ from groundstation.results.grouped_findings import grouped
 from groundstation.results.reasons import explained
 
 MOST_FINDINGS = 200
+TOLD_ABOVE = (".not_assessable", "heading.accept", "heading.reject", "heading.extend", "heading.undecided")
+TITLE, LEAD = "Findings", "What was noticed about this log, the most severe first; summary.json lists every one."
 MARKS = {"fail": Mark("bad", "fail"), "warn": Mark("warn", "warn"), "info": Mark("plain", "info")}
 GRAVITY = {"fail": 0, "warn": 1, "info": 2}
-HEADS = (Head("Severity"), Head("Finding"), Head("Where"), Head("Count", True), Head("Code"))
+HEADS = (Head("Severity"), Head("Finding"), Head("Where"), Head("Count", True))
 
 
 def findings(results: FlightResults) -> Section:
-    """The chapter; no findings is an answer too."""
-    parts: list[Part] = [_findings(results) or Note("No findings.", "good")]
-    missing = not_assessable(results)
-    if missing is not None:
-        parts.append(missing)
-    return Section("findings", "Findings", "What was noticed about this log, the most severe first.", parts)
+    """The chapter: warnings and failures, remarks in the appendix; no findings is an answer too.
+
+    What the front tells is left out: verdicts, and what could not be assessed.
+    """
+    found = [item for item in grouped(results.findings) if not item.code.endswith(TOLD_ABOVE)]
+    grave = [item for item in found if item.severity != "info"]
+    remarks = [item for item in found if item.severity == "info"]
+    parts: list[Part] = [_table(grave) if grave else Note("No warnings.", "good")]
+    if remarks:
+        parts.append(Note(f"{number(len(remarks), 0)} remarks stand in the appendix."))
+    return Section("findings", TITLE, LEAD, parts, appendix=(_table(remarks),) if remarks else ())
 
 
 def not_assessable(results: FlightResults) -> Grid | None:
@@ -27,16 +37,11 @@ def not_assessable(results: FlightResults) -> Grid | None:
     return Grid("Not assessable", (Head("Analysis"), Head("Reason")), rows) if rows else None
 
 
-def _findings(results: FlightResults) -> Grid | None:
-    found = sorted(grouped(results.findings), key=lambda item: GRAVITY[item.severity])
+def _table(found: Sequence[Finding]) -> Grid:
     rows: list[tuple[Cell, ...]] = []
-    for item in found[:MOST_FINDINGS]:
+    for item in sorted(found, key=lambda item: GRAVITY[item.severity])[:MOST_FINDINGS]:
         where = " · ".join(text for text in (item.topic, item.place) if text)
         count = "" if item.count is None else number(item.count, 0)
-        rows.append((MARKS[item.severity], item.text, where, count, item.code))
+        rows.append((MARKS[item.severity], item.text, where, count))
     more = len(found) - len(rows)
-    caption = f"{more} more in summary.json." if more else ""
-    every = len(results.findings)
-    if len(found) < every:
-        caption = f"Remarks on raw topics are joined by kind; summary.json lists all {every}. {caption}".strip()
-    return Grid("Findings", HEADS, rows, caption) if rows else None
+    return Grid("Findings", HEADS, rows, f"{more} more in summary.json." if more else "")

@@ -4,15 +4,14 @@ from collections.abc import Iterable
 
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.forecast_conclusions import conclusions, rows_of, title_of
-from groundstation.chapters.inertial import AIDED
-from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Part, Section, Tone
+from groundstation.chapters.inertial_claim import forecast_claim
+from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Part, Section, Tone, kept
 from groundstation.chapters.wording import clock, is_number, number, percent, words
 from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import (
     FEWEST_STARTS,
     METHODS,
     CalibrationRow,
-    ClassicStart,
     CoupledRow,
     ForecastResult,
     GapRow,
@@ -25,10 +24,7 @@ from groundstation.results.inertial import InertialResult
 HONESTY_TONES: dict[str, Tone] = {"within limits": "good", "too sure": "warn"}
 COMPARED = ("last_estimate", "windows")  # beside the shipped method in the calibration table
 TITLE = "Forecast without GNSS"
-LEAD = (
-    "GNSS taken away at many moments of this flight, on paper: the errors the filter forecast from there, against what "
-    "GNSS then showed. Error: radial position error built up since the start, position known there."
-)
+LEAD = "GNSS taken away at many moments of this flight: the radial error built up since, against what GNSS showed."
 
 
 def forecast(results: FlightResults) -> Section | None:
@@ -37,22 +33,24 @@ def forecast(results: FlightResults) -> Section | None:
     if answer is None:
         return without_answer(results, "forecast", TITLE, LEAD)
     kind = "" if ins is None else ins.kind
+    notes = conclusions(answer, kind)
     parts: tuple[Part | None, ...] = (
-        *conclusions(answer, kind),
-        _skill(answer),
+        *notes,
         Figure("forecast.growth"),
-        _default_in_detail(answer),
+        _skill(answer),
         Figure("forecast.calibration"),
-        *_calibration(answer),
         Figure("forecast.hindcast_map"),
-        Figure("forecast.classic"),
-        _classic(answer.classic_starts),
         _gaps(answer.gaps),
-        _phases(answer.phases),
-        _coupled(answer.coupled),
     )
-    headline = AIDED if kind == "gnss_aided" else f"Shipped method: {title_of(answer.default_method)}"
-    return Section("forecast", TITLE, LEAD, tuple(part for part in parts if part is not None), headline)
+    workings: tuple[Part | None, ...] = (
+        *(_default_in_detail(answer), *_calibration(answer), _phases(answer.phases), _coupled(answer.coupled)),
+    )
+    headline = f"Shipped method: {title_of(answer.default_method)}"
+    tone: Tone = "warn" if any(note.tone == "warn" for note in notes) else "good"
+    told = None
+    if kind == "unaided":
+        told = forecast_claim(answer, tuple(note.text for note in notes[:2]), tone)
+    return Section("forecast", TITLE, LEAD, kept(parts), headline, claim=told, appendix=kept(workings))
 
 
 def short(method: str) -> str:
@@ -149,18 +147,6 @@ def _calibration_cells(row: CalibrationRow) -> tuple[Cell, ...]:
         number(row.scale, 2),
         state,
     )
-
-
-def _classic(starts: tuple[ClassicStart, ...]) -> Grid | None:
-    methods = list(dict.fromkeys(row.method for row in starts))
-    errors = {(row.start_h, row.horizon_min, row.method): row.error_m for row in starts}
-    rows = [
-        (f"{start:g} h", f"{lead:g} min", *(number(errors.get((start, lead, name)), 0) for name in methods))
-        for start, lead in sorted({(row.start_h, row.horizon_min) for row in starts})
-    ]
-    heads = _heads("Start", ("Horizon", *map(short, methods)))
-    caption = "Radial error, m. The later the start, the longer the filter has watched: compare equal horizons."
-    return Grid("The four starts of the paper", heads, rows, caption) if rows else None
 
 
 def _gaps(gaps: tuple[GapRow, ...]) -> Grid | None:

@@ -1,4 +1,4 @@
-"""What the chapter on the forecast comes to, in sentences: skill, honesty of the sigma, the paper's windows."""
+"""What the chapter on the forecast comes to, in sentences: skill, honesty of the sigma, windows."""
 
 from collections.abc import Mapping, Sequence
 
@@ -13,9 +13,6 @@ HEADLINE_MIN = 60.0  # the horizon the conclusion quotes, or the longest there i
 
 def conclusions(answer: ForecastResult, kind: str) -> list[Note]:
     """A sentence or two for skill, honesty and windows; ``kind`` is that of the INS."""
-    if kind == "gnss_aided":
-        text = "The INS is aided by GNSS: what follows shows how it follows GNSS, and nothing about a forecast."
-        return [Note(text, "warn")]
     text = "Whether GNSS corrects this INS already cannot be told: if it does, what follows says nothing of a forecast."
     notes = [
         Note(text, "unknown") if kind == "unknown" else None,
@@ -110,7 +107,7 @@ def _too_few(answer: ForecastResult) -> set[float]:
 
 
 def _windows(answer: ForecastResult) -> Note | None:
-    """Whether the paper's windows help on this flight."""
+    """Whether the windows of Neusypin 2003 help on this flight."""
     windows, last = rows_of(answer, "windows"), rows_of(answer, "last_estimate")
     shared = sorted(set(windows) & set(last))
     if not shared:
@@ -119,7 +116,9 @@ def _windows(answer: ForecastResult) -> Note | None:
     helped = [lead for lead, (ours, theirs) in pairs.items() if ours < (1.0 - SAME) * theirs]
     hurt = [lead for lead, (ours, theirs) in pairs.items() if ours > (1.0 + SAME) * theirs]
     told = [_at(verb, leads, pairs) for verb, leads in (("help", helped), ("hurt", hurt)) if leads]
-    sentence = "The paper's long-period windows " + (" and ".join(told) if told else "change nothing on this flight")
+    sentence = "The long-period windows of Neusypin 2003 " + (
+        " and ".join(told) if told else "change nothing on this flight"
+    )
     return Note(f"{sentence}. One flight decides nothing: starts overlap.", "plain")
 
 

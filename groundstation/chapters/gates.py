@@ -1,16 +1,10 @@
 """The gates of an answer and the settings it was found with, as every chapter tells them."""
 
+import json
 from collections.abc import Mapping, Sequence
 
 from groundstation.chapters.parts import Cell, Facts, Grid, Head, Mark
-from groundstation.chapters.wording import (
-    any_value,
-    named_quantity,
-    number_with_unit,
-    significant,
-    typeset,
-    unit_sign,
-)
+from groundstation.chapters.wording import clean, number_with_unit, significant, typeset, unit_sign
 from groundstation.results.heading import Gate
 
 SENSE_SIGNS = {"at_most": "≤ ", "at_least": "≥ "}
@@ -23,7 +17,7 @@ HEADS = (
     *(Head("State"), Head("Gate"), Head("Figure", True), Head("Limit", True)),
     *(Head("Role"), Head("Reason")),
 )
-CAPTION = "Accept asks for every gate that decides; one that could not be measured is neither passed nor failed."
+CAPTION = "Accept asks for every gate that decides."
 
 
 def gate_grid(gates: Sequence[Gate]) -> Grid | None:
@@ -43,6 +37,23 @@ def _row(gate: Gate) -> tuple[Cell, ...]:
         "decides" if gate.required else "informs",
         typeset(gate.reason),
     )
+
+
+def failed_to_inform(gates: Sequence[Gate]) -> str:
+    """A sentence that names the failed gates that only inform; empty without one.
+
+    Examples
+    --------
+    >>> failed_to_inform([Gate("kurtosis", "excess kurtosis", 2.4, (-1.2, 2.0), "", "failed", required=False)])
+    'Failed, but does not decide: excess kurtosis 2.4 (wanted −1.2 … 2).'
+    """
+    failed = [gate for gate in gates if gate.state == "failed" and not gate.required]
+    told = [
+        f"{typeset(gate.title or gate.name)} {number_with_unit(significant(gate.value, 3), unit_sign(gate.unit))} "
+        f"(wanted {limit_text(gate)})"
+        for gate in failed
+    ]
+    return f"Failed, but {'does' if len(told) == 1 else 'do'} not decide: {'; '.join(told)}." if told else ""
 
 
 def state_of(gate: Gate) -> Mark:
@@ -76,10 +87,20 @@ def limit_text(gate: Gate) -> str:
     return SENSE_SIGNS.get(gate.sense, "") + number_with_unit(significant(gate.limit, 4), unit)
 
 
-def setting_facts(settings: Mapping[str, float | str | bool]) -> Facts | None:
-    """The settings an answer was found with; None where there are none."""
-    pairs = []
-    for name, value in sorted(settings.items()):
-        title, unit = named_quantity(name)
-        pairs.append((title, any_value(value, unit), ""))
-    return Facts("Settings of the method", pairs, compact=True) if pairs else None
+def setting_facts(settings: Mapping[str, float | str | bool], table: str = "") -> Facts | None:
+    """The settings an answer was found with, spelled as in a settings file; None where there are none.
+
+    Examples
+    --------
+    >>> facts = setting_facts({"taxi_min_s": 20.0, "turn_rate_kind": "slope"}, "heading")
+    >>> facts.title, facts.pairs
+    ('Settings: [heading]', [('taxi_min_s', '20', ''), ('turn_rate_kind', '"slope"', '')])
+    """
+    pairs = [(clean(name), _in_toml(value), "") for name, value in sorted(settings.items())]
+    return Facts(f"Settings: [{table}]" if table else "Settings", pairs, compact=True) if pairs else None
+
+
+def _in_toml(value: float | str | bool) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return json.dumps(clean(value), ensure_ascii=False) if isinstance(value, str) else f"{value:.10g}"

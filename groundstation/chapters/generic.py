@@ -14,7 +14,21 @@ import numpy as np
 
 from groundstation.base.digits import digits_of, rounded
 from groundstation.chapters.gates import gate_grid, setting_facts
-from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Note, Part, Section, Tone
+from groundstation.chapters.parts import (
+    Cell,
+    Claim,
+    Facts,
+    Figure,
+    Grid,
+    Head,
+    Mark,
+    Note,
+    Part,
+    Rank,
+    Section,
+    Tone,
+    kept,
+)
 from groundstation.chapters.wording import any_value, clean, is_number, named_quantity, sentence, typeset, words
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
@@ -39,10 +53,14 @@ def generic(results: FlightResults, answer: Answer) -> Section:
         gate_grid(getattr(answer, "gates", ())),
         *(_part(name, value) for name, value in plain.items() if _has_parts(value)),
         *(Note(sentence(remark)) for remark in getattr(answer, "remarks", ())),
-        setting_facts(getattr(answer, "settings", {})),
     )
     headline = f"{title}: {verdict}" if verdict else ""
-    return Section(answer.analysis, title, _lead(answer), tuple(part for part in parts if part is not None), headline)
+    reason = str(getattr(answer, "verdict_reason", ""))
+    mark = Mark(VERDICTS.get(verdict, "plain"), titled(verdict) if verdict else "Answered")
+    told = Claim(Rank.OTHER, mark, title, sentences=(sentence(reason),) if reason else ())
+    settings = setting_facts(getattr(answer, "settings", {}), answer.analysis)
+    lead, workings = _lead(answer), kept((settings,))
+    return Section(answer.analysis, title, lead, kept(parts), headline, claim=told, appendix=workings)
 
 
 def figures_over_time(results: FlightResults, analysis: str) -> tuple[str, ...]:

@@ -1,24 +1,22 @@
-"""Chapter: heading correction (system 1): gates, estimates and the figures of the published method."""
+"""Chapter: heading correction (system 1): gates, estimates and the figures of the published method (Markelov 2015)."""
 
 from collections.abc import Sequence
 
 from groundstation.chapters.assessed import reason_of
-from groundstation.chapters.front import UNKNOWN_REASON, front
 from groundstation.chapters.gates import gate_grid, setting_facts
-from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Part, Section
-from groundstation.chapters.verdict import NOT_ASSESSABLE, figures, reasons
+from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Part, Section, kept
+from groundstation.chapters.verdict import NOT_ASSESSABLE, claim
 from groundstation.chapters.wording import ABSENT, clock, interval, is_number, number, step_places
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult, OnboardComparison, Standstill, TaxiSegment
 
 TITLE = "Heading correction"
-LEAD = (
-    "On straight taxi the nose points where the aircraft moves: the mean of INS heading minus GNSS track is the "
-    "heading error. Error = INS heading − true heading; the correction is its negative."
-)
-FIGURES = ("difference", "density", "convergence", "taxi", "forest", "spectrum")
+LEAD = "On straight taxi the nose points where the aircraft moves: INS heading − GNSS track is the heading error."
+WORKINGS = ("density", "convergence", "spectrum")
 STANDSTILL_FIGURES = (Figure("standstill.components"), Figure("standstill.mean_speed"))
+HELD = "The receiver holds its velocity when standing, so its error at standstill cannot be seen."
+UNKNOWN_REASON = "the log does not hold what the method needs"
 USES = {"exclude": "Left out by hand", "force": "Used by hand against the gates"}
 ESTIMATE_HEADS = (Head("Estimate"), Head("Value", True), Head("95 %", True), Head("Meaning"))
 SEGMENT_HEADS = (
@@ -38,22 +36,24 @@ def heading(results: FlightResults) -> Section:
     if answer is None:
         note = Note(f"Not assessable: {reason_of(results, 'heading') or UNKNOWN_REASON}", "unknown")
         headline = f"{NOT_ASSESSABLE.symbol} Heading not assessable"
-        return Section("heading", TITLE, LEAD, (note, *_figures(()), *STANDSTILL_FIGURES), headline)
+        return Section("heading", TITLE, LEAD, (note,), headline)
+    told, segments = claim(answer), _segments(answer.segments)
     parts = (
-        *(gate_grid(answer.gates), _estimates(answer)),
-        *_figures(answer.segments),
-        *(_onboard(answer), _runway(answer), _geometry(answer), _standstill(answer.standstill)),
-        *STANDSTILL_FIGURES,
-        *(_by_hand(results.chosen), setting_facts(answer.settings)),
+        gate_grid(answer.gates),
+        Figure("heading.difference"),
+        Figure("heading.taxi"),
+        Figure("heading.forest", instead=segments),
+        *(_onboard(answer), _runway(answer)),
+        *_standstill(answer.standstill),
+        _by_hand(results.chosen),
     )
-    shown = tuple(part for part in parts if part is not None)
-    above: tuple[Part, ...] = (*(Note(reason) for reason in reasons(answer)), Facts("", figures(answer)))
-    return Section("heading", TITLE, LEAD, shown, front(results).line, above)
-
-
-def _figures(segments: Sequence[TaxiSegment]) -> tuple[Figure, ...]:
-    table = _segments(segments)
-    return tuple(Figure(f"heading.{name}", instead=table if name == "forest" else None) for name in FIGURES)
+    workings = (
+        *(_estimates(answer), _spread(answer), _geometry(answer), _standstill_facts(answer.standstill)),
+        *(Figure(f"heading.{name}") for name in WORKINGS),
+        setting_facts(answer.settings, "heading"),
+    )
+    above: tuple[Part, ...] = (*(Note(sentence) for sentence in told.sentences), Facts("", told.figures))
+    return Section("heading", TITLE, LEAD, kept(parts), told.line, above, told, kept(workings))
 
 
 def _segments(segments: Sequence[TaxiSegment]) -> Grid | None:
@@ -72,37 +72,32 @@ def _segments(segments: Sequence[TaxiSegment]) -> Grid | None:
 
 
 def _estimates(answer: HeadingResult) -> Grid:
+    value = {
+        name: number(getattr(answer, f"{name}_deg"), places, "°", signed=name.endswith("error"))
+        for name, places in (("error", 4), ("paper_error", 4), ("precision", 4), ("uncorrected_error", 4))
+    }
     rows = (
         (
             "Heading error, robust and weighted by speed",
-            number(answer.error_deg, 4, "°", signed=True),
+            value["error"],
             interval(answer.confidence95_deg, 3, "°"),
-            "the estimate corrected by; its interval allows for errors correlated over seconds",
+            "corrected by; allows for errors correlated over seconds, steady sideslip and mounting",
         ),
         (
-            "Heading error, running mean of the paper",
-            number(answer.paper_error_deg, 4, "°", signed=True),
-            f"± {number(answer.precision_deg, 4, '°')} (e)",
-            "e is right for white errors only: it is not the accuracy",
+            "The same by this taxi alone",
+            value["error"],
+            interval(answer.confidence95_measured_deg, 3, "°"),
+            "without steady sideslip and mounting",
         ),
         (
-            "Heading error, antenna velocity as logged",
-            number(answer.uncorrected_error_deg, 4, "°", signed=True),
-            ABSENT,
-            "what a computer on board would find without correcting for the lever arm",
+            "Heading error, running mean of Markelov 2015",
+            value["paper_error"],
+            f"± {value['precision']} (e)",
+            "e is right for white errors only",
         ),
-        (
-            "Standard deviation of the differences",
-            number(answer.estimate_sd_deg, 3, "°"),
-            ABSENT,
-            "sway, GNSS noise and what the airframe adds",
-        ),
-        (
-            "Quality: scatter of the running mean",
-            number(answer.quality_deg, 3, "°"),
-            ABSENT,
-            "convergence, and gross drift in azimuth",
-        ),
+        ("Heading error, antenna velocity as logged", value["uncorrected_error"], ABSENT, "no lever arm"),
+        ("Standard deviation of the differences", number(answer.estimate_sd_deg, 3, "°"), ABSENT, ""),
+        ("Quality: scatter of the running mean", number(answer.quality_deg, 3, "°"), ABSENT, ""),
     )
     pair = f"INS topic {answer.ins_topic} ({answer.heading_source}) against GNSS topic {answer.gnss_topic}."
     return Grid("Estimates", ESTIMATE_HEADS, rows, pair)
@@ -153,8 +148,13 @@ def _runway(answer: HeadingResult) -> Grid | None:
     return Grid("Runway check", RUNWAY_HEADS, rows, caption) if rows else None
 
 
-def _standstill(still: Standstill | None) -> Facts | None:
-    if still is None:
+def _standstill(still: Standstill | None) -> tuple[Part, ...]:
+    """The figures of the standstill; of a receiver that holds its velocity they would be flat lines at zero."""
+    return (Note(HELD, "unknown"),) if still is not None and still.velocity_is_held else STANDSTILL_FIGURES
+
+
+def _standstill_facts(still: Standstill | None) -> Facts | None:
+    if still is None or still.velocity_is_held:
         return None
     mean = f"{_velocity(still.mean_north_mps)} / {_velocity(still.mean_east_mps)}"
     sigma = f"{number(still.sigma_north_mps, 4, 'm/s')} / {number(still.sigma_east_mps, 4, 'm/s')}"
@@ -167,7 +167,11 @@ def _standstill(still: Standstill | None) -> Facts | None:
         ("Mean velocity, north / east", mean, ""),
         ("Standard deviation, north / east", sigma, ""),
         ("Length of the mean vector", length, f"gated; 0.97 bound {bound}"),
-        ("Mean of the speeds", number(still.mean_of_speed_mps, 4, "m/s"), "the paper's other reading; not gated"),
+        (
+            "Mean of the speeds",
+            number(still.mean_of_speed_mps, 4, "m/s"),
+            "the other reading of Markelov 2015; not gated",
+        ),
         ("Raw samples above 0.2 m/s", share, ""),
         ("Make-up of the velocity error", _make_up(still), ""),
     )
@@ -198,6 +202,23 @@ def _geometry(answer: HeadingResult) -> Facts:
         ("Azimuth drift", drift, slope),
     )
     return Facts("Lever arm, time offset, drift", pairs)
+
+
+def _spread(answer: HeadingResult) -> Facts | None:
+    """What parts of the taxi have of their own, what is added for steady terms, and steps."""
+    if not is_number(answer.steady_sigma_deg):
+        return None
+    wander = f"over {number(answer.wander_s, 0, 's')}"
+    pairs = (
+        ("Own error of a segment, σ", number(answer.segment_spread_deg, 3, "°"), "from what segments say"),
+        ("Wander of INS heading minus path, σ", number(answer.wander_spread_deg, 3, "°"), wander),
+        ("Steady sideslip and mounting left, σ", number(answer.steady_sigma_deg, 3, "°"), answer.steady_origin),
+        *(
+            ("Step of the INS heading", number(step.size_deg, 2, "°", signed=True), f"at {clock(step.time_s)}")
+            for step in answer.steps
+        ),
+    )
+    return Facts("Segments, minutes and steady terms", pairs)
 
 
 def _with_sigma(value: float | None, sigma: float | None, places: int, unit: str) -> str:

@@ -1,15 +1,18 @@
 """Chapter: INS errors (system 2): what the INS is like, its states with sigma, and how consistent the filter is."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
+from groundstation.chapters.aided_ins import aided
 from groundstation.chapters.assessed import without_answer
-from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, Tone
+from groundstation.chapters.gates import setting_facts
+from groundstation.chapters.inertial_claim import inertial_claim
+from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, Tone, kept
 from groundstation.chapters.wording import (
     ABSENT,
     any_value,
     clock,
     is_number,
-    named_quantity,
     number,
     percent,
     typeset,
@@ -26,14 +29,11 @@ from groundstation.results.inertial import (
     is_left_alone,
 )
 
+NOISE = "noise."  # what begins the names of those settings that the class gives
 PLACES = {"m": 1, "mps": 3, "arcsec": 1, "dph": 4, "dphph": 4}
 CONSISTENT = (0.93, 0.97)  # shares of innovations inside their 95 % band that pass for it
 TITLE = "INS errors"
-LEAD = (
-    "While GNSS is there a Kalman filter finds the errors of the INS, north and east apart: position, velocity, "
-    "platform tilt, gyro drift. Error = INS − truth."
-)
-AIDED = "This INS is aided by GNSS: a forecast from it means nothing"
+LEAD = "A Kalman filter finds the errors of the INS against GNSS, north and east apart. Error = INS − truth."
 
 
 def inertial(results: FlightResults) -> Section | None:
@@ -41,27 +41,31 @@ def inertial(results: FlightResults) -> Section | None:
     answer = results.answer(InertialResult)
     if answer is None:
         return without_answer(results, "inertial", TITLE, LEAD)
+    if answer.kind == "gnss_aided":
+        return replace(aided(answer), claim=inertial_claim(answer, "", is_doubtful=False))
     parts: tuple[Part | None, ...] = (
         *_conclusions(answer),
-        _figures_of_merit(answer),
-        _states(answer),
         Figure("inertial.state", of="position"),
         Figure("inertial.state", of="velocity"),
-        Figure("inertial.tilt_and_drift"),
         Figure("inertial.radial"),
+        _states(answer),
         _outages(answer.outages),
+        _azimuth(answer.azimuth),
+    )
+    workings: tuple[Part | None, ...] = (
+        _figures_of_merit(answer),
+        Figure("inertial.tilt_and_drift"),
         _consistency(answer.channels),
         Figure("inertial.innovations"),
         Figure("inertial.observability"),
-        _azimuth(answer.azimuth),
-        _settings(answer.settings),
+        *_settings(answer.settings),
     )
-    return Section("inertial", TITLE, LEAD, tuple(part for part in parts if part is not None), _headline(answer))
+    is_doubtful = bool(_shares(answer.channels)) and min(_shares(answer.channels).values()) < CONSISTENT[0]
+    told = inertial_claim(answer, _in_words(answer.channels), is_doubtful=is_doubtful)
+    return Section("inertial", TITLE, LEAD, kept(parts), _headline(answer), claim=told, appendix=kept(workings))
 
 
 def _headline(answer: InertialResult) -> str:
-    if answer.kind == "gnss_aided":
-        return AIDED
     if answer.kind == "unknown":
         return "Whether GNSS corrects this INS cannot be told"
     rate = number(answer.radial_error_rate_50_nmiph, 2, "nmi/h")
@@ -70,11 +74,9 @@ def _headline(answer: InertialResult) -> str:
 
 def _conclusions(answer: InertialResult) -> list[Note]:
     """The chapter in a few sentences: what the INS is like, and whether the filter can be trusted."""
-    reason = typeset(answer.kind_reason).strip().rstrip(".")
-    if answer.kind == "gnss_aided":
-        return [Note(f"This INS is aided by GNSS, and a forecast from it means nothing: {reason}.", "warn")]
     notes = []
     if answer.kind == "unknown":
+        reason = typeset(answer.kind_reason).strip().rstrip(".")
         text = f"Whether GNSS corrects this INS already cannot be told: {reason or 'the log does not show it'}."
         notes.append(Note(f"{text} If it does, its errors and any forecast mean nothing.", "unknown"))
     notes.append(_quality(answer))
@@ -268,9 +270,9 @@ def _azimuth(azimuth: AzimuthEstimate | None) -> Note | None:
     return Note(f"Azimuth error from the turns: {error} (σ {sigma}): {reason}.")
 
 
-def _settings(settings: Mapping[str, float | str | bool]) -> Facts | None:
-    pairs = []
-    for name, value in sorted(settings.items()):
-        title, unit = named_quantity(name)
-        pairs.append((title, any_value(value, unit), ""))
-    return Facts("Model, noise and gates as used", pairs, compact=True) if pairs else None
+def _settings(settings: Mapping[str, float | str | bool]) -> tuple[Facts | None, ...]:
+    """What stands in the settings file, and the noise that follows from the class of the INS."""
+    own = {name: value for name, value in settings.items() if not name.startswith(NOISE)}
+    noise = {name.removeprefix(NOISE): value for name, value in settings.items() if name.startswith(NOISE)}
+    facts = setting_facts(noise)
+    return setting_facts(own, "inertial"), None if facts is None else replace(facts, title="Noise of the INS class")

@@ -1,7 +1,21 @@
 """The chapter on recorded approaches: how each was flown, where it touched down, and what shows accuracy."""
 
 from groundstation.chapters.gates import limit_text, setting_facts, state_of
-from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, Tone
+from groundstation.chapters.parts import (
+    Cell,
+    Claim,
+    Facts,
+    Figure,
+    Grid,
+    Head,
+    Mark,
+    Note,
+    Part,
+    Rank,
+    Section,
+    Tone,
+    kept,
+)
 from groundstation.chapters.wording import (
     ABSENT,
     clock,
@@ -19,10 +33,8 @@ from groundstation.results.flight import FlightResults
 from groundstation.results.landing import Approach, LandingResult, PositionError, StabilisedAt
 from groundstation.results.landing_categories import CATEGORIES
 
-LEAD = (
-    "How was each approach flown against its runway, where did it touch down, and what do localizer or protection "
-    "levels say of the accuracy of positions?"
-)
+LEAD = "How each approach was flown against its runway, and where it touched down."
+TITLE = "Approaches"
 TONES: dict[str, Tone] = {"stabilised": "good", "not stabilised": "warn", "not measured": "unknown"}
 MOST_TOLD = 6
 HOW = (
@@ -45,9 +57,60 @@ def landing(results: FlightResults) -> Section | None:
         parts += _approach(one)
     if len(answer.approaches) > MOST_TOLD:
         parts.append(Note(f"Approaches {MOST_TOLD + 1} to {len(answer.approaches)} stand in the table above alone."))
-    parts += [_left_out(answer), _categories(), *(Note(sentence(remark)) for remark in answer.remarks), Note(HOW)]
-    parts.append(setting_facts(answer.settings))
-    return Section("landing", "Approaches", LEAD, tuple(part for part in parts if part is not None), _headline(answer))
+    parts += [_left_out(answer), *(Note(sentence(remark)) for remark in answer.remarks)]
+    workings = (
+        *(_basis(one) for one in told),
+        *(_categories(), Note(HOW), setting_facts(answer.settings, "landing")),
+    )
+    headline, claim = _headline(answer), _claim(answer)
+    return Section("landing", TITLE, LEAD, kept(parts), headline, claim=claim, appendix=kept(workings))
+
+
+def _claim(answer: LandingResult) -> Claim | None:
+    """The last landing, or the last approach of a flight without one."""
+    if not answer.approaches:
+        return None
+    landings = [one for one in answer.approaches if one.outcome == "landing"]
+    one = (landings or answer.approaches)[-1]
+    state = _verdict(one)
+    others = len(answer.approaches) - 1
+    also = f" {others} more {'approach' if others == 1 else 'approaches'} in the log." if others else ""
+    return Claim(
+        Rank.LANDING,
+        Mark(state.tone, state.text.capitalize()),
+        f"{_name(one).capitalize()}: {state.text}",
+        value=state.text.capitalize(),
+        remark=_name(one),
+        sentences=(f"{_why(one)}{also}",),
+        figures=_figures(one),
+    )
+
+
+def _why(one: Approach) -> str:
+    """From which gates the approach was stabilised, and the criteria that failed."""
+    told = []
+    for at in one.stabilised:
+        failed = [gate.title for gate in at.gates if gate.state == "failed"]
+        height = number(at.height_m, 0, "m")
+        why = f" ({', '.join(failed)})" if failed else ""
+        told.append(f"From {height}: {at.verdict}{why}.")
+    return " ".join(told) or "No gate height was passed."
+
+
+def _figures(one: Approach) -> tuple[tuple[str, str, str], ...]:
+    on, down = one.established, one.touchdown
+    error = next((row for row in one.position_errors if row.state == "measured"), None)
+    found = (
+        ("Off the course", number(on.lateral_rms_dots, 2, "dot") if on else ABSENT, "RMS while established"),
+        ("Off the path", number(on.vertical_rms_dots, 2, "dot") if on else ABSENT, "RMS while established"),
+        ("Sink rate at touchdown", number(down.sink_rate_mps, 1, "m/s") if down else ABSENT, "over the last 3 s"),
+        (
+            "Positions across the course",
+            number(error.error_m, 0, "m", signed=True) if error else ABSENT,
+            f"{error.topic} by the localizer; 95 % {interval(error.confidence95_m, 0, 'm')}" if error else "",
+        ),
+    )
+    return tuple(figure for figure in found if figure[1] != ABSENT)
 
 
 def _headline(answer: LandingResult) -> str:
@@ -107,7 +170,6 @@ def _approach(one: Approach) -> list[Part | None]:
         *(_error(one, error) for error in one.position_errors),
         Figure("landing.protection", of) if one.protection else None,
         _protection(one),
-        _basis(one),
     ]
 
 

@@ -2,7 +2,7 @@
 
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.gates import setting_facts
-from groundstation.chapters.parts import Cell, Figure, Grid, Head, Note, Part, Section
+from groundstation.chapters.parts import Cell, Claim, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
 from groundstation.chapters.wording import ABSENT, clock, number, sentence
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing_beacons import BeaconApproachRow, BeaconLanding, DeviationRow
@@ -47,11 +47,11 @@ def landing_beacons(results: FlightResults) -> Section | None:
         Grid("Deviations", ROW_HEADS, [_deviation(row) for row in answer.rows], ROW_CAPTION, ("landing_beacons_path",)),
         _beacons(answer),
         *(Note(sentence(remark)) for remark in answer.remarks),
-        Note(HOW),
-        setting_facts(answer.settings),
     )
-    shown = tuple(part for part in parts if part is not None)
-    return Section("landing_beacons", TITLE, LEAD, shown, _headline(answer))
+    workings = kept((Note(HOW), setting_facts(answer.settings, "landing_beacons")))
+    headline = _headline(answer)
+    told = Claim(Rank.LANDING, Mark("good", "Measured"), headline, remark=headline)
+    return Section("landing_beacons", TITLE, LEAD, kept(parts), headline, claim=told, appendix=workings)
 
 
 def _headline(answer: BeaconLanding) -> str:

@@ -1,21 +1,18 @@
 """Chapter: latency between sensors: how much later than the INS each shows the same motion."""
 
 from groundstation.chapters.assessed import without_answer
-from groundstation.chapters.parts import Figure, Grid, Head, Mark, Section
+from groundstation.chapters.parts import Claim, Figure, Grid, Head, Mark, Rank, Section
 from groundstation.chapters.wording import interval, number, significant, typeset
 from groundstation.results.flight import FlightResults
 from groundstation.results.latency import Latencies, Latency
 
 TITLE = "Latency between sensors"
-LEAD = (
-    "How much later than the INS each sensor shows the same motion, by the time stamps of the log: positive is later. "
-    "Estimated from ordinary motion; straight and level flight shows nothing of it."
-)
+LEAD = "How much later than the INS each sensor shows the same motion, by the time stamps of the log."
 HEADS = (
     *(Head("Sensor"), Head("Quantity"), Head("State"), Head("Latency, s", True), Head("95 % interval", True)),
     *(Head("Windows", True), Head("Motion in 1 s / left, RMS", True), Head("What it rests on, or why not")),
 )
-CAPTION = "Windows: degrees of freedom of the interval, of the windows used; motion slower than a window is taken away."
+CAPTION = "Windows: degrees of freedom of the interval, of the windows used."
 
 
 def latency(results: FlightResults) -> Section | None:
@@ -24,7 +21,33 @@ def latency(results: FlightResults) -> Section | None:
     if answer is None or not answer.rows:
         return without_answer(results, "latency", TITLE, LEAD)
     table = Grid("Latencies", HEADS, [_row(row) for row in answer.rows], CAPTION, ("latency_search",))
-    return Section("latency", TITLE, LEAD, (table, Figure("latency.search")))
+    told = _claim(answer)
+    of = ", ".join(dict.fromkeys(row.other for row in answer.rows))
+    headline = f"not observable for {of}: too little motion" if told is None else told.headline
+    return Section(
+        "latency", TITLE, LEAD, (table, Figure("latency.search")), headline, claim=told, is_open=told is None
+    )
+
+
+def _claim(answer: Latencies) -> Claim | None:
+    seen = [row for row in answer.rows if row.state == "observed"]
+    if not seen:
+        return None
+    first = seen[0]
+    value = number(first.latency_s, 3, "s", signed=True)
+    what = f"{first.other} {first.quantity} against {first.reference}"
+    figures = tuple(
+        (
+            f"{row.other} {row.quantity}",
+            number(row.latency_s, 3, "s", signed=True),
+            f"95 % {interval(row.confidence95_s, 3, 's')}",
+        )
+        for row in seen
+    )
+    sense = "later than" if (first.latency_s or 0.0) >= 0.0 else "earlier than"
+    size = number(abs(first.latency_s or 0.0), 3, "s")
+    headline = f"{first.other} {first.quantity} is {size} {sense} {first.reference}"
+    return Claim(Rank.LATENCY, Mark("good", "Measured"), headline, value, what, (), figures)
 
 
 def _row(row: Latency) -> tuple[str | Mark, ...]:

@@ -1,9 +1,25 @@
 """Chapter: magnetic deviation (system 3): verdict, coefficients, steer card, and what each correction leaves."""
 
 from groundstation.chapters.assessed import reason_of
-from groundstation.chapters.gates import gate_grid, setting_facts
-from groundstation.chapters.magnetic_ground import ground_runs
-from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, Tone
+from groundstation.chapters.gates import failed_to_inform, gate_grid, setting_facts
+from groundstation.chapters.magnetic_ground import LEAD as GROUND_LEAD
+from groundstation.chapters.magnetic_ground import TITLE as GROUND_TITLE
+from groundstation.chapters.magnetic_ground import ground_claim, ground_runs, ground_workings
+from groundstation.chapters.parts import (
+    Cell,
+    Claim,
+    Facts,
+    Figure,
+    Grid,
+    Head,
+    Mark,
+    Note,
+    Part,
+    Rank,
+    Section,
+    Tone,
+    kept,
+)
 from groundstation.chapters.wording import ABSENT, clock, is_number, number, sentence, significant, typeset
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.flight import FlightResults
@@ -19,16 +35,12 @@ from groundstation.results.magnetic import (
 )
 
 TITLE = "Magnetic deviation"
-LEAD = (
-    "Opposite turns of equal bank show the deviation of the magnetic heading against the aligned INS. Error = magnetic "
-    "heading − true magnetic heading; the deviation is its negative, to be added to the reading, east positive."
-)
+LEAD = "Opposite turns of equal bank show what to add to the magnetic heading, east positive."
 HOW = (
     "How computed: field levelled by roll and pitch of the INS; magnetic minus INS true heading averaged in bins of 1° "
     "on each branch, then over both; A to E by least squares. Hard and soft iron are fitted with the attitude, and "
     "from the constancy of the field's modulus. Level flight outside the figures, which no fit has seen, judges all "
-    "three. error(c) = A + B sin c + C cos c + D sin 2c + E cos 2c, c the uncorrected magnetic heading. Source: "
-    "Russian patent on the deviation of magnetometric sensors determined in flight; prior art RU 2550774."
+    "three. error(c) = A + B sin c + C cos c + D sin 2c + E cos 2c, c the uncorrected magnetic heading."
 )
 TONES: dict[str, Tone] = {"accept": "good", "reject": "bad", "undecided": "unknown"}
 MEANING = {
@@ -45,10 +57,8 @@ def magnetic(results: FlightResults) -> Section | None:
     """The chapter; None when the flight was not assessed and no reason is known."""
     answer = results.answer(MagneticResult)
     if answer is None:
-        reason = reason_of(results, "magnetic")
-        notes = (Note(f"Not assessable: {typeset(reason)}", "unknown"),) if reason else ()
-        instead = (*notes, *ground_runs(results))
-        return Section("magnetic", TITLE, LEAD, instead, f"{TITLE} not assessed") if instead else None
+        return _without_turns(results)
+    told = _claim(answer)
     parts: tuple[Part | None, ...] = (
         *_conclusions(answer),
         _coefficients(answer),
@@ -57,18 +67,51 @@ def magnetic(results: FlightResults) -> Section | None:
         Figure("magnetic.deviation"),
         gate_grid(answer.gates),
         _methods(answer),
-        *(Figure(f"magnetic.{name}") for name in ("held_out", "track", "branches", "modulus")),
-        _turns(answer),
+        *(Figure(f"magnetic.{name}") for name in ("held_out", "track")),
         _swings(answer),
-        _basis(answer),
-        _iron(answer.poisson),
         *(Note(sentence(remark)) for remark in answer.remarks),
-        Note(HOW),
-        setting_facts(answer.settings),
         *ground_runs(results),
     )
+    workings: tuple[Part | None, ...] = (
+        *(Figure(f"magnetic.{name}") for name in ("branches", "modulus")),
+        *(_turns(answer), _basis(answer), _iron(answer.poisson), Note(HOW), setting_facts(answer.settings, "magnetic")),
+        *ground_workings(results),
+    )
     headline = f"{TITLE}: {answer.verdict}"
-    return Section("magnetic", TITLE, LEAD, tuple(part for part in parts if part is not None), headline)
+    return Section("magnetic", TITLE, LEAD, kept(parts), headline, claim=told, appendix=kept(workings))
+
+
+def _without_turns(results: FlightResults) -> Section | None:
+    """The chapter of a flight without opposite turns: its ground runs, and why there is no deviation."""
+    reason, runs = reason_of(results, "magnetic"), ground_runs(results)
+    if not runs and not reason:
+        return None
+    if not runs:
+        note = Note(f"Not assessable: {typeset(reason)}", "unknown")
+        return Section("magnetic", TITLE, LEAD, (note,), f"{TITLE} not assessed")
+    told = ground_claim(results)
+    headline = "" if told is None else told.headline
+    workings = ground_workings(results)
+    return Section("magnetic", GROUND_TITLE, GROUND_LEAD, runs, headline, claim=told, appendix=workings)
+
+
+def _claim(answer: MagneticResult) -> Claim:
+    residual = answer.residual_rms_deg
+    left = None if residual is None else residual.after
+    before = None if residual is None else residual.before
+    remark = f"RMS left of {number(before, 2, '°')}, on level flight no fit has seen"
+    has_figure = is_number(left)
+    return Claim(
+        Rank.MAGNETIC if answer.verdict in ("accept", "reject") else Rank.MAGNETIC_OPEN,
+        Mark(TONES[answer.verdict], answer.verdict.capitalize()),
+        f"Magnetic deviation: {number(left, 2, '°')} {remark}" if has_figure else "Magnetic deviation found in turns",
+        value=number(left, 2, "°") if has_figure else "",
+        remark=remark if has_figure else "",
+        sentences=tuple(
+            filter(None, (sentence(answer.verdict_reason), failed_to_inform(answer.gates), sentence(ADVISORY)))
+        ),
+        figures=(("Magnetic heading", number(left, 2, "°"), remark),) if has_figure else (),
+    )
 
 
 def _conclusions(answer: MagneticResult) -> list[Note]:

@@ -1,20 +1,17 @@
 """Parts of the chapter on magnetic deviation: the installed heading sensor on straight ground runs."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from groundstation.chapters.gates import setting_facts
-from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part
+from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, kept
 from groundstation.chapters.wording import ABSENT, clock, is_number, number, sentence, typeset
 from groundstation.results.flight import FlightResults
 from groundstation.results.magnetic import ADVISORY
 from groundstation.results.magnetic_ground import GroundCoefficient, GroundDeviation, GroundRun
 
 MOST_RUNS = 40
-LEAD = (
-    "Installed heading sensor on straight ground runs: on its wheels an aircraft has no drift angle, so the GNSS track "
-    "is the true heading of the nose, and magnetic heading + declination − track is the error of the sensor."
-)
+TITLE = "Heading sensor on ground runs"
+LEAD = "On straight ground runs the nose points along the GNSS track: reading + declination − track is the error."
 HOW = (
     "How computed: runs of steady heading with ground contact proven; one noise model for all, correlated over "
     "seconds, and an error of its own for each run. A to E with what a run has of its own (iron in the ground, loads) "
@@ -29,35 +26,60 @@ def ground_runs(results: FlightResults) -> tuple[Part, ...]:
     errors_deg = [run.error_deg for run in answer.used if run.error_deg is not None] if answer else []
     if answer is None or not errors_deg:
         return ()
-    found: tuple[Part | None, ...] = (
-        Note(f"{LEAD} {_conclusion(answer, errors_deg)} {ADVISORY}"),
-        Figure("magnetic.ground_runs"),
-        _runs(answer.runs),
-        _coefficients(answer),
-        _repeats(answer),
-        _basis(answer),
-        *(Note(sentence(remark)) for remark in answer.remarks),
-        Note(HOW),
-        _settings(answer),
+    return kept(
+        (
+            Note(f"Heading sensor: {_conclusion(answer, errors_deg)} {ADVISORY}"),
+            Figure("magnetic.ground_runs"),
+            _runs(answer.runs),
+            *(Note(sentence(remark)) for remark in answer.remarks),
+        )
     )
-    return tuple(part for part in found if part is not None)
 
 
-def _settings(answer: GroundDeviation) -> Facts | None:
-    facts = setting_facts(answer.settings)
-    return replace(facts, title="Ground runs: settings") if facts else None
+def ground_workings(results: FlightResults) -> tuple[Part, ...]:
+    """What stands in the appendix of a report; nothing where there are no runs."""
+    answer = results.answer(GroundDeviation)
+    if answer is None or not ground_runs(results):
+        return ()
+    settings = setting_facts(answer.settings, "magnetic_ground")
+    return kept((_coefficients(answer), _repeats(answer), _basis(answer), Note(HOW), settings))
+
+
+def ground_claim(results: FlightResults) -> Claim | None:
+    """What the ground runs answer; None where there are none."""
+    answer = results.answer(GroundDeviation)
+    errors_deg = [run.error_deg for run in answer.used if run.error_deg is not None] if answer else []
+    if answer is None or not errors_deg:
+        return None
+    span = _span(errors_deg)
+    return Claim(
+        Rank.GROUND_RUNS,
+        Mark("good", "Measured"),
+        f"Heading sensor off by {span} on the ground",
+        value=span,
+        remark=_on_runs(answer, errors_deg),
+        sentences=(f"{_on_runs(answer, errors_deg).capitalize()}. {ADVISORY}",),
+        figures=(("Error of the heading sensor", span, _on_runs(answer, errors_deg)),),
+    )
 
 
 def _with_sigma(value: float | None, sigma: float | None, places: int = 2) -> str:
     return f"{number(value, places, signed=True)} ± {number(sigma, places)}" if is_number(value) else ABSENT
 
 
-def _conclusion(answer: GroundDeviation, errors_deg: Sequence[float]) -> str:
-    ends = sorted({min(errors_deg), max(errors_deg)})
-    spanned = " to ".join(number(value, 1, "°", signed=True) for value in ends)
-    runs = "one run" if len(errors_deg) == 1 else f"{len(errors_deg)} runs"
+def _span(errors_deg: Sequence[float]) -> str:
+    ends = dict.fromkeys(number(value, 1, "°", signed=True) for value in (min(errors_deg), max(errors_deg)))
+    return " to ".join(ends)
+
+
+def _on_runs(answer: GroundDeviation, errors_deg: Sequence[float]) -> str:
+    runs = "one straight run" if len(errors_deg) == 1 else f"{len(errors_deg)} straight runs"
     directions = "one direction" if answer.directions == 1 else f"{number(answer.directions, 0)} directions"
-    return f"Here {runs} in {directions}: error {spanned}."
+    return f"{runs} in {directions}"
+
+
+def _conclusion(answer: GroundDeviation, errors_deg: Sequence[float]) -> str:
+    return f"{_on_runs(answer, errors_deg)}, error {_span(errors_deg)}."
 
 
 def _runs(runs: Sequence[GroundRun]) -> Grid:

@@ -58,14 +58,20 @@ def part_markdown(part: Part, *, level: int = 2) -> str:
 
 
 def front_markdown(front: Front) -> str:
-    """The front of a report as a Markdown document: what flight it is, the verdict, and why."""
+    """The front of a report as a Markdown document: what flight it is, a row for each answer, why, what is missing."""
     parts = [f"# {escaped(front.title)}"]
     if front.headline:
         parts.append(f"## {escaped(front.line)}")  # before the rest: a small panel shows it without scrolling
+    if front.others:
+        rows = [(front.subject, front.line), *((tile.title, tile.claim.line) for tile in front.others)]
+        parts.append(table(("Answer", "Found"), [(escaped(title), escaped(line)) for title, line in rows]))
     parts.append(table(("", ""), [(escaped(label), _cell(cell)) for label, cell in front.pairs]))
     parts += [escaped(sentence) for sentence in front.sentences]
     if front.figures:
         parts += _facts(Facts("", front.figures), 2)
+    if front.missing:
+        parts.append("## Not assessable")
+        parts += [f"**{escaped(subject)}**: {escaped(reason)}" for subject, reason in front.missing]
     return "\n\n".join(parts)
 
 

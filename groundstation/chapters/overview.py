@@ -1,10 +1,13 @@
-"""Chapter: the flight at a glance: track map, altitude, speed, phases and the state of GNSS."""
+"""Chapter: the flight at a glance: track map, altitude, speed, attitude, phases and the state of GNSS."""
 
 from groundstation.chapters.parts import Figure, Section
 from groundstation.results.flight import FlightResults
 
-LEAD = "Where the aircraft was and what it did, from the logged navigation data."
-FIGURES = (Figure("overview.track"), Figure("overview.profile"), Figure("overview.states"))
+LEAD = "Where the aircraft was and what it did, as logged."
+FIGURES = (
+    *(Figure("overview.track"), Figure("overview.profile")),
+    *(Figure("overview.attitude"), Figure("overview.states")),
+)
 
 
 def overview(results: FlightResults) -> Section | None:

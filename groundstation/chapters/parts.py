@@ -4,8 +4,9 @@ A chapter builds them from the answers, once. HTML, typst, Markdown and the term
 happens there, for everything.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import ClassVar, Literal, TypeAlias
 
 Tone = Literal["good", "bad", "warn", "unknown", "plain"]
@@ -89,9 +90,70 @@ class Note(Part):
     files: Sequence[str] = ()
 
 
+def kept(parts: Iterable[Part | None]) -> tuple[Part, ...]:
+    """The parts that there are."""
+    return tuple(part for part in parts if part is not None)
+
+
+class Rank(IntEnum):
+    """Which claim a report opens with: the lowest that the flight has."""
+
+    HEADING = 0  # decided: accept, reject, extend
+    MAGNETIC = 1  # decided
+    INERTIAL = 2
+    FORECAST = 3
+    LANDING = 4
+    HEADING_OPEN = 5  # undecided
+    GROUND_RUNS = 6
+    MAGNETIC_OPEN = 7
+    INERTIAL_OPEN = 8  # aided by GNSS, or not known whether
+    LATENCY = 9
+    OTHER = 10
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What a chapter answers, at a glance: the report opens with the best claim, the others stand beside it as tiles.
+
+    Parameters
+    ----------
+    rank : Rank
+    mark : Mark
+        Whether to trust it, in a word.
+    headline : str
+        What was found, or what to do.
+    value, remark : str
+        The figure of a tile, and what it is; without a value the tile shows the word.
+    sentences : sequence of str
+        Why.
+    figures : sequence of (str, str, str)
+        Label, value, remark.
+    to_sign : bool
+        Whether room is left for a name and a signature.
+    """
+
+    rank: Rank
+    mark: Mark
+    headline: str
+    value: str = ""
+    remark: str = ""
+    sentences: Sequence[str] = ()
+    figures: Sequence[tuple[str, str, str]] = ()
+    to_sign: bool = False
+
+    @property
+    def line(self) -> str:
+        """Word and headline in one line, with the symbol of the word."""
+        return f"{self.mark.symbol} {self.mark.text} · {self.headline}".strip()
+
+
 @dataclass(frozen=True)
 class Section:
     """One chapter of the report. ``key`` is its anchor; ``lead`` says in a sentence what it answers.
+
+    ``appendix`` are parts that only a report shows, behind all chapters: settings, workings, how it was computed.
+    ``number`` is what a report counts it by. ``is_open``: the answer came to nothing and ``headline`` says why; a
+    report then tells it among what could not be assessed, and its parts in the appendix.
 
     A page without a front (a text panel, the terminal) begins with ``headline``, the answer in a few words, and
     ``above``, what the front of a report tells of it.
@@ -103,6 +165,19 @@ class Section:
     parts: Sequence[Part] = field(default_factory=tuple)
     headline: str = ""
     above: Sequence[Part] = ()
+    claim: Claim | None = None
+    appendix: Sequence[Part] = ()
+    number: str = ""
+    is_open: bool = False
+
+
+@dataclass(frozen=True)
+class Tile:
+    """An answer beside the one a report opens with: the title and key of its chapter, and its claim."""
+
+    title: str
+    key: str
+    claim: Claim
 
 
 @dataclass(frozen=True)
@@ -120,6 +195,12 @@ class Front:
         Label, value, remark.
     to_sign : bool
         Whether room is left for a name and a signature.
+    subject : str
+        What the verdict is on: the title of its chapter, whose key is ``key``.
+    others : sequence of Tile
+        The other answers.
+    missing : sequence of (str, str)
+        Subject and reason of what could not be assessed, a folded line each.
     """
 
     title: str
@@ -129,6 +210,10 @@ class Front:
     sentences: Sequence[str] = ()
     figures: Sequence[tuple[str, str, str]] = ()
     to_sign: bool = False
+    subject: str = ""
+    key: str = ""
+    others: Sequence[Tile] = ()
+    missing: Sequence[tuple[str, str]] = ()
 
     @property
     def line(self) -> str:

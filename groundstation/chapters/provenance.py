@@ -7,12 +7,9 @@ from groundstation.chapters.wording import ABSENT, clean, number
 from groundstation.results.flight import FlightResults, Source
 
 LONG_LISTS = ("parameter.", "units.")  # of autopilot logs, hundreds of them
-MOST_METADATA = 40
-REST = "The rest of the metadata, parameters and units among it, stands in summary.json."
-CHECKS = (
-    "Every number on these pages stands in summary.json or in tables/*.csv beside this file. Time of run, "
-    "host, versions and configuration stand in manifest.json: equal input gives this report byte for byte."
-)
+MOST_METADATA = 12
+REST = "More metadata in summary.json."
+CHECKS = "Every number stands in summary.json or tables/*.csv; versions and configuration in manifest.json."
 
 
 def provenance(results: FlightResults) -> Section:
@@ -38,7 +35,7 @@ def provenance(results: FlightResults) -> Section:
         if len(rows) < len(listed):
             parts.append(Note(REST))
     parts.append(Note(CHECKS))
-    return Section("provenance", "Provenance", "Where the numbers come from and how to check them.", parts)
+    return Section("provenance", "Provenance", "", parts)
 
 
 def source_pairs(source: Source, what: str = "log") -> tuple[tuple[str, str, str], ...]:

@@ -3,11 +3,15 @@
 from dataclasses import fields, is_dataclass
 from typing import Any
 
+import numpy as np
+
 from groundstation.base.clock import Clock, RelationEntry
 from groundstation.base.ledger import DamageEntry, Ledger
-from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Section
+from groundstation.base.signals import RAW_PREFIX
+from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Section, kept
 from groundstation.chapters.provenance import source_pairs
 from groundstation.chapters.wording import (
+    ABSENT,
     any_value,
     named_quantity,
     number,
@@ -19,7 +23,7 @@ from groundstation.chapters.wording import (
 from groundstation.results.figures import numbers, texts
 from groundstation.results.flight import FlightResults
 
-LEAD = "What the recorder delivered: rates, gaps and order of every topic, and how its clock was read."
+LEAD = "What the recorder delivered."
 MOST_TOPICS = 60
 MOST_ENTRIES = 20
 MOST_DAMAGES = 60
@@ -38,7 +42,7 @@ TITLES = {
     "out_of_range": "Out of range",
     "stuck": "Stuck",
 }
-COUNTED_IF_KNOWN = ("lost_by_counter", "out_of_range", "stuck")
+NOTHING = ("0", "no", "none", ABSENT)
 IN_TABLES = ("topics", "damages", "remarks", "spans", "spans_more", "steps", "relations")  # remarks are findings
 STEP_HEADS = (
     *(Head(title, True) for title in ("Record", "Step, s", "Clock set by, s", "Records before it, moved")),
@@ -48,10 +52,7 @@ CLOCK_HEADS = (
     *(Head("Other clock"), Head("From"), Head("Length, s", True)),
     *(Head("Other less recorder"), Head("Drift of the recorder"), Head("Scatter, s", True)),
 )
-CLOCK_CAPTION = (
-    "± is one standard error; positive drift: the recorder is fast. Corrected time is the recorder's, moved where "
-    "its clock was set, and not changed by its drift. UTC of autopilots' logs comes from GNSS time itself."
-)
+CLOCK_CAPTION = "± is one standard error; positive drift: the recorder is fast. Drift does not change corrected time."
 DAMAGE_HEADS = (Head("Kind"), Head("What"), Head("Where"), Head("Count", True), Head("Data lost"))
 WHOLE = "No damage was found in the log: nothing lost, nothing unreadable."
 
@@ -59,31 +60,36 @@ WHOLE = "No damage was found in the log: nothing lost, nothing unreadable."
 def quality(results: FlightResults) -> Section:
     """The chapter: every flight has a ledger."""
     parts = (
-        *(_topics(results), Figure("quality.gaps")),
-        *(_nested(results.clock, "Clock model"), _clock_steps(results.clock), _other_clocks(results.clock)),
-        *(_damages(results.ledger), _nested(results.ledger, "Ledger of the log")),
+        *(_damages(results.ledger), _topics(results), Figure("quality.gaps")),
+        *(_clock_steps(results.clock), _other_clocks(results.clock)),
     )
-    shown = tuple(part for part in parts if part is not None)
-    headline = f"{results.flight_id}: {results.status}"
-    return Section("quality", "Data quality", LEAD, shown, headline, (Facts("", source_pairs(results.source)),))
+    workings = (_nested(results.clock, "Clock model"), _nested(results.ledger, "Ledger of the log"))
+    headline, above = f"{results.flight_id}: {results.status}", (Facts("", source_pairs(results.source)),)
+    return Section("quality", "Data quality", LEAD, kept(parts), headline, above, appendix=kept(workings))
 
 
 def _topics(results: FlightResults) -> Grid | None:
+    """The topics that answers rest on; those of raw data where there are no others. Counts of nothing are left out."""
     data = results.figure_with_rows("ledger")
     if data is None:
         return None
-    counts = [name for name in list(TITLES)[5:] if name not in COUNTED_IF_KNOWN or name in data.columns]
+    names = texts(data, "topic").tolist()
+    own = [place for place, name in enumerate(names) if not name.startswith(RAW_PREFIX)]
+    shown = (own or list(range(len(names))))[:MOST_TOPICS]
+    counts = [name for name in list(TITLES)[5:] if np.nansum(numbers(data, name)[shown]) > 0.0]
     measured = ("rows", "nominal_rate_hz", "actual_rate_hz", "longest_gap_s", "coverage", *counts)
     columns = {name: numbers(data, name) for name in measured}
     rows = []
-    for place, topic in enumerate(texts(data, "topic").tolist()[:MOST_TOPICS]):
+    for place in shown:
+        topic = names[place]
         row = {name: float(values[place]) for name, values in columns.items()}
         rates = f"{significant(row['actual_rate_hz'])} / {significant(row['nominal_rate_hz'])}"
         whole, gap = number(row["coverage"] * 100, 1, "%"), number(row["longest_gap_s"], 2)
         rows.append((topic, number(row["rows"], 0), rates, whole, gap, *(number(row[name], 0) for name in counts)))
     heads = [Head(TITLES[name], name != "topic") for name in (*list(TITLES)[:5], *counts)]
     more = len(data) - len(rows)
-    return Grid("Topics", heads, rows, f"{more} more topics in the table file." if more else "", ("ledger",))
+    caption = f"{more} {'raw' if own else 'more'} topics in the table file." if more else ""
+    return Grid("Topics", heads, rows, caption, ("ledger",))
 
 
 def _clock_steps(clock: Clock) -> Grid | None:
@@ -136,8 +142,8 @@ def _damage_row(damage: DamageEntry) -> tuple[str, ...]:
 
 
 def _nested(document: Clock | Ledger, title: str) -> Facts | None:
-    """Everything of a document that has no table of its own, by the names of its fields."""
-    pairs = [(name, value, "") for name, value in _flat(document)]
+    """What a document says, and has no table of its own, by the names of its fields; what is nothing is left out."""
+    pairs = [(name, value, "") for name, value in _flat(document) if value.partition("\u202f")[0] not in NOTHING]
     return Facts(title, pairs) if pairs else None
 
 

@@ -1,7 +1,7 @@
 """What all verbs have in common: the application, its exit codes, options spelled alike, errors in one line."""
 
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any, Literal, ParamSpec
@@ -23,6 +23,32 @@ VERBS = (
     *("info", "check", "convert", "run", "report", "view", "clip", "compare", "cooperative", "plan", "serve"),
     *("simulate", "study", "list"),
 )
+
+
+EXAMPLES: Mapping[str, tuple[str, ...]] = {
+    "info": ("info flight3.ulg",),
+    "check": ("check flight3.ulg", "check logs/a.csv logs/b.csv --fail-on warn"),
+    "convert": ("convert flight3.ulg -o flight3.mcap",),
+    "run": (
+        "run flight3.ulg -o out",
+        "run logs -o out --aircraft aircraft.toml --site airfield.toml",
+        "run logs -o out --dry-run",
+    ),
+    "report": ("report out",),
+    "view": ("view out", "view flight3.ulg --web"),
+    "clip": ("clip flight3.mcap --from +05:00 --to +12:30 -o part.mcap",),
+    "compare": ("compare out/first out/second -o comparison",),
+    "cooperative": ("cooperative a.csv b.csv --stations stations.toml -o out",),
+    "serve": ("serve out",),
+    "simulate": ("simulate taxi-good -o logs",),
+    "study": ("study heading -o tables --runs 50",),
+    "list": ("list", "list flight3.ulg"),
+}
+
+
+def examples(verb: str) -> str:
+    """What stands under the help of a verb: calls to copy, a paragraph each."""
+    return "\n\n".join(("Examples:", *(f"groundstation {line}" for line in EXAMPLES[verb])))
 
 
 class InOrder(typer.core.TyperGroup):
@@ -61,6 +87,15 @@ Profile = Annotated[
     Path | None,
     typer.Option(
         "--profile", help="Profile (TOML) that describes the columns of a CSV.", metavar="FILE", readable=False
+    ),
+]
+IcdFiles = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--icd",
+        help="ICD (DTS YAML) that tells what the words of 1553 and ARINC-429 buses mean, or the name of a shipped one; "
+        "may be repeated.",
+        metavar="FILE",
     ),
 ]
 ConfigFile = Annotated[Path | None, typer.Option("--config", help="Settings (TOML).", metavar="FILE", readable=False)]

@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
-from groundstation.cli.application import DONE, Verbose, answers_with_exit_code, app, say
+from groundstation.cli.application import DONE, Verbose, answers_with_exit_code, app, examples, say
 
 
-@app.command()
+@app.command(epilog=examples("serve"))
 @answers_with_exit_code
 def serve(
     out: Annotated[Path, typer.Argument(help="A folder that `run` made.", metavar="OUT", readable=False)],

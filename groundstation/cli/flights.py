@@ -16,6 +16,7 @@ from groundstation.cli.application import (
     Verbose,
     answers_with_exit_code,
     app,
+    examples,
 )
 from groundstation.cli.text import printable
 
@@ -26,7 +27,7 @@ Align = Literal["start", "first-movement", "lift-off", "outage", "utc"]
 SIGNIFICANCE = {None: "", True: "beyond", False: "within"}
 
 
-@app.command()
+@app.command(epilog=examples("clip"))
 @answers_with_exit_code
 def clip(
     flight: Annotated[Path, typer.Argument(help="Flight folder, MCAP or log.", metavar="X", readable=False)],
@@ -72,7 +73,7 @@ def clip(
     return outcome.code
 
 
-@app.command()
+@app.command(epilog=examples("compare"))
 @answers_with_exit_code
 def compare(
     a: Annotated[Path, typer.Argument(help="Flight folder.", metavar="A", readable=False)],

@@ -12,10 +12,12 @@ from groundstation.cli import fleets, flights, plans
 from groundstation.cli.application import (
     DATA_LOST,
     DONE,
+    INTERRUPTED,
     AircraftFile,
     ConfigFile,
     FailOn,
     Force,
+    IcdFiles,
     IntervalsFile,
     Json,
     NoPdf,
@@ -27,6 +29,7 @@ from groundstation.cli.application import (
     Verbose,
     answers_with_exit_code,
     app,
+    examples,
     say,
     tell_written,
 )
@@ -49,30 +52,39 @@ def common(
     """Options before the verb."""
 
 
-@app.command()
+@app.command(epilog=examples("info"))
 @answers_with_exit_code
 def info(
     log: Annotated[Path, typer.Argument(help="A recorded log or an MCAP.", metavar="LOG", readable=False)],
     profile: Profile = None,
+    icd: IcdFiles = None,
+    suggest_icd: Annotated[
+        bool, typer.Option("--suggest-icd", help="Print the beginning of an ICD for what is on its buses.")
+    ] = False,
     json: Json = False,
     verbose: Verbose = False,
 ) -> int | None:
-    """Tell what a log is: format, clock, span, topics with rows, rates and fields."""
+    """Tell what a log is: format, clock, span, topics with rows, rates, fields; its buses (word by word with -v)."""
     from groundstation.cli import printing
-    from groundstation.pipeline.verbs.describe import describe
+    from groundstation.pipeline.verbs import describe
 
-    description = describe(log, profile)
-    typer.echo(printing.as_json(description.to_dict()) if json else printing.description(description))
+    if suggest_icd:
+        typer.echo(describe.suggest_icd(log))
+        return DONE
+    description = describe.describe(log, profile, tuple(icd or ()))
+    shown = printing.as_json(description.to_dict()) if json else printing.description(description, everything=verbose)
+    typer.echo(shown)
     return DATA_LOST if description.has_lost_data else DONE
 
 
-@app.command()
+@app.command(epilog=examples("check"))
 @answers_with_exit_code
 def check(
     logs: Annotated[list[Path], typer.Argument(help="Recorded logs or MCAPs.", metavar="LOG", readable=False)],
     thresholds: ThresholdsFile = None,
     config: ConfigFile = None,
     profile: Profile = None,
+    icd: IcdFiles = None,
     fail_on: FailOn = "none",
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -85,23 +97,30 @@ def check(
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.check import check_many
 
-    configuration = load_configuration(config, profile=profile, thresholds=thresholds)
+    configuration = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
     with listener("none" if quiet else progress) as listen:
         checked = check_many(logs, configuration, fail_on=fail_on, listen=listen)
     check_table.show(checked, as_json_text=json, quiet=quiet, everything=verbose)
     return printing.worst_code(tuple(one.outcome for one in checked))
 
 
-@app.command()
+@app.command(epilog=examples("convert"))
 @answers_with_exit_code
 def convert(
     logs: Annotated[list[Path], typer.Argument(help="Recorded logs.", metavar="LOG", readable=False)],
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="MCAP to write; a folder for several logs.", metavar="FILE")
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            help="MCAP to write; a folder for several logs. A name *.ch10 writes Chapter 10 with its ICD.",
+            metavar="FILE",
+        ),
     ],
     thresholds: ThresholdsFile = None,
     config: ConfigFile = None,
     profile: Profile = None,
+    icd: IcdFiles = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -114,14 +133,14 @@ def convert(
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.conversions import convert_many
 
-    configuration = load_configuration(config, profile=profile, thresholds=thresholds)
+    configuration = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
     with listener("none" if quiet else progress) as listen:
         outcomes = convert_many(logs, output, configuration=configuration, force=force, listen=listen)
     printing.outcomes(outcomes, as_json_text=json, quiet=quiet)
     return printing.worst_code(outcomes)
 
 
-@app.command()
+@app.command(epilog=examples("run"))
 @answers_with_exit_code
 def run(
     paths: Annotated[list[str], typer.Argument(help="Logs or folders of logs, or URLs of them.", metavar="PATH")],
@@ -132,6 +151,7 @@ def run(
     intervals: IntervalsFile = None,
     thresholds: ThresholdsFile = None,
     profile: Profile = None,
+    icd: IcdFiles = None,
     jobs: Annotated[int, typer.Option("-j", "--jobs", help="Processes; 0: one per core.", min=0)] = 0,
     scheduler: Annotated[
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
@@ -175,30 +195,35 @@ def run(
     from groundstation.pipeline.many_flights.batch import plan_many, run_many
     from groundstation.pipeline.one_flight.configuration import applying, load_configuration
 
-    configuration = applying(load_configuration(config, aircraft, site, intervals, profile, thresholds), apply)
+    settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd)
+    configuration = applying(settings, apply)
     if dry_run:
-        planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo)
+        planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet)
         return DONE
-    with listener("none" if quiet else progress) as listen:
-        outcomes = run_many(
-            paths,
-            output,
-            configuration,
-            jobs=jobs,
-            scheduler=scheduler,
-            force=force,
-            fail_on=fail_on,
-            with_pdf=not no_pdf,
-            redo=redo,
-            stations=stations,
-            listen=listen,
-        )
+    try:
+        with listener("none" if quiet else progress) as listen:
+            outcomes = run_many(
+                paths,
+                output,
+                configuration,
+                jobs=jobs,
+                scheduler=scheduler,
+                force=force,
+                fail_on=fail_on,
+                with_pdf=not no_pdf,
+                redo=redo,
+                stations=stations,
+                listen=listen,
+            )
+    except KeyboardInterrupt:
+        say(f"interrupted: {output} keeps what is finished; the same command again goes on with the rest")
+        return INTERRUPTED
     printing.outcomes(outcomes, as_json_text=json, quiet=quiet, with_times=verbose)
     return printing.worst_code(outcomes)
 
 
-@app.command()
+@app.command(epilog=examples("report"))
 @answers_with_exit_code
 def report(
     out: Annotated[Path, typer.Argument(help="A folder that `run` made, or one flight folder in it.", metavar="OUT")],
@@ -218,7 +243,7 @@ def report(
     return printing.worst_code(problems)
 
 
-@app.command()
+@app.command(epilog=examples("view"))
 @answers_with_exit_code
 def view(
     flight: Annotated[
@@ -245,12 +270,15 @@ def view(
     return DONE
 
 
-@app.command()
+@app.command(epilog=examples("simulate"))
 @answers_with_exit_code
 def simulate(
     scenario: Annotated[str, typer.Argument(help="Name of a shipped scenario, or a TOML file.", metavar="SCENARIO")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the log.", metavar="DIR")],
     seed: Annotated[int | None, typer.Option("--seed", help="Seed in place of the scenario's own.")] = None,
+    form: Annotated[
+        Literal["csv", "ch10"], typer.Option("--format", help="csv, or ch10: IRIG 106 Chapter 10 with its ICD.")
+    ] = "csv",
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -259,11 +287,11 @@ def simulate(
     """Simulate a flight as a flat CSV, with the truth beside it. `groundstation list` names the scenarios."""
     from groundstation.pipeline.verbs.synthesis import simulate_to
 
-    tell_written(simulate_to(scenario, output, seed=seed, force=force), as_json_text=json, quiet=quiet)
+    tell_written(simulate_to(scenario, output, seed=seed, form=form, force=force), as_json_text=json, quiet=quiet)
     return DONE
 
 
-@app.command()
+@app.command(epilog=examples("study"))
 @answers_with_exit_code
 def study(
     name: Annotated[
@@ -293,7 +321,7 @@ def study(
     return DONE
 
 
-@app.command(name="list")
+@app.command(name="list", epilog=examples("list"))
 @answers_with_exit_code
 def list_(
     log: Annotated[
@@ -315,7 +343,7 @@ def list_(
     return DONE
 
 
-@app.command()
+@app.command(epilog=examples("cooperative"))
 @answers_with_exit_code
 def cooperative(
     logs: Annotated[

@@ -1,6 +1,8 @@
 """How results look on stdout: lines for people, JSON for programs."""
 
 from collections.abc import Mapping, Sequence
+from itertools import groupby
+from pathlib import PurePath
 from typing import Any
 
 import typer
@@ -8,13 +10,15 @@ import typer
 from groundstation.chapters.terminal import columns
 from groundstation.cli.text import as_json, printable
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
-from groundstation.pipeline.verbs.describe import Description
+from groundstation.pipeline.verbs.describe import BusWord, Description
+
+NAMED_SHOWN = 6  # words of a bus that an ICD names, told one by one
 
 __all__ = ["as_json", "catalogue", "description", "outcomes", "worst_code"]
 
 
-def description(what: Description) -> str:
-    """Text of ``info``."""
+def description(what: Description, *, everything: bool = False) -> str:
+    """Text of ``info``; with ``everything`` each word of the buses has a line, else each bus."""
     head = [[f"{key}:", printable(value)] for key, value in what.facts.items()]
     parts = [columns(head)]
     if what.topics:
@@ -32,33 +36,94 @@ def description(what: Description) -> str:
                 ]
             )
         parts.append(columns(rows, right=(1, 2, 3)))
+    if what.buses:
+        parts.append(_every_word(what.buses) if everything else _every_bus(what.buses))
     if what.findings:
         rows = [[finding.severity, printable(finding.text)] for finding in what.findings]
         parts.append("findings\n" + columns(rows))
     return "\n\n".join(parts)
 
 
+def _every_word(buses: Sequence[BusWord]) -> str:
+    """A line for each terminal and subaddress, or label."""
+    rows = [["channel", "bus", "what", "count", "rate Hz", "ICD"]]
+    for one in buses:
+        rate = "" if one.rate_hz is None else f"{one.rate_hz:.4g}"
+        rows.append([one.place, printable(one.bus), one.what, str(one.count), rate, printable(", ".join(one.names))])
+    return columns(rows, right=(3, 4))
+
+
+def _every_bus(buses: Sequence[BusWord]) -> str:
+    """A line for each bus, with what the ICD names on it."""
+    rows = [["channel", "bus", "words", "kinds", "named", "by the ICD"]]
+    for place, found in groupby(buses, key=lambda one: one.place):
+        words = list(found)
+        named = [one for one in words if one.names]
+        listed = ", ".join(f"{one.what}: {' '.join(one.names)}" for one in named[:NAMED_SHOWN])
+        listed += f" and {len(named) - NAMED_SHOWN} more" if len(named) > NAMED_SHOWN else ""
+        total = sum(one.count for one in words)
+        rows.append([place, printable(words[0].bus), str(total), str(len(words)), str(len(named)), printable(listed)])
+    return columns(rows, right=(2, 3, 4))
+
+
 def outcomes(
     done: Sequence[Outcome], *, as_json_text: bool = False, quiet: bool = False, with_times: bool = False
 ) -> None:
-    """Print what became of each log: one line each on stdout, failures last with their reasons, then totals."""
+    """Print what became of each log: a line each on stdout, in the order of the logs: log, state, flight, answer.
+
+    On stderr what was skipped, by reason, then failures, then totals.
+    """
     if as_json_text:
         typer.echo(as_json([_plain(outcome) for outcome in done]))
         return
-    for outcome in sorted(done, key=lambda one: one.state == "failed"):
-        if outcome.state == "failed":
-            typer.echo(f"error: {printable(outcome.text)}", err=True)
-        elif outcome.state == "skipped" and not quiet:
-            typer.echo(f"skipped: {printable(outcome.text)}", err=True)
-        elif not quiet:
-            typer.echo(f"{printable(outcome.flight_id or outcome.source)}  {printable(outcome.text)}")
+    names = _names(done)
+    for name, outcome in zip(names, done, strict=True):
+        if outcome.state not in ("failed", "skipped") and not quiet:
+            state = "finished before" if outcome.was_finished else _LINE_WORDS[outcome.state]
+            typer.echo("  ".join(printable(part) for part in (name, state, outcome.flight_id, outcome.text) if part))
         if with_times and outcome.times_s:
             spent = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in outcome.times_s.items())
             typer.echo(f"  {spent}", err=True)
-        if with_times and outcome.trace:
-            typer.echo(outcome.trace, err=True)
+    if not quiet:
+        for line in skipped_lines(done, most=len(done) if with_times else MOST_SKIPPED):
+            typer.echo(line, err=True)
+    for outcome in done:
+        if outcome.state == "failed":
+            typer.echo(f"error: {printable(outcome.text)}", err=True)
+            if with_times and outcome.trace:
+                typer.echo(outcome.trace, err=True)
     if len(done) > 1 and not quiet:
         typer.echo(totals(done), err=True)
+
+
+def _names(done: Sequence[Outcome]) -> list[str]:
+    """Logs by the names of their files; by their paths where two files have one name."""
+    files = [PurePath(outcome.source).name if not outcome.is_session else outcome.source for outcome in done]
+    return [file if files.count(file) == 1 else outcome.source for file, outcome in zip(files, done, strict=True)]
+
+
+def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:
+    """Logs that were skipped: one line for each reason, with at most so many names.
+
+    Examples
+    --------
+    >>> notes = [Outcome(name, "skipped", f"{name}: no log") for name in ("a.txt", "b.txt")]
+    >>> skipped_lines(notes, 1), skipped_lines(notes[:1], 1)
+    (['skipped 2 files, a.txt and 1 more: no log'], ['skipped: a.txt: no log'])
+    """
+    by_reason: dict[str, list[str]] = {}
+    for outcome in done:
+        if outcome.state == "skipped":
+            name = PurePath(outcome.source).name
+            by_reason.setdefault(outcome.text.removeprefix(f"{name}: "), []).append(name)
+    lines = []
+    for reason, names in by_reason.items():
+        if len(names) == 1:
+            lines.append(printable(f"skipped: {names[0]}: {reason}"))
+            continue
+        more = f" and {len(names) - most} more" if len(names) > most else ""
+        lines.append(printable(f"skipped {len(names)} files, {', '.join(names[:most])}{more}: {reason}"))
+    return lines
 
 
 def totals(done: Sequence[Outcome]) -> str:
@@ -70,10 +135,16 @@ def totals(done: Sequence[Outcome]) -> str:
     '2 logs: 1 done, 0 with data lost, 0 at the limit, 1 failed, 0 skipped'
     >>> totals([Outcome("a", "done", ""), Outcome("a, b", "done", "", is_session=True)]).partition("; ")[2]
     '1 session: 1 done, 0 with data lost, 0 at the limit, 0 failed'
+    >>> totals([Outcome("a", "done", "", was_finished=True)])
+    '1 log: 1 done, 0 with data lost, 0 at the limit, 0 failed, 0 skipped; 1 was finished before'
     """
     logs = _counted("log", [one for one in done if not one.is_session], list(_STATE_WORDS))
     sessions = [one for one in done if one.is_session and one.state != "skipped"]
-    return "; ".join([logs, *([_counted("session", sessions, list(_STATE_WORDS)[:-1])] if sessions else [])])
+    parts = [logs, *([_counted("session", sessions, list(_STATE_WORDS)[:-1])] if sessions else [])]
+    before = sum(one.was_finished for one in done)
+    if before:
+        parts.append(f"{before} {'was' if before == 1 else 'were'} finished before")
+    return "; ".join(parts)
 
 
 def _counted(noun: str, done: Sequence[Outcome], states: Sequence[State]) -> str:
@@ -81,6 +152,8 @@ def _counted(noun: str, done: Sequence[Outcome], states: Sequence[State]) -> str
     return f"{len(done)} {noun}{'' if len(done) == 1 else 's'}: {counts}"
 
 
+MOST_SKIPPED = 5  # named in a line
+_LINE_WORDS: Mapping[State, str] = {"done": "done", "data_lost": "data lost", "limit_reached": "at the limit"}
 _STATE_WORDS: Mapping[State, str] = {
     "done": "done",
     "data_lost": "with data lost",
@@ -98,6 +171,7 @@ def _plain(outcome: Outcome) -> dict[str, Any]:
         "exit_code": outcome.code,
         "flight_id": outcome.flight_id,
         "folder": outcome.folder,
+        "was_finished": outcome.was_finished,
         "text": outcome.text,
     }
 

@@ -26,23 +26,30 @@ class AircraftData:
         None where unknown: it is then estimated, or its possible effect widens the interval.
     entry_step_deg : float
         Step in which the operator can enter the correction.
-    mounting_deg, mounting_sigma_deg : float
-        Heading of the INS case minus heading of the airframe, known, and the sigma of what remains of it
-        (steady sideslip included). The sigma widens the interval.
+    mounting_deg : float
+        Heading of the INS case minus heading of the airframe, known.
+    mounting_sigma_deg : float or None
+        What remains uncertain of it, and of sideslip that is the same in every direction; None: the settings' figure.
+    sideslip_sigma_deg : float or None
+        Sigma of the steady sideslip that a crosswind makes on taxi; None: the settings' figure.
     gnss_latency_s, gnss_latency_sigma_s : float or None
         How much later GNSS velocities are logged than the INS shows the same motion, known; None: estimated.
     ins_class : str
         For the record.
+    ins_kind : str
+        Whether GNSS corrects the INS already, ``gnss_aided`` or ``unaided``; empty: the log shows it.
     """
 
     antenna_arm_m: float | None = number(None, -50.0, 50.0)
     antenna_arm_sigma_m: float = number(0.05, 0.0)
     entry_step_deg: float = number(0.1, LEAST_ENTRY_STEP_DEG, 10.0)
     mounting_deg: float = number(0.0, -10.0, 10.0)
-    mounting_sigma_deg: float = number(0.0, 0.0)
+    mounting_sigma_deg: float | None = number(None, 0.0)
+    sideslip_sigma_deg: float | None = number(None, 0.0)
     gnss_latency_s: float | None = number(None, -10.0, 10.0)
     gnss_latency_sigma_s: float = number(0.01, 0.0, 10.0)
     ins_class: str = ""
+    ins_kind: Literal["", "unaided", "gnss_aided"] = ""
 
     def __post_init__(self) -> None:
         check_ranges(self)

@@ -19,6 +19,16 @@ MAX_OVERVIEW_ROWS = 4000
 GAP_PERIODS = 5.0
 LARGEST_QUIET_GAP_S = 3.0
 NEAR_NS = 1_000_000_000  # a value this near in time stands for a row that lacks it
+# Also drawn where a topic of the kind has it: name, kind, and the columns in whose place it stands when they are empty.
+ALSO = (
+    ("roll_deg", "ins", ()),
+    ("pitch_deg", "ins", ()),
+    ("magnetic_heading_deg", "ins", ("heading_deg",)),
+    ("true_airspeed_mps", "air", ()),
+    ("indicated_airspeed_mps", "air", ("true_airspeed_mps",)),
+    ("pressure_altitude_m", "baro", ("altitude_m",)),
+    ("height_above_airfield_m", "baro", ("altitude_m", "pressure_altitude_m")),
+)
 MODE = "mode "  # what the names of events that change the flight mode begin with
 
 
@@ -70,9 +80,14 @@ def gnss_lanes(flight: Flight, geometry_limit: float) -> FigureData | None:
 
 
 def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_topic: str | None) -> FigureData | None:
-    """Thinned flight for the map and profiles, on the times of GNSS (of INS where there is no GNSS), NaN at gaps."""
+    """Thinned flight for the map and profiles, on the times of GNSS, else of INS, else of the barometer; NaN at gaps.
+
+    Position, altitude, ground speed, climb, heading and track are always there; the columns of :data:`ALSO` where they
+    are known.
+    """
     gnss = first_of_kind(flight, "gnss", "latitude_deg", "longitude_deg")
     base = gnss or first_of_kind(flight, "ins", "latitude_deg", "longitude_deg") or ins_topic
+    base = base or first_of_kind(flight, "ins") or first_of_kind(flight, "baro")
     if base is None or not len(flight[base]):
         return None
     every = flight[base]
@@ -87,14 +102,16 @@ def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_t
         "ground_speed_mps": _at(every, ground_speed(every), rows[keep]),
         "heading_deg": _nearest_heading(flight, time_ns, true_heading_deg, ins_topic),
         "track_deg": _at(every, _track(every), rows[keep]),
+        "climb_mps": _at(every, -every.values("velocity_down_mps"), rows[keep]),
     }
-    baro = first_of_kind(flight, "baro", "pressure_altitude_m")
-    if baro is not None and not np.isfinite(columns["altitude_m"]).any():
-        pressure_altitude = flight[baro].values("pressure_altitude_m")
-        columns["pressure_altitude_m"] = _nearest(flight[baro].time_ns, pressure_altitude, time_ns)
+    for name, kind, instead_of in ALSO:
+        source = first_of_kind(flight, kind, name)
+        is_wanted = all(not np.isfinite(columns[other]).any() for other in instead_of if other in columns)
+        if source is not None and is_wanted:
+            columns[name] = _nearest(flight[source].time_ns, flight[source].values(name), time_ns)
     columns = _break_at_gaps(columns, flight.duration_s / MAX_OVERVIEW_ROWS)
-    digits = {"time_s": 2, "latitude_deg": 7, "longitude_deg": 7, "altitude_m": 1, "ground_speed_mps": 2}
-    return FigureData("overview", columns, {**digits, "heading_deg": 2, "track_deg": 2, "pressure_altitude_m": 1})
+    places = {"latitude_deg": 7, "longitude_deg": 7, "altitude_m": 1, "pressure_altitude_m": 1}
+    return FigureData("overview", columns, {name: places.get(name, 2) for name in columns})
 
 
 def _rows_with_motion(table: Table) -> NDArray[np.intp]:

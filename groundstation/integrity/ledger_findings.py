@@ -14,7 +14,10 @@ TOPIC_CODES = (
     *("time.duplicates", "data.gaps", "data.sequence", "data.sequence_reset"),
     *("values.out_of_range", "values.nan", "values.stuck"),
 )
-_REMARKS_THAT_WARN = ("assumed_utc", "clock_disagrees", "unreadable_metadata", "plug_in", "duplicate_column")
+_REMARKS_THAT_WARN = (
+    *("assumed_utc", "assumed_year", "year_unknown", "clock_disagrees", "unreadable_metadata"),
+    *("plug_in", "duplicate_column", "icd_of_another", "tmats_contradicted"),
+)
 
 
 def ledger_findings(ledger: LedgerCounts) -> tuple[Finding, ...]:

@@ -1,7 +1,8 @@
 """The Python API: a flight opened from a log or from a flight folder, everything computed when first asked for."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
+from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -39,6 +40,7 @@ def open_flight(
     site: Settings | None = None,
     intervals: Settings | None = None,
     profile: AnyPath | None = None,
+    icd: AnyPath | Sequence[AnyPath] = (),
     thresholds: Settings | None = None,
 ) -> "OpenFlight":
     """Open a flight: a recorded log, an MCAP that groundstation wrote, or a flight folder that ``run`` made.
@@ -50,6 +52,8 @@ def open_flight(
         Settings as of the verb ``run``: a TOML file, or its content as a mapping. Not for a flight folder.
     profile : str or Path, optional
         Layout of a log that no reader knows.
+    icd : str, Path or several of them, optional
+        What the words of a recording's buses mean: files, or names of shipped ICDs.
 
     Returns
     -------
@@ -62,16 +66,18 @@ def open_flight(
         When there is nothing to open, no reader claims it, or a setting is wrong.
     """
     where, layout = Path(path), None if profile is None else Path(profile)
+    icds = tuple(str(one) for one in ([icd] if isinstance(icd, str | PathLike) else icd))
     given = {"config": config, "aircraft": aircraft, "site": site, "intervals": intervals, "thresholds": thresholds}
     files = {name: _file_or_content(value) for name, value in given.items()}
     with told_in_a_line(where.name):
         if not where.exists():
             raise UsageError(str(where), "no such file or folder")
         if where.is_dir():
-            if layout or any(value is not None for value in given.values()):
+            if layout or icds or any(value is not None for value in given.values()):
                 raise UsageError(str(where), "settings for saved results", next_step="open it, then with_settings()")
             return SavedRun(_flight_folder(where))
-        return OpenLog(Conversion(open_log(where, layout)), load_configuration(profile=layout, **files))
+        configuration = load_configuration(profile=layout, icds=icds, **files)
+        return OpenLog(Conversion(open_log(where, layout, icds)), configuration)
 
 
 def open_fleet(out: AnyPath) -> "pd.DataFrame":
@@ -171,7 +177,8 @@ class OpenLog(OpenFlight):
     def with_settings(self, **sections: Any) -> "OpenLog":
         document = _laid_over(self.configuration.to_dict(), sections)
         profile = self.configuration.profile
-        return OpenLog(self._conversion, load_configuration(document, profile=Path(profile) if profile else None))
+        layouts: dict[str, Any] = {"profile": Path(profile) if profile else None, "icds": self.configuration.icds}
+        return OpenLog(self._conversion, load_configuration(document, **layouts))
 
     def save(self, out: AnyPath, *, force: bool = False) -> "SavedRun":
         """Run the log into ``out`` as the verb ``run`` does, and open the flight folder.
@@ -259,7 +266,7 @@ def _file_or_content(settings: Settings | None) -> Path | Mapping[str, Any] | No
 
 def _laid_over(document: Mapping[str, Any], sections: Mapping[str, Any]) -> dict[str, Any]:
     """Settings with some sections changed: mappings key by key, lists as a whole."""
-    out = {name: value for name, value in document.items() if name != "profile"}
+    out = {name: value for name, value in document.items() if name not in ("profile", "icds")}
     for name, value in sections.items():
         known = out.get(name, {})
         out[name] = {**known, **value} if isinstance(value, Mapping) and isinstance(known, Mapping) else value

@@ -1,17 +1,15 @@
 """What a notebook does with one flight, whether it comes from a log or from a flight folder."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from functools import cached_property
 from html import escape
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from groundstation.base.clock import Clock
-from groundstation.base.errors import GroundstationError, NotAssessableError, UsageError, told_in_a_line
+from groundstation.base.errors import GroundstationError, NotAssessableError, UnknownNameError, told_in_a_line
 from groundstation.base.ledger import Ledger
 from groundstation.pipeline.one_flight.flight import sentence
 from groundstation.results.answer import A
@@ -23,7 +21,7 @@ from groundstation.results.inertial import InertialResult
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
 from groundstation.results.magnetic_ground import GroundDeviation
-from groundstation.tables.table import Flight, TimedTable, timed
+from groundstation.tables.table import Flight, Tables
 
 if TYPE_CHECKING:
     from groundstation.reports.drawing import Drawing, Sketch
@@ -87,10 +85,12 @@ class OpenFlight(ABC):
         """The flight as the report reads it."""
 
     @cached_property
-    def tables(self) -> Mapping[str, TimedTable]:
-        """Tables by topic; ``tables["ins"].to_frame()`` is indexed by UTC, or by flight time where there is none."""
-        flight = self.flight
-        return MappingProxyType({topic: timed(flight, topic) for topic in flight.topics()})
+    def tables(self) -> Tables:
+        """Tables by topic: ``tables["ins"]["roll_deg"]`` is an array, ``tables["ins"].utc`` its times.
+
+        ``tables["ins"].to_frame()`` is indexed by UTC, or by flight time where there is none.
+        """
+        return Tables(self.flight)
 
     def heading(self) -> HeadingResult:
         """The heading correction (system 1).
@@ -164,7 +164,7 @@ class OpenFlight(ABC):
         showing = (sketch for drawing, sketch in self._sketches.values() if name in drawing.numbers)
         sketch = self._sketches[name][1] if name in self._sketches else next(showing, None)
         if sketch is None:
-            raise UsageError("figure", repr(name), "one of " + ", ".join(self._sketches))
+            raise UnknownNameError("figures", name, self._sketches)
         return figure_from(sketch)
 
     @cached_property

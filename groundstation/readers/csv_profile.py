@@ -11,6 +11,7 @@ from pathlib import Path
 
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Item, LogHeader, Remark
+from groundstation.base.source_units import PREFIX, units_entry
 from groundstation.readers.dialect import (
     DELIMITERS,
     Dialect,
@@ -153,7 +154,18 @@ def _metadata(fit: _Fit) -> dict[str, str]:
     for key, template in fit.profile.join.items():
         names = {name: found.get(name, "") for name in (*fit.profile.find, *fit.profile.constants)}
         found[key] = " ".join(template.format(**names).split())
-    return found
+    units = units_entry(_units(fit))
+    return found | {PREFIX + fit.profile.raw_topic: units} if units else found
+
+
+def _units(fit: _Fit) -> dict[str, str]:
+    """Units by column: a comment above the header, or the first row left out below it, that has as many cells."""
+    header = len(fit.above) - 1 - fit.profile.rows_after_header
+    for line in (*(line for line in fit.above[:header] if line.text.startswith("#")), *fit.above[header + 1 :]):
+        cells = [cell.strip() for cell in split_cells(line.text.lstrip("# "), fit.delimiter)]
+        if len(cells) == len(fit.names):
+            return {name: cell for name, cell in zip(fit.names, cells, strict=True) if name and cell != "-"}
+    return {}
 
 
 def _utc_of_zero(fit: _Fit, metadata: dict[str, str]) -> tuple[int | None, list[Remark]]:

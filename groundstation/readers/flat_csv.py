@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from groundstation.base.errors import UnreadableLogError
+from groundstation.base.errors import UnreadableLogError, near_names
 from groundstation.base.records import Damage, Item, LogHeader, Remark
-from groundstation.base.signals import RAW_PREFIX, field_of
+from groundstation.base.signals import RAW_PREFIX, TOPICS, field_of, kind_of
 from groundstation.readers.dialect import (
     Dialect,
     Line,
@@ -29,6 +29,7 @@ from groundstation.readers.source import Claim, Source
 from groundstation.readers.start import told_at_zero, unusable_references, utc_of_zero
 
 NAME = "flat-csv"
+PAGE = "docs/flat-csv.md has ten lines to copy"
 TIME_COLUMNS = {"time_ns": "nanoseconds", "time_s": "seconds", "time_utc": "iso"}  # the recorder's own clock first
 _MOST_NS = 9e18  # 64 bits hold such differences
 FEWEST_ROWS = 3  # below a header row that does not stand on top
@@ -106,7 +107,7 @@ def sniff(source: Source) -> Claim | None:
             f"{source.name}, row {top.header.number}",
             f"columns such as {canonical[0]!r} but no time column",
             "time_s, time_ns or time_utc",
-            "name the time column so, or describe the file by a profile",
+            f"name the time column so ({PAGE}), or describe the file by a profile",
         )
     return Claim(NAME, "", 0.9 if canonical else 0.4) if top.is_flat else None
 
@@ -123,7 +124,9 @@ def read(source: Source) -> Iterator[Item]:
 
     top = _read_top(source)
     if top is None or sniff(source) is None:
-        raise UnreadableLogError(source.name, "no flat-CSV header row", "a time column and <topic>.<field> columns")
+        raise UnreadableLogError(
+            source.name, "no flat-CSV header row", f"a time column and <topic>.<field> columns ({PAGE})"
+        )
     layout, remarks = _layout(top)
     remarks += _mistakes(top) + unusable_references(top.metadata)
     if not top.header.ended:
@@ -228,5 +231,18 @@ def _mistakes(top: _Top) -> list[Remark]:
     slips = [name for name in unknown if not name.startswith(RAW_PREFIX)]
     if not slips:
         return []
-    shown = ", ".join(slips[:5]) + (", ..." if len(slips) > 5 else "")
+    shown = ", ".join(map(_with_near, slips[:5])) + (", ..." if len(slips) > 5 else "")
     return [Remark("unknown_columns", f"{len(slips)} columns name no canonical field and are kept as raw: {shown}")]
+
+
+def _with_near(name: str) -> str:
+    """A column with the canonical one that was perhaps meant.
+
+    Examples
+    --------
+    >>> _with_near("ins.roll"), _with_near("engine.rpm")
+    ('ins.roll (ins.roll_deg?)', 'engine.rpm')
+    """
+    topic, _, field = name.rpartition(".")
+    near = near_names(field, (one.name for one in TOPICS.get(kind_of(topic), ())), 1)
+    return f"{name} ({topic}.{near[0]}?)" if near else name

@@ -4,16 +4,14 @@ import re
 
 from groundstation.readers.source import Source
 
-_NMEA_SENTENCE = re.compile(rb"[$!][A-Z]{2,}[A-Z0-9]*,[ -~]{0,200}\*[0-9A-F]{2}\r?\n")
-
 _SAMPLES, _SAMPLE_BYTES = 32, 4096
 _CONTROL = re.compile(rb"[\0-\x08\x0b\x0c\x0e-\x1f]")
 
 _AT_START: tuple[tuple[bytes, str], ...] = (
     (b"ULog\x01\x12\x35", "PX4 ULog"),
     (b"\xa3\x95", "ArduPilot DataFlash without its definitions"),
-    (b"\x25\xeb", "IRIG 106 Chapter 10"),
-    (b"\xb5\x62", "u-blox UBX"),
+    (b"\x25\xeb", "IRIG 106 Chapter 10 without a whole packet header"),
+    (b"\xb5\x62", "u-blox UBX without a sound frame"),
     (b"#ROSBAG", "ROS 1 bag older than version 2.0"),
     (b"SQLite format 3\0", "SQLite that is no ROS 2 bag"),
     (b"\x1f\x8b", "gzip"),
@@ -29,8 +27,7 @@ _AT_START: tuple[tuple[bytes, str], ...] = (
 
 def recognise(source: Source) -> str | None:
     """Name of the format that a file's first bytes show, None when they show none."""
-    found = next((name for magic, name in _AT_START if source.head.startswith(magic)), None)
-    return found or ("NMEA 0183" if _NMEA_SENTENCE.match(source.head) else None)
+    return next((name for magic, name in _AT_START if source.head.startswith(magic)), None)
 
 
 def is_mostly_text(source: Source) -> bool:

@@ -5,23 +5,27 @@ Built-in readers are listed here; third parties add theirs through entry points 
 fails never hides the others.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
 from groundstation.base.records import Item, RecordBatch, Remark
 from groundstation.readers import (
     bags,
+    chapter10,
     csv_profile,
     dataflash,
     flat_csv,
     flightdata_hdf5,
     magic,
     miluv,
+    receiver,
+    rtklib_pos,
+    sbet,
     tlog,
     ulog,
     utias,
@@ -29,9 +33,16 @@ from groundstation.readers import (
 from groundstation.readers.compressed import COMPRESSIONS
 from groundstation.readers.source import Claim, Reader, Source
 
+if TYPE_CHECKING:
+    from groundstation.readers.icd import Icd
+
 ENTRY_POINT_GROUP = "groundstation.readers"
-_OF_TEXT: tuple[Reader, ...] = (csv_profile, flat_csv, miluv, utias)
-_BUILT_IN: tuple[Reader, ...] = (dataflash, ulog, flightdata_hdf5, bags, tlog, *_OF_TEXT)
+FLAT_CSV = f"the flat CSV ({flat_csv.PAGE})"
+_OF_TEXT: tuple[Reader, ...] = (csv_profile, flat_csv, miluv, rtklib_pos, utias)
+_BUILT_IN: tuple[Reader, ...] = (
+    *(chapter10, dataflash, ulog, flightdata_hdf5, receiver, sbet, bags, tlog),
+    *_OF_TEXT,
+)
 
 
 @dataclass(frozen=True)
@@ -115,20 +126,27 @@ def identify(path: str | Path, profile: Path | None = None) -> Claim:
     return _claim(Source(Path(path)), profile)[0]
 
 
-def read(path: str | Path | Source, profile: Path | None = None) -> Iterator[Item]:
+def read(path: str | Path | Source, profile: Path | None = None, icds: "Sequence[Icd]" = ()) -> Iterator[Item]:
     """Iterate over the items of a file, with the reader that claims it.
 
     Raises at once as :func:`identify` does, not at the first item. Parameters as there; a :class:`Source` that is read
-    again is not decompressed again.
+    again is not decompressed again. ``icds`` name the bus words of a recording that has any.
     """
     source = path if isinstance(path, Source) else Source(Path(path))
     claim, troubles = _claim(source, profile)
     reader = _readers()[claim.reader]
     if reader in (bags, csv_profile):
         items = reader.read(source, profile)
+    elif reader is chapter10:
+        items = chapter10.read(source, icds)
     else:
         items = reader.read(source) if reader in _BUILT_IN else _guarded(reader, claim, source)
-    return chain(items, _of_the_source(source), (Remark("plug_in", trouble) for trouble in troubles))
+    unused = [Remark("icd_of_another", "the ICD is not used: the log holds no bus words")]
+    remarks = [
+        *(Remark("plug_in", trouble) for trouble in troubles),
+        *(unused if icds and reader is not chapter10 else []),
+    ]
+    return chain(items, _of_the_source(source), remarks)
 
 
 def _of_the_source(source: Source) -> Iterator[Item]:
@@ -216,11 +234,12 @@ def _unclaimed(source: Source, refusals: list[GroundstationError], troubles: lis
         return UnclaimedLogError(source.name, f"{known} data that cannot be decompressed")
     if known is not None:
         return UnclaimedLogError(
-            source.name, f"recognised as {known}, not readable in this version", "", "convert it to the flat CSV"
+            source.name, f"recognised as {known}, not readable in this version", "", f"convert it to {FLAT_CSV}"
         )
     if refusals:
         return refusals[0]
     found = "binary data of an unknown format" if magic.is_binary(source) else "text that no reader claims"
     names = ", ".join(reader for reader in _readers())
     found += f" ({'; '.join(troubles)})" if troubles else ""
-    return UnclaimedLogError(source.name, found, f"one of {names}", "describe a table by a profile (--profile FILE)")
+    next_step = f"write {FLAT_CSV}, or describe a table by a profile (--profile FILE)"
+    return UnclaimedLogError(source.name, found, f"one of {names}", next_step)

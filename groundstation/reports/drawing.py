@@ -19,6 +19,8 @@ from groundstation.chapters.wording import clean, clock
 WIDTH_MM = 178.0  # the printable width of A4
 MAX_POINTS = 5000
 MM_PER_INCH = 25.4
+LEAST_PAUSE_S, MOST_WINDOWS = 60.0, 6  # a longer pause breaks a time axis
+PANEL_GAP_MM, LEAST_PANEL_MM = 9.0, 20.0
 
 # Okabe and Ito (2008), colour-blind safe. One meaning, one colour, in every figure.
 INS = "#0072b2"
@@ -241,6 +243,61 @@ def time_axis(axes: Any, low: float, high: float, title: bool = True, most: int 
         axes.tick_params(labelbottom=False)
 
 
+def windows(time: Any, least_gap_s: float = LEAST_PAUSE_S) -> list[tuple[float, float]]:
+    """Spans of flight time that the samples fill, a little around each; a longer pause ends one, at most six of them.
+
+    Examples
+    --------
+    >>> windows([0.0, 1.0, 2.0, 500.0, 540.0])
+    [(-2.0, 4.0), (498.0, 542.0)]
+    """
+    known = np.sort(finite(time))
+    if not known.size:
+        return [(0.0, 1.0)]
+    pauses = np.diff(known)
+    longest = np.argsort(-pauses, kind="stable")[: MOST_WINDOWS - 1]
+    cuts = np.sort(longest[pauses[longest] > least_gap_s]).tolist()
+    ends = [*cuts, len(known) - 1]
+    starts = [0, *(cut + 1 for cut in cuts)]
+    spans = [(float(known[first]), float(known[last])) for first, last in zip(starts, ends, strict=True)]
+    return [padded(low, high, 0.05, 2.0) for low, high in spans]
+
+
+def time_panels(
+    figure: Any,
+    edges_mm: tuple[float, float, float, float],
+    spans: Sequence[tuple[float, float]],
+    *,
+    title: bool = True,
+    shared: bool = True,
+) -> list[Any]:
+    """Axes beside each other, one for each span of flight time: a time axis broken where nothing is to be seen.
+
+    Parameters
+    ----------
+    edges_mm : (float, float, float, float)
+        Left, bottom, right and top, from the lower left corner of the figure.
+    title : bool
+        Whether the time axis is written.
+    shared : bool
+        Whether all have the vertical scale of the first; else each has its own, written beside it.
+    """
+    left, bottom, right, top = edges_mm
+    room = right - left - PANEL_GAP_MM * (len(spans) - 1)
+    lengths = np.array([high - low for low, high in spans])
+    widths = np.maximum(lengths / lengths.sum() * room, LEAST_PANEL_MM)
+    widths *= room / widths.sum()
+    panels: list[Any] = []
+    for (low, high), width in zip(spans, widths.tolist(), strict=True):
+        options = {"sharey": panels[0]} if panels and shared else {}
+        axes = place(figure, left, bottom, left + width, top, **options)
+        time_axis(axes, low, high, title=title and width == widths.max(), most=max(int(width / 16.0), 1))
+        axes.tick_params(labelbottom=title, labelleft=not (panels and shared))
+        panels.append(axes)
+        left += width + PANEL_GAP_MM
+    return panels
+
+
 def legend_above(axes: Any, columns: int = 6) -> None:
     """Put the legend on one line above the axes, where it hides nothing."""
     handles, _ = axes.get_legend_handles_labels()
@@ -249,19 +306,15 @@ def legend_above(axes: Any, columns: int = 6) -> None:
 
 
 def limit_line(axes: Any, value: float, text: str, vertical: bool = False, colour: str = LIMIT) -> None:
-    """Draw a limit as a dashed line with its value written on it."""
-    style = {"color": colour, "linewidth": 0.9, "linestyle": (0, (4, 2)), "zorder": 3}
-    if vertical:
-        axes.axvline(value, **style)
-        beside(axes, value, 0.88, " " + text, colour, axes.get_xaxis_transform(), ha="left")
-    else:
-        axes.axhline(value, **style)
-        beside(axes, 0.995, value, text, colour, axes.get_yaxis_transform(), ha="right")
+    """Draw a limit as a dashed line; its text goes to the legend, where it hides no curve. Empty: no text."""
+    style = {"color": colour, "linewidth": 0.9, "linestyle": (0, (4, 2)), "zorder": 3, "label": text or None}
+    (axes.axvline if vertical else axes.axhline)(value, **style)
 
 
 def beside(axes: Any, x: float, y: float, text: str, colour: str, transform: Any, ha: str) -> None:
-    """Write a short label just above a place, on a ground that keeps it legible over lines."""
-    ground = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.6}
+    """Write a short label just above a place, its letters edged in white to be legible over lines."""
+    from matplotlib.patheffects import withStroke
+
     axes.annotate(
         text,
         (x, y),
@@ -272,7 +325,7 @@ def beside(axes: Any, x: float, y: float, text: str, colour: str, transform: Any
         fontsize=8,
         va="bottom",
         ha=ha,
-        bbox=ground,
+        path_effects=[withStroke(linewidth=1.6, foreground="white")],
         zorder=6,
     )
 

@@ -37,7 +37,7 @@ def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], 
     Parameters
     ----------
     folder : Path
-        Holds summary.json, manifest.json and results.parquet/: nothing else is read, and equal files give equal bytes
+        Holds summary.json, manifest.json and arrays/: nothing else is read, and equal files give equal bytes
         whatever the time, the host or the number of workers.
     answer_types : mapping of analysis name to dataclass
         What its answers become.

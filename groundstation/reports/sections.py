@@ -1,35 +1,59 @@
 """Chapters of the flight report, in its order, with their figures drawn."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
+from string import ascii_uppercase
 
-from groundstation.chapters import chapters_of
+from groundstation.chapters import answer_chapters, chapters_of
 from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.findings import findings
+from groundstation.chapters.next_steps import next_steps
 from groundstation.chapters.overview import overview
 from groundstation.chapters.parts import Note, Section
 from groundstation.chapters.plan import is_plan
 from groundstation.chapters.provenance import provenance
 from groundstation.chapters.quality import quality
+from groundstation.chapters.sources import sources
 from groundstation.reports.figures import with_drawings
 from groundstation.results.files import SavedFlight
 
-ON_THE_FLIGHT = (overview, quality, findings, provenance)  # behind the chapters on its answers
+ON_THE_DATA = (findings, quality)  # behind the chapters on the answers
 ON_THE_SESSION = (findings, provenance)  # and of a plan
 
 
 def flight_sections(saved: SavedFlight) -> tuple[Section, ...]:
-    """The chapters of a flight: those on its answers, then the flight itself, its data and findings, its source.
+    """The chapters of a flight: the flight itself, what to do next, its answers, the best first, its data; appendices.
 
     Of a session of several aircraft, and of a plan: those on its answers, its findings, its source.
 
     A chapter that has nothing to say is left out, and one of nothing but figures without arrays.
     """
     results = saved.results
-    on_the_rest = ON_THE_SESSION if is_session(results) or is_plan(results) else ON_THE_FLIGHT
-    told = (*chapters_of(results), *(build(results) for build in on_the_rest))
-    drawn = (on_a_page(section, saved) for section in told if section is not None)
-    return tuple(section for section in drawn if section.parts)
+    is_flight = not (is_session(results) or is_plan(results))
+    told = (
+        (overview(results), next_steps(results), *answer_chapters(results), *(build(results) for build in ON_THE_DATA))
+        if is_flight
+        else (*chapters_of(results), *(build(results) for build in ON_THE_SESSION))
+    )
+    chapters = [section for section in told if section is not None]
+    appendix = [*map(_workings, chapters), *((provenance(results), sources(results)) if is_flight else ())]
+    shown = [replace(section, appendix=()) for section in chapters if not section.is_open]
+    return (*_numbered(shown, saved, count(1)), *_numbered(appendix, saved, ascii_uppercase))
+
+
+def _numbered(sections: Sequence[Section | None], saved: SavedFlight, numbers: Iterable[object]) -> tuple[Section, ...]:
+    """The sections as a page shows them, those without parts left out."""
+    drawn = (on_a_page(section, saved) for section in sections if section is not None)
+    shown = (section for section in drawn if section.parts)
+    return tuple(replace(section, number=str(number)) for section, number in zip(shown, numbers, strict=False))
+
+
+def _workings(section: Section) -> Section:
+    """What a chapter leaves to the appendix."""
+    parts = (*section.parts, *section.appendix) if section.is_open else section.appendix
+    return Section(f"{section.key}-workings", f"{section.title}: workings", "", parts)
 
 
 def on_a_page(section: Section, saved: SavedFlight) -> Section:

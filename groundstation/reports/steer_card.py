@@ -71,7 +71,7 @@ def write_exports(saved: SavedFlight, *, with_pdf: bool) -> tuple[tuple[Path, ..
     paths, problems = [], []
     text = deviation_csv(saved.results)
     if text is None:
-        problems.append(f"{DEVIATION_CSV}: not written, its arrays are missing in results.parquet: run the log again")
+        problems.append(f"{DEVIATION_CSV}: not written, its arrays are missing in arrays/: run the log again")
     else:
         write_text(table, text)
         paths.append(table)

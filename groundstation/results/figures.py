@@ -21,7 +21,7 @@ class FigureData:
     Parameters
     ----------
     name : str
-        File name in results.parquet/ and tables/: ``heading_samples``.
+        File name in arrays/ and tables/: ``heading_samples``.
     columns : mapping of name to ndarray, shapes (n,)
         Units in the names; numbers, bool or text. NaN is a gap.
     digits : mapping of name to int

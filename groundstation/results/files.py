@@ -1,4 +1,4 @@
-"""The files of one flight: summary.json, manifest.json, results.parquet/ and its readable copies tables/*.csv."""
+"""The files of one flight: summary.json, manifest.json, arrays/*.parquet and its readable copies tables/*.csv."""
 
 import json
 import shutil
@@ -23,7 +23,8 @@ from groundstation.results.restore import restored
 from groundstation.results.summary import digits_of, summary_of
 
 Document = TypeVar("Document")
-SUMMARY, MANIFEST, ARRAYS, TABLES = "summary.json", "manifest.json", "results.parquet", "tables"
+SUMMARY, MANIFEST, ARRAYS, TABLES = "summary.json", "manifest.json", "arrays", "tables"
+OLD_ARRAYS = "results.parquet"  # an earlier name of that folder, still read
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 PARQUET_MAGIC = b"PAR1"  # at both ends of a whole file
 PARQUET_LEAST_BYTES = 12  # both, and the length of what describes the file
@@ -108,8 +109,9 @@ def save(folder: Path, results: FlightResults, manifest: Manifest) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name in (SUMMARY, MANIFEST):  # written last: a folder that was cut short has none, and does not look finished
         (folder / name).unlink(missing_ok=True)
-    for name in (ARRAYS, TABLES):
+    for name in (ARRAYS, OLD_ARRAYS, TABLES):
         shutil.rmtree(folder / name, ignore_errors=True)
+    for name in (ARRAYS, TABLES):
         (folder / name).mkdir()
     for figure in results.figures:
         _write_parquet(folder / ARRAYS / f"{figure.name}.parquet", figure)
@@ -200,7 +202,7 @@ def load(folder: Path, answer_types: Mapping[str, type[Answer]]) -> SavedFlight:
         figure that is broken inside raises the same when it is asked for.
     """
     summary, manifest = _json_object(folder / SUMMARY), load_manifest(folder)
-    paths = sorted((folder / ARRAYS).glob("*.parquet"))
+    paths = sorted(path for name in (ARRAYS, OLD_ARRAYS) for path in (folder / name).glob("*.parquet"))
     for path in paths:
         _require_whole(path)
     figures = _Figures({path.stem: path for path in paths})

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.errors import UnknownNameError
 from groundstation.base.records import frozen
 from groundstation.base.serial import to_json
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.results.figures import FigureData
-from groundstation.results.frames import no_such_table, row_fields, rows_frame
+from groundstation.results.frames import row_fields, rows_frame
 from groundstation.results.magnetic import LETTERS
 
 if TYPE_CHECKING:
@@ -78,8 +79,9 @@ class AircraftRow:
 
     Parameters
     ----------
-    flights, assessed, accepted : int
-        Flights, those with a heading error, those with the verdict accept.
+    flights, assessed, averaged, accepted : int
+        Flights, those with a heading error, those of them that enter the statistics below (all but those with the
+        verdict reject), those with the verdict accept.
     samples : int
         Used samples of the flights that have their samples.
     mean_deg, confidence95_deg
@@ -99,6 +101,7 @@ class AircraftRow:
     aircraft: str
     flights: int
     assessed: int
+    averaged: int
     accepted: int
     samples: int
     mean_deg: float | None
@@ -357,7 +360,7 @@ class FleetResults:
         found = getattr(self, name, None)
         if not isinstance(found, FigureData):
             known = [part.name for part in fields(self) if part.name != "stated"]
-            raise no_such_table(name, known)
+            raise UnknownNameError("tables", name, known)
         frame = found.to_frame()
         for key, values in found.columns.items():
             if values.dtype.kind == "M":

@@ -4,13 +4,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from groundstation.base.clock import Clock
+from groundstation.base.errors import UnknownNameError
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
+from groundstation.base.units import NS_PER_S
 from groundstation.results.answer import A, Answers, answer_of
 from groundstation.results.chosen import ChosenInterval
-from groundstation.results.figures import FigureData, FigureSet
-from groundstation.results.frames import Tabular, no_such_table
+from groundstation.results.figures import FigureData, FigureSet, numbers
+from groundstation.results.frames import Tabular
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +41,11 @@ class Source:
     reader: str
 
 
-@dataclass(frozen=True)
+NAT_NS = np.iinfo(np.int64).min  # what numpy takes for "not a time"
+UTC_OF = {"time_s": "utc", "start_s": "start_utc", "end_s": "end_utc"}  # columns of flight seconds, and their UTC
+
+
+@dataclass(frozen=True, repr=False)
 class FlightResults(Tabular):
     """Results of one flight.
 
@@ -111,6 +120,8 @@ class FlightResults(Tabular):
     def to_frame(self, table: str = "findings") -> "pd.DataFrame":
         """A table of the flight as a frame: a list of rows, or the arrays behind a figure.
 
+        Where the flight has UTC, flight seconds of arrays have it beside them (``utc``, ``start_utc``, ``end_utc``).
+
         Raises
         ------
         UsageError
@@ -120,5 +131,22 @@ class FlightResults(Tabular):
             return super().to_frame(table)
         figure = self.figure(table)
         if figure is None:
-            raise no_such_table(table, self.table_names())
-        return figure.to_frame()
+            raise UnknownNameError("tables", table, self.table_names())
+        frame = figure.to_frame()
+        if self.start_utc_ns is not None:
+            for place, name in enumerate([name for name in UTC_OF if name in figure.columns]):
+                frame.insert(place, UTC_OF[name], self._utc(numbers(figure, name)))
+        return frame
+
+    def _utc(self, flight_seconds: NDArray[np.float64]) -> "pd.DatetimeIndex":
+        """UTC of flight seconds, NaT where unknown."""
+        import pandas as pd
+
+        known = np.isfinite(flight_seconds)
+        offsets = np.rint(np.where(known, flight_seconds, 0.0) * NS_PER_S).astype(np.int64)
+        times = np.where(known, offsets + (self.start_utc_ns or 0), NAT_NS)
+        return pd.DatetimeIndex(times.astype("datetime64[ns]"), tz="UTC")
+
+    def __repr__(self) -> str:
+        told = f"answers {', '.join(self.answers) or 'none'}, {len(self.findings)} findings"
+        return f"<FlightResults {self.flight_id}: {self.status}, {told}>"

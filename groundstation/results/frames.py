@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from groundstation.base.errors import UsageError
+from groundstation.base.errors import UnknownNameError
 from groundstation.results.figures import FigureData
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class Tabular:
         known = row_fields(type(self))
         name = table or next(iter(known))
         if name not in known:
-            raise no_such_table(name, self.table_names())
+            raise UnknownNameError("tables", name, self.table_names())
         return rows_frame(known[name], getattr(self, name))
 
     def _repr_html_(self) -> str:
@@ -57,11 +57,6 @@ class Tabular:
         shown = {part.name: getattr(self, part.name) for part in fields(cast(Any, self))}
         plain = {name: value for name, value in shown.items() if value is None or isinstance(value, str | int | float)}
         return pd.Series(plain, dtype=object).to_frame().to_html(header=False)
-
-
-def no_such_table(name: str, known: Sequence[str]) -> UsageError:
-    """The error for a table that is not there."""
-    return UsageError("table", repr(name), "one of " + ", ".join(known))
 
 
 def row_fields(results: type) -> dict[str, type]:

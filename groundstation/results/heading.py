@@ -1,5 +1,6 @@
 """Answer of the heading estimator (system 1): what the operator types, why, and how sure it is."""
 
+import math
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
@@ -73,6 +74,14 @@ class TaxiSegment:
 
 
 @dataclass(frozen=True)
+class HeadingStep:
+    """A step of the INS heading: flight time of the first sample after it, heading after minus heading before."""
+
+    time_s: float
+    size_deg: float
+
+
+@dataclass(frozen=True)
 class RunwayCheck:
     """Second reference: runway true bearing on line-up or take-off run against the INS heading there."""
 
@@ -112,7 +121,18 @@ class HeadingResult(Answer):
     paper_error_deg : float
         The plain running mean of the paper over the same samples.
     standard_error_deg, confidence95_deg
-        Honest ones: they allow for errors correlated over seconds.
+        Honest ones: they allow for errors correlated over seconds, for what segments and minutes say against each
+        other, and for steady sideslip and mounting.
+    confidence95_measured_deg : (low, high), optional
+        The interval without steady sideslip and mounting: what this taxi shows by itself.
+    steady_sigma_deg, steady_origin
+        Sigma of what steady sideslip and mounting leave in the error, and whence their prior sigmas come:
+        ``"aircraft file"`` or ``"shipped figures"``.
+    segment_spread_deg, wander_spread_deg, wander_s
+        Error that each segment has of its own, and wander of INS heading minus path: sigmas and correlation time, as
+        their spread shows.
+    steps : tuple of HeadingStep
+        Steps of the INS heading before or on taxi; the error is that after the last.
     precision_deg : float
         The paper's e: 1.96 sqrt(s^2 / (n - 1)).
     quality_deg : float
@@ -174,6 +194,18 @@ class HeadingResult(Answer):
     runway: tuple[RunwayCheck, ...] = ()
     onboard: OnboardComparison | None = None
     uncorrected_error_deg: float | None = None
+    confidence95_measured_deg: tuple[float, float] | None = None
+    steady_sigma_deg: float | None = None
+    steady_origin: str = field(default="", metadata={"one_of": ("", "aircraft file", "shipped figures")})
+    segment_spread_deg: float | None = None
+    wander_spread_deg: float | None = None
+    wander_s: float | None = None
+    steps: tuple[HeadingStep, ...] = ()
     reference_time_s: float | None = None
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
+
+    @property
+    def measured_sigma_deg(self) -> float:
+        """Standard error without steady sideslip and mounting."""
+        return math.sqrt(max(self.standard_error_deg**2 - (self.steady_sigma_deg or 0.0) ** 2, 0.0))

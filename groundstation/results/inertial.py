@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 MISSING: dict[str, str] = {"gnss": "GNSS", "ins": "INS", "both": "both"}  # RealOutage.missing, for people
 CHANNELS = ("north", "east")
+QUANTITIES = ("position", "velocity")
 STATES = ("position", "velocity", "tilt", "drift", "drift_rate", "random_drift")
 NOT_SEEN = 0.01  # observability below which the data said nothing of a state
 UNMOVED = 0.01  # share of its sigma at the start by which the sigma of such a state may differ
@@ -91,18 +92,57 @@ class AzimuthEstimate:
 
 
 @dataclass(frozen=True)
+class Difference:
+    """INS minus GNSS over the epochs compared: ``north``, ``east``, or ``horizontal``, the length of both.
+
+    ``mean`` has its sign; ``median``, ``p95`` and ``largest`` are of the magnitude.
+    """
+
+    quantity: str = field(metadata={"one_of": QUANTITIES})
+    axis: str = field(metadata={"one_of": (*CHANNELS, "horizontal")})
+    unit: str
+    samples: int
+    mean: float
+    median: float
+    p95: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class OwnInnovation:
+    """What the INS's own filter logged of its innovations against GNSS: innovation = measured - predicted.
+
+    ``mean`` has its sign; ``median`` and ``p95`` are of the magnitude. ``sigma`` is the root of the filter's median
+    variance, ``share_inside95`` that of the innovations inside their 95 % band; None where it logs no variance.
+    ``share_rejected`` is that of the samples beyond the filter's own gate, None where it logs no ratio to it.
+    """
+
+    quantity: str = field(metadata={"one_of": QUANTITIES})
+    axis: str = field(metadata={"one_of": CHANNELS})
+    unit: str
+    samples: int
+    mean: float
+    median: float
+    p95: float
+    sigma: float | None
+    share_inside95: float | None
+    share_rejected: float | None
+
+
+@dataclass(frozen=True)
 class InertialResult(Answer):
-    """INS errors of one flight.
+    """INS errors of one flight; of an INS that GNSS corrects already, what it differs from GNSS by and nothing else.
 
     Parameters
     ----------
     ins_topic, gnss_topic : str
         The pair used.
+    kind : str
+        ``"unaided"``; ``"gnss_aided"`` for an INS that GNSS corrects: then ``differences`` are all that is told, and
+        there are no channels, rates, outages or class; ``"unknown"`` where the log is too short or at rest for too
+        long to tell. ``kind_reason`` says why.
     ins_class : str
         Noise parameters used, by name; ``ins_class_origin`` says who chose them.
-    kind : str
-        ``"unaided"``; ``"gnss_aided"`` for an INS that never drifts from GNSS: then a forecast means nothing;
-        ``"unknown"`` where the log is too short or at rest for too long to tell. ``kind_reason`` says why.
     transition : str
         ``"exact"`` or ``"first_order"`` (I + A T of the paper).
     epochs, gnss_seconds
@@ -110,6 +150,11 @@ class InertialResult(Answer):
     radial_error_rate_50_nmiph, radial_error_rate_95_nmiph : float or None
         Radial position error over time since the first epoch, nautical miles per hour, median and 95 % over epochs
         later than ten minutes.
+    differences : tuple of Difference
+        INS minus GNSS of an INS that GNSS corrects.
+    own_filter : str
+        Topic of the log in which that INS tells of its own filter, empty where it does not; ``own_innovations`` are
+        what it tells.
     outages : tuple of RealOutage
         Intervals of the log itself without GNSS or without the INS.
     reopened : int
@@ -119,26 +164,30 @@ class InertialResult(Answer):
     settings : dict
         Every parameter of model, noise and gates as used.
     figures : tuple of FigureData
-        ``inertial_states``, ``inertial_observability``, ``inertial_track``.
+        ``inertial_states``, ``inertial_observability``, ``inertial_track``; of an INS that GNSS corrects
+        ``inertial_differences``, ``inertial_track`` and, where its filter is logged, ``inertial_own_innovations``.
     """
 
     analysis: ClassVar[str] = "inertial"
 
     ins_topic: str
     gnss_topic: str
-    ins_class: str
-    ins_class_origin: str
     kind: str = field(metadata={"one_of": ("unaided", "gnss_aided", "unknown")})
     kind_reason: str
-    transition: str = field(metadata={"one_of": ("exact", "first_order")})
     epochs: int
     gnss_seconds: float
-    north: ChannelResult
-    east: ChannelResult
-    radial_error_rate_50_nmiph: float | None
-    radial_error_rate_95_nmiph: float | None
-    velocity_error_rms_mps: float | None
-    largest_radial_error_m: float | None
+    ins_class: str = ""
+    ins_class_origin: str = ""
+    transition: str = field(default="exact", metadata={"one_of": ("exact", "first_order")})
+    north: ChannelResult | None = None
+    east: ChannelResult | None = None
+    radial_error_rate_50_nmiph: float | None = None
+    radial_error_rate_95_nmiph: float | None = None
+    velocity_error_rms_mps: float | None = None
+    largest_radial_error_m: float | None = None
+    differences: tuple[Difference, ...] = ()
+    own_filter: str = ""
+    own_innovations: tuple[OwnInnovation, ...] = ()
     outages: tuple[RealOutage, ...] = ()
     azimuth: AzimuthEstimate | None = None
     reopened: int = 0
@@ -147,9 +196,13 @@ class InertialResult(Answer):
     figures: tuple[FigureData, ...] = ()
 
     @property
-    def channels(self) -> tuple[ChannelResult, ChannelResult]:
-        """Both channels."""
-        return self.north, self.east
+    def channels(self) -> tuple[ChannelResult, ...]:
+        """Both channels; none of an INS that GNSS corrects."""
+        return tuple(channel for channel in (self.north, self.east) if channel is not None)
+
+    def difference(self, quantity: str, axis: str = "horizontal") -> Difference | None:
+        """INS minus GNSS of a quantity along an axis, None where there is none."""
+        return next((row for row in self.differences if (row.quantity, row.axis) == (quantity, axis)), None)
 
     def table_names(self) -> tuple[str, ...]:
         """Names that :meth:`to_frame` takes."""

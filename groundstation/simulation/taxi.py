@@ -13,14 +13,22 @@ from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.records import BoolArray, Column, frozen
 from groundstation.base.units import NS_PER_S
 from groundstation.simulation.processes import damped_oscillation, gauss_markov
+from groundstation.simulation.taxi_disturbance import (
+    KINDS,
+    NO_DISTURBANCE,
+    Disturbance,
+    draw_disturbance,
+    turns_of,
+)
 from groundstation.tables.table import Flight, Table
 
 FloatArray = NDArray[np.float64]
-Family = Literal["grid", "continuous"]
+Family = Literal["grid", "continuous", "wide"]
 
 INS_RATE_HZ = 50
 GNSS_EVERY = 5  # INS steps per GNSS epoch: 10 Hz
 FASTEST_GATED_MPS = 6.0
+QUIET_SHARE = 0.5  # of family wide: receivers good enough for the gate at standstill
 AIRFIELD_DEG = (59.8, 179.999)  # beside the date line: the wrap is met in every test
 START_OF_DAY_NS = 1_777_874_400 * NS_PER_S  # 2026-05-04T06:00:00Z
 
@@ -56,6 +64,7 @@ class TaxiCase:
     is_arm_known: bool = True
     heading_noise_deg: float = 0.005
     heading_resolution_deg: float = 0.005
+    disturbance: Disturbance = NO_DISTURBANCE
 
 
 def noiseless(case: TaxiCase) -> TaxiCase:
@@ -81,7 +90,9 @@ class TaxiRun:
     ins_time_s, ins_heading_deg, heading_deg : ndarray, shape (n,)
         50 Hz: what the INS shows, and the true heading.
     ins_error_deg : ndarray, shape (n,)
-        INS heading minus true heading, without noise and rounding.
+        INS heading minus true heading, without noise, rounding and wander about the error.
+    on_ground : ndarray of bool, shape (m,)
+        Weight on wheels at the GNSS times.
     gnss_time_s, velocity_north_mps, velocity_east_mps : ndarray, shape (m,)
         10 Hz.
     taxi_start_s : float
@@ -96,13 +107,13 @@ class TaxiRun:
     gnss_time_s: FloatArray
     velocity_north_mps: FloatArray
     velocity_east_mps: FloatArray
+    on_ground: BoolArray
     taxi_start_s: float
 
     def __post_init__(self) -> None:
-        for name in ("ins_time_s", "ins_heading_deg", "heading_deg", "ins_error_deg", "gnss_time_s"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
-        object.__setattr__(self, "velocity_north_mps", frozen(self.velocity_north_mps))
-        object.__setattr__(self, "velocity_east_mps", frozen(self.velocity_east_mps))
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                object.__setattr__(self, name, frozen(value))
 
     def error_at(self, time_s: float) -> float:
         """True INS heading error, degrees, at a time."""
@@ -113,8 +124,21 @@ def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
+def draw_run(family: Family, seed: int, number: int) -> "TaxiRun":
+    """Run ``number`` of a seed of a family; those of family wide go through its cells one after the other."""
+    rng = np.random.default_rng((seed, number))
+    case = draw_case(rng, family)
+    if family == "wide":
+        kind = KINDS[number % len(KINDS)]
+        case = replace(case, disturbance=draw_disturbance(rng, kind), turns_deg=turns_of(kind, rng, case.turns_deg))
+        if rng.random() < QUIET_SHARE:
+            quiet, white = float(rng.uniform(0.003, 0.015)), float(rng.uniform(0.01, 0.04))
+            case = replace(case, correlated_mps=quiet, white_mps=white)
+    return simulate_taxi(case, rng)
+
+
 def draw_case(rng: np.random.Generator, family: Family) -> TaxiCase:
-    """Draw the parameters of one run from a family of docs/heading-family.md."""
+    """Draw the parameters of one run from a family of docs/heading-family.md, undisturbed."""
     grid = family == "grid"
     if grid:
         total_s = float(rng.choice([20.0, 40.0, 60.0, 90.0, 120.0]))
@@ -151,6 +175,7 @@ def draw_case(rng: np.random.Generator, family: Family) -> TaxiCase:
 
 ACCELERATION_MPS2, BRAKING_MPS2, TURNING_MPS = 1.0, 1.2, 5.0
 ROLL_OUT_MPS, HOLDING_S, MARGIN_S = 3.0, 12.0, 0.4
+TAKE_OFF_MPS2, LIFT_OFF_MPS, CLIMBING_MPS, CLIMBING_S = 2.5, 30.0, 45.0, 20.0
 
 
 class _Profile:
@@ -164,9 +189,9 @@ class _Profile:
         self.time_s.append(self.time_s[-1] + max(duration_s, 1e-3))
         self.speed_mps.append(self.speed_mps[-1])
 
-    def change_speed(self, speed_mps: float) -> None:
+    def change_speed(self, speed_mps: float, acceleration_mps2: float = ACCELERATION_MPS2) -> None:
         change = speed_mps - self.speed_mps[-1]
-        rate = ACCELERATION_MPS2 if change > 0 else BRAKING_MPS2
+        rate = acceleration_mps2 if change > 0 else BRAKING_MPS2
         self.time_s.append(self.time_s[-1] + abs(change) / rate + 1e-3)
         self.speed_mps.append(speed_mps)
 
@@ -196,6 +221,9 @@ def _plan(case: TaxiCase) -> _Profile:
             profile.hold(1.0)
             profile.turn(case.turns_deg[index], case.turn_rate_dps)
     profile.hold(HOLDING_S)
+    if case.disturbance.take_off_crab_deg is not None:
+        profile.change_speed(CLIMBING_MPS, TAKE_OFF_MPS2)
+        profile.hold(CLIMBING_S)
     return profile
 
 
@@ -213,9 +241,10 @@ def simulate_taxi(case: TaxiCase, rng: np.random.Generator) -> TaxiRun:
     """Draw one taxi run: standstill, straight segments with turns between, holding point.
 
     The middle of the main-gear axle moves along its track; the antenna ahead of it moves sideways as the heading turns:
-    v_antenna = v_axle + (heading rate) x arm. Heading = track + sway. The sensor errors are those of the case.
+    v_antenna = v_axle + (heading rate) x arm. Heading = track + sway + sideslip. The sensor errors are those of the
+    case, the disturbances those of ``case.disturbance``.
     """
-    profile = _plan(case)
+    profile, disturbance = _plan(case), case.disturbance
     step = 1.0 / INS_RATE_HZ
     time_s: FloatArray = np.arange(int(profile.time_s[-1] * INS_RATE_HZ), dtype=np.float64) * step
     count = len(time_s)
@@ -225,21 +254,28 @@ def simulate_taxi(case: TaxiCase, rng: np.random.Generator) -> TaxiRun:
     moving = np.clip(planned_mps / 3.0, 0.0, 1.0)
     steering = case.steering_sigma_deg * damped_oscillation(rng, (count,), step, 1.0, case.steering_hz, 0.7)
     sway = case.sway_sigma_deg * damped_oscillation(rng, (count,), step, 1.0, case.sway_hz, case.sway_damping)
-    track_deg = _path_track_deg(time_s, case, profile.turns) + moving * steering
-    heading_deg = track_deg + moving * sway
+    path_deg = _path_track_deg(time_s, case, profile.turns)
+    track_deg = path_deg + moving * steering
+    sideslip = disturbance.sideslip(rng, path_deg, case.first_track_deg, step)
+    if disturbance.take_off_crab_deg is not None:
+        is_run = np.arange(count) > np.flatnonzero(planned_mps <= 0.0)[-1]
+        sideslip = sideslip + disturbance.take_off_crab_deg * is_run
+    heading_deg = track_deg + moving * (sway + sideslip)
     rate_radps = np.deg2rad(np.gradient(heading_deg, step))
     track_rad, heading_rad = np.deg2rad(track_deg), np.deg2rad(heading_deg)
     north = speed * np.cos(track_rad) - rate_radps * case.antenna_arm_m * np.sin(heading_rad)
     east = speed * np.sin(track_rad) + rate_radps * case.antenna_arm_m * np.cos(heading_rad)
+    velocity = disturbance.delayed(time_s, np.stack([north, east]))
 
     error = case.heading_error_deg + case.drift_deg_per_h / 3600.0 * (time_s - case.standstill_s)
+    error = error + disturbance.ins_error(time_s, case.standstill_s)
     shown = heading_deg + error + case.heading_noise_deg * rng.standard_normal(count)
+    shown = shown + disturbance.ins_wander(rng, count, step)
     if case.heading_resolution_deg > 0.0:
         shown = np.round(shown / case.heading_resolution_deg) * case.heading_resolution_deg
-    at_gnss = slice(0, None, GNSS_EVERY)
-    epochs = len(time_s[at_gnss])
-    noise = gauss_markov(rng, (2, epochs), GNSS_EVERY * step, case.correlated_mps, case.correlation_s)
-    noise = noise + case.white_mps * rng.standard_normal((2, epochs))
+    every = max(round(disturbance.gnss_every_s * INS_RATE_HZ), GNSS_EVERY)
+    at_gnss = slice(0, None, every)
+    velocity = velocity[:, at_gnss] + _gnss_error(case, rng, moving[at_gnss], path_deg[at_gnss], every * step)
     return TaxiRun(
         case=case,
         ins_time_s=time_s,
@@ -247,10 +283,22 @@ def simulate_taxi(case: TaxiCase, rng: np.random.Generator) -> TaxiRun:
         heading_deg=wrap_360(heading_deg),
         ins_error_deg=wrap_180(error),
         gnss_time_s=time_s[at_gnss],
-        velocity_north_mps=north[at_gnss] + noise[0],
-        velocity_east_mps=east[at_gnss] + noise[1],
+        velocity_north_mps=velocity[0],
+        velocity_east_mps=velocity[1],
+        on_ground=planned_mps[at_gnss] < LIFT_OFF_MPS,
         taxi_start_s=case.standstill_s,
     )
+
+
+def _gnss_error(
+    case: TaxiCase, rng: np.random.Generator, moving: FloatArray, path_deg: FloatArray, step_s: float
+) -> FloatArray:
+    """GNSS velocity error, m/s, shape (2, n); ``moving`` is 0 at standstill and 1 in motion."""
+    disturbance, count = case.disturbance, len(moving)
+    noise = gauss_markov(rng, (2, count), step_s, case.correlated_mps, case.correlation_s)
+    noise = noise * (1.0 + (disturbance.motion_factor - 1.0) * moving)
+    in_motion = disturbance.multipath(path_deg) + disturbance.patches(rng, count, step_s)
+    return np.asarray(noise + case.white_mps * rng.standard_normal((2, count)) + moving * in_motion)
 
 
 def table_of(topic: str, time_ns: NDArray[np.int64], columns: Mapping[str, NDArray[np.generic]]) -> Table:
@@ -268,8 +316,7 @@ def taxi_flight(run: TaxiRun, *, rng: np.random.Generator | None = None) -> Flig
     ins_ns = START_OF_DAY_NS + np.round(run.ins_time_s * NS_PER_S).astype(np.int64)
     gnss_ns = START_OF_DAY_NS + np.round(run.gnss_time_s * NS_PER_S).astype(np.int64)
     epochs = len(gnss_ns)
-    on_ground: BoolArray = np.ones(epochs, dtype=bool)
-    step_s = GNSS_EVERY / INS_RATE_HZ
+    step_s = float(run.gnss_time_s[1] - run.gnss_time_s[0])
     latitude_deg, longitude_deg = latitude_longitude_deg(
         np.cumsum(run.velocity_north_mps) * step_s, np.cumsum(run.velocity_east_mps) * step_s, *AIRFIELD_DEG
     )
@@ -284,10 +331,10 @@ def taxi_flight(run: TaxiRun, *, rng: np.random.Generator | None = None) -> Flig
                 "velocity_north_mps": run.velocity_north_mps,
                 "velocity_east_mps": run.velocity_east_mps,
                 "gdop": np.full(epochs, gdop),
-                "integrity_ok": on_ground,
+                "integrity_ok": np.ones(epochs, dtype=bool),
             },
         ),
-        table_of("discrete", gnss_ns, {"weight_on_wheels": on_ground}),
+        table_of("discrete", gnss_ns, {"weight_on_wheels": run.on_ground}),
         table_of("truth", ins_ns, {"true_heading_deg": run.heading_deg}),
     )
     metadata = MappingProxyType({"aircraft": "simulated", "flight": "taxi"})

@@ -2,17 +2,16 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from foxglove_schemas_protobuf import LocationFix_pb2
-from google.protobuf.descriptor import FileDescriptor
-from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.records import Channel, Schema
 from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
+from groundstation.base.source_units import source_units
 from groundstation.base.units import NS_PER_S
 from groundstation.store.messages import ByteArray
 from groundstation.store.schema import GrowingType, WireField, columns_text
@@ -22,7 +21,8 @@ CHUNK_BYTES = 1 << 20  # a chunk is closed when it has so many bytes: a flipped 
 CHUNK_SPAN_NS = 300 * NS_PER_S  # or at each such boundary of time, which bounds the loss of slow topics
 SHORT_SPAN_NS = 60 * NS_PER_S  # or at such a boundary when it has enough bytes to be worth a chunk
 SHORT_SPAN_BYTES = 32 << 10
-COLUMNS_KEY, DERIVED_KEY = "columns", "derived_from"
+COLUMNS_KEY = "columns"
+DERIVED_KEY = "derived_from"  # in the metadata of a channel made from another one: reading skips it
 
 
 @dataclass(frozen=True)
@@ -63,8 +63,8 @@ class ChannelWriter:
         """Values of a batch as they are written, in order of their field numbers."""
         raise NotImplementedError
 
-    def definition(self) -> tuple[Schema, Channel]:
-        """Schema and channel records, for all that was written."""
+    def definition(self, metadata: Mapping[str, str] = MappingProxyType({})) -> tuple[Schema, Channel]:
+        """Schema and channel records, for all that was written; ``metadata`` of the file may tell units."""
         raise NotImplementedError
 
     def write(self, batch: RecordBatch) -> None:
@@ -156,82 +156,23 @@ class TopicWriter(ChannelWriter):
         where = f"topic {self.topic}, column {field.column}"
         raise GroundstationError(where, f"values of {values.dtype}", f"{field.dtype} as in the batches before")
 
-    def definition(self) -> tuple[Schema, Channel]:
+    def definition(self, metadata: Mapping[str, str] = MappingProxyType({})) -> tuple[Schema, Channel]:
         """Schema and channel records, with every column that was written."""
-        message = self._type.message_type()
-        metadata = {COLUMNS_KEY: columns_text(self._type.own_fields)}
+        units = source_units(metadata, self.topic, [field.column for field in self._type.own_fields])
+        message = self._type.message_type(units)
         schema = Schema(id=self.id, name=message.name, encoding="protobuf", data=message.descriptor_set)
-        return schema, _channel(self.id, self.topic, metadata)
+        return schema, channel_record(self.id, self.topic, {COLUMNS_KEY: columns_text(self._type.own_fields)})
 
 
-class LocationFixWriter(ChannelWriter):
-    """Positions of a GNSS topic once more as ``foxglove.LocationFix``, which gives them a map in any viewer."""
-
-    LATITUDE, LONGITUDE, ALTITUDE, TIMESTAMP = b"\x09", b"\x11", b"\x19", b"\x32\x0c"
-
-    def __init__(self, channel_id: int, source_topic: str, emit: Callable[[Chunk], None], has_utc: bool) -> None:
-        super().__init__(channel_id, f"location_fix.{source_topic}", emit)
-        self._source_topic = source_topic
-        self._has_utc = has_utc
-
-    def write(self, batch: RecordBatch) -> None:
-        """Take in the rows that have a position."""
-        position = [batch.columns.get(name) for name in ("latitude_deg", "longitude_deg")]
-        if any(column is None for column in position):
-            return
-        known = np.logical_and.reduce([column.mask & np.isfinite(column.values) for column in position if column])
-        if known.any():
-            super().write(batch if known.all() else batch.take(known))
-
-    def slots(self, batch: RecordBatch) -> list[Slot]:
-        """Latitude, longitude, altitude and, on an absolute clock, the timestamp."""
-        tags = {"latitude_deg": self.LATITUDE, "longitude_deg": self.LONGITUDE}
-        altitude = next((name for name in ("altitude_ellipsoid_m", "altitude_msl_m") if name in batch.columns), None)
-        if altitude:
-            tags[altitude] = self.ALTITUDE
-        columns = ((tag, batch.columns[name]) for name, tag in tags.items())
-        slots = [Slot(tag, column.values.astype("<f8", copy=False), column.present) for tag, column in columns]
-        if self._has_utc and batch.time_ns is not None:
-            slots.append(Slot(self.TIMESTAMP, _timestamps(batch.time_ns)))
-        return slots
-
-    def definition(self) -> tuple[Schema, Channel]:
-        """Foxglove's schema; the channel's metadata says that reading skips it."""
-        files = FileDescriptorSet()
-        for descriptor in _with_imports(LocationFix_pb2.DESCRIPTOR, {}).values():
-            descriptor.CopyToProto(files.file.add())
-        name = LocationFix_pb2.LocationFix.DESCRIPTOR.full_name
-        schema = Schema(id=self.id, name=name, encoding="protobuf", data=files.SerializeToString(deterministic=True))
-        return schema, _channel(self.id, self.topic, {DERIVED_KEY: self._source_topic})
-
-
-def _channel(channel_id: int, topic: str, metadata: Mapping[str, str]) -> Channel:
+def channel_record(channel_id: int, topic: str, metadata: Mapping[str, str]) -> Channel:
+    """Record of a channel whose schema has its number."""
     return Channel(
         id=channel_id, topic=topic, message_encoding="protobuf", metadata=dict(metadata), schema_id=channel_id
     )
 
 
-def _with_imports(file: FileDescriptor, found: dict[str, FileDescriptor]) -> dict[str, FileDescriptor]:
-    """A file's descriptor and all that it imports, imported ones first."""
-    for imported in file.dependencies:
-        _with_imports(imported, found)
-    found[file.name] = file
-    return found
-
-
 def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
-
-
-def _timestamps(time_ns: Int64Array) -> NDArray[np.void]:
-    """google.protobuf.Timestamp of each time: varints padded to five bytes, so that all are equally long."""
-    seconds, nanos = np.divmod(time_ns, NS_PER_S)
-    out = np.empty((len(time_ns), 12), np.uint8)
-    for at, tag, value in ((0, 0x08, seconds), (6, 0x10, nanos)):
-        out[:, at] = tag
-        for k in range(5):
-            out[:, at + 1 + k] = (value >> (7 * k)) & 0x7F | (0x80 if k < 4 else 0)
-    return out.view("V12")[:, 0]
 
 
 def _width(dtype: np.dtype[Any]) -> int:

@@ -6,10 +6,11 @@ A message type describes its fields to numpy (:class:`WireField`) and itself to 
 
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -271,12 +272,12 @@ class GrowingType:
         """Fields of the columns met so far, in order of their numbers."""
         return tuple(sorted(self._fields.values(), key=lambda field: field.number))
 
-    def message_type(self) -> MessageType:
-        """The type as it stands now."""
+    def message_type(self, units: Mapping[str, str] = MappingProxyType({})) -> MessageType:
+        """The type as it stands now; ``units`` of columns, as the source tells them, describe fields made for them."""
         if self._canonical is not None:
             return self._canonical
         fields = (*self.common_fields, *self.own_fields)
-        return MessageType(self._name, fields, _describe(self._name, fields))
+        return MessageType(self._name, fields, _describe(self._name, fields, units))
 
 
 def identifier(text: str) -> str:
@@ -296,8 +297,11 @@ def _name_key(name: str) -> str:
     return name.replace("_", "").lower()
 
 
-def _describe(name: str, fields: Iterable[WireField]) -> bytes:
-    """Serialised descriptor set of a message made at run time, every field with explicit presence."""
+def _describe(name: str, fields: Sequence[WireField], units: Mapping[str, str]) -> bytes:
+    """Serialised descriptor set of a message made at run time, every field with explicit presence.
+
+    A field's unit is its comment, as if it stood before it in a .proto file.
+    """
     package, _, message_name = name.rpartition(".")
     message = DescriptorProto(name=message_name)
     for index, field in enumerate(fields):
@@ -311,4 +315,8 @@ def _describe(name: str, fields: Iterable[WireField]) -> bytes:
         )
         message.oneof_decl.add(name=f"_{field.name}")  # proto3 `optional` is a oneof of one
     file = FileDescriptorProto(name=f"{name}.proto", package=package, syntax="proto3", message_type=[message])
+    for index, field in enumerate(fields):
+        if field.column in units:
+            path = [FileDescriptorProto.MESSAGE_TYPE_FIELD_NUMBER, 0, DescriptorProto.FIELD_FIELD_NUMBER, index]
+            file.source_code_info.location.add(path=path, span=[0, 0, 0], leading_comments=f" {units[field.column]}\n")
     return FileDescriptorSet(file=[file]).SerializeToString()

@@ -51,6 +51,8 @@ class GroundSettings:
         Largest change of 1-s mean roll and pitch against the standstill.
     height_m, height_s
         Surely airborne is what stays that much above what the ground can be, for so long, in every altitude source.
+    low_height_m
+        The same for what is as fast as ``speed_share`` of sure flight all the time: a low hop between two standstills.
     speed_share
         Of the lowest speed while surely airborne (first percentile): nothing faster is proven. A vehicle that hovers is
         never proven to roll; a float above the runway does not pass.
@@ -79,6 +81,7 @@ class GroundSettings:
     tilt_deg: float = 5.0
     height_m: float = 15.0
     height_s: float = 5.0
+    low_height_m: float = 5.0
     speed_share: float = 0.8
     unlearnt_speed_mps: float = 15.0
     lift_off_share: float = 0.7
@@ -140,10 +143,14 @@ def detect_ground(motion: Motion, settings: GroundSettings | None = None) -> Det
     standing = nothing.copy()
     for stop in stops:
         standing[stop.start : stop.end] = True
-    airborne = _surely_airborne(motion, stops, settings) & ~standing
+    height = _height_above_ground_m(motion, stops, settings)
+    flying = (height > settings.height_m) & np.isfinite(motion.speed_mps)
+    airborne = lasting(flying, settings.height_s) & ~standing
     limit = settings.unlearnt_speed_mps
     if airborne.any():
         limit = settings.speed_share * float(np.nanpercentile(motion.speed_mps[airborne], 1.0))
+        hops = (height > settings.low_height_m) & (motion.speed_mps > max(limit, WALKING_MPS))
+        airborne |= lasting(hops, settings.height_s) & ~standing
     ground = nothing.copy()
     allowed = _rolls(motion, limit, settings) | standing
     component = np.cumsum(np.diff(allowed.astype(np.int8), prepend=0) != 0)
@@ -242,27 +249,32 @@ def _without_hovers(motion: Motion, stops: list[_Stop], settings: GroundSettings
     return [stop for stop in stops if not any(is_above(stop, other) for other in stops if other is not stop)]
 
 
-def _surely_airborne(motion: Motion, stops: list[_Stop], settings: GroundSettings) -> BoolArray:
-    """Where a known motion is higher above the standstill before or after than ground can be, in every source."""
+def _height_above_ground_m(motion: Motion, stops: list[_Stop], settings: GroundSettings) -> FloatArray:
+    """Height above the highest that ground can be, in every source, by the standstill before or after, shape (n,)."""
     starts = np.array([stop.start for stop in stops])
     row = np.arange(len(motion))
     before = np.searchsorted(starts, row, side="right") - 1
     reference = np.array([stop.altitude_m for stop in stops]).T  # (sources, stops)
     middle = np.array([stop.middle for stop in stops])
     smooth = running_mean(motion.all_altitudes_m, 1.0)
-    airborne = np.zeros(len(motion), dtype=bool)
+    highest = np.full(len(motion), -np.inf)
     for neighbour in (before, before + 1):
         exists = (neighbour >= 0) & (neighbour < len(stops))
         stop = np.clip(neighbour, 0, len(stops) - 1)
         height = np.fmin.reduce(smooth - reference[:, stop], axis=0)
         distance = motion.distance_m(middle[stop], slice(None))
         spread = _ground_spread_m(distance, np.abs(row - middle[stop]) / RATE_HZ, settings)
-        airborne |= exists & (height > settings.height_m + spread)
-    airborne &= np.isfinite(motion.speed_mps)
-    for start, end in runs(airborne):
-        if end - start < settings.height_s * RATE_HZ:
-            airborne[start:end] = False
-    return airborne
+        highest = np.where(exists, np.fmax(highest, height - spread), highest)
+    return highest
+
+
+def lasting(mask: BoolArray, least_s: float) -> BoolArray:
+    """The runs of a mask that last so long."""
+    out = mask.copy()
+    for start, end in runs(mask):
+        if end - start < least_s * RATE_HZ:
+            out[start:end] = False
+    return out
 
 
 def _rolls(motion: Motion, limit_mps: float, settings: GroundSettings) -> BoolArray:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.base.units import NS_PER_S
-from groundstation.tables.detector import Detection, GroundSettings, detect_ground
+from groundstation.tables.detector import Detection, GroundSettings, detect_ground, lasting
 from groundstation.tables.motion import (
     RATE_HZ,
     Motion,
@@ -34,6 +34,7 @@ LEAST_COVERAGE = 0.5  # share of the flight for which a flag must speak
 RUN_SHARE = 0.25  # a run begins and a roll ends at this share of the speed at lift-off and touch-down
 SLOWEST_RUN_MPS = 3.0  # what lifts off slower made no run
 LIFTED_M = 1.5  # height at which a lift-off is seen, in smoothed altitudes
+CARRIED_M, CARRIED_S = 5.0, 5.0  # up to that height what is too slow to fly for so long is carried
 SHORTEST_STANDSTILL_S = 3.0
 
 
@@ -209,7 +210,7 @@ class _Evidence:
         """Flight on the grid, from lift-off to touch-down."""
         if self.contact is not None and not self.against_flag:
             return _up_to_the_ground(held(self.contact, self.grid_ns)[1], self.ground)
-        return _between_lift_off_and_touch_down(self.motion, self.ground, self.detection.airborne)
+        return _between_lift_off_and_touch_down(self.motion, self.ground, self.detection)
 
 
 def _labels(evidence: _Evidence) -> NDArray[np.int64]:
@@ -254,8 +255,12 @@ def _up_to_the_ground(denied: BoolArray, ground: BoolArray) -> BoolArray:
     return airborne
 
 
-def _between_lift_off_and_touch_down(motion: Motion, ground: BoolArray, sure: BoolArray) -> BoolArray:
-    """Widen sure flight to where the altitude leaves and meets that of the ground proven before and after."""
+def _between_lift_off_and_touch_down(motion: Motion, ground: BoolArray, detection: Detection) -> BoolArray:
+    """Widen sure flight to where the altitude leaves and meets that of the ground proven before and after.
+
+    A little above it, and slower than it ever was in sure flight, it does not fly yet: it is carried to its launch.
+    """
+    sure, slow = detection.airborne, lasting(motion.speed_mps < detection.speed_limit_mps, CARRIED_S)
     airborne = np.zeros(len(ground), dtype=bool)
     altitude = running_mean(motion.all_altitudes_m, 1.0)
     near = round(5.0 * RATE_HZ)
@@ -265,15 +270,18 @@ def _between_lift_off_and_touch_down(motion: Motion, ground: BoolArray, sure: Bo
             continue
         lift_off, touch_down = int(flying[0]), int(flying[-1]) + 1
         if start > 0:
-            low = _is_low(altitude[:, start:lift_off], altitude[:, max(start - near, 0) : start])
+            low = _low_rows(
+                altitude[:, start:lift_off], altitude[:, max(start - near, 0) : start], slow[start:lift_off]
+            )
             lift_off = start + (int(low[-1]) + 1 if low.size else 0)
         if end < len(ground):
-            low = _is_low(altitude[:, touch_down:end], altitude[:, end : end + near])
+            low = _low_rows(altitude[:, touch_down:end], altitude[:, end : end + near], slow[touch_down:end])
             touch_down = touch_down + int(low[0]) if low.size else end
         airborne[lift_off:touch_down] = True
     return airborne
 
 
-def _is_low(altitude_m: FloatArray, ground_m: FloatArray) -> NDArray[np.intp]:
-    """Rows no more than LIFTED_M above the mean altitude of the ground."""
-    return np.flatnonzero(largest_over_sources(altitude_m - known_mean(ground_m)[:, None]) <= LIFTED_M)
+def _low_rows(altitude_m: FloatArray, ground_m: FloatArray, slow: BoolArray) -> NDArray[np.intp]:
+    """Rows no more than LIFTED_M above the mean altitude of the ground, CARRIED_M where they are slow."""
+    height_m = largest_over_sources(altitude_m - known_mean(ground_m)[:, None])
+    return np.flatnonzero(height_m <= np.where(slow, CARRIED_M, LIFTED_M))

@@ -1,6 +1,6 @@
 """A table: the samples of one topic as named numpy columns on the corrected clock."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, Self
@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.errors import NotAssessableError
+from groundstation.base.errors import NotAssessableError, UnknownNameError
 from groundstation.base.records import BoolArray, Column, Int64Array, frozen
-from groundstation.base.signals import field_of
+from groundstation.base.signals import RAW_PREFIX, TOPICS, field_of, is_canonical, is_field_name, kind_of
+from groundstation.base.source_units import source_units
+from groundstation.base.unit_names import split_unit
 from groundstation.base.units import NS_PER_S
 
 if TYPE_CHECKING:
@@ -19,9 +21,9 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Table:
-    """Samples of one topic, in order of corrected time.
+    """Samples of one topic, in order of corrected time. ``table["roll_deg"]`` is a column, ``"gdop" in table`` asks.
 
     Parameters
     ----------
@@ -56,17 +58,44 @@ class Table:
     def __contains__(self, name: str) -> bool:
         return name in self.columns
 
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """A column of the log as it is read: numbers as of :meth:`values`, text as of :meth:`text`, shape (n,).
+
+        Raises
+        ------
+        UnknownNameError
+            When the log has none of that name, with the names that are near.
+        """
+        if name not in self.columns:
+            raise UnknownNameError(f"table {self.topic}", name, self.columns)
+        return self.text(name) if self.columns[name].values.dtype.kind == "U" else self.values(name)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.topic}: {len(self)} rows of {', '.join(self.columns)}>"
+
+    def _absent(self, name: str) -> None:
+        """Refuse a name that no field has; one that this log merely lacks is absent throughout."""
+        if not is_field_name(name):
+            names = dict.fromkeys((*self.columns, *(field.name for field in TOPICS.get(kind_of(self.topic), ()))))
+            raise UnknownNameError(f"table {self.topic}", name, names)
+
     def has(self, *names: str) -> bool:
         """Whether every named field is there with at least one present value."""
         return all(name in self.columns and bool(self.columns[name].mask.any()) for name in names)
 
     def values(self, name: str) -> FloatArray:
-        """Field as float64, shape (n,), NaN where absent (also where the device wrote NaN, and for no such field).
+        """Field as float64, shape (n,), NaN where absent (also where the device wrote NaN, and if the log lacks it).
 
         NaN also where a measured quantity is further outside its physical range than that range is wide (1e308 m/s,
         infinity): nothing is computed with it. Quality figures (dilutions, sigmas) are given as they are.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is neither in the log nor that of any signal.
         """
         if name not in self.columns:
+            self._absent(name)
             return np.full(len(self), np.nan)
         column = self.columns[name]
         out = np.asarray(column.values, dtype=np.float64)
@@ -87,8 +116,9 @@ class Table:
         return mask
 
     def text(self, name: str) -> NDArray[np.str_]:
-        """Text field, shape (n,), empty where absent."""
+        """Text field, shape (n,), empty where absent; raises as :meth:`values`."""
         if name not in self.columns:
+            self._absent(name)
             return np.full(len(self), "", dtype="U1")
         column = self.columns[name]
         return np.where(column.mask, column.values.astype(np.str_), "")
@@ -104,10 +134,17 @@ class Table:
         )
 
     def unique_times(self) -> Self:
-        """The table without repeated times: of several samples of one time the first is kept."""
+        """The table without repeated times: of several samples of one time the first present value of each field.
+
+        Two messages of a log may give parts of one topic at the same time.
+        """
         keep = np.ones(len(self), dtype=bool)
         keep[1:] = np.diff(self.time_ns) > 0
-        return self if keep.all() else self.take(keep)
+        if keep.all():
+            return self
+        first, group = np.flatnonzero(keep), np.cumsum(keep) - 1
+        columns = {name: _first_present(column, first, group) for name, column in self.columns.items()}
+        return replace(self.take(first), columns=columns)
 
     def to_frame(self) -> "pd.DataFrame":
         """Pandas frame of the columns, index ``time_ns`` (int64 nanoseconds).
@@ -135,7 +172,7 @@ class Table:
         return pd.DataFrame(data, index=pd.Index(self.time_ns, name="time_ns"))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class TimedTable(Table):
     """A table that knows the flight's clock, so that its frame is indexed by time.
 
@@ -145,10 +182,31 @@ class TimedTable(Table):
         Corrected time of flight time zero.
     has_utc : bool
         Whether corrected time is UTC.
+    units : mapping of str to str
+        Units by column, where the name or the log tells one; ``frame.attrs["units"]`` has them too.
     """
 
     start_ns: int = 0
     has_utc: bool = False
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def flight_time_s(self) -> FloatArray:
+        """Seconds since the start of the flight, shape (n,)."""
+        return (self.time_ns - self.start_ns) / NS_PER_S
+
+    @property
+    def utc(self) -> NDArray[np.datetime64]:
+        """UTC of every row, datetime64[ns], shape (n,).
+
+        Raises
+        ------
+        NotAssessableError
+            When the flight has none.
+        """
+        if not self.has_utc:
+            raise NotAssessableError(self.topic, "no UTC in this flight", "flight_time_s")
+        return self.time_ns.astype("datetime64[ns]")
 
     def to_frame(self, index: Literal["auto", "utc", "flight_time"] = "auto") -> "pd.DataFrame":
         """Pandas frame as of :meth:`Table.to_frame`, indexed by time.
@@ -176,13 +234,14 @@ class TimedTable(Table):
         if index == "utc" and not self.has_utc:
             raise NotAssessableError(self.topic, "no UTC in this flight", "index='flight_time'")
         frame = super().to_frame()
+        frame.attrs["units"] = dict(self.units)
         if index == "flight_time" or not self.has_utc:
             since = (self.time_ns - self.start_ns).astype("timedelta64[ns]")
             return frame.set_index(pd.TimedeltaIndex(since, name="flight_time"))
         return frame.set_index(pd.DatetimeIndex(self.time_ns.astype("datetime64[ns]"), tz="UTC", name="utc"))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Flight:
     """The tables of one flight on one clock.
 
@@ -213,7 +272,13 @@ class Flight:
         return topic in self.tables
 
     def __getitem__(self, topic: str) -> Table:
+        if topic not in self.tables:
+            raise UnknownNameError(f"flight of {self.source_name or 'no log'}", topic, self.topics())
         return self.tables[topic]
+
+    def __repr__(self) -> str:
+        clock = "UTC" if self.has_utc else "no UTC"
+        return f"<Flight {self.source_name}: {self.duration_s:.1f} s, {clock}, {_rows(self.tables)}>"
 
     def topics(self) -> tuple[str, ...]:
         """Topics in alphabetical order."""
@@ -234,9 +299,51 @@ class Flight:
         return (max(ends) - self.start_ns) / NS_PER_S if ends else 0.0
 
 
+def _first_present(column: Column, first: NDArray[np.intp], group: NDArray[np.intp]) -> Column:
+    """The first present value of each group of rows, whose first rows are ``first``; absent where there is none."""
+    if column.present is None:
+        return column.take(first)
+    rows = np.flatnonzero(column.present)
+    groups, places = np.unique(group[rows], return_index=True)
+    index = first.copy()
+    index[groups] = rows[places]
+    return column.take(index)
+
+
+class Tables(Mapping[str, TimedTable]):
+    """The tables of a flight by topic, each with the flight's clock. An unknown topic is told with those near to it."""
+
+    def __init__(self, flight: Flight) -> None:
+        self._flight = flight
+        self._tables = {topic: timed(flight, topic) for topic in flight.topics()}
+
+    def __getitem__(self, topic: str) -> TimedTable:
+        if topic not in self._tables:
+            raise UnknownNameError("tables", topic, self._tables)
+        return self._tables[topic]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._tables)
+
+    def __len__(self) -> int:
+        return len(self._tables)
+
+    def __repr__(self) -> str:
+        return f"<Tables of {self._flight.source_name}: {_rows(self._tables)}>"
+
+
+def _rows(tables: Mapping[str, Table]) -> str:
+    """Topics with their number of rows, canonical ones first, the rest counted."""
+    shown = [topic for topic in sorted(tables) if is_canonical(topic)]
+    told = [f"{topic} ({len(tables[topic])})" for topic in shown]
+    others = len(tables) - len(shown)
+    return ", ".join([*told, *([f"{others} raw topics"] if others else [])]) or "no topic"
+
+
 def timed(flight: Flight, topic: str) -> TimedTable:
     """The table of a topic with the flight's clock."""
     table = flight[topic]
+    named = {name: unit.spelled for name in table.columns if (unit := split_unit(name)[1]) is not None}
     return TimedTable(
         topic,
         table.time_ns,
@@ -245,4 +352,5 @@ def timed(flight: Flight, topic: str) -> TimedTable:
         table.device_time_ns,
         start_ns=flight.start_ns,
         has_utc=flight.has_utc,
+        units=source_units(flight.metadata, topic, table.columns) if topic.startswith(RAW_PREFIX) else named,
     )

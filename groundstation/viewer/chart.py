@@ -11,7 +11,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.viewer import colours
-from groundstation.viewer.colours import Colour
+from groundstation.viewer.colours import Colour, faint
 from groundstation.viewer.recorder import FLIGHT_TIME, UTC, Line, Recorder
 from groundstation.viewer.series import FloatArray
 
@@ -20,7 +20,8 @@ LEFT, RIGHT, TOP, BOTTOM = 24.0, 6.0, 14.0, 20.0  # room for ticks, a title and 
 TICKS = 5  # about so many
 GRID, LABEL = 0.4, 0.1  # widths and radii in points of the screen
 KEY_ROOM = 56.0  # beside the box, for the names of many lines
-BEHIND, MIDDLE, FRONT = 0.0, 1.0, 2.0
+BAND_COLUMNS = 320  # upright lines of a filled band across the whole box
+FILLING, BEHIND, MIDDLE, FRONT = -1.0, 0.0, 1.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -123,6 +124,25 @@ class Chart:
             shades += [line.colour] * len(pieces)
             radii += [screen_radius(line.width)] * len(pieces)
         drawn = rr.LineStrips2D(strips, colors=shades, radii=radii, draw_order=FRONT)
+        self._log(name, drawn, at_s)
+
+    def band(
+        self, name: str, x: FloatArray, low: FloatArray, high: FloatArray, colour: Colour, at_s: float | None = None
+    ) -> None:
+        """Log a filled band between two curves, of upright lines side by side; ``at_s`` as for :meth:`curves`."""
+        places = np.linspace(0.0, 1.0, BAND_COLUMNS)
+        known = np.isfinite(x) & np.isfinite(low) & np.isfinite(high)
+        share = self.x.share(x[known])
+        order = np.argsort(share, kind="stable")
+        clipped = (np.clip(edge[known][order], self.y.low, self.y.high) for edge in (low, high))
+        ends = [
+            self.height * (1.0 - np.interp(places, share[order], self.y.share(edge), left=np.nan, right=np.nan))
+            for edge in clipped
+        ]
+        strips = np.stack([np.column_stack([WIDTH * places, end]) for end in ends], axis=1)
+        filled = strips[np.isfinite(strips).all(axis=(1, 2))]
+        radius = 0.75 * WIDTH / (BAND_COLUMNS - 1)  # more than half of the distance: no seams
+        drawn = rr.LineStrips2D(list(filled), colors=[faint(colour)] * len(filled), radii=radius, draw_order=FILLING)
         self._log(name, drawn, at_s)
 
     def note(self, name: str, text: str, at_s: float | None = None) -> None:

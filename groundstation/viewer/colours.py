@@ -4,6 +4,7 @@ Source: M. Okabe, K. Ito, Color Universal Design, 2008 (https://jfly.uni-koeln.d
 """
 
 import itertools
+import math
 from collections.abc import Iterable, Mapping
 from typing import Final, TypeAlias
 
@@ -25,9 +26,23 @@ GREY: Final = _rgb(0x8C8C8C)
 DIM: Final = _rgb(0x5A5A5A)
 YELLOW_GREEN: Final = _rgb(0xA3C14A)
 
+FAINT: Final = 0.35  # brightness of a filled band, of that of its line
+
 # Meanings. A quantity keeps its colour on every tab.
 INS, GNSS, ANSWER, LIMIT, HONEST, PAPER = SKY, ORANGE, GREEN, VERMILION, PINK, YELLOW
 SAMPLES, NORMAL, OVER_LIMIT = GREY, VERMILION, ORANGE
+WORDS: Final[dict[Colour, str]] = {
+    SKY: "blue",
+    BLUE: "dark blue",
+    ORANGE: "orange",
+    GREEN: "green",
+    YELLOW_GREEN: "yellow-green",
+    YELLOW: "yellow",
+    VERMILION: "red",
+    PINK: "pink",
+    GREY: "grey",
+    DIM: "dark grey",
+}
 SERIES: Final = (SKY, ORANGE, GREEN, PINK, YELLOW, BLUE, VERMILION, GREY)
 
 PHASES: Final[dict[str, Colour]] = {
@@ -70,6 +85,18 @@ DATA_STATES: Final[dict[str, Colour]] = {"data": GREEN, "gap": VERMILION}
 LIGHT: Final = _rgb(0xB0B0B0)
 FLAGS: Final[dict[str, Colour]] = {"yes": GREEN, "no": GREY}
 SEVERITIES: Final[dict[str, Colour]] = {"info": LIGHT, "warn": ORANGE, "fail": VERMILION}
+
+
+def faint(colour: Colour) -> Colour:
+    """A dark shade of a colour, to fill with: lines drawn beside one another must not be transparent.
+
+    Examples
+    --------
+    >>> faint((200, 100, 50, 255))
+    (70, 35, 18, 255)
+    """
+    red, green, blue = (math.ceil(FAINT * part) for part in colour[:3])
+    return red, green, blue, colour[3]
 
 
 def for_states(states: Iterable[str], known: Mapping[str, Colour]) -> dict[str, Colour]:

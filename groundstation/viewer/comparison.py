@@ -128,17 +128,17 @@ def _overlay(
         if figure is None:
             continue
         time_ns, values = recorder.time_ns(half.time_s(figure)), numbers(figure, column)
-        series, lines = [values], [Line(f"{half.letter}: {title}", half.colour, half.width)]
+        breaks = gap_after(time_ns) | wraps_after(values) if is_direction else gap_after(time_ns)
+        path = f"{half.letter}/{name}/{column}"
         if half_width is not None and half_width[0] in figure.columns:
             width = half_width[1] * numbers(figure, half_width[0])
-            band = [values - width, values + width]
-            edges += band
-            series = [*band, values]
-            lines = [Line(f"{half.letter}: 95 %", half.colour, THIN)] * 2 + lines
-        breaks = gap_after(time_ns) | wraps_after(values) if is_direction else gap_after(time_ns)
-        paths.append(f"{half.letter}/{name}/{column}")
+            edges += [values - width, values + width]
+            recorder.band(path, time_ns, values, width, Line(f"{half.letter}: ± 95 %", half.colour, half.width), breaks)
+        else:
+            line = Line(f"{half.letter}: {title}", half.colour, half.width)
+            recorder.lines(path, time_ns, values[:, None], [line], breaks)
+        paths.append(path)
         shown.append(values)
-        recorder.lines(paths[-1], time_ns, np.column_stack(series), lines, breaks)
     if not paths:
         return None
     axis_range = (-MARGIN_DEG, 360.0 + MARGIN_DEG) if is_direction else _range(shown, edges)

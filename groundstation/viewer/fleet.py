@@ -18,7 +18,7 @@ from groundstation.viewer.fleet_charts import (
     verdicts,
 )
 from groundstation.viewer.fleet_density import heading_error_density
-from groundstation.viewer.fleet_recorder import FleetRecorder
+from groundstation.viewer.fleet_recorder import FLIGHT_NUMBER, FleetRecorder
 from groundstation.viewer.fleet_text import aircraft_text, failed_text, flights_text, forecast_text
 from groundstation.viewer.recording import save_stream, send_layout
 from groundstation.viewer.views import document
@@ -52,13 +52,12 @@ def send_fleet(stream: rr.RecordingStream, fleet: FleetResults) -> rrb.Blueprint
     found = [(one, log_aircraft(recorder, fleet, one)) for one in aircraft]
     recorder.document("by_aircraft", aircraft_text(fleet, {one.name: one.entity for one in aircraft}))
     recorder.document(FLIGHTS_TEXT, flights_text(recorder, fleet))
-    recorder.document("failed", failed_text(fleet))
-    density = heading_error_density(recorder, fleet)
     plots = [*over_time(found, HEADING), *([verdicts(aircraft)] if aircraft else [])]
-    tabs: list[rrb.Container] = []
-    if density or plots:
-        right = [rrb.Vertical(contents=plots, row_shares=[3.0, 1.0][: len(plots)])] if plots else []
-        tabs.append(rrb.Horizontal(contents=[*density, *right], name="Fleet"))
+    answer = [document("By aircraft", "by_aircraft"), *heading_error_density(recorder, fleet)]
+    columns = [rrb.Vertical(contents=answer)]
+    if plots:
+        columns.append(rrb.Vertical(contents=plots, row_shares=[3.0, 1.0][: len(plots)]))
+    tabs: list[rrb.Container] = [rrb.Horizontal(contents=columns, name="Fleet")]
     own = [
         rrb.Vertical(
             contents=[*(view for quantity in PATHS for view in over_time([(one, names)], quantity)), verdicts([one])],
@@ -66,13 +65,15 @@ def send_fleet(stream: rr.RecordingStream, fleet: FleetResults) -> rrb.Blueprint
         )
         for one, names in found[:MOST_AIRCRAFT]
     ]
-    table = document("By aircraft", "by_aircraft")
-    tabs.append(rrb.Horizontal(contents=[table, *([rrb.Tabs(contents=own)] if own else [])], name="Aircraft"))
+    if own:
+        tabs.append(rrb.Tabs(contents=own, name="Aircraft"))
     forecast = [*skill_over_flights(recorder, fleet), *skill_by_horizon(recorder, fleet)]
     if fleet.skill:
         recorder.document("forecast/skill", forecast_text(fleet))
         views = [*forecast, document("Skill of the forecast", "forecast/skill")]
         tabs.append(rrb.Grid(contents=views, grid_columns=2, name="Forecast"))
     tabs.append(rrb.Vertical(contents=[document("Flights and their recordings", FLIGHTS_TEXT)], name="Flights"))
-    tabs.append(rrb.Vertical(contents=[document("Logs without a flight", "failed")], name="Failed"))
-    return send_layout(stream, tabs, timeline=recorder.timeline)
+    if fleet.not_in_fleet:
+        recorder.document("failed", failed_text(fleet))
+        tabs.append(rrb.Vertical(contents=[document("Logs without a flight", "failed")], name="Failed"))
+    return send_layout(stream, tabs, timeline=FLIGHT_NUMBER)  # on utc, the flights of a year are a few columns of dots

@@ -14,6 +14,7 @@ from rerun.server import Server
 from rerun_bindings import CatalogClientInternal
 
 from groundstation.base.errors import GroundstationError
+from groundstation.viewer.catalog_table import save_flight_table
 from groundstation.viewer.fleet import FLEET, FLIGHTS_TEXT
 from groundstation.viewer.recording import open_stream
 
@@ -32,6 +33,8 @@ class Catalog:
     ----------
     url : str
         Where clients and viewers find it: ``rerun+http://host:port``.
+    table_url : str
+        Where a viewer opens on the table of flights.
     flights : tuple of str
         Segment ids of the data set ``flights``: flight ids.
     sessions : tuple of str
@@ -43,6 +46,7 @@ class Catalog:
     """
 
     url: str
+    table_url: str
     flights: tuple[str, ...]
     sessions: tuple[str, ...]
     has_fleet: bool
@@ -75,9 +79,11 @@ def catalog_server(
         for name, paths in {FLIGHTS: flights, **({SESSIONS: sessions} if sessions else {})}.items():
             dataset = client.create_dataset(name)
             offered, problems = _register(dataset, paths)
+            _lay_out_table(dataset, Path(folder) / f"{name}.rbl")
             refused += problems
             segments[name] = tuple(sorted(offered))
             links |= {one: dataset.segment_url(one).replace(server.url(), url) for one in offered}
+        table_url = f"{url}/entry/{client.get_dataset(FLIGHTS).id}"
         has_fleet = False
         if fleet is not None:
             dataset = client.create_dataset(FLEET)
@@ -86,7 +92,7 @@ def catalog_server(
             has_fleet = bool(offered)
             if has_fleet:
                 _link(dataset, fleet, links, Path(folder) / "links.rrd")
-        yield Catalog(url, segments[FLIGHTS], segments[SESSIONS], has_fleet, tuple(refused))
+        yield Catalog(url, table_url, segments[FLIGHTS], segments[SESSIONS], has_fleet, tuple(refused))
 
 
 def reachable(url: str) -> str:
@@ -131,6 +137,12 @@ def _lay_out(dataset: DatasetEntry, recordings: Iterable[Path]) -> None:
     views = {path: _views(path) for path in largest}
     if any(views.values()):
         dataset.register_blueprint(max(largest, key=lambda path: views[path]).absolute().as_uri())
+
+
+def _lay_out_table(dataset: DatasetEntry, layout: Path) -> None:
+    """Give the table of a data set its columns and cards."""
+    save_flight_table(layout, dataset.schema().to_arrow().names)
+    dataset.register_blueprint(layout.absolute().as_uri(), segment_table=True)
 
 
 def _views(path: Path) -> int:

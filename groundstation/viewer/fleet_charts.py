@@ -72,13 +72,25 @@ def log_aircraft(recorder: FleetRecorder, fleet: FleetResults, aircraft: Aircraf
         line = Line(f"{aircraft.label}, {TITLES[quantity].rpartition(', ')[2]}", aircraft.colour, DOT)
         recorder.dots(f"{path}/flights", places, values, line)
         if quantity == HEADING:
-            ends = [numbers(flights, f"confidence95_{end}_deg")[rows] for end in ("low", "high")]
-            pieces = _interrupted(np.column_stack(ends), places, _firsts(recorder, fleet, aircraft, quantity))
-            edges = [Line(line.name, line.colour, THIN)] * pieces.shape[1]
-            draw = recorder.lines if len(places) > 1 else recorder.points  # a line of one flight is not seen
-            draw(f"{path}/interval95", places, pieces, edges)
+            _interval(recorder, fleet, aircraft, rows, f"{path}/interval95")
         _control(recorder, fleet, aircraft, quantity, path)
     return found
+
+
+def _interval(recorder: FleetRecorder, fleet: FleetResults, aircraft: Aircraft, rows: Int64Array, path: str) -> None:
+    """Log the 95 % interval of the heading error, a filled band for each stretch between changes of level."""
+    flights = fleet.flights
+    places = recorder.numbers(flights["flight_id"][rows])
+    ends = np.column_stack([numbers(flights, f"confidence95_{end}_deg")[rows] for end in ("low", "high")])
+    name = f"{aircraft.label}, 95 %, deg"
+    if len(places) == 1:  # a band of one flight is not seen
+        recorder.points(path, places, ends, [Line(name, aircraft.colour, DOT)] * 2)
+        return
+    stretch = np.searchsorted(_firsts(recorder, fleet, aircraft, HEADING), places, side="right")
+    for one in np.unique(stretch).tolist():
+        mine = stretch == one
+        middle, half = ends[mine].mean(axis=1), 0.5 * np.ptp(ends[mine], axis=1)
+        recorder.band(f"{path}/{one}", places[mine], middle, half, Line(name, aircraft.colour, THIN))
 
 
 def _firsts(recorder: FleetRecorder, fleet: FleetResults, aircraft: Aircraft, quantity: str) -> Int64Array:

@@ -36,11 +36,6 @@ class FleetRecorder(Recorder):
         self._number = {name: place + 1 for place, name in enumerate(ids[self.order].tolist())}
         super().__init__(stream, 0, self.timed > 0)
 
-    @property
-    def timeline(self) -> str:
-        """The timeline to begin on."""
-        return UTC if self.has_utc else FLIGHT_NUMBER
-
     def numbers(self, flight_ids: NDArray[np.str_]) -> Int64Array:
         """Numbers of flights."""
         return np.array([self._number[name] for name in flight_ids.tolist()], dtype=np.int64)
@@ -71,19 +66,25 @@ class FleetRecorder(Recorder):
         self._scalars(path, numbers, values)
 
     def lane(self, path: str, time_ns: Int64Array, states: Sequence[str], colours: Mapping[str, Colour]) -> None:
-        """Log one lane of states, a flight each."""
+        """Log one lane of states, a flight each; the last one of the fleet is as wide as if another flight followed."""
         shown = np.array([clean_text(state) for state in states])
         shades = for_states((state for state in shown.tolist() if state), colours)
         self.static(path, rr.StateConfiguration(values=list(shades), colors=list(shades.values())))
         for part in self._parts(time_ns):
             rows = rr.StateChange.columns(state=shown[part].tolist())
             self.stream.send_columns(path, self.indexes(time_ns[part]), rows)
+        self.stream.send_columns(path, self._behind_all(), rr.StateChange.columns(state=[""]))
 
-    def _scalars(self, path: str, time_ns: Int64Array, values: FloatArray) -> None:
-        for part in self._parts(time_ns):
-            super()._scalars(path, time_ns[part], values[part])
+    def _behind_all(self) -> list[rr.TimeColumn]:
+        """Time columns of the place behind the last flight: a state that begins there is never seen."""
+        columns = [rr.TimeColumn(FLIGHT_NUMBER, sequence=[len(self.order) + 1])]
+        if self.timed:
+            known = self.starts[: self.timed]
+            margin = max(np.timedelta64(1, "D"), (known[-1] - known[0]) / self.timed)
+            columns.append(rr.TimeColumn(UTC, timestamp=[known[-1] + margin]))
+        return columns
 
-    def _parts(self, numbers: Int64Array) -> list[Int64Array]:
+    def _parts(self, time_ns: Int64Array) -> list[Int64Array]:
         """Rows of flights with a time, and of those without."""
-        has_time = numbers <= self.timed
+        has_time = time_ns <= self.timed
         return [rows for rows in (np.flatnonzero(has_time), np.flatnonzero(~has_time)) if len(rows)]

@@ -23,7 +23,16 @@ QUANTITIES = {"error_deg": "heading error", "radial_error_rate_50_nmiph": "INS r
 
 def aircraft_text(fleet: FleetResults, entities: Mapping[str, str]) -> str:
     """Table of the aircraft, each a link to its entity, then changes of level, outliers and calibration."""
-    header = ["aircraft", "flights", "accepted", "mean error, deg", "95 %, deg", "σ within, deg", "σ between, deg"]
+    header = [
+        "aircraft",
+        "assessed",
+        "in the mean",
+        "accepted",
+        "mean error, deg",
+        "95 %, deg",
+        "σ within, deg",
+        "σ between, deg",
+    ]
     rows = [_aircraft_row(one, entities) for one in fleet.by_aircraft[: MOST_ROWS + 1]]
     parts = ["# Heading error by aircraft", table(header, rows)]
     if fleet.change_points:
@@ -52,6 +61,7 @@ def _aircraft_row(row: AircraftRow, entities: Mapping[str, str]) -> list[str]:
     return [
         f"[{name}](recording://{entity})" if entity.isascii() and entity else name,
         f"{row.assessed} of {row.flights}",
+        str(row.averaged),
         str(row.accepted),
         number(row.mean_deg, 3, sign=True),
         "–" if interval is None else f"{interval[0]:+.3f} to {interval[1]:+.3f}",
@@ -112,9 +122,10 @@ def _linked(name: str, recording: str) -> str:
 
 def _flights(recorder: FleetRecorder, fleet: FleetResults, rows: Int64Array) -> str:
     flights = fleet.flights
-    header = ["#", "flight", "aircraft", "start, UTC", "heading error, deg", "verdict", "status"]
+    header = ["#", "flight", "aircraft", "start, UTC", "heading error ± 95 %, deg", "verdict", "status"]
     starts = flights["start_utc"].astype("datetime64[ns]")
-    errors, sigmas = numbers(flights, "error_deg"), numbers(flights, "standard_error_deg")
+    errors = numbers(flights, "error_deg")
+    halves = 0.5 * (numbers(flights, "confidence95_high_deg") - numbers(flights, "confidence95_low_deg"))
     places = recorder.numbers(flights["flight_id"].astype(np.str_))
     lines = []
     for row in rows:
@@ -127,7 +138,7 @@ def _flights(recorder: FleetRecorder, fleet: FleetResults, rows: Int64Array) -> 
                 _linked(name, recording),
                 markdown_text(str(flights["aircraft"][row])) or "–",
                 start,
-                error if error == "–" else f"{error} ± {number(float(sigmas[row]))}",
+                error if error == "–" else f"{error} ± {number(float(halves[row]))}",
                 markdown_text(str(flights["verdict"][row])) or "–",
                 markdown_text(str(flights["status"][row])),
             ]
@@ -165,8 +176,6 @@ def forecast_text(fleet: FleetResults) -> str:
 
 def failed_text(fleet: FleetResults) -> str:
     """Table of the logs that gave no flight, and why."""
-    if not fleet.not_in_fleet:
-        return "Every log gave a flight."
     rows = [[one.kind, markdown_text(one.source), markdown_text(one.reason)] for one in fleet.not_in_fleet[:MOST_ROWS]]
     more = len(fleet.not_in_fleet) - len(rows)
     rest = [f"{more} more stand in index.csv."] if more else []

@@ -33,6 +33,24 @@ def viewer_executable() -> Path:
     )
 
 
+def require_display(environment: Mapping[str, str], platform: str = sys.platform) -> None:
+    """Refuse to open a window where nothing can show it.
+
+    Raises
+    ------
+    GroundstationError
+        When this is a Linux machine without X11 and Wayland.
+
+    Examples
+    --------
+    >>> require_display({}, "linux")
+    Traceback (most recent call last):
+    groundstation.base.errors.GroundstationError: view: no display on this machine: --web shows it in a browser
+    """
+    if platform == "linux" and not (environment.get("DISPLAY") or environment.get("WAYLAND_DISPLAY")):
+        raise GroundstationError("view", "no display on this machine", next_step="--web shows it in a browser")
+
+
 def viewer_command(
     what: Path | str, *, web: bool = False, host: str = LOCAL, port: int | None = None, headless: bool = False
 ) -> list[str]:

@@ -9,6 +9,7 @@ from groundstation.chapters import without_chapter
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight
 from groundstation.viewer.names import clean_text
+from groundstation.viewer.properties import send_properties
 from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.recording import save_stream, send_layout
 from groundstation.viewer.tabs.control import control
@@ -35,6 +36,7 @@ def send_plan(stream: rr.RecordingStream, results: FlightResults) -> rrb.Bluepri
     """Log everything to a stream that has its sink and send the layout; returns the layout."""
     recorder = Recorder(stream, 0, has_utc=False)
     stream.send_recording_name(clean_text(results.flight_id))
+    send_properties(stream, results)
     clock = Flight({}, results.metadata)  # findings have places in time alone
     own = (tab(recorder, results) for tab in PLAN_TABS)
     tabs = (

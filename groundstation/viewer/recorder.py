@@ -1,13 +1,13 @@
 """Send columns of one flight to Rerun, always on both timelines: what every tab logs with."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import rerun as rr
 from numpy.typing import ArrayLike, NDArray
-from rerun.components import AggregationPolicy
+from rerun.components import AggregationPolicy, InterpolationMode
 
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
@@ -18,6 +18,7 @@ from groundstation.viewer.series import FloatArray, break_line, thin
 UTC, FLIGHT_TIME = "utc", "flight_time"
 ROWS_PER_CALL = 65_536  # larger chunks only cost the viewer memory
 MAX_LOG_TEXT = 600
+MAX_HALF_WIDTH = 1e150  # of a band: its square is a number
 LEVELS = {"info": "INFO", "warn": "WARN", "fail": "ERROR"}
 
 
@@ -72,10 +73,13 @@ class Recorder:
         values: FloatArray,
         lines: Sequence[Line],
         breaks: BoolArray | None = None,
+        *,
+        is_stepped: bool = False,
     ) -> None:
         """Log series that share their rows: ``values`` of shape (n, k), NaN where a line is interrupted.
 
-        ``breaks``, shape (n - 1,), tells after which rows the lines end; a row of NaN is put there.
+        ``breaks``, shape (n - 1,), tells after which rows the lines end; a row of NaN is put there. Stepped lines hold
+        each value until the next one.
         """
         if breaks is not None:
             time_ns, values = break_line(time_ns, values, breaks)
@@ -84,6 +88,7 @@ class Recorder:
             colors=[line.colour for line in lines],
             widths=[line.width for line in lines],
             aggregation_policy=AggregationPolicy.MinMax,  # averages would hide spikes until one zooms in
+            interpolation_mode=InterpolationMode.StepAfter if is_stepped else None,
         )
         self.static(path, style)
         self._scalars(path, time_ns, values)
@@ -102,6 +107,31 @@ class Recorder:
         self.lines(path, time_ns[rows], values[rows], lines, breaks[rows[:-1]])
         return len(rows)
 
+    def band(
+        self,
+        path: str,
+        time_ns: Int64Array,
+        centre: FloatArray,
+        half_width: FloatArray,
+        line: Line,
+        breaks: BoolArray | None = None,
+    ) -> None:
+        """Log a filled band of ``half_width`` on either side of a line, shapes (n,), empty where one of them is NaN.
+
+        Rerun fills one sigma of a measurement: its variance is the half width squared, whatever share the name says
+        that the band holds. Axes are scaled by the line alone. Entities are drawn in the order of their names.
+        """
+        edges = np.column_stack([centre, half_width])
+        if breaks is not None:
+            time_ns, edges = break_line(time_ns, edges, breaks)
+        known = np.isfinite(edges[:, 0]) & (np.abs(edges[:, 1]) < MAX_HALF_WIDTH)
+        values, variances = np.where(known, edges[:, 0], np.nan), np.where(known, edges[:, 1], 0.0) ** 2
+        style = rr.Measurements.from_fields(names=[line.name], colors=[line.colour], widths=[line.width])
+        self.static(path, style)
+        for part in self._parts(time_ns):
+            columns = rr.Measurements.columns(values=values[part], variances=variances[part])
+            self.stream.send_columns(path, self.indexes(time_ns[part]), columns)
+
     def dots(self, path: str, time_ns: Int64Array, values: FloatArray, line: Line) -> None:
         """Log one series, shape (n,), as dots: samples that no line should join."""
         style = rr.SeriesPoints(names=[line.name], colors=[line.colour], marker_sizes=[line.width], markers="circle")
@@ -110,11 +140,14 @@ class Recorder:
 
     def _scalars(self, path: str, time_ns: Int64Array, values: FloatArray) -> None:
         width = values.shape[1]
-        for start in range(0, len(time_ns), ROWS_PER_CALL):
-            part = slice(start, start + ROWS_PER_CALL)
+        for part in self._parts(time_ns):
             scalars = rr.Scalars.columns(scalars=np.ascontiguousarray(values[part]).ravel())
             rows = len(time_ns[part])
             self.stream.send_columns(path, self.indexes(time_ns[part]), scalars.partition([width] * rows))
+
+    def _parts(self, time_ns: Int64Array) -> Iterable[slice | Int64Array]:
+        """Rows in parts that one call sends."""
+        return (slice(start, start + ROWS_PER_CALL) for start in range(0, len(time_ns), ROWS_PER_CALL))
 
     def lane(self, path: str, time_ns: Int64Array, states: Sequence[str], colours: Mapping[str, Colour]) -> None:
         """Log one lane of states, each holding until the next row; an empty state ends the one before."""

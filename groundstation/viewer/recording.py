@@ -17,6 +17,7 @@ from groundstation.results.answer import Answer
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight
 from groundstation.viewer.names import clean_text
+from groundstation.viewer.properties import send_properties
 from groundstation.viewer.recorder import FLIGHT_TIME, Recorder
 from groundstation.viewer.tabs.forecast import forecast
 from groundstation.viewer.tabs.generic import generic_tab
@@ -124,6 +125,7 @@ def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResul
     """Log everything to a stream that has its sink, send the layout, wait until it is out; returns the layout."""
     recorder = Recorder(stream, flight.start_ns, flight.has_utc)
     stream.send_recording_name(clean_text(results.flight_id))
+    send_properties(stream, results)
     if flight.has_utc:
         stream.send_recording_start_time_nanos(flight.start_ns)
     tabs = (

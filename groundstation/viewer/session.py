@@ -9,6 +9,7 @@ from groundstation.results.flight import FlightResults
 from groundstation.tables.session_assemble import AssembledSession
 from groundstation.tables.table import Flight
 from groundstation.viewer.names import clean_text
+from groundstation.viewer.properties import send_properties
 from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.recording import save_stream, send_layout
 from groundstation.viewer.tabs.cooperative import cooperative
@@ -38,6 +39,7 @@ def send_session(stream: rr.RecordingStream, assembled: AssembledSession, result
     """Log everything to a stream that has its sink and send the layout; returns the layout."""
     recorder = Recorder(stream, assembled.start_ns, assembled.has_utc)
     stream.send_recording_name(clean_text(results.flight_id))
+    send_properties(stream, results)
     if assembled.has_utc:
         stream.send_recording_start_time_nanos(assembled.start_ns)
     clock = Flight({}, results.metadata, assembled.start_ns, assembled.has_utc)  # findings have places in time alone

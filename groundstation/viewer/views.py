@@ -8,6 +8,8 @@ import rerun.blueprint as rrb
 
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
+from groundstation.viewer import colours
+from groundstation.viewer.recorder import Line
 
 
 def whole_flight() -> rrb.TimeAxis:
@@ -37,6 +39,21 @@ def lanes(name: str, contents: str | Sequence[str]) -> rrb.StateTimelineView:
     return rrb.StateTimelineView(
         name=name, origin="/", contents=[f"+ /{entity}/**" for entity in entities], time_view=whole_flight()
     )
+
+
+def told_by_colour(lines: Sequence[Line], unit: str) -> str:
+    """Title of a view without a legend, which would cover what it names: each line with the word for its colour.
+
+    Examples
+    --------
+    >>> told_by_colour([Line("heading", colours.INS), Line("track", colours.GNSS)], "deg")
+    'Heading (blue), track (orange), deg'
+    >>> told_by_colour([Line("altitude", colours.INS)], "m")
+    'Altitude, m'
+    """
+    names = [f"{line.name} ({colours.WORDS[line.colour]})" if len(lines) > 1 else line.name for line in lines]
+    told = ", ".join([*names, unit])
+    return told[:1].upper() + told[1:]
 
 
 def document(name: str, path: str) -> rrb.TextDocumentView:

@@ -20,7 +20,7 @@ import numpy as np
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import RecordBatch
-from tests.fuzz.bases import Base, bases, line_starts, mcap_starts, ulog_starts
+from tests.fuzz.bases import Base, bases, chapter10_starts, line_starts, mcap_starts, ulog_starts
 from tests.fuzz.mutation import Mutant
 from tests.fuzz.trial import Case, edits_of, suffix_of
 
@@ -96,6 +96,37 @@ def of_dataflash(data: bytes) -> Expected:
     return _expected(rows, groups)
 
 
+def of_chapter10(data: bytes) -> Expected:
+    """1553 messages and ARINC 429 words by channel and counter, each with the span of its packet: all or none."""
+    rows = []
+    for at in chapter10_starts(data):
+        channel, length = (int.from_bytes(data[at + place : at + place + 2], "little") for place in (2, 4))
+        end = at + (length | int.from_bytes(data[at + 6 : at + 8], "little") << 16)
+        first, kind = int.from_bytes(data[at + 16 : at + 22], "little"), data[at + 15]
+        if end <= len(data) and kind in (0x19, 0x38) and not data[at + 14] & 0x80:
+            body = data[at + 24 : at + 24 + int.from_bytes(data[at + 8 : at + 12], "little")]
+            times = _times_1553(body) if kind == 0x19 else _times_429(body, first)
+            rows += [(at, end, (f"{'1553' if kind == 0x19 else '429'}.{channel}", time), 0) for time in times]
+    return _expected(rows, [[]])
+
+
+def _times_1553(body: bytes) -> Iterator[int]:
+    at = 4
+    for _message in range(int.from_bytes(body[:3], "little")):
+        if at + 14 > len(body):
+            return
+        yield int.from_bytes(body[at : at + 6], "little")
+        at += 14 + int.from_bytes(body[at + 12 : at + 14], "little")
+
+
+def _times_429(body: bytes, first: int) -> Iterator[int]:
+    time = first
+    for number in range(int.from_bytes(body[:2], "little")):
+        head = int.from_bytes(body[4 + 8 * number : 8 + 8 * number], "little")
+        time += head & 0xFFFFF
+        yield time
+
+
 def of_mcap(data: bytes) -> Expected:
     """Messages by topic and time, each with the span of its chunk; defined at the start or in the summary."""
     from mcap.stream_reader import StreamReader, breakup_chunk
@@ -110,7 +141,9 @@ def of_mcap(data: bytes) -> Expected:
         elif type(record).__name__ == "Chunk":
             at, end = next(chunks)
             for message in breakup_chunk(record):
-                if type(message).__name__ == "Message" and not topics[message.channel_id].startswith("location_fix"):
+                if type(message).__name__ == "Message" and not topics[message.channel_id].startswith(
+                    ("location_fix.", "pose.", "log")
+                ):
                     rows.append((at, end, (topics[message.channel_id], message.log_time), 0))
     return _expected(rows, [[]])
 
@@ -164,6 +197,13 @@ def our_dataflash(path: Path, found: Found) -> None:
             found.update((name, time // 1000) for time in batch.device_time_ns.values.tolist())
 
 
+def our_chapter10(path: Path, found: Found) -> None:
+    for batch in _items(path):
+        if batch.topic.startswith("raw.bus."):
+            name = batch.topic.removeprefix("raw.bus.")
+            found.update((name, time // 100) for time in batch.device_time_ns.values.tolist())
+
+
 def our_mcap(path: Path, found: Found) -> None:
     for batch in _items(path):
         times = batch.device_time_ns.values if batch.time_ns is None else batch.time_ns  # taken for another format
@@ -204,6 +244,43 @@ def by_pymavlink(path: Path, found: Found) -> None:
             fields = message.to_dict()
             time_us = fields.get("TimeUS", 1000 * fields.get("TimeMS", 0))
             found[message.get_type(), time_us] += 1
+
+
+def by_pychapter10(path: Path, found: Found) -> None:
+    from chapter10 import C10
+
+    for packet in C10(str(path)):
+        if packet.data_type == 0x19:
+            for message in packet:
+                found[f"1553.{packet.channel_id}", message.ipts & 0xFFFFFFFFFFFF] += 1
+        elif packet.data_type == 0x38:
+            time = packet.rtc
+            for message in packet:
+                time += message.gap_time
+                found[f"429.{packet.channel_id}", time] += 1
+
+
+def by_acranetwork(path: Path, found: Found) -> None:
+    from AcraNetwork.IRIG106.Chapter10.FileParser import FileParser
+    from AcraNetwork.IRIG106.Chapter11 import Chapter11
+    from AcraNetwork.IRIG106.Chapter11.ARINC429 import ARINC429DataPacket
+    from AcraNetwork.IRIG106.Chapter11.MILSTD1553 import MILSTD1553DataPacket
+
+    with FileParser(str(path)) as file:
+        for content in file:
+            packet = Chapter11()
+            packet.unpack(content)
+            payload = packet.payload[: packet.datalen]
+            if packet.datatype == 0x19:
+                body = MILSTD1553DataPacket()
+                body.unpack(payload)
+                found.update((f"1553.{packet.channelID}", message.ipts.count) for message in body)
+            elif packet.datatype == 0x38:
+                body, time = ARINC429DataPacket(), packet.relativetimecounter
+                body.unpack(payload)
+                for word in body:
+                    time += word.gaptime
+                    found[f"429.{packet.channelID}", time] += 1
 
 
 def by_mcap_seeking(path: Path, found: Found) -> None:
@@ -248,6 +325,7 @@ READERS: dict[str, dict[str, Callable[[Path, Found], None]]] = {
     "csv-profile": {"groundstation": our_g1000, "pandas (bad lines skipped)": by_pandas_g1000},
     "ulog": {"groundstation": our_ulog, "pyulog": by_pyulog},
     "dataflash": {"groundstation": our_dataflash, "pymavlink": by_pymavlink},
+    "chapter10": {"groundstation": our_chapter10, "pychapter10": by_pychapter10, "AcraNetwork": by_acranetwork},
     "mcap": {"groundstation": our_mcap, "mcap make_reader": by_mcap_seeking, "mcap StreamReader": by_mcap_stream},
 }
 
@@ -258,6 +336,8 @@ def expected_of(base: Base) -> Expected | None:
         return of_ulog(base.data)
     if base.format == "dataflash":
         return of_dataflash(base.data)
+    if base.format == "chapter10":
+        return of_chapter10(base.data)
     if base.format == "mcap":
         return of_mcap(base.data)
     if base.format == "flat-csv":

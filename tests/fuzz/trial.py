@@ -73,6 +73,7 @@ def suffix_of(format_name: str) -> str:
     return {
         "ulog": ".ulg",
         "dataflash": ".BIN",
+        "chapter10": ".ch10",
         "mcap": ".mcap",
         "robot-mcap": ".mcap",
         "ros1": ".bag",

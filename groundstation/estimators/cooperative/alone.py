@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from groundstation.base.compile import compiled, part
+from groundstation.base.compile import in_place, part
 from groundstation.base.records import Int64Array
 from groundstation.estimators.cooperative.alone_arrays import (
     EXACT,
@@ -40,7 +40,7 @@ from groundstation.estimators.cooperative.observation import observe
 from groundstation.tables.session import NO_SLOT
 
 
-@compiled
+@in_place
 def run_alone(
     fleet: Fleet,
     points: Points,
@@ -59,7 +59,7 @@ def run_alone(
     log: Log,
 ) -> None:
     """Work through the items ``begin`` to ``end``: one window of the error map."""
-    entry = np.empty(len(batch.event), dtype=np.int64)  # of Heard, for each measurement of a group
+    entry = room.entry
     for item in range(begin, end):
         who = items.vehicle[item]
         if who >= 0:

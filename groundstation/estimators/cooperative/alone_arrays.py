@@ -89,3 +89,5 @@ class Room(NamedTuple):
     gain: FloatArray  # (r, n)
     mixed: FloatArray  # (r, N)
     cross: FloatArray  # (5, 4, 4)
+    entry: Int64Array  # (r,) of Heard, for each measurement of a group
+    lines: FloatArray  # (2, n or r)

@@ -138,7 +138,7 @@ def update(
                     total += gain[r, i] * kept[r, s] * gain[s, j]
             P[i, j] = P[j, i] = 0.5 * (P[i, j] + P[j, i]) - total
     if is_modified:
-        _correct_shared(n, count, gain, method, own.shared[who], heard, batch)
+        _correct_shared(n, count, gain, method, own.shared[who], heard, batch, room.lines[0])
     _mix(fleet, who, count, own, heard, batch, 0, room.mixed)
     _correct_map(n, count, gain, room.mixed, own.map_rows[who])
 
@@ -224,10 +224,16 @@ def _root(covariance: FloatArray, root: FloatArray, A: FloatArray, V: FloatArray
 
 @part
 def _correct_shared(
-    n: int, count: int, gain: FloatArray, method: Method, shared: FloatArray, heard: Heard, batch: Batch
+    n: int,
+    count: int,
+    gain: FloatArray,
+    method: Method,
+    shared: FloatArray,
+    heard: Heard,
+    batch: Batch,
+    brought: FloatArray,
 ) -> None:
     """Covariance with the errors of the points after an update."""
-    brought = np.empty(count)
     for c in range(shared.shape[1]):
         for row in range(count):  # all of them before the first correction
             brought[row] = batch.by_shared[row, c] * method.point_variance[c] + _told_shared(row, c, heard, batch)
@@ -250,7 +256,7 @@ def split_update(
     h, brought, sensor = batch.h[row], batch.brought[row], batch.own[row]
     weight = 1.0
     if brought > 0.0:
-        weight = _best_weight(n, h, P, independent, brought, sensor, method.weights)
+        weight = _best_weight(n, h, P, independent, brought, sensor, method.weights, room.lines)
     if weight == 0.0:
         return  # every weight leaves larger errors than none
     gain, S = room.right[0], sensor + (brought / (1.0 - weight) if brought > 0.0 else 0.0)
@@ -290,12 +296,14 @@ def _best_weight(
     brought: float,
     sensor: float,
     weights: FloatArray,
+    lines: FloatArray,
 ) -> float:
     """Weight of the dependent part that leaves the least sum of variances, each over what it was; 0: none is better."""
-    by_dependent, by_independent = np.zeros(n), np.zeros(n)
+    by_dependent, by_independent = lines[0], lines[1]
     one, two, least, best = 0.0, 0.0, 0.0, 0.0
     for i in range(n):
         least += 1.0 if P[i, i] > 0.0 else 0.0
+        by_dependent[i] = by_independent[i] = 0.0
         for j in range(n):
             by_dependent[i] += (P[i, j] - independent[i, j]) * h[j]
             by_independent[i] += independent[i, j] * h[j]

@@ -102,13 +102,22 @@ class Rules(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """One event linearised, a range or a height: innovation = receiver + place + clock + noise; row 0 holds it."""
+    """One event linearised, a range or a height: innovation = receiver + place + clock + noise; row 0 holds it.
+
+    ``line`` is room.
+    """
 
     innovation: FloatArray  # (1,)
     receiver: FloatArray  # (1, n) derivative by the receiver's state
     place: FloatArray  # (1, 3) by the position of the source
     clock: FloatArray  # (1,) by its clock offset
     variance: FloatArray  # (1,)
+    line: FloatArray  # (3, 3)
+
+
+def rows_for(n: int) -> Rows:
+    """Room for the row of an event."""
+    return Rows(np.zeros(1), np.zeros((1, n)), np.zeros((1, 3)), np.zeros(1), np.zeros(1), np.zeros((3, 3)))
 
 
 class Log(NamedTuple):

@@ -20,7 +20,7 @@ import numpy as np
 
 from groundstation.estimators.cooperative.arrays import Rules
 from groundstation.estimators.cooperative.events import Prepared
-from groundstation.estimators.cooperative.joint import Joint, run_joint
+from groundstation.estimators.cooperative.joint import Joint, work
 from groundstation.estimators.cooperative.messages import report_bytes
 from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.estimators.cooperative.timeline import SAME_TIME_S, timeline
@@ -45,7 +45,7 @@ def run_centralised(
     items = timeline(prepared, settings, together=together)
     rules = Rules(settings.gate_sigma, together, settings.derivatives == "reckoning", uses_measurements, innovates)
     log = log_for(prepared, items)
-    run_joint(prepared.fleet, prepared.points, prepared.events, items, rules, _start(prepared), log)
+    work(prepared.fleet, prepared.points, prepared.events, items, rules, _start(prepared), log)
     messages = reports(prepared, settings) if uses_measurements else {}
     name = "centralised" if uses_measurements else "dead_reckoning"
     return finished(prepared, items, log, name, settings.update, messages)
@@ -69,10 +69,10 @@ def reports(prepared: Prepared, settings: CooperativeSettings) -> dict[str, tupl
     """What the vehicles send to the centre: their dead reckoning and what they measured, once a frame."""
     events = prepared.events
     frame = np.floor((events.time_s + SAME_TIME_S) / settings.frame_s).astype(np.int64)
-    pairs, ranges = np.unique(np.stack([frame, events.receiver]), axis=1, return_counts=True)
+    report, ranges = np.unique(frame * len(prepared.vehicles) + events.receiver, return_counts=True)
     found: dict[str, tuple[int, int]] = {}
     for who, vehicle in enumerate(prepared.vehicles):
-        mine = ranges[pairs[1] == who].tolist()
+        mine = ranges[report % len(prepared.vehicles) == who].tolist()
         if mine:
             found[vehicle.name] = (len(mine), sum(report_bytes(count) for count in mine))
     return found

@@ -34,12 +34,11 @@ from groundstation.estimators.cooperative.alone_arrays import (
     Past,
     Room,
 )
-from groundstation.estimators.cooperative.arrays import Items, Log
+from groundstation.estimators.cooperative.arrays import Items, Log, rows_for
 from groundstation.estimators.cooperative.error_map import blocks, spectral_radius, unit_rows, windows
 from groundstation.estimators.cooperative.events import Prepared
 from groundstation.estimators.cooperative.messages import Broadcast
 from groundstation.estimators.cooperative.motion import ROOMS
-from groundstation.estimators.cooperative.observation import rows_for
 from groundstation.estimators.cooperative.plain.split_covariance import WEIGHTS
 from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.estimators.cooperative.timeline import timeline
@@ -185,6 +184,8 @@ def _room(most: int, n: int, errors: int, width: int) -> Room:
         np.zeros((most, n)),
         np.zeros((most, width)),
         np.zeros((5, 4, 4)),
+        np.zeros(most, dtype=np.int64),
+        np.zeros((2, max(most, n))),
     )
 
 

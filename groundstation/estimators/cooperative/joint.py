@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundstation.base.compile import compiled, part
+from groundstation.base.compile import in_place, part
 from groundstation.base.records import Int64Array
 from groundstation.estimators.cooperative.arrays import (
     HEIGHT,
@@ -20,6 +20,7 @@ from groundstation.estimators.cooperative.arrays import (
     Points,
     Rows,
     Rules,
+    rows_for,
 )
 from groundstation.estimators.cooperative.judging import count_rejection, write_down
 from groundstation.estimators.cooperative.motion import ROOMS, place, position, step
@@ -51,12 +52,17 @@ class Room(NamedTuple):
     step: FloatArray  # (ROOMS, n, n)
     reading: FloatArray  # (2, 3)
     derivative: FloatArray  # (2, 3, n)
-    line: FloatArray  # (3, 3) source, reference line, another
+    line: FloatArray  # (4, 3) source, reference line, two others
     wide: FloatArray  # (N, N)
     g: FloatArray  # (N,)
     gain: FloatArray  # (N,)
+    before: FloatArray  # (2, N) states before an event and before an update
     states: Int64Array  # (N,) 0, 1, ...
     held: Int64Array  # (0,) no state is considered only
+    changed: Int64Array  # (n,) pattern of a vehicle's transition
+    starts: Int64Array  # (n + 1,)
+    columns: Int64Array  # (n n,), at least 2 n
+    values: FloatArray  # (1, n n), at least 2 n
 
 
 class Lines(NamedTuple):
@@ -69,37 +75,57 @@ class Lines(NamedTuple):
     variance: FloatArray
 
 
-@compiled
-def run_joint(fleet: Fleet, points: Points, events: Events, items: Items, rules: Rules, joint: Joint, log: Log) -> None:
+def work(fleet: Fleet, points: Points, events: Events, items: Items, rules: Rules, joint: Joint, log: Log) -> None:
     """Work through a session."""
     size, n = len(joint.x), fleet.density.shape[1]
-    room = Room(
+    most = int(np.max(items.last - items.first, initial=1))
+    lines = Lines(
+        np.zeros(most + 1, dtype=np.int64),
+        np.zeros(most * (2 * n + 2), dtype=np.int64),
+        np.zeros(most * (2 * n + 2)),
+        np.zeros(most),
+        np.zeros(most),
+    )
+    run_joint(fleet, points, events, items, rules, joint, _room(size, n), rows_for(n), lines, log)
+
+
+def _room(size: int, n: int) -> Room:
+    return Room(
         np.zeros((2, n)),
         np.zeros((2, n, n)),
         np.zeros((n, n)),
         np.zeros((ROOMS, n, n)),
         np.zeros((2, 3)),
         np.zeros((2, 3, n)),
-        np.zeros((3, 3)),
+        np.zeros((4, 3)),
         np.zeros((size, size)),
         np.zeros(size),
         np.zeros(size),
+        np.zeros((2, size)),
         np.arange(size),
         np.zeros(0, dtype=np.int64),
+        np.zeros(n, dtype=np.int64),
+        np.zeros(n + 1, dtype=np.int64),
+        np.zeros(max(n, 2) * n, dtype=np.int64),
+        np.zeros((1, max(n, 2) * n)),
     )
-    rows = Rows(np.zeros(1), np.zeros((1, n)), np.zeros((1, 3)), np.zeros(1), np.zeros(1))
-    most = 1
-    for item in range(len(items.vehicle)):
-        most = max(most, items.last[item] - items.first[item])
-    wide = most * (2 * n + 2)
-    lines = Lines(
-        np.zeros(most + 1, dtype=np.int64),
-        np.zeros(wide, dtype=np.int64),
-        np.zeros(wide),
-        np.zeros(most),
-        np.zeros(most),
-    )
-    before = np.zeros(size)
+
+
+@in_place
+def run_joint(
+    fleet: Fleet,
+    points: Points,
+    events: Events,
+    items: Items,
+    rules: Rules,
+    joint: Joint,
+    room: Room,
+    rows: Rows,
+    lines: Lines,
+    log: Log,
+) -> None:
+    """Work through a session."""
+    size, before = len(joint.x), room.before[0]
     for item in range(len(items.vehicle)):
         who = items.vehicle[item]
         if who >= 0:
@@ -144,8 +170,7 @@ def _advance(fleet: Fleet, joint: Joint, who: int, to_s: float, room: Room) -> N
     for i in range(n):
         x[i] = joint.x[first + i]
     step(fleet, who, x, joint.time_s[who], to_s, phi, noise, room.step)
-    changed, starts = np.empty(n, dtype=np.int64), np.empty(n + 1, dtype=np.int64)
-    columns, values = np.empty(n * n, dtype=np.int64), np.empty((1, n * n))
+    changed, starts, columns, values = room.changed, room.starts, room.columns, room.values
     rows = count = 0
     for i in range(n):
         joint.x[first + i] = x[i]
@@ -275,7 +300,7 @@ def _put(n: int, h: FloatArray, is_back: bool, phi: FloatArray, first: int, line
 @part
 def _refer(fleet: Fleet, joint: Joint, who: int, source: int, arm_m: FloatArray, room: Room) -> None:
     """Line between two aircraft about which their range is linearised; its ends move when known to be wrong."""
-    here, about, across = room.line[2], room.line[1], np.empty(3)
+    here, about, across = room.line[2], room.line[1], room.line[3]
     position(fleet.size[who], room.reading[0], room.derivative[0], room.x[0], here)
     along = square = length = 0.0
     for axis in range(3):
@@ -287,23 +312,17 @@ def _refer(fleet: Fleet, joint: Joint, who: int, source: int, arm_m: FloatArray,
     for axis in range(3):
         across[axis] -= about[axis] * along / length
         square += across[axis] ** 2
-    variance = 0.0
-    for a in range(2):
-        one = who if a == 0 else source
-        for b in range(2):
-            two = who if b == 0 else source
-            for i in range(fleet.size[one]):
-                left = 0.0
-                for axis in range(3):
-                    left += across[axis] * room.derivative[a, axis, i]
-                if left == 0.0:
-                    continue
-                for j in range(fleet.size[two]):
-                    right = 0.0
-                    for axis in range(3):
-                        right += across[axis] * room.derivative[b, axis, j]
-                    sign = 1.0 if a == b else -1.0
-                    variance += sign * left * right * joint.P[joint.first[one] + i, joint.first[two] + j]
+    columns, values, count = room.columns, room.values[0], 0  # the derivative of the line's end, across it
+    for end in range(2):
+        one = who if end == 0 else source
+        for i in range(fleet.size[one]):
+            by_state = 0.0
+            for axis in range(3):
+                by_state += across[axis] * room.derivative[end, axis, i]
+            if by_state != 0.0:
+                columns[count], values[count] = joint.first[one] + i, by_state if end == 0 else -by_state
+                count += 1
+    variance = predicted_variance(columns, values, 0, count, joint.P)
     if square * square > KNOWN_WRONG_SIGMAS**2 * variance:
         for axis in range(3):
             joint.offset_m[who, axis] = room.reading[0, axis] - here[axis]
@@ -391,7 +410,7 @@ def _use_together(
             if not _judge(fleet, events, event, rules, joint, lines, at, log):
                 lines.innovation[at] = np.nan
         count += found
-    before = np.empty(len(joint.x))
+    before = room.before[1]
     for i in range(len(before)):
         before[i] = joint.x[i]
     for at in range(count):

@@ -8,7 +8,7 @@ Strapdown Inertial Navigation Technology, 2nd ed. 2004, section 12.3 (dynamics o
 
 import numpy as np
 
-from groundstation.base.compile import compiled, part
+from groundstation.base.compile import in_place, part
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.estimators.cooperative.arrays import (
     AXES,
@@ -42,40 +42,24 @@ def discretise(
     Phi = sum (F h)^k / k!; Q = sum L_k h^(k+1) / (k+1)! with L_0 = diag(q), L_(k+1) = F L_k + L_k F'. A step may go
     back; then the noise means nothing.
     """
-    term, level, moved, entries = room[0], room[1], room[2], room[3]
-    count = 0
-    rows, columns = np.empty(n * n, dtype=np.int64), np.empty(n * n, dtype=np.int64)
+    term, level, moved = room[0], room[1], room[2]
     for i in range(n):
         for j in range(n):
             term[i, j] = level[i, j] = phi[i, j] = noise[i, j] = 0.0
-            if F[i, j] != 0.0:
-                rows[count], columns[count] = i, j
-                entries[count // n, count % n] = F[i, j]
-                count += 1
         term[i, i] = phi[i, i] = 1.0
         level[i, i] = q[i]
         noise[i, i] = q[i] * step_s
     factor = step_s
     for k in range(1, TERMS):
         largest = 0.0
-        for i in range(n):
-            for j in range(n):
-                moved[i, j] = 0.0
-        for e in range(count):
-            i, m, a = rows[e], columns[e], entries[e // n, e % n]
-            for j in range(n):
-                moved[i, j] += a * term[m, j]
+        _times(n, F, term, moved)
         for i in range(n):
             for j in range(n):
                 value = moved[i, j] * step_s / k
                 term[i, j] = value
                 phi[i, j] += value
                 largest = max(largest, abs(value))
-                moved[i, j] = 0.0
-        for e in range(count):
-            i, m, a = rows[e], columns[e], entries[e // n, e % n]
-            for j in range(n):
-                moved[i, j] += a * level[m, j]
+        _times(n, F, level, moved)
         factor *= step_s / (k + 1)
         for i in range(n):
             for j in range(n):
@@ -83,6 +67,19 @@ def discretise(
                 noise[i, j] += level[i, j] * factor
         if k >= FEWEST_TERMS and largest < SMALLEST:
             break
+
+
+@part
+def _times(n: int, F: FloatArray, matrix: FloatArray, product: FloatArray) -> None:
+    """product <- F matrix."""
+    for i in range(n):
+        for j in range(n):
+            product[i, j] = 0.0
+        for m in range(n):
+            a = F[i, m]
+            if a != 0.0:
+                for j in range(n):
+                    product[i, j] += a * matrix[m, j]
 
 
 @part
@@ -213,7 +210,7 @@ def turn_rows(n: int, phi: FloatArray, rows: FloatArray, w: FloatArray) -> None:
             rows[i, c] = w[i, c]
 
 
-@compiled
+@in_place
 def step(
     fleet: Fleet,
     who: int,
@@ -282,7 +279,7 @@ def _over_epochs(
         cut += 1
 
 
-@compiled
+@in_place
 def place(fleet: Fleet, who: int, at_s: float, reading: FloatArray, derivative: FloatArray) -> None:
     """Position of the antenna = reading + derivative x: fill what dead reckoning has, (3,), and the derivative, (3, n).
 
@@ -327,3 +324,13 @@ def position(n: int, reading: FloatArray, derivative: FloatArray, x: FloatArray,
         for j in range(n):
             total += derivative[axis, j] * x[j]
         out[axis] = reading[axis] + total
+
+
+@in_place
+def positions(
+    fleet: Fleet, who: int, time_s: FloatArray, states: FloatArray, derivative: FloatArray, out: FloatArray
+) -> None:
+    """Fill the positions (m, 3) at some times from the states there (m, n); ``derivative`` (3, n) is room."""
+    for row in range(len(time_s)):
+        place(fleet, who, time_s[row], out[row], derivative)
+        position(fleet.size[who], out[row], derivative, states[row], out[row])

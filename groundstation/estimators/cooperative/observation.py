@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from groundstation.base.compile import compiled, part
+from groundstation.base.compile import in_place, part
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.estimators.cooperative.arrays import HEIGHT, POINT, SATELLITE, Events, Fleet, FloatArray, Rows
 
@@ -10,12 +10,7 @@ LIGHT_MPS = 299_792_458.0
 NEAREST_M = 1e-3  # a source on top of the receiver has no direction
 
 
-def rows_for(n: int) -> Rows:
-    """Room for the row of an event."""
-    return Rows(np.zeros(1), np.zeros((1, n)), np.zeros((1, 3)), np.zeros(1), np.zeros(1))
-
-
-@compiled
+@in_place
 def observe(
     fleet: Fleet,
     events: Events,
@@ -60,7 +55,7 @@ def observe(
         rows.clock[0], rows.variance[0] = 0.0, events.variance_m2[event]
         rows.innovation[0] = events.value_m[event] - (-reading[2] - x[fleet.height[who]])
         return 1
-    line = np.empty(3)
+    line = rows.line[0]
     for axis in range(3):
         line[axis] = events.arm_m[event, axis] + reading[axis] - source_m[axis]
         for j in range(n):
@@ -87,7 +82,7 @@ def _range_row(
     rows: Rows,
 ) -> None:
     who, kind = events.receiver[event], events.kind[event]
-    direction = np.empty(3)
+    direction = rows.line[1]
     distance = np.sqrt(line[0] ** 2 + line[1] ** 2 + line[2] ** 2)
     for axis in range(3):
         direction[axis] = line[axis] / distance
@@ -98,7 +93,7 @@ def _range_row(
         for axis in range(3):
             distance += direction[axis] * (line[axis] - about_m[axis])
     if kind == SATELLITE:
-        distance = _while_the_earth_turns(line, source_m, distance, direction)
+        distance = _while_the_earth_turns(line, source_m, distance, direction, rows.line[2])
     predicted = distance
     for j in range(fleet.size[who]):
         rows.receiver[0, j] = (
@@ -119,9 +114,10 @@ def _range_row(
 
 
 @part
-def _while_the_earth_turns(line: FloatArray, source_m: FloatArray, distance: float, direction: FloatArray) -> float:
+def _while_the_earth_turns(
+    line: FloatArray, source_m: FloatArray, distance: float, direction: FloatArray, seen: FloatArray
+) -> float:
     """Direction and distance from where a satellite was at emission, in the ECEF axes of the instant of reception."""
-    seen = np.empty(3)
     for _ in range(3):  # each gains six digits
         turn = EARTH_RATE_RADPS * distance / LIGHT_MPS
         cosine, sine = np.cos(turn), np.sin(turn)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundstation.base.compile import compiled, part
+from groundstation.base.compile import in_place, part
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.estimators.cooperative.alone_update import solve
 from groundstation.estimators.cooperative.arrays import (
@@ -52,23 +52,12 @@ class Room(NamedTuple):
     h: FloatArray  # (2 n,)
     shared: FloatArray  # (2 n,)
     gain: FloatArray  # (2 n,)
+    mixed: FloatArray  # (N,)
 
 
-@compiled
-def run_pairs(
-    fleet: Fleet,
-    points: Points,
-    events: Events,
-    items: Items,
-    begin: int,
-    end: int,
-    gate_sigma: float,
-    members: Members,
-    log: Log,
-) -> None:
-    """Work through the items ``begin`` to ``end``: one window of the error map."""
-    n, width = fleet.density.shape[1], members.map_rows.shape[2]
-    room = Room(
+def room_for(n: int, width: int) -> Room:
+    """Room for vehicles of n states and an error map of so many columns."""
+    return Room(
         np.zeros((n, n)),
         np.zeros((n, n)),
         np.zeros((ROOMS, n, n)),
@@ -80,8 +69,25 @@ def run_pairs(
         np.zeros(2 * n),
         np.zeros(2 * n),
         np.zeros(2 * n),
+        np.zeros(width),
     )
-    rows = Rows(np.zeros(1), np.zeros((1, n)), np.zeros((1, 3)), np.zeros(1), np.zeros(1))
+
+
+@in_place
+def run_pairs(
+    fleet: Fleet,
+    points: Points,
+    events: Events,
+    items: Items,
+    begin: int,
+    end: int,
+    gate_sigma: float,
+    members: Members,
+    room: Room,
+    rows: Rows,
+    log: Log,
+) -> None:
+    """Work through the items ``begin`` to ``end``: one window of the error map."""
     for item in range(begin, end):
         who = items.vehicle[item]
         if who >= 0:
@@ -286,7 +292,9 @@ def _join(fleet: Fleet, one: int, two: int, members: Members, both: FloatArray) 
 def _share(fleet: Fleet, one: int, two: int, innovation: float, members: Members, room: Room) -> None:
     """Give both vehicles their part of the update; factors towards third ones are scaled by P(after) P(before)^-1."""
     n, width = fleet.size[one], members.map_rows.shape[2]
-    both, gain, h, mixed = room.both, room.gain, room.h, np.zeros(members.map_rows.shape[2])
+    both, gain, h, mixed = room.both, room.gain, room.h, room.mixed
+    for c in range(width):
+        mixed[c] = 0.0
     for end in range(2):
         who, first = (one, 0) if end == 0 else (two, n)
         for i in range(fleet.size[who]):

@@ -12,11 +12,11 @@ asynchronous pairwise communication, International Journal of Robotics Research 
 
 import numpy as np
 
-from groundstation.estimators.cooperative.arrays import PEER
+from groundstation.estimators.cooperative.arrays import PEER, rows_for
 from groundstation.estimators.cooperative.error_map import blocks, spectral_radius, unit_rows, windows
 from groundstation.estimators.cooperative.events import Prepared
 from groundstation.estimators.cooperative.messages import pairwise_bytes
-from groundstation.estimators.cooperative.pair import Members, run_pairs
+from groundstation.estimators.cooperative.pair import Members, room_for, run_pairs
 from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.estimators.cooperative.timeline import timeline
 from groundstation.estimators.cooperative.tracks import AlgorithmRun, finished, log_for
@@ -38,6 +38,7 @@ def run_pairwise(prepared: Prepared, settings: CooperativeSettings) -> Algorithm
     )
     for who, vehicle in enumerate(prepared.vehicles):
         members.x[who, : vehicle.size], members.P[who, : vehicle.size, : vehicle.size] = vehicle.start()
+    room, rows = room_for(n, unit.shape[2]), rows_for(n)
     times: list[float] = []
     radii: list[float] = []
     for begin, end in windows(items, settings.map_window_s):
@@ -45,7 +46,8 @@ def run_pairwise(prepared: Prepared, settings: CooperativeSettings) -> Algorithm
             times.append(float(items.time_s[begin]))
             radii.append(spectral_radius(blocks(members.map_rows, fleet)))
         members.map_rows[:] = unit
-        run_pairs(fleet, prepared.points, prepared.events, items, begin, end, settings.gate_sigma, members, log)
+        given = fleet, prepared.points, prepared.events, items
+        run_pairs(*given, begin, end, settings.gate_sigma, members, room, rows, log)
     return finished(prepared, items, log, "pairwise", "sequential", _messages(prepared), (times, radii))
 
 

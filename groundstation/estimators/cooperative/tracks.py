@@ -18,7 +18,7 @@ from groundstation.estimators.cooperative.arrays import (
     Log,
 )
 from groundstation.estimators.cooperative.events import Prepared
-from groundstation.estimators.cooperative.motion import place
+from groundstation.estimators.cooperative.motion import positions
 
 
 @dataclass(frozen=True)
@@ -179,10 +179,7 @@ def _track(prepared: Prepared, items: Items, log: Log, who: int) -> Track:
     time_s = items.time_s[items.vehicle == who]
     state, covariance = log.x[mine][:, :n], log.P[mine][:, :n, :n]
     position_m = np.empty((len(time_s), 3))
-    derivative = np.empty((3, n))
-    for row, at_s in enumerate(time_s.tolist()):
-        place(prepared.fleet, who, at_s, position_m[row], derivative)
-        position_m[row] += derivative @ state[row]
+    positions(prepared.fleet, who, time_s, np.ascontiguousarray(state), np.empty((3, n)), position_m)
     return Track(vehicle.name, time_s, position_m, state, covariance, vehicle.height)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.compile import compiled
+from groundstation.base.compile import in_place
 from groundstation.estimators.cooperative.motion import ROOMS
 from groundstation.estimators.cooperative.motion import discretise as _fill
 
@@ -26,7 +26,7 @@ def discretise(F: FloatArray, q: FloatArray, step_s: float) -> tuple[FloatArray,
     return transition, noise
 
 
-@compiled
+@in_place
 def _series(F: FloatArray, q: FloatArray, step_s: float, phi: FloatArray, noise: FloatArray, room: FloatArray) -> None:
     _fill(len(F), F, q, step_s, phi, noise, room)
 

@@ -84,11 +84,13 @@ def by_aircraft(flights: FigureData) -> tuple[AircraftRow, ...]:
 
 
 def _aircraft_row(name: str, flights: FigureData, rows: NDArray[np.intp]) -> AircraftRow:
-    error = flights["error_deg"][rows]
-    over = mean_over_flights(error, flights["standard_error_deg"][rows])
+    """What the flights of an aircraft say together; those with the verdict reject enter no statistic."""
+    kept = rows[flights["verdict"][rows] != "reject"]
+    error = flights["error_deg"][kept]
+    over = mean_over_flights(error, flights["standard_error_deg"][kept])
     has_interval = over is not None and over.flights > 1
     is_one = len(np.unique(flights["aircraft"][rows])) == 1
-    sampled = rows[np.isfinite(flights["sample_m2_deg2"][rows])]
+    sampled = kept[np.isfinite(flights["sample_m2_deg2"][kept])]
     columns = (flights[key][sampled].tolist() for key in ("samples", "sample_mean_deg", "sample_m2_deg2"))
     parts = [Moments(int(count), mean, m2) for count, mean, m2 in zip(*columns, strict=True)]
     pooled, within = merged(parts), sum(part.m2 for part in parts)
@@ -96,7 +98,8 @@ def _aircraft_row(name: str, flights: FigureData, rows: NDArray[np.intp]) -> Air
     return AircraftRow(
         aircraft=name,
         flights=len(rows),
-        assessed=int(np.isfinite(error).sum()),
+        assessed=int(np.isfinite(flights["error_deg"][rows]).sum()),
+        averaged=int(np.isfinite(error).sum()),
         accepted=int(np.sum(flights["verdict"][rows] == "accept")),
         samples=pooled.count,
         mean_deg=None if over is None else over.mean,

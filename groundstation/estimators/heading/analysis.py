@@ -36,14 +36,24 @@ def _run(flight: "Flight", known: Known, settings: HeadingSettings) -> Found[Hea
         site=known.site,
         request=HeadingRequest(intervals=known.intervals),
         latencies=known.answer(Latencies),
+        phases=known.phases,
     )
-    return Found(found, (_verdict(found), *_findings_of_what_was_set(flight, found, known)))
+    return Found(found, (_verdict(found), *_steps(found), *_findings_of_what_was_set(flight, found, known)))
 
 
 def _verdict(result: HeadingResult) -> Finding:
     """The verdict: a rejected one is a warning."""
     text = f"heading correction: {result.verdict}: {result.verdict_reason}"
     return Finding("warn" if result.verdict == "reject" else "info", f"heading.{result.verdict}", text)
+
+
+def _steps(result: HeadingResult) -> tuple[Finding, ...]:
+    """Steps of the INS heading, each by name."""
+    text = "INS heading steps by {size:+.2f} deg at {time:.1f} s: the error is that after it"
+    return tuple(
+        Finding("warn", "heading.step", text.format(size=step.size_deg, time=step.time_s), result.ins_topic)
+        for step in result.steps
+    )
 
 
 def _findings_of_what_was_set(flight: "Flight", heading: HeadingResult, known: Known) -> tuple[Finding, ...]:
@@ -70,6 +80,9 @@ def _sentence(answers: Answers) -> str:
         return ""
     low, high = heading.confidence95_deg
     text = f"{heading.verdict}: heading error {heading.error_deg:+.3f} deg, 95 % {low:+.3f} to {high:+.3f}"
+    if heading.confidence95_measured_deg is not None:
+        low, high = heading.confidence95_measured_deg
+        text += f" ({low:+.3f} to {high:+.3f} without steady sideslip and mounting)"
     if heading.correction_deg is not None:
         return f"{text}, enter {heading.correction_deg:+g} deg"
     return f"{text} ({heading.verdict_reason})"

@@ -6,9 +6,10 @@ import numpy as np
 
 from groundstation.base.angles import wrap_180
 from groundstation.estimators.heading import figures as drawn
-from groundstation.estimators.heading.checks import normality, variance_ratio
+from groundstation.estimators.heading.checks import disagreement, normality, variance_ratio
 from groundstation.estimators.heading.interval import ErrorPosterior
 from groundstation.estimators.heading.references import (
+    drift_prior,
     mode_changes,
     onboard_comparison,
     parking_heading,
@@ -17,21 +18,26 @@ from groundstation.estimators.heading.references import (
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.solution import Solution
 from groundstation.estimators.heading.standstill import StandstillData
+from groundstation.estimators.heading.steady import SteadyPrior
 from groundstation.estimators.heading.verdict import Figures, build_gates, decide, explain, round_to_step
 from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.results.figures import FigureData
-from groundstation.results.heading import HeadingResult, Standstill, TaxiSegment
+from groundstation.results.heading import HeadingResult, Standstill
 from groundstation.tables.table import Flight
 
 
 @dataclass(frozen=True)
 class _Error:
-    """The error with the sigma of what all samples share (mounting, declination) in it, wrapped."""
+    """The error with the sigma of what all samples share (declination, mounting) in it, wrapped.
+
+    ``whole_deg`` and ``measured_deg`` are the intervals with and without steady sideslip and mounting.
+    """
 
     error_deg: float
     sigma_deg: float
-    low_deg: float
-    high_deg: float
+    whole_deg: tuple[float, float]
+    measured_deg: tuple[float, float]
+    steady_sigma_deg: float
 
 
 def build_answer(
@@ -42,9 +48,10 @@ def build_answer(
     settings: HeadingSettings,
     aircraft: AircraftData,
     site: SiteData,
+    steady: SteadyPrior,
 ) -> HeadingResult:
     """Judge a solution and set it beside its references. ``topics`` are those of INS and GNSS."""
-    error = _error_of(solution, aircraft)
+    error = _error_of(solution, steady)
     assessed = _assessed(standstill, solution.posterior)
     figures = _judged_figures(flight, topics[0], solution, assessed, settings, error)
     gates = build_gates(solution.samples, assessed, figures, settings)
@@ -58,7 +65,7 @@ def build_answer(
         verdict_reason=explain(verdict, deciding, error.error_deg, step_deg),
         error_deg=error.error_deg,
         standard_error_deg=error.sigma_deg,
-        confidence95_deg=(error.low_deg, error.high_deg),
+        confidence95_deg=error.whole_deg,
         paper_error_deg=float(wrap_180(solution.running.mean_deg[-1])),
         precision_deg=figures.precision_deg,
         quality_deg=figures.quality_deg,
@@ -75,20 +82,35 @@ def build_answer(
         directions=solution.directions,
         uncorrected_error_deg=solution.uncorrected_deg,
         reference_time_s=solution.reference_time_s,
+        confidence95_measured_deg=error.measured_deg,
+        steady_sigma_deg=error.steady_sigma_deg,
+        steady_origin="aircraft file" if steady.is_stated else "shipped figures",
+        segment_spread_deg=solution.posterior.parameter("segment_deg"),
+        wander_spread_deg=solution.posterior.parameter("wander_deg"),
+        wander_s=solution.posterior.parameter("wander_s"),
+        steps=solution.steps,
         settings=_settings_of(settings, aircraft),
         figures=_figures_of(solution, standstill, settings),
     )
-    return _with_references(_with_arm(plain, solution), flight, solution, standstill, settings, site)
+    drift_prior_deg_per_h = drift_prior(aircraft.ins_class, flight.metadata.get("ins_class", ""))
+    with_arm = _with_arm(plain, solution)
+    return _with_references(with_arm, flight, solution, standstill, settings, site, drift_prior_deg_per_h)
 
 
-def _error_of(solution: Solution, aircraft: AircraftData) -> _Error:
-    posterior = solution.posterior
-    common_sigma = float(np.hypot(aircraft.mounting_sigma_deg, solution.samples.heading_sigma_deg))
-    low, high = posterior.interval_deg(extra_sigma_deg=common_sigma)
+def _error_of(solution: Solution, steady: SteadyPrior) -> _Error:
+    posterior, declination_deg = solution.posterior, solution.samples.heading_sigma_deg
+    common_deg = float(np.hypot(declination_deg, steady.mounting_sigma_deg))
     wrapped = float(wrap_180(posterior.error_deg))
     shift = wrapped - posterior.error_deg  # differences near +-180 deg were kept together
-    sigma = float(np.hypot(posterior.standard_error_deg, common_sigma))
-    return _Error(wrapped, sigma, low + shift, high + shift)
+    low, high = posterior.interval_deg(extra_sigma_deg=common_deg)
+    least, most = posterior.interval_deg(extra_sigma_deg=declination_deg, is_measured=True)
+    return _Error(
+        wrapped,
+        float(np.hypot(posterior.standard_error_deg, common_deg)),
+        (low + shift, high + shift),
+        (least + shift, most + shift),
+        float(np.hypot(posterior.apart_sigma_deg, steady.mounting_sigma_deg)),
+    )
 
 
 def _assessed(standstill: StandstillData, posterior: ErrorPosterior) -> Standstill | None:
@@ -116,24 +138,16 @@ def _judged_figures(
     return Figures(
         precision_deg=float(running.precision_deg[-1]),
         quality_deg=float(running.quality_deg[-1]),
-        half_width_deg=0.5 * (error.high_deg - error.low_deg),
+        half_width_deg=0.5 * (error.measured_deg[1] - error.measured_deg[0]),
         taxi_seconds=float(sum(part.end_s - part.start_s + interval_s for part in solution.segments)),
         normality=normality(solution.difference_deg),
         variance=variance_ratio(used, assessed, settings.sway_line_s),
         drift_deg_per_h=solution.drift_deg_per_h,
         drift_sigma_deg_per_h=solution.drift_sigma_deg_per_h,
         mode_changes=mode_changes(flight, ins_topic, begin_s, float(used.time_s[-1])),
-        segments_chi2=_segments_chi2(solution.segments),
+        disagreement=disagreement(solution.parts, settings.disagreement_probability),
+        steps=solution.steps,
     )
-
-
-def _segments_chi2(segments: tuple[TaxiSegment, ...]) -> float | None:
-    if len(segments) < 2:
-        return None
-    errors = np.array([segment.error_deg for segment in segments])
-    weights = 1.0 / np.maximum(np.array([segment.sigma_deg for segment in segments]), 1e-9) ** 2
-    mean = float(np.sum(weights * errors) / np.sum(weights))
-    return float(np.sum(weights * (errors - mean) ** 2) / (len(errors) - 1))
 
 
 def _with_arm(result: HeadingResult, solution: Solution) -> HeadingResult:
@@ -157,6 +171,7 @@ def _with_references(
     standstill: StandstillData,
     settings: HeadingSettings,
     site: SiteData,
+    drift_prior_deg_per_h: float,
 ) -> HeadingResult:
     error, sigma = result.error_deg, result.standard_error_deg
     parking = parking_heading(
@@ -164,8 +179,9 @@ def _with_references(
         standstill.in_interval,
         flight,
         site,
-        (error, sigma, solution.reference_time_s),
+        (error - _stepped_deg(solution, standstill), sigma, solution.reference_time_s),
         (solution.drift_deg_per_h, solution.drift_sigma_deg_per_h),
+        drift_prior_deg_per_h,
     )
     return replace(
         result,
@@ -177,6 +193,14 @@ def _with_references(
         runway=runway_checks(solution.samples, site, error, sigma, settings),
         onboard=onboard_comparison(flight, float(solution.used.time_s[-1]), error),
     )
+
+
+def _stepped_deg(solution: Solution, standstill: StandstillData) -> float:
+    """What the steps after the standstill added to the error."""
+    if not standstill.in_interval.any():
+        return 0.0
+    parked_s = float(solution.samples.time_s[standstill.in_interval][-1])
+    return sum(step.size_deg for step in solution.steps if step.time_s > parked_s)
 
 
 def _settings_of(settings: HeadingSettings, aircraft: AircraftData) -> dict[str, float | str | bool]:

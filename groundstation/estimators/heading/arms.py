@@ -100,7 +100,7 @@ def _turning(samples: Samples, settings: HeadingSettings) -> NDArray[np.bool_]:
         )
     if samples.ground_method:
         turning &= samples.on_ground
-    return np.asarray(turning & ~np.isin(samples.gate, ["excluded", "outlier", "too fast"]))
+    return np.asarray(turning & ~np.isin(samples.gate, ["excluded", "outlier", "too fast", "take-off run"]))
 
 
 def _from_turns(

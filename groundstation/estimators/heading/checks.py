@@ -10,12 +10,14 @@ from groundstation.base.normal import NORMAL_95
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.estimators.heading.lines import fitted_lines, window_bounds
 from groundstation.estimators.heading.samples import Samples
+from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.standstill import effective_samples
-from groundstation.results.heading import Standstill
+from groundstation.results.heading import Standstill, TaxiSegment
 
 FloatArray = NDArray[np.float64]
 LEAST_NORMALITY = 20  # samples
 LEAST_IN_LINE = 4
+MADE_FOR_SAMPLES, SCATTER_SIGMAS = 400, 3.0  # of the limits of skewness, kurtosis and distance
 LEAST_SPREAD_DEG = 1e-6  # below it there is nothing to fit a normal to
 
 
@@ -132,3 +134,46 @@ def variance_ratio(used: Samples, standstill: Standstill | None, line_s: float) 
     spread = np.hypot(_variance_log_sigma(difference), sway2 / expected * _variance_log_sigma(residual))
     low, high = ratio * np.exp(-NORMAL_95 * spread), ratio * np.exp(NORMAL_95 * spread)
     return VarianceRatio(ratio, float(low), float(high), float(np.sqrt(track2)), float(np.sqrt(sway2)))
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """Chi-square per degree of freedom of the errors of parts, its limit, and in words which part is farthest off."""
+
+    chi2: float
+    limit: float
+    told: str
+
+
+def disagreement(parts: tuple[TaxiSegment, ...], probability: float) -> Disagreement | None:
+    """What the parts of a taxi say against each other; None for fewer than two.
+
+    The limit is what chance exceeds with the probability given, were the sigmas of the parts all there is.
+    """
+    from scipy.stats import chi2
+
+    if len(parts) < 2:
+        return None
+    errors = np.array([part.error_deg for part in parts])
+    weights = 1.0 / np.maximum(np.array([part.sigma_deg for part in parts]), 1e-9) ** 2
+    off = errors - float(np.sum(weights * errors) / np.sum(weights))
+    freedom = len(parts) - 1
+    worst = int(np.argmax(weights * off**2))
+    told = f"farthest off: {parts[worst].start_s:.0f} to {parts[worst].end_s:.0f} s, by {off[worst]:+.2f} deg"
+    limit = float(chi2.isf(probability, freedom)) / freedom
+    return Disagreement(float(np.sum(weights * off**2)) / freedom, limit, told)
+
+
+def normality_limits(settings: HeadingSettings, samples: int) -> tuple[float, tuple[float, float], float]:
+    """Limits of skewness, excess kurtosis and distance for so many samples.
+
+    The settings are for 400 samples; fewer scatter more by themselves, by three standard errors: sqrt(6 / n) and
+    sqrt(24 / n) of the moments, 0.35 / sqrt(n) of the distance.
+    """
+
+    def more(variance: float) -> float:
+        return SCATTER_SIGMAS * float(np.sqrt(variance) * max(samples**-0.5 - MADE_FOR_SAMPLES**-0.5, 0.0))
+
+    low, high = settings.excess_kurtosis_range
+    kurtosis = low - more(24.0), high + more(24.0)
+    return settings.skewness_max + more(6.0), kurtosis, settings.normal_distance_max + more(0.35**2)

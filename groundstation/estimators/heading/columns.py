@@ -30,6 +30,9 @@ COLUMNS: tuple[AnswerColumn[HeadingResult], ...] = (
         lambda heading: heading.confidence95_deg[0],
     ),
     AnswerColumn("confidence95_high_deg", "number", "its upper end", lambda heading: heading.confidence95_deg[1]),
+    AnswerColumn(
+        "steady_sigma_deg", "number", "steady sideslip and mounting left in error_deg, sigma", is_indexed=False
+    ),
     AnswerColumn("correction_deg", "number", "the number to type; missing unless accepted"),
     AnswerColumn("paper_error_deg", "number", "plain running mean of the paper", is_indexed=False),
     AnswerColumn("precision_deg", "number", "the paper's e"),

@@ -9,13 +9,23 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.heading.answer import build_answer
 from groundstation.estimators.heading.delay import known_delay
 from groundstation.estimators.heading.gating import gate_samples
-from groundstation.estimators.heading.samples import HeadingOf, OnGround, Samples, choose_topics, pair_samples
+from groundstation.estimators.heading.samples import (
+    HeadingOf,
+    OnGround,
+    Samples,
+    choose_topics,
+    logged_heading,
+    pair_samples,
+)
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.heading.solution import solve
 from groundstation.estimators.heading.standstill import find_standstill
+from groundstation.estimators.heading.steady import steady_prior
+from groundstation.estimators.heading.steps import heading_steps
 from groundstation.estimators.known import AircraftData, SiteData
-from groundstation.results.heading import HeadingResult
+from groundstation.results.heading import HeadingResult, HeadingStep
 from groundstation.results.latency import Latencies
+from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight
 
 
@@ -29,6 +39,7 @@ def estimate_heading_error(
     site: SiteData | None = None,
     request: HeadingRequest | None = None,
     latencies: Latencies | None = None,
+    phases: Phases | None = None,
 ) -> HeadingResult:
     """Estimate the INS heading error from straight taxi before take-off.
 
@@ -46,6 +57,8 @@ def estimate_heading_error(
     settings, aircraft, site, request : optional
     latencies : Latencies, optional
         Where that of GNSS behind the INS is observed, GNSS times are put back by it; the aircraft file's comes first.
+    phases : Phases, optional
+        Phases of the flight: epochs of the take-off run are not used, for power crabs the aircraft.
 
     Returns
     -------
@@ -83,7 +96,7 @@ def estimate_heading_error(
         )
         if aircraft.mounting_deg:
             paired = replace(paired, heading_deg=wrap_360(paired.heading_deg - aircraft.mounting_deg))
-        return gate_samples(paired, settings, request)
+        return gate_samples(paired, settings, request, phases)
 
     antenna = gated(with_later_runs=settings.runs == "all_ground")
     if settings.runs == "auto" and antenna.is_used.sum() * antenna.interval_s < settings.taxi_min_s:
@@ -93,13 +106,28 @@ def estimate_heading_error(
     if antenna.is_used.sum() < 2:
         raise NotAssessableError("heading", _why_nothing_is_used(antenna, settings))
     standstill = find_standstill(antenna, settings)
-    solution = solve(antenna, standstill, aircraft, delay.narrowed(settings) if delay else settings)
-    result = build_answer(flight, (ins_topic, gnss_topic), solution, standstill, settings, aircraft, site)
+    span_s = tuple(float(time_s) for time_s in antenna.time_s[antenna.is_used][[0, -1]])
+    steady = steady_prior(flight, span_s, aircraft, settings)
+    steps = _steps(flight, ins_topic, heading, (standstill.start_s(antenna), span_s[1]), settings)
+    offset_s = max(settings.offset_prior_sigma_s, settings.offset_prior_intervals * antenna.interval_s)
+    at_rate = replace(settings, offset_prior_sigma_s=offset_s)  # a slow receiver is later, and differs more
+    solution = solve(antenna, standstill, aircraft, delay.narrowed(at_rate) if delay else at_rate, steady, steps)
+    result = build_answer(flight, (ins_topic, gnss_topic), solution, standstill, settings, aircraft, site, steady)
     if delay is None:
         return result
     return replace(
         result, latency_used_s=delay.latency_s, latency_used_sigma_s=delay.sigma_s, latency_origin=delay.origin
     )
+
+
+def _steps(
+    flight: Flight, ins_topic: str, heading: HeadingOf | None, span_s: tuple[float, float], settings: HeadingSettings
+) -> tuple[HeadingStep, ...]:
+    """Steps of the INS heading over a span of flight time."""
+    given = heading(ins_topic) if heading else logged_heading(flight, ins_topic)
+    time_s = flight.time_s(ins_topic)
+    inside = (time_s >= span_s[0]) & (time_s <= span_s[1])
+    return heading_steps(time_s[inside], np.asarray(given.values_deg)[inside], settings)
 
 
 def _why_nothing_is_used(samples: Samples, settings: HeadingSettings) -> str:

@@ -208,9 +208,13 @@ def spectrum_figure(
 
 def model_density(frequency_hz: FloatArray, parameters: FloatArray, inverse_speed: float, step_s: float) -> FloatArray:
     """One-sided spectral density of the noise model, deg^2/Hz, at parameters as in ``noise.PARAMETER_NAMES``."""
-    white, correlated, tau, sway, natural, damping, heading_white, motion = np.exp(parameters)
+    white, correlated, tau, sway, natural, damping, heading_white, motion, _segment, wander, wander_s = np.exp(
+        parameters
+    )
     scale2 = np.rad2deg(inverse_speed) ** 2
     omega, peak = 2.0 * np.pi * frequency_hz, 2.0 * np.pi * natural
     markov = 4.0 * correlated**2 * tau / (1.0 + (omega * tau) ** 2)
     resonance = 8.0 * damping * peak**3 * sway**2 / ((peak**2 - omega**2) ** 2 + (2.0 * damping * peak * omega) ** 2)
-    return np.asarray(scale2 * motion**2 * markov + resonance + 2.0 * step_s * (scale2 * white**2 + heading_white**2))
+    slow = 4.0 * wander**2 * wander_s / (1.0 + (omega * wander_s) ** 2)
+    whites = 2.0 * step_s * (scale2 * white**2 + heading_white**2)
+    return np.asarray(scale2 * motion**2 * markov + slow + resonance + whites)

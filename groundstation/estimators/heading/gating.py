@@ -11,17 +11,24 @@ from groundstation.base.records import BoolArray
 from groundstation.estimators.heading.samples import GATE_TEXT, USED, Samples
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.known import Interval
+from groundstation.tables.phases import Phases
+
+TAKE_OFF = "take-off run"  # the phase, and the reason: power crabs the aircraft
 
 
-def gate_samples(samples: Samples, settings: HeadingSettings, request: HeadingRequest) -> Samples:
+def gate_samples(
+    samples: Samples, settings: HeadingSettings, request: HeadingRequest, phases: Phases | None = None
+) -> Samples:
     """Say of every epoch why it is used or not, and number the straight segments.
 
-    Later reasons give way to earlier ones: excluded, no heading, ground, geometry, integrity, too slow, turning,
-    outlier, GNSS gap. A forced interval overrides ``too slow``, ``turning`` and ``outlier``.
+    Later reasons give way to earlier ones: excluded, no heading, ground, geometry, integrity, too fast, too slow,
+    turning, take-off run, outlier, GNSS gap. A forced interval overrides those from ``too fast`` on.
     """
     speed = samples.speed_mps
     gate = np.full(len(samples), USED, dtype=GATE_TEXT)
     gate[_outliers(samples, settings)] = "outlier"
+    if phases is not None:
+        gate[phases.at(samples.time_s) == TAKE_OFF] = TAKE_OFF
     with np.errstate(invalid="ignore"):
         gate[~(np.abs(samples.rate_dps) <= settings.turn_rate_max_dps)] = "turning"
     gate[~(speed > settings.taxi_speed_min_mps)] = "too slow"

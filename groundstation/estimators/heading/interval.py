@@ -1,26 +1,27 @@
 """The honest interval: the heading error averaged over what the noise may be, given standstill and taxi data.
 
 The width of an interval hangs on the spectral density at zero frequency, which one run shows only dimly. So the
-eight parameters of the noise model (``noise.py``) are not fixed at a best fit: they have broad priors, their
+parameters of the noise model (``noise.py``) are not fixed at a best fit: they have broad priors, their
 posterior is sampled, and the answer is the mixture of the normal distributions that belong to the draws. Short runs
 and short standstills get heavier tails by themselves.
 
 The sampling itself is in ``sampling.py``.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.units import DEG_PER_RAD
+from groundstation.base.units import ARCMIN_PER_DEG, DEG_PER_RAD
 from groundstation.estimators.heading import noise
 from groundstation.estimators.heading.sampling import find_mode, sample
 
 FloatArray = NDArray[np.float64]
 
 # Priors: each parameter is log-normal. (median, sigma of the natural logarithm): two sigma either side reach over
-# 0.007-0.37 m/s, 0.007-0.12 m/s, 0.4-45 s, 0.05-3 deg, 0.1-1.3 Hz, 0.012-0.99, 0.003-0.2 deg.
+# 0.007-0.37 m/s, 0.007-0.12 m/s, 0.4-45 s, 0.05-3 deg, 0.1-1.3 Hz, 0.012-0.99, 0.003-0.2 deg, 0.2-5 times,
+# 0.1-11 arcmin (twice), 8-440 s.
 PRIOR: dict[str, tuple[float, float]] = {
     "white_mps": (0.05, 1.0),
     "correlated_mps": (0.03, 0.7),
@@ -29,10 +30,15 @@ PRIOR: dict[str, tuple[float, float]] = {
     "sway_hz": (0.36, 0.65),
     "sway_damping": (0.15, 1.25),
     "heading_white_deg": (0.025, 1.05),
-    "motion_factor": (1.0, 0.25),
+    "motion_factor": (1.0, 0.8),
+    "segment_deg": (1.0 / ARCMIN_PER_DEG, 1.2),
+    "wander_deg": (1.0 / ARCMIN_PER_DEG, 1.2),
+    "wander_s": (60.0, 1.0),
 }
 PRIOR_MEAN = np.log([PRIOR[name][0] for name in noise.PARAMETER_NAMES])
 PRIOR_SIGMA = np.array([PRIOR[name][1] for name in noise.PARAMETER_NAMES])
+SPREAD = (noise.SEGMENT, noise.WANDER)  # what parts of a run have of their own
+NO_SPREAD = np.log(1e-3 / ARCMIN_PER_DEG)
 
 
 @dataclass(frozen=True)
@@ -54,11 +60,15 @@ NO_STANDSTILL = StandstillVelocities(np.zeros(0), np.zeros(0), np.zeros(0))
 
 @dataclass(frozen=True)
 class Regressor:
-    """A known shape times an unknown factor with a normal prior, beside the constant error."""
+    """A known shape times an unknown factor with a normal prior, beside the constant error.
+
+    ``is_apart``: what it leaves in the error is told apart from what was measured.
+    """
 
     values: FloatArray
     prior_mean: float
     prior_sigma: float
+    is_apart: bool = False
 
 
 @dataclass(frozen=True)
@@ -75,6 +85,8 @@ class Differences:
         Known shapes with unknown factors, beside the constant error.
     error_prior_deg : (mean, sigma), optional
         Prior of the error; flat without one.
+    segment : ndarray of int64, shape (n,), optional
+        Number of the segment of each; without it all are of one piece: no error of a segment's own, and no wander.
     """
 
     time_s: FloatArray
@@ -83,6 +95,7 @@ class Differences:
     speed_mps: FloatArray
     regressors: tuple[Regressor, ...] = ()
     error_prior_deg: tuple[float, float] | None = None
+    segment: NDArray[np.int64] | None = None
 
 
 @dataclass(frozen=True)
@@ -92,11 +105,13 @@ class ErrorPosterior:
     Parameters
     ----------
     mean_deg, sigma_deg, weight : ndarray, shape (k,)
+    measured_sigma_deg : ndarray, shape (k,)
+        Sigma without what the regressors leave in the error that are told apart.
     coefficients, coefficient_sigma : ndarray, shape (k, c)
         Regression coefficients of each draw, the heading error first.
     growth_sigma_deg : ndarray, shape (k, m)
-        Sigma after the samples counted in ``growth_samples``.
-    parameters : ndarray, shape (k, 8)
+        Measured sigma after the samples counted in ``growth_samples``.
+    parameters : ndarray, shape (k, 11)
         Draws, natural logarithms, in the order of ``noise.PARAMETER_NAMES``.
     effective_draws : float
         1 / sum of squared weights: a small figure means a badly sampled posterior.
@@ -106,6 +121,7 @@ class ErrorPosterior:
 
     mean_deg: FloatArray
     sigma_deg: FloatArray
+    measured_sigma_deg: FloatArray
     weight: FloatArray
     coefficients: FloatArray
     coefficient_sigma: FloatArray
@@ -125,8 +141,13 @@ class ErrorPosterior:
         """Posterior standard deviation."""
         return float(np.sqrt(self.weight @ (self.sigma_deg**2 + (self.mean_deg - self.error_deg) ** 2)))
 
+    @property
+    def apart_sigma_deg(self) -> float:
+        """Standard deviation of what the regressors told apart leave in the error."""
+        return float(np.sqrt(self.weight @ np.maximum(self.sigma_deg**2 - self.measured_sigma_deg**2, 0.0)))
+
     def typical(self) -> FloatArray:
-        """Posterior mean of the parameters (natural logarithms), shape (8,)."""
+        """Posterior mean of the parameters (natural logarithms), shape (11,)."""
         return np.asarray(self.weight @ self.parameters)
 
     def parameter(self, name: str) -> float:
@@ -141,9 +162,14 @@ class ErrorPosterior:
         spread = self.coefficient_sigma[:, index] ** 2 + (self.coefficients[:, index] - mean) ** 2
         return mean, float(np.sqrt(self.weight @ spread))
 
-    def interval_deg(self, probability: float = 0.95, extra_sigma_deg: float = 0.0) -> tuple[float, float]:
-        """Equal-tailed interval of the mixture, widened by a further independent sigma."""
-        sigma = np.hypot(self.sigma_deg, extra_sigma_deg)
+    def interval_deg(
+        self, probability: float = 0.95, extra_sigma_deg: float = 0.0, *, is_measured: bool = False
+    ) -> tuple[float, float]:
+        """Equal-tailed interval of the mixture, widened by a further independent sigma.
+
+        ``is_measured``: without what the regressors leave in the error that are told apart.
+        """
+        sigma = np.hypot(self.measured_sigma_deg if is_measured else self.sigma_deg, extra_sigma_deg)
         tail = 0.5 * (1.0 - probability)
         return (
             mixture_quantile(tail, self.mean_deg, sigma, self.weight),
@@ -158,10 +184,16 @@ class ErrorPosterior:
         return np.array([mixture_quantile(upper, zeros, sigma, self.weight) for sigma in columns])
 
     def even_draws(self, count: int = 40) -> FloatArray:
-        """Draws of the parameters with equal weights, shape (count, 8): systematic resampling."""
+        """Draws of the parameters with equal weights, shape (count, 11): systematic resampling."""
         places = (np.arange(count) + 0.5) / count
         index = np.minimum(np.searchsorted(np.cumsum(self.weight), places), len(self.weight) - 1)
         return np.asarray(self.parameters[index])
+
+    def draws_of_one_piece(self, count: int = 40) -> FloatArray:
+        """The same, the parts of a run taken to have nothing of their own: what they say against each other shows."""
+        draws = self.even_draws(count)
+        draws[:, SPREAD] = NO_SPREAD
+        return draws
 
 
 def mixture_quantile(probability: float, mean: FloatArray, sigma: FloatArray, weight: FloatArray) -> float:
@@ -190,7 +222,6 @@ class _Target:
 
     standstill: StandstillVelocities
     differences: Differences
-    checkpoints: NDArray[np.int64]
 
     def __post_init__(self) -> None:
         data, still = self.differences, self.standstill
@@ -204,7 +235,11 @@ class _Target:
             np.ascontiguousarray(np.column_stack(columns)),
             np.sin(direction_rad) * scale,
             -np.cos(direction_rad) * scale,
+            np.diff(data.segment, prepend=data.segment[:1]) != 0
+            if data.segment is not None
+            else np.zeros(len(data.time_s), dtype=bool),
         )
+        self.free = np.arange(len(PRIOR_MEAN) if data.segment is not None else noise.SEGMENT)
         gap_s = -1.0 if still.gap_s is None else float(still.gap_s)
         self.still = (
             np.ascontiguousarray(still.time_s, dtype=np.float64),
@@ -220,17 +255,24 @@ class _Target:
         self.last = np.array([len(data.time_s)], dtype=np.int64)
 
     def evaluate(self, thetas: FloatArray, checkpoints: NDArray[np.int64]) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Log posterior (k,), coefficients (k, c), variances (k, m, c)."""
+        """Log posterior (k,), coefficients (k, c), variances (k, m, c); thetas (k, 11)."""
         count, width = len(thetas), self.taxi[1].shape[1] - 1
         log_likelihood, estimate = np.empty(count), np.empty((count, width))
         variance = np.empty((count, len(checkpoints), width))
         bounded = np.clip(thetas, PRIOR_MEAN - 6.0 * PRIOR_SIGMA, PRIOR_MEAN + 6.0 * PRIOR_SIGMA)
         noise.evaluate(bounded, self.still, self.taxi, self.prior, checkpoints, log_likelihood, estimate, variance)
-        log_prior = -0.5 * np.sum(((thetas - PRIOR_MEAN) / PRIOR_SIGMA) ** 2, axis=1)
-        return log_likelihood + log_prior, estimate, variance
+        scaled = ((thetas - PRIOR_MEAN) / PRIOR_SIGMA)[:, self.free]
+        return log_likelihood - 0.5 * np.sum(scaled**2, axis=1), estimate, variance
+
+    def whole(self, thetas: FloatArray) -> FloatArray:
+        """All parameters, shape (k, 11), from those that are sampled."""
+        out = np.full((len(thetas), len(PRIOR_MEAN)), PRIOR_MEAN)
+        out[:, SPREAD] = NO_SPREAD
+        out[:, self.free] = thetas
+        return out
 
     def log_density(self, thetas: FloatArray) -> FloatArray:
-        return self.evaluate(thetas, self.last)[0]
+        return self.evaluate(self.whole(thetas), self.last)[0]
 
 
 def _start(differences: Differences, standstill: StandstillVelocities) -> FloatArray:
@@ -268,26 +310,35 @@ def error_posterior(
     """
     count = len(differences.time_s)
     checkpoints = np.unique(np.linspace(min(2, count), count, growth).astype(np.int64))
-    target = _Target(standstill, differences, checkpoints)
-    mode, has_converged = find_mode(target.log_density, _start(differences, standstill), PRIOR_SIGMA)
-    points, weight = sample(target.log_density, mode, PRIOR_SIGMA, draws, np.random.default_rng(seed))
+    target = _Target(standstill, differences)
+    scale = PRIOR_SIGMA[target.free]
+    mode, has_converged = find_mode(target.log_density, _start(differences, standstill)[target.free], scale)
+    points, weight = sample(target.log_density, mode, scale, draws, np.random.default_rng(seed))
     kept = weight > 1e-5 / len(weight)
-    points, weight = points[kept], weight[kept] / weight[kept].sum()
-    _log_density, coefficients, variance = target.evaluate(points, checkpoints)
+    points, weight = target.whole(points[kept]), weight[kept] / weight[kept].sum()
+    _log_density, coefficients, variance = target.evaluate(points, target.last)
     coefficients[:, 0] += target.reference_deg
-    sigma = np.sqrt(np.maximum(variance, 1e-18))
+    sigma = np.sqrt(np.maximum(variance[:, -1, :], 1e-18))
+    measured = _Target(standstill, without_apart(differences)).evaluate(points, checkpoints)[2][:, :, 0]
+    measured_sigma = np.sqrt(np.maximum(measured, 1e-18))
     return ErrorPosterior(
         mean_deg=coefficients[:, 0],
-        sigma_deg=sigma[:, -1, 0],
+        sigma_deg=sigma[:, 0],
+        measured_sigma_deg=measured_sigma[:, -1],
         weight=weight,
         coefficients=coefficients,
-        coefficient_sigma=sigma[:, -1, :],
+        coefficient_sigma=sigma,
         growth_samples=checkpoints,
-        growth_sigma_deg=sigma[:, :, 0],
+        growth_sigma_deg=measured_sigma,
         parameters=points,
         effective_draws=float(1.0 / np.sum(weight**2)),
         has_converged=has_converged,
     )
+
+
+def without_apart(differences: Differences) -> Differences:
+    """The same without the regressors that are told apart."""
+    return replace(differences, regressors=tuple(one for one in differences.regressors if not one.is_apart))
 
 
 def fixed_noise_estimate(
@@ -298,7 +349,7 @@ def fixed_noise_estimate(
     The error comes first, then the factors of the regressors. For parts of a run (segments, directions) and further
     regressors (drift), with the noise as found from the whole of it.
     """
-    target = _Target(standstill, differences, np.array([len(differences.time_s)], dtype=np.int64))
+    target = _Target(standstill, differences)
     _log_density, coefficients, variance = target.evaluate(parameters, target.last)
     coefficients[:, 0] += target.reference_deg
     mean = coefficients.mean(axis=0)
@@ -308,10 +359,12 @@ def fixed_noise_estimate(
 
 def misfit(differences: Differences, parameters: FloatArray) -> float:
     """Mean square of the whitened residuals: 1 where the differences are as noisy as the parameters say, shape ()."""
-    target = _Target(NO_STANDSTILL, differences, np.array([len(differences.time_s)], dtype=np.int64))
+    target = _Target(NO_STANDSTILL, differences)
     width = int(target.taxi[1].shape[1])
     information = np.zeros((1, width, width))
-    noise.taxi_filter(*target.taxi, -1.0, parameters, np.zeros(3), target.last, information, np.zeros((0, 5)))
+    noise.taxi_filter(
+        *target.taxi, -1.0, parameters, np.zeros(3), target.last, information, np.zeros((0, 1 + noise.STATES))
+    )
     mean, inverse = np.zeros(width - 1), np.zeros((width - 1, width - 1))
     noise.solve_normal_equations(information[0], target.prior[0], target.prior[1], mean, inverse)
     full = np.concatenate([[1.0], -mean])
@@ -321,11 +374,9 @@ def misfit(differences: Differences, parameters: FloatArray) -> float:
 
 def sample_weights(differences: Differences, parameters: FloatArray) -> FloatArray:
     """Weight of every sample in the estimate of the error, shape (n,), sum 1, for given noise parameters."""
-    target = _Target(NO_STANDSTILL, differences, np.array([len(differences.time_s)], dtype=np.int64))
-    time_s, columns, from_north, from_east = target.taxi
-    history = np.zeros((len(time_s), 5))
+    target = _Target(NO_STANDSTILL, differences)
+    time_s, columns, from_north, from_east, is_start = target.taxi
+    history = np.zeros((len(time_s), 1 + noise.STATES))
     information = np.zeros((1, columns.shape[1], columns.shape[1]))
-    noise.taxi_filter(
-        time_s, columns, from_north, from_east, -1.0, parameters, np.zeros(3), target.last, information, history
-    )
-    return np.asarray(noise.generalised_weights(time_s, from_north, from_east, parameters, history))
+    noise.taxi_filter(*target.taxi, -1.0, parameters, np.zeros(3), target.last, information, history)
+    return np.asarray(noise.generalised_weights(time_s, from_north, from_east, is_start, parameters, history))

@@ -5,7 +5,11 @@ Gauss-Markov process. On taxi the same processes, turned across the track and di
 difference d = INS heading - track, beside the sway of the airframe (a noise-driven damped oscillator), white
 heading noise, the error looked for and, where asked, an antenna arm:
 
-    d_i = error + arm * (-omega_i / V_i) + sway(t_i) + (sin(track) g_N - cos(track) g_E) / V_i + white_i
+    d_i = error + arm * (-omega_i / V_i) + segment + wander(t_i) + sway(t_i)
+          + (sin(track) g_N - cos(track) g_E) / V_i + white_i
+
+Each segment has an error of its own, and INS heading minus path wanders (a first-order Gauss-Markov process): what
+segments and minutes say against each other is in the sizes of the two.
 
 Everything is linear and Gaussian, samples may come at any times, and what counts for the error of a mean, the
 spectral density at zero frequency, is that of the model. The regression coefficients are found by generalised least
@@ -20,12 +24,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.compile import compiled
+from groundstation.base.compile import compiled, inlined
 
 FloatArray = NDArray[np.float64]
 
 # Parameters, all as natural logarithms, in this order.
-WHITE, CORRELATED, TAU, SWAY, FREQUENCY, DAMPING, HEADING_WHITE, MOTION = range(8)
+WHITE, CORRELATED, TAU, SWAY, FREQUENCY, DAMPING, HEADING_WHITE, MOTION, SEGMENT, WANDER, WANDER_TAU = range(11)
 PARAMETER_NAMES = (
     "white_mps",
     "correlated_mps",
@@ -35,7 +39,11 @@ PARAMETER_NAMES = (
     "sway_damping",
     "heading_white_deg",
     "motion_factor",  # correlated GNSS error in motion over that at standstill
+    "segment_deg",  # error that each segment has of its own
+    "wander_deg",  # slow wander of INS heading minus path
+    "wander_s",
 )
+STATES = 6  # GNSS north and east (m/s), sway (deg), sway rate (deg/s), own error of the segment, wander (deg)
 DAMPING_MAX = 0.99
 _LOG_2PI = math.log(2.0 * math.pi)
 
@@ -79,12 +87,24 @@ def standstill_filter(
     return log_likelihood - len(time_s) * _LOG_2PI
 
 
+@inlined
+def _oscillator(theta: FloatArray, step_s: float, f: FloatArray) -> None:
+    """Transition of sway and sway rate over a step, exact, into ``f`` of shape (2, 2)."""
+    natural = 2.0 * math.pi * math.exp(theta[FREQUENCY])
+    zeta = min(math.exp(theta[DAMPING]), DAMPING_MAX)
+    decay, damped = zeta * natural, natural * math.sqrt(1.0 - zeta * zeta)
+    shrink, sine, cosine = math.exp(-decay * step_s), math.sin(damped * step_s), math.cos(damped * step_s)
+    f[0, 0], f[0, 1] = shrink * (cosine + decay / damped * sine), shrink * sine / damped
+    f[1, 0], f[1, 1] = -natural * natural * f[0, 1], shrink * (cosine - decay / damped * sine)
+
+
 @compiled
 def taxi_filter(
     time_s: FloatArray,
     columns: FloatArray,
     from_north: FloatArray,
     from_east: FloatArray,
+    is_start: NDArray[np.bool_],
     start_gap_s: float,
     theta: FloatArray,
     start: FloatArray,
@@ -100,96 +120,89 @@ def taxi_filter(
         Column 0 the differences, degrees, the others the regressors.
     from_north, from_east : ndarray, shape (n,)
         What one m/s of GNSS velocity error does to the difference, degrees.
+    is_start : ndarray of bool, shape (n,)
+        First sample of a segment: its own error is drawn afresh there.
     start_gap_s, start
         Time since the standstill state ``start`` (mean north, mean east, variance); negative: no standstill.
     checkpoints : ndarray of int64, shape (k,)
         Numbers of samples, increasing, after which the information is written out.
     information : ndarray, shape (k, c, c)
         Out: sums of products of whitened columns.
-    history : ndarray, shape (n, 5) or (0, 5)
+    history : ndarray, shape (n, 7) or (0, 7)
         Out, where there is room: S and K of every sample.
 
-    Letters: P covariance and x states in the order g_north, g_east (m/s), sway (deg), sway rate (deg/s);
-    S innovation variance (deg^2), K gain, F the transition of the oscillator.
+    Letters: P covariance and x states in the order of ``STATES``; q stationary variances; S innovation variance
+    (deg^2), K gain, H measurement, F the transition of the oscillator, the other states decaying by ``keep``.
     """
     count, width = columns.shape
-    white2, variance = math.exp(2.0 * theta[0]), math.exp(2.0 * theta[1])
-    tau, sway2 = math.exp(theta[2]), math.exp(2.0 * theta[3])
-    natural = 2.0 * math.pi * math.exp(theta[4])
-    zeta = min(math.exp(theta[5]), DAMPING_MAX)
-    heading2 = math.exp(2.0 * theta[6])
-    motion = math.exp(theta[7])
-    decay, damped = zeta * natural, natural * math.sqrt(1.0 - zeta * zeta)
-    rate2 = sway2 * natural * natural
-
-    p00 = p11 = variance
-    p22, p33 = sway2, rate2
-    p01 = p02 = p03 = p12 = p13 = p23 = 0.0
-    x = np.zeros((width, 4))
+    white2, heading2 = math.exp(2.0 * theta[WHITE]), math.exp(2.0 * theta[HEADING_WHITE])
+    motion = math.exp(theta[MOTION])
+    q = np.zeros(STATES)
+    q[0] = q[1] = math.exp(2.0 * theta[CORRELATED])
+    q[2] = math.exp(2.0 * theta[SWAY])
+    q[3] = q[2] * (2.0 * math.pi * math.exp(theta[FREQUENCY])) ** 2
+    q[4], q[5] = math.exp(2.0 * theta[SEGMENT]), math.exp(2.0 * theta[WANDER])
+    P, x, K, H = np.zeros((STATES, STATES)), np.zeros((width, STATES)), np.zeros(STATES), np.zeros(STATES)
+    for a in range(STATES):
+        P[a, a] = q[a]
     if start_gap_s >= 0.0:
-        keep = math.exp(-start_gap_s / tau)
-        p00 = p11 = keep * keep * (start[2] - variance) + variance
-        x[0, 0], x[0, 1] = keep * start[0], keep * start[1]
-    total = np.zeros((width, width))
-    innovation = np.zeros(width)
-    log_determinant, last_step = 0.0, -1.0
-    keep = f00 = f01 = f10 = f11 = 0.0
-    written = 0
+        kept = math.exp(-start_gap_s / math.exp(theta[TAU]))
+        P[0, 0] = P[1, 1] = kept * kept * (start[2] - q[0]) + q[0]
+        x[0, 0], x[0, 1] = kept * start[0], kept * start[1]
+    total, innovation = np.zeros((width, width)), np.zeros(width)
+    keep, F = np.ones(STATES), np.eye(2)
+    log_determinant, last_step, written = 0.0, -1.0, 0
     for i in range(count):
+        step = time_s[i] - time_s[i - 1] if i > 0 else 0.0
         if i > 0:
-            step = time_s[i] - time_s[i - 1]
             if abs(step - last_step) > 1e-6:
-                last_step, keep, shrink = step, math.exp(-step / tau), math.exp(-decay * step)
-                sine, cosine = math.sin(damped * step), math.cos(damped * step)
-                f00 = shrink * (cosine + decay / damped * sine)
-                f01 = shrink * sine / damped
-                f10 = -natural * natural * f01
-                f11 = shrink * (cosine - decay / damped * sine)
-            keep2 = keep * keep
-            p00 = keep2 * (p00 - variance) + variance
-            p11 = keep2 * (p11 - variance) + variance
-            p01 *= keep2
-            p02, p03 = keep * (f00 * p02 + f01 * p03), keep * (f10 * p02 + f11 * p03)
-            p12, p13 = keep * (f00 * p12 + f01 * p13), keep * (f10 * p12 + f11 * p13)
+                last_step = step
+                keep[0] = keep[1] = math.exp(-step / math.exp(theta[TAU]))
+                keep[5] = math.exp(-step / math.exp(theta[WANDER_TAU]))
+                _oscillator(theta, step, F)
             # Stationary covariance is diagonal, so only the deviation from it is moved: no process-noise matrix.
-            q22, q33 = p22 - sway2, p33 - rate2
-            a0, a1 = f00 * q22 + f01 * p23, f00 * p23 + f01 * q33
-            b0, b1 = f10 * q22 + f11 * p23, f10 * p23 + f11 * q33
-            p22, p23, p33 = a0 * f00 + a1 * f01 + sway2, a0 * f10 + a1 * f11, b0 * f10 + b1 * f11 + rate2
+            for a in range(STATES):
+                P[a, a] -= q[a]
+            for a in range(STATES):
+                low, high = P[2, a], P[3, a]
+                P[2, a], P[3, a] = F[0, 0] * low + F[0, 1] * high, F[1, 0] * low + F[1, 1] * high
+            for a in range(STATES):
+                low, high = P[a, 2], P[a, 3]
+                P[a, 2], P[a, 3] = F[0, 0] * low + F[0, 1] * high, F[1, 0] * low + F[1, 1] * high
+            fresh = 0.0 if is_start[i] else 1.0
+            keep[4] = fresh
+            for a in range(STATES):
+                for b in range(STATES):
+                    P[a, b] *= keep[a] * keep[b]
+            for a in range(STATES):
+                P[a, a] += q[a]
             for j in range(width):
-                x[j, 0] *= keep
-                x[j, 1] *= keep
-                sway, rate = x[j, 2], x[j, 3]
-                x[j, 2], x[j, 3] = f00 * sway + f01 * rate, f10 * sway + f11 * rate
-        h0, h1 = motion * from_north[i], motion * from_east[i]
-        c0 = p00 * h0 + p01 * h1 + p02
-        c1 = p01 * h0 + p11 * h1 + p12
-        c2 = p02 * h0 + p12 * h1 + p22
-        c3 = p03 * h0 + p13 * h1 + p23
-        s = h0 * c0 + h1 * c1 + c2 + white2 * (from_north[i] * from_north[i] + from_east[i] * from_east[i]) + heading2
+                low, high = x[j, 2], x[j, 3]
+                x[j, 2], x[j, 3] = F[0, 0] * low + F[0, 1] * high, F[1, 0] * low + F[1, 1] * high
+                for a in range(STATES):
+                    x[j, a] *= keep[a]
+        H[0], H[1], H[2], H[4], H[5] = motion * from_north[i], motion * from_east[i], 1.0, 1.0, 1.0
+        s = white2 * (from_north[i] * from_north[i] + from_east[i] * from_east[i]) + heading2
+        for a in range(STATES):
+            K[a] = P[a, 0] * H[0] + P[a, 1] * H[1] + P[a, 2] + P[a, 4] + P[a, 5]
+            s += H[a] * K[a]
         log_determinant += math.log(s)
-        k0, k1, k2, k3 = c0 / s, c1 / s, c2 / s, c3 / s
+        inverse = 1.0 / s
+        for a in range(STATES):
+            for b in range(STATES):
+                P[a, b] -= K[a] * K[b] * inverse
+        for a in range(STATES):
+            K[a] *= inverse
         if len(history) > 0:
-            history[i, 0], history[i, 1], history[i, 2], history[i, 3], history[i, 4] = s, k0, k1, k2, k3
-        p00 -= k0 * c0
-        p01 -= k0 * c1
-        p02 -= k0 * c2
-        p03 -= k0 * c3
-        p11 -= k1 * c1
-        p12 -= k1 * c2
-        p13 -= k1 * c3
-        p22 -= k2 * c2
-        p23 -= k2 * c3
-        p33 -= k3 * c3
+            history[i, 0] = s
+            history[i, 1:] = K
         for j in range(width):
-            v = columns[i, j] - h0 * x[j, 0] - h1 * x[j, 1] - x[j, 2]
-            x[j, 0] += k0 * v
-            x[j, 1] += k1 * v
-            x[j, 2] += k2 * v
-            x[j, 3] += k3 * v
+            v = columns[i, j] - H[0] * x[j, 0] - H[1] * x[j, 1] - x[j, 2] - x[j, 4] - x[j, 5]
+            for a in range(STATES):
+                x[j, a] += K[a] * v
             innovation[j] = v
             for m in range(j + 1):
-                total[j, m] += v * innovation[m] / s
+                total[j, m] += v * innovation[m] * inverse
         if written < len(checkpoints) and i + 1 == checkpoints[written]:
             for j in range(width):
                 for m in range(j + 1):
@@ -201,44 +214,47 @@ def taxi_filter(
 
 @compiled
 def generalised_weights(
-    time_s: FloatArray, from_north: FloatArray, from_east: FloatArray, theta: FloatArray, history: FloatArray
+    time_s: FloatArray,
+    from_north: FloatArray,
+    from_east: FloatArray,
+    is_start: NDArray[np.bool_],
+    theta: FloatArray,
+    history: FloatArray,
 ) -> FloatArray:
     """Weight of every sample in the generalised least-squares mean, shape (n,), sum 1.
 
     The weights are the row sums of the inverse covariance: the gradient of half the quadratic form of a constant,
-    taken backwards through the filter whose ``history`` (S and K) is given. Letters as in ``taxi_filter``.
+    taken backwards through the filter whose ``history`` (S and K) is given. Letters as in ``taxi_filter``; r is the
+    gradient with respect to the state.
     """
-    count = len(time_s)
-    tau, motion = math.exp(theta[2]), math.exp(theta[7])
-    natural = 2.0 * math.pi * math.exp(theta[4])
-    zeta = min(math.exp(theta[5]), DAMPING_MAX)
-    decay, damped = zeta * natural, natural * math.sqrt(1.0 - zeta * zeta)
-    transition = np.zeros((count, 5))
-    innovation = np.zeros(count)
-    x0 = x1 = x2 = x3 = 0.0
-    for i in range(count):
+    count, motion = len(time_s), math.exp(theta[MOTION])
+    H, x, r, keep, F = np.zeros(STATES), np.zeros(STATES), np.zeros(STATES), np.ones(STATES), np.eye(2)
+    H[2] = H[4] = H[5] = 1.0
+    innovation, weights = np.zeros(count), np.zeros(count)
+    for turn in range(2 * count):
+        is_forward = turn < count
+        i = turn if is_forward else 2 * count - 1 - turn
         step = time_s[i] - time_s[i - 1] if i > 0 else 0.0
-        shrink, sine, cosine = math.exp(-decay * step), math.sin(damped * step), math.cos(damped * step)
-        keep = math.exp(-step / tau)
-        f00, f01 = shrink * (cosine + decay / damped * sine), shrink * sine / damped
-        f10, f11 = -natural * natural * f01, shrink * (cosine - decay / damped * sine)
-        transition[i, 0], transition[i, 1], transition[i, 2] = keep, f00, f01
-        transition[i, 3], transition[i, 4] = f10, f11
-        x0, x1, x2, x3 = keep * x0, keep * x1, f00 * x2 + f01 * x3, f10 * x2 + f11 * x3
-        v = 1.0 - motion * (from_north[i] * x0 + from_east[i] * x1) - x2
-        innovation[i] = v
-        x0, x1 = x0 + history[i, 1] * v, x1 + history[i, 2] * v
-        x2, x3 = x2 + history[i, 3] * v, x3 + history[i, 4] * v
-    weights = np.zeros(count)
-    r0 = r1 = r2 = r3 = 0.0
-    for i in range(count - 1, -1, -1):
-        u = innovation[i] / history[i, 0]
-        u += history[i, 1] * r0 + history[i, 2] * r1 + history[i, 3] * r2 + history[i, 4] * r3
-        weights[i] = u
-        r0, r1, r2 = r0 - motion * from_north[i] * u, r1 - motion * from_east[i] * u, r2 - u
-        keep = transition[i, 0]
-        r0, r1 = keep * r0, keep * r1
-        r2, r3 = transition[i, 1] * r2 + transition[i, 3] * r3, transition[i, 2] * r2 + transition[i, 4] * r3
+        keep[0] = keep[1] = math.exp(-step / math.exp(theta[TAU]))
+        keep[5] = math.exp(-step / math.exp(theta[WANDER_TAU]))
+        keep[4] = 0.0 if is_start[i] else 1.0
+        _oscillator(theta, step, F)
+        H[0], H[1] = motion * from_north[i], motion * from_east[i]
+        if is_forward:
+            x[2], x[3] = F[0, 0] * x[2] + F[0, 1] * x[3], F[1, 0] * x[2] + F[1, 1] * x[3]
+            innovation[i] = 1.0
+            for a in range(STATES):
+                x[a] *= keep[a]
+                innovation[i] -= H[a] * x[a]
+            for a in range(STATES):
+                x[a] += history[i, 1 + a] * innovation[i]
+        else:
+            weights[i] = innovation[i] / history[i, 0]
+            for a in range(STATES):
+                weights[i] += history[i, 1 + a] * r[a]
+            for a in range(STATES):
+                r[a] = (r[a] - H[a] * weights[i]) * keep[a]
+            r[2], r[3] = F[0, 0] * r[2] + F[1, 0] * r[3], F[0, 1] * r[2] + F[1, 1] * r[3]
     total = weights.sum()
     for i in range(count):
         weights[i] /= total
@@ -252,7 +268,7 @@ def solve_normal_equations(
     """Solve the normal equations with normal priors; returns log determinant plus residual sum of squares.
 
     ``information`` has shape (c, c), column 0 the data; ``mean`` (c - 1,) and ``inverse`` (c - 1, c - 1) are written.
-    A prior precision of 0 is a flat prior. Gauss-Jordan: the matrix is positive definite and at most 3 by 3.
+    A prior precision of 0 is a flat prior. Gauss-Jordan: the matrix is positive definite and small.
     """
     width = len(prior_mean)
     work = np.zeros((width, 2 * width))
@@ -292,20 +308,20 @@ def solve_normal_equations(
 def evaluate(
     thetas: FloatArray,
     standstill: tuple[FloatArray, FloatArray, FloatArray, int, float],
-    taxi: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    taxi: tuple[FloatArray, FloatArray, FloatArray, FloatArray, NDArray[np.bool_]],
     prior: tuple[FloatArray, FloatArray],
     checkpoints: NDArray[np.int64],
     log_likelihood: FloatArray,
     estimate: FloatArray,
     variance: FloatArray,
 ) -> None:
-    """Log likelihood, estimate and its variance for every row of ``thetas``, shape (k, 8).
+    """Log likelihood, estimate and its variance for every row of ``thetas``, shape (k, 11).
 
     Parameters
     ----------
     standstill : (time_s, north, east, restart, gap_s)
         Velocities at standstill; ``gap_s`` from its last sample to the first of taxi, negative: not linked.
-    taxi : (time_s, columns, from_north, from_east)
+    taxi : (time_s, columns, from_north, from_east, is_start)
         As in ``taxi_filter``.
     prior : (mean, precision), shapes (c - 1,)
         Normal priors of the regression coefficients.
@@ -318,7 +334,7 @@ def evaluate(
     information = np.zeros((len(checkpoints), width, width))
     start = np.zeros(3)
     mean, inverse = np.zeros(width - 1), np.zeros((width - 1, width - 1))
-    history = np.zeros((0, 5))
+    history = np.zeros((0, 1 + STATES))
     for k in range(len(thetas)):
         theta = thetas[k]
         total = standstill_filter(
@@ -333,7 +349,7 @@ def evaluate(
         )
         gap_s = standstill[4]
         log_determinant = taxi_filter(
-            taxi[0], taxi[1], taxi[2], taxi[3], gap_s, theta, start, checkpoints, information, history
+            taxi[0], taxi[1], taxi[2], taxi[3], taxi[4], gap_s, theta, start, checkpoints, information, history
         )
         rest = 0.0
         for m in range(len(checkpoints)):

@@ -7,18 +7,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.angles import mean_heading, wrap_180, wrap_360
+from groundstation.base.angles import mean_heading, unwrap, wrap_180, wrap_360
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.heading.samples import Samples
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.standstill import effective_samples
+from groundstation.estimators.inertial.noise import class_names, load_class
 from groundstation.estimators.known import SiteData
 from groundstation.results.heading import HeadingResult, OnboardComparison, RunwayCheck
 from groundstation.tables.table import Flight
 
 FloatArray = NDArray[np.float64]
-DRIFT_PRIOR_DEG_PER_H = 0.1  # sigma of the azimuth drift of an INS in order: all that taxi can add to it is noise
+DRIFT_LEAST_DEG_PER_H, DRIFT_UNKNOWN_DEG_PER_H = 0.1, 5.0  # sigma of the azimuth drift: least, and of an unknown INS
+CLASS_SIGMAS = 3.0
+HELD_SHARE = 0.3  # of that sigma, by which the drift in motion may differ from that at standstill
+LEAST_STANDING, STANDING_DEG = 20, 0.01  # samples; what people aboard and wind may turn an aircraft that stands
+S_PER_H = 3600.0
 RUNWAY_ALONG_DEG = 10.0
 REFERENCE_KEY = "reference.parking_heading_deg"
 REFERENCE_SIGMA_KEY = "reference.parking_heading_sigma_deg"
@@ -48,19 +53,47 @@ class Parking:
     residual_arcmin: float | None = None
 
 
-def shrunk_drift(drift_deg_per_h: float | None, sigma_deg_per_h: float | None) -> tuple[float, float]:
-    """Drift and sigma, deg/h, after the prior of an INS in order (0 +- 0.1 deg/h) has had its say.
+def drift_prior(ins_class: str, logged_class: str) -> float:
+    """Sigma of the azimuth drift of an INS, deg/h: three times the gyro drift of its class, at least 0.1.
+
+    The class is that of the aircraft file, else the log's where it is a shipped one; an INS of no known class may be a
+    tactical one.
 
     Examples
     --------
-    >>> drift, sigma = shrunk_drift(20.0, 10.0)
+    >>> drift_prior("navigation", ""), drift_prior("", "")
+    (0.1, 5.0)
+    """
+    name = ins_class or (logged_class.lower() if logged_class.lower() in class_names() else "")
+    return max(CLASS_SIGMAS * load_class(name).drift_dph, DRIFT_LEAST_DEG_PER_H) if name else DRIFT_UNKNOWN_DEG_PER_H
+
+
+def standstill_drift(time_s: FloatArray, heading_deg: FloatArray) -> tuple[float, float] | None:
+    """Slope of the INS heading while the aircraft stands, deg/h, and its sigma; None where the INS holds it."""
+    known = np.isfinite(heading_deg)
+    time_s, heading = time_s[known], unwrap(heading_deg[known])
+    span_s = float(np.ptp(time_s)) if len(time_s) > LEAST_STANDING else 0.0
+    if span_s <= 0.0 or float(np.ptp(heading)) == 0.0:
+        return None
+    centred = time_s - np.mean(time_s)
+    slope = float(centred @ heading / (centred @ centred))
+    left = heading - np.mean(heading) - slope * centred
+    error = float(np.std(left)) * np.sqrt(len(left) / effective_samples(left) / (centred @ centred))
+    return slope * S_PER_H, float(np.hypot(error, STANDING_DEG / span_s)) * S_PER_H
+
+
+def shrunk_drift(prior_sigma_deg_per_h: float, *measured: tuple[float, float] | None) -> tuple[float, float]:
+    """Drift and sigma, deg/h: 0 +- the prior of the INS, weighed with what was measured.
+
+    Examples
+    --------
+    >>> drift, sigma = shrunk_drift(0.1, (20.0, 10.0), None)
     >>> round(drift, 4), round(sigma, 4)
     (0.002, 0.1)
     """
-    if drift_deg_per_h is None or not sigma_deg_per_h:
-        return 0.0, DRIFT_PRIOR_DEG_PER_H
-    weight = DRIFT_PRIOR_DEG_PER_H**2 / (DRIFT_PRIOR_DEG_PER_H**2 + sigma_deg_per_h**2)
-    return weight * drift_deg_per_h, float(np.sqrt(weight)) * sigma_deg_per_h
+    known = [(drift, 1.0 / sigma**2) for drift, sigma in (one for one in measured if one) if sigma > 0.0]
+    weight = 1.0 / prior_sigma_deg_per_h**2 + sum(part for _drift, part in known)
+    return sum(drift * part for drift, part in known) / weight, float(weight**-0.5)
 
 
 def site_reference(site: SiteData) -> Reference | None:
@@ -142,23 +175,31 @@ def parking_heading(
     site: SiteData,
     error: tuple[float, float, float],
     drift: tuple[float | None, float | None],
+    drift_prior_deg_per_h: float,
 ) -> Parking:
     """Heading of the aircraft at the last standstill, corrected.
 
     heading = INS heading there - (error - drift x (t_taxi - t_parking)), because the error at parking was smaller than
-    the error on taxi by what it drifted in between. The drift is that of :func:`shrunk_drift`.
+    the error on taxi by what it drifted in between. The drift is that of :func:`shrunk_drift`, from the slope on taxi
+    and from that at standstill, which may be another than in motion by a share of the prior.
 
     Parameters
     ----------
     error : (error_deg, sigma_deg, t_taxi_s)
     drift : (drift, sigma), deg/h
+        On taxi.
+    drift_prior_deg_per_h : float
     """
     known = parking_reference(flight.metadata, site)
     reference = known.heading_deg if known else None
     if not in_interval.any() or not np.isfinite(samples.heading_deg[in_interval]).any():
         return Parking(reference_deg=reference)
     shown = mean_heading(samples.heading_deg[in_interval])
-    rate, rate_sigma = shrunk_drift(*drift)
+    standing = standstill_drift(samples.time_s[in_interval], samples.heading_deg[in_interval])
+    if standing is not None:
+        standing = standing[0], float(np.hypot(standing[1], HELD_SHARE * drift_prior_deg_per_h))
+    on_taxi = None if drift[0] is None or drift[1] is None else (drift[0], drift[1])
+    rate, rate_sigma = shrunk_drift(drift_prior_deg_per_h, on_taxi, standing)
     hours = (error[2] - float(np.mean(samples.time_s[in_interval]))) / 3600.0
     corrected = float(wrap_360(shown - (error[0] - rate * hours)))
     residual = None if reference is None else float(wrap_180(corrected - reference)) * ARCMIN_PER_DEG

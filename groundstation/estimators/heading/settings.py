@@ -34,6 +34,10 @@ class HeadingSettings:
     standstill_guard_s: float = number(2.0, 0.0)  # cut from both ends: the aircraft starts to move below the limit
     standstill_min_s: float = number(10.0, 0.0)  # paper: 10 to 30 s
     standstill_max_s: float = number(30.0, 0.0)
+    standstill_doubt_mps: float = number(
+        1.0, 0.0
+    )  # shown by GNSS on wheels, the heading quite still: still a standstill
+    standstill_still_deg: float = number(0.1, 0.0)  # what the heading then ranges over in standstill_min_s
     speed_of_mean_max_mps: float = number(0.01, 0.0)  # paper
     spectrum_max_s: float = number(300.0, 0.0)  # standstill used for the spectrum of the GNSS error
 
@@ -62,6 +66,9 @@ class HeadingSettings:
     variance_ratio_range: tuple[float, float] = (0.5, 2.0)
     sway_line_s: float = number(5.0, 0.0)
     drift_sigmas_max: float = number(3.0, 0.0)
+    disagreement_probability: float = number(0.01, 0.0, 1.0)  # that parts of a taxi disagree as much by chance
+    part_max_s: float = number(60.0, 5.0)  # a longer segment is judged in parts
+    step_min_deg: float = number(0.15, 0.0)  # of the INS heading between two samples, a turn allowed for
 
     # Lever arm and time offset
     use_latency: UseLatency = "when_observed"  # shift GNSS by its latency behind the INS, estimated from motion
@@ -72,7 +79,12 @@ class HeadingSettings:
     arm_prior_sigma_m: float = number(3.0, 0.0)
     arm_observable_sigma_m: float = number(1.0, 0.0)
     offset_prior_sigma_s: float = number(0.1, 0.0)
+    offset_prior_intervals: float = number(0.3, 0.0)  # of the GNSS interval, where that is more
     offset_observable_sigma_s: float = number(0.05, 0.0)
+
+    # Steady sideslip and mounting, where the aircraft file does not state them
+    sideslip_sigma_deg: float = number(0.25, 0.0)  # of a crosswind; at 10 m/s where the wind is logged
+    mounting_sigma_deg: float = number(0.1, 0.0)
 
     # Honest interval
     posterior_draws: int = number(400, LEAST_DRAWS)

@@ -17,19 +17,22 @@ from groundstation.estimators.heading.interval import (
     error_posterior,
     fixed_noise_estimate,
     sample_weights,
+    without_apart,
 )
 from groundstation.estimators.heading.recursion import Running, run_recursion
 from groundstation.estimators.heading.samples import Samples, without_arm
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.standstill import StandstillData
+from groundstation.estimators.heading.steady import SteadyPrior
 from groundstation.estimators.known import AircraftData
-from groundstation.results.heading import TaxiSegment
+from groundstation.results.heading import HeadingStep, TaxiSegment
 
 FloatArray = NDArray[np.float64]
 DRAWS_FOR_PARTS = 24
 MOST_SAMPLES = 3000  # of the honest interval; a longer taxi at a high rate is thinned
 LEAST_DRIFT_S = 5.0
 LEAST_IN_DIRECTION = 20  # samples
+STEP_SIGMA_DEG = 0.05  # of the size of a step, read off the INS heading
 FLAT_DEG_PER_S = 1e3
 
 
@@ -57,6 +60,9 @@ class Solution:
         Weighted mean time: the error belongs to it.
     drift_deg_per_h, drift_sigma_deg_per_h : float or None
     segments, directions : tuple of TaxiSegment
+    parts : tuple of TaxiSegment
+        The segments, long ones cut: what their errors say against each other is judged.
+    steps : tuple of HeadingStep
     """
 
     samples: Samples
@@ -73,6 +79,8 @@ class Solution:
     drift_sigma_deg_per_h: float | None
     segments: tuple[TaxiSegment, ...]
     directions: tuple[TaxiSegment, ...]
+    parts: tuple[TaxiSegment, ...]
+    steps: tuple[HeadingStep, ...]
 
     @property
     def difference_deg(self) -> FloatArray:
@@ -93,31 +101,50 @@ def take_samples(samples: Samples, mask: BoolArray | NDArray[np.intp]) -> Sample
     return replace(samples, **arrays)
 
 
-def _differences(used: Samples, knowledge: ArmKnowledge) -> Differences:
+def _differences(
+    used: Samples, knowledge: ArmKnowledge, steady: SteadyPrior, steps: tuple[HeadingStep, ...]
+) -> Differences:
     difference = _centred(used.difference_deg)
+    direction = wrap_360(used.heading_deg - np.median(difference))
     return Differences(
         time_s=used.time_s,
         difference_deg=difference,
-        direction_deg=wrap_360(used.heading_deg - np.median(difference)),
+        direction_deg=direction,
         speed_mps=used.speed_mps,
-        regressors=straight_regressors(used, knowledge),
+        regressors=(*straight_regressors(used, knowledge), *steady.regressors(direction), *_before(used, steps)),
+        segment=used.segment,
     )
 
 
-def solve(antenna: Samples, standstill: StandstillData, aircraft: AircraftData, settings: HeadingSettings) -> Solution:
+def _before(used: Samples, steps: tuple[HeadingStep, ...]) -> tuple[Regressor, ...]:
+    """What the differences before each step have less than those after it: the error is that after the last."""
+    return tuple(
+        Regressor((used.time_s < step.time_s).astype(np.float64), -step.size_deg, STEP_SIGMA_DEG) for step in steps
+    )
+
+
+def solve(
+    antenna: Samples,
+    standstill: StandstillData,
+    aircraft: AircraftData,
+    settings: HeadingSettings,
+    steady: SteadyPrior,
+    steps: tuple[HeadingStep, ...] = (),
+) -> Solution:
     """Find the error from gated samples with the velocities of the antenna."""
     knowledge = know_arm(antenna, aircraft, settings)
     uncorrected = _centred(antenna.difference_deg[antenna.is_used])
     samples = without_arm(antenna, knowledge.applied_arm_m, float(np.median(uncorrected)))
     used = take_samples(samples, samples.is_used)
-    differences = _differences(used, knowledge)
+    differences = _differences(used, knowledge, steady, steps)
     thinning = -(-len(used) // MOST_SAMPLES)
     thinned = _part(differences, slice(None, None, thinning))
     velocities = _velocities(antenna, standstill, float(used.time_s[0]), settings)
     posterior = error_posterior(thinned, velocities, draws=settings.posterior_draws, seed=settings.posterior_seed)
     weight = sample_weights(differences, posterior.typical())
-    reference_time_s = float(np.sum(weight * used.time_s))
-    draws = posterior.even_draws(DRAWS_FOR_PARTS)
+    current = np.where(used.time_s >= max((step.time_s for step in steps), default=-np.inf), weight, 0.0)
+    reference_time_s = float(np.sum(current * used.time_s) / np.sum(current)) if current.any() else steps[-1].time_s
+    draws = posterior.draws_of_one_piece(DRAWS_FOR_PARTS)
     drift, drift_sigma = _drift(thinned, reference_time_s, draws)
     segments = tuple(_segment(differences, used, used.segment == number, draws) for number in np.unique(used.segment))
     full_weight = np.zeros(len(samples))
@@ -137,6 +164,8 @@ def solve(antenna: Samples, standstill: StandstillData, aircraft: AircraftData, 
         drift_sigma_deg_per_h=drift_sigma,
         segments=segments,
         directions=_directions(differences, used, segments, draws),
+        parts=_parts(differences, used, segments, draws, settings.part_max_s),
+        steps=steps,
     )
 
 
@@ -148,6 +177,7 @@ def _part(differences: Differences, index: slice | BoolArray) -> Differences:
         direction_deg=differences.direction_deg[index],
         speed_mps=differences.speed_mps[index],
         regressors=tuple(replace(item, values=item.values[index]) for item in differences.regressors),
+        segment=None if differences.segment is None else differences.segment[index],
     )
 
 
@@ -183,7 +213,7 @@ def _drift(differences: Differences, reference_time_s: float, draws: FloatArray)
 
 
 def _segment(differences: Differences, used: Samples, mask: BoolArray, draws: FloatArray) -> TaxiSegment:
-    mean, sigma = fixed_noise_estimate(_part(differences, mask), draws)
+    mean, sigma = fixed_noise_estimate(without_apart(_part(differences, mask)), draws)
     return TaxiSegment(
         start_s=float(used.time_s[mask][0]),
         end_s=float(used.time_s[mask][-1]),
@@ -193,6 +223,28 @@ def _segment(differences: Differences, used: Samples, mask: BoolArray, draws: Fl
         error_deg=float(mean[0]),
         sigma_deg=float(sigma[0]),
     )
+
+
+def _parts(
+    differences: Differences,
+    used: Samples,
+    segments: tuple[TaxiSegment, ...],
+    draws: FloatArray,
+    longest_s: float,
+) -> tuple[TaxiSegment, ...]:
+    """The segments, those longer than ``longest_s`` cut into equal parts."""
+    parts = []
+    for segment in segments:
+        count = int(np.ceil(max(segment.end_s - segment.start_s, 1e-9) / longest_s))
+        if count == 1:
+            parts.append(segment)
+            continue
+        inside = (used.time_s >= segment.start_s) & (used.time_s <= segment.end_s)
+        share = (used.time_s - segment.start_s) / (segment.end_s - segment.start_s)
+        number = np.minimum((share * count).astype(np.int64), count - 1)
+        masks = (inside & (number == part) for part in range(count))
+        parts += [_segment(differences, used, mask, draws) for mask in masks if mask.sum() > 1]
+    return tuple(parts)
 
 
 def _directions(

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.angles import unwrap
 from groundstation.base.records import BoolArray
 from groundstation.estimators.heading.lines import window_bounds
 from groundstation.estimators.heading.samples import Samples
@@ -39,6 +40,10 @@ class StandstillData:
     stretches: tuple[tuple[int, int], ...]
     is_informative: bool
 
+    def start_s(self, samples: Samples) -> float:
+        """Start of the interval assessed; without one, of the used samples."""
+        return float(samples.time_s[self.in_interval if self.in_interval.any() else samples.is_used][0])
+
 
 def _moving_mean(time_s: FloatArray, values: FloatArray, window_s: float) -> FloatArray:
     low, high = window_bounds(time_s, time_s, window_s)
@@ -53,39 +58,58 @@ def find_standstill(samples: Samples, settings: HeadingSettings) -> StandstillDa
     heading steady (or not known), geometry and integrity good; no GNSS gap inside; ``standstill_guard_s`` cut from both
     ends. The interval assessed is the last ``standstill_max_s`` of the last stretch of at least
     ``standstill_min_s`` that ends before the first used taxi sample: a rule that does not look at the answer.
+
+    Where there is none, but the aircraft is on its wheels and its heading quite still while GNSS shows up to
+    ``standstill_doubt_mps``, it stands and GNSS errs: that stretch is assessed, and fails the gate.
     """
     mean_speed = np.hypot(
         _moving_mean(samples.time_s, samples.north_mps, settings.standstill_mean_s),
         _moving_mean(samples.time_s, samples.east_mps, settings.standstill_mean_s),
     )
-    still = mean_speed <= settings.standstill_speed_max_mps
-    still &= ~(np.abs(samples.rate_dps) > settings.standstill_rate_max_dps)
-    still &= ~(samples.geometry > settings.geometry_max) & ~(samples.integrity == 0.0)
+    steady = ~(np.abs(samples.rate_dps) > settings.standstill_rate_max_dps)
+    steady &= ~(samples.geometry > settings.geometry_max) & ~(samples.integrity == 0.0)
     if samples.ground_method:
-        still &= samples.on_ground
-    stretches = _stretches(samples, still, settings)
-    is_still = np.zeros(len(samples), dtype=bool)
+        steady &= samples.on_ground
+    used = np.flatnonzero(samples.is_used)
+    before = int(used[0]) if len(used) else len(samples)
+    stretches = _stretches(samples, steady & (mean_speed <= settings.standstill_speed_max_mps), settings)
+    part = _last_long(samples, stretches, before, settings)
+    if part is None and samples.ground_method:
+        doubted = _stretches(samples, steady & (mean_speed <= settings.standstill_doubt_mps), settings)
+        found = _last_long(samples, doubted, before, settings)
+        shown_mps = 0.0 if found is None else float(np.median(mean_speed[found]))
+        is_moving = shown_mps > settings.standstill_speed_max_mps  # else it is a standstill too short, rolling added
+        if found is not None and is_moving and _is_heading_still(samples.heading_deg[found], settings):
+            stretches, part = (*stretches, (found.start, found.stop)), found
+    is_still, in_interval = np.zeros(len(samples), dtype=bool), np.zeros(len(samples), dtype=bool)
     for first, end in stretches:
         is_still[first:end] = True
-    used = np.flatnonzero(samples.is_used)
-    before = used[0] if len(used) else len(samples)
-    in_interval = np.zeros(len(samples), dtype=bool)
-    candidates = [
-        (first, end)
-        for first, end in stretches
-        if end <= before and samples.time_s[end - 1] - samples.time_s[first] >= settings.standstill_min_s - 1e-6
-    ]
     answer = None
-    if candidates:
-        first, end = candidates[-1]
-        start_s = max(samples.time_s[first], samples.time_s[end - 1] - settings.standstill_max_s)
-        first = int(np.searchsorted(samples.time_s, start_s - 1e-6))
-        in_interval[first:end] = True
-        answer = assess_standstill(samples, slice(first, end), settings)
+    if part is not None:
+        in_interval[part] = True
+        answer = assess_standstill(samples, part, settings)
     is_informative = _is_informative(samples, is_still)
     if answer is not None:
         answer = replace(answer, velocity_is_held=not is_informative)
     return StandstillData(answer, in_interval, is_still, stretches, is_informative)
+
+
+def _last_long(
+    samples: Samples, stretches: tuple[tuple[int, int], ...], before: int, settings: HeadingSettings
+) -> slice | None:
+    """The last ``standstill_max_s`` of the last stretch long enough that ends before an epoch."""
+    for first, end in reversed(stretches):
+        last_s = float(samples.time_s[end - 1])
+        if end <= before and last_s - samples.time_s[first] >= settings.standstill_min_s - 1e-6:
+            start_s = max(float(samples.time_s[first]), last_s - settings.standstill_max_s)
+            return slice(int(np.searchsorted(samples.time_s, start_s - 1e-6)), end)
+    return None
+
+
+def _is_heading_still(heading_deg: FloatArray, settings: HeadingSettings) -> bool:
+    """Whether a heading is known and ranges over no more than that of an aircraft that stands."""
+    known = heading_deg[np.isfinite(heading_deg)]
+    return bool(len(known)) and float(np.ptp(unwrap(known))) <= settings.standstill_still_deg
 
 
 def _stretches(samples: Samples, still: BoolArray, settings: HeadingSettings) -> tuple[tuple[int, int], ...]:

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from groundstation.estimators.heading.checks import Normality, VarianceRatio
-from groundstation.estimators.heading.gating import is_straight_and_fast
+from groundstation.estimators.heading.checks import Disagreement, Normality, VarianceRatio, normality_limits
+from groundstation.estimators.heading.gating import TAKE_OFF, is_straight_and_fast
 from groundstation.estimators.heading.samples import Samples
 from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.results.heading import Gate, Sense, Standstill, Verdict
+from groundstation.estimators.heading.wording import told
+from groundstation.results.heading import Gate, HeadingStep, Sense, Standstill, Verdict
 
 # Required gates whose failure more data may cure; the failure of any other required gate rejects.
 CURED_BY_MORE_DATA = frozenset({"standstill_duration", "taxi_seconds", "precision", "half_width"})
@@ -28,7 +29,8 @@ class Figures:
     drift_deg_per_h: float | None
     drift_sigma_deg_per_h: float | None
     mode_changes: int | None
-    segments_chi2: float | None
+    disagreement: Disagreement | None
+    steps: tuple[HeadingStep, ...]
 
 
 def _gate(
@@ -60,7 +62,7 @@ def build_gates(
         *_throughout_gates(samples, figures, settings),
         *_standstill_gates(standstill, settings),
         *_taxi_gates(samples, figures, settings),
-        *_normality_gates(figures.normality, settings),
+        *_normality_gates(figures.normality, int(samples.is_used.sum()), settings),
         *_steadiness_gates(figures, settings),
     )
 
@@ -144,7 +146,16 @@ def _standstill_gates(standstill: Standstill | None, settings: HeadingSettings) 
 def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings) -> tuple[Gate, ...]:
     outliers, used = int(np.sum(samples.gate == "outlier")), int(samples.is_used.sum())
     later = int(samples.is_after_lift_off[samples.is_used].sum())
+    run = is_straight_and_fast(samples, settings) & (samples.gate == TAKE_OFF)
     return (
+        _gate(
+            "take_off_run",
+            "share of the straight epochs that the take-off run has (not used: power crabs the aircraft)",
+            float(run.sum()) / max(int(run.sum()) + used, 1),
+            high=1.0,
+            reason=f"{run.sum()} epochs" if run.any() else "",
+            required=False,
+        ),
         _gate(
             "before_take_off",
             "share of used samples before take-off",
@@ -162,14 +173,18 @@ def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings) -
         ),
         _gate(
             "gnss_rate",
-            "GNSS rate (10 Hz in the paper)",
+            "GNSS rate (10 Hz in Markelov 2015)",
             1.0 / samples.interval_s if samples.interval_s > 0 else None,
             low=9.0,
             unit="Hz",
             required=False,
         ),
         _gate(
-            "precision", "precision e of the paper", figures.precision_deg, high=settings.precision_max_deg, unit="deg"
+            "precision",
+            "precision e of Markelov 2015",
+            figures.precision_deg,
+            high=settings.precision_max_deg,
+            unit="deg",
         ),
         _gate("quality", "spread of the running mean", figures.quality_deg, high=settings.quality_max_deg, unit="deg"),
         _gate(
@@ -182,19 +197,19 @@ def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings) -
     )
 
 
-def _normality_gates(normal: Normality | None, settings: HeadingSettings) -> tuple[Gate, ...]:
+def _normality_gates(normal: Normality | None, count: int, settings: HeadingSettings) -> tuple[Gate, ...]:
     few = "too few samples, or no spread"
 
     def p_value(value: float) -> str:
         return f"p = {value:.2g} for independent samples, not gated"
 
-    low, high = settings.excess_kurtosis_range
+    skewness, (low, high), distance = normality_limits(settings, max(count, 1))
     return (
         _gate(
             "skewness",
             "skewness of the differences, absolute",
             None if normal is None else abs(normal.skewness),
-            high=settings.skewness_max,
+            high=skewness,
             reason=few if normal is None else p_value(normal.skewness_p),
         ),
         _gate(
@@ -209,14 +224,14 @@ def _normality_gates(normal: Normality | None, settings: HeadingSettings) -> tup
             "normal_distance",
             "distance to the fitted normal distribution",
             None if normal is None else normal.distance,
-            high=settings.normal_distance_max,
+            high=distance,
             reason=few if normal is None else p_value(normal.distance_p),
         ),
     )
 
 
 def _steadiness_gates(figures: Figures, settings: HeadingSettings) -> tuple[Gate, ...]:
-    variance = figures.variance
+    variance, parts = figures.variance, figures.disagreement
     drift, sigma = figures.drift_deg_per_h, figures.drift_sigma_deg_per_h
     low, high = settings.variance_ratio_range
     return (
@@ -239,11 +254,18 @@ def _steadiness_gates(figures: Figures, settings: HeadingSettings) -> tuple[Gate
         ),
         _gate(
             "segments",
-            "disagreement of the segments, chi-square per degree of freedom",
-            figures.segments_chi2,
-            high=4.0,
-            reason="one segment" if figures.segments_chi2 is None else "",
-            required=False,
+            "disagreement of segments and minutes, chi-square per degree of freedom",
+            None if parts is None else parts.chi2,
+            high=1.0 if parts is None else parts.limit,
+            reason="one part" if parts is None else parts.told,
+            required=parts is not None,
+        ),
+        _gate(
+            "steps",
+            "steps of the INS heading",
+            float(len(figures.steps)),
+            high=0.0,
+            reason=", ".join(f"{step.size_deg:+.2f} deg at {step.time_s:.1f} s" for step in figures.steps),
         ),
     )
 
@@ -259,15 +281,14 @@ def _is_curable(gate: Gate, standstill: Standstill | None, settings: HeadingSett
 def decide(
     gates: tuple[Gate, ...], standstill: Standstill | None, settings: HeadingSettings
 ) -> tuple[Verdict, tuple[Gate, ...]]:
-    """The verdict and the gates it rests on.
+    """The verdict and every gate that stands against a correction.
 
     reject: a required gate failed that more data cannot cure; extend: only such failed as more data may cure;
     undecided: nothing failed, but a required gate could not be measured; accept: every required gate passed.
     """
     failed = tuple(gate for gate in gates if gate.required and gate.state == "failed")
-    grave = tuple(gate for gate in failed if not _is_curable(gate, standstill, settings))
-    if grave:
-        return "reject", grave
+    if any(not _is_curable(gate, standstill, settings) for gate in failed):
+        return "reject", failed
     if failed:
         return "extend", failed
     missing = tuple(gate for gate in gates if gate.required and gate.state == "not_measured")
@@ -289,19 +310,7 @@ def round_to_step(value: float, step: float) -> float:
 
 
 def explain(verdict: Verdict, gates: tuple[Gate, ...], error_deg: float, step_deg: float) -> str:
-    """One line for people: why, and what the number would be; a number not to be entered is said not to be."""
-    number = round_to_step(-error_deg, step_deg)
+    """One line for people: every gate the verdict rests on, the plainest first; a number not to be entered says so."""
     if verdict == "accept":
-        return f"every gate passed: enter {number:+g} deg"
-    parts = [f"{gate.title} {_figure(gate)}" for gate in gates[:3]]
-    if len(gates) > 3:
-        parts.append(f"{len(gates) - 3} more")
-    return f"{'; '.join(parts)}. Not to be entered: {number:+g} deg"
-
-
-def _figure(gate: Gate) -> str:
-    if gate.value is None:
-        return f"not measured ({gate.reason})"
-    limit = gate.limit if isinstance(gate.limit, tuple) else (gate.limit,)
-    unit = f" {gate.unit}" if gate.unit else ""
-    return f"{gate.value:.3g} against {' to '.join(f'{value:g}' for value in limit)}{unit}"
+        return f"every required gate passed: enter {round_to_step(-error_deg, step_deg):+g} deg"
+    return f"{told(gates)}. Not to be entered: {round_to_step(-error_deg, step_deg):+g} deg"

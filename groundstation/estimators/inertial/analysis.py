@@ -28,11 +28,16 @@ def take_off_s(phases: Phases) -> float:
 
 
 def _run(flight: "Flight", known: Known, settings: InertialSettings) -> Found[InertialResult]:
-    from groundstation.estimators.inertial.estimate import estimate_ins_errors
+    from groundstation.estimators.inertial.aided import compare_aided
+    from groundstation.estimators.inertial.differences import differences
+    from groundstation.estimators.inertial.estimate import estimate_compared
+    from groundstation.estimators.inertial.kind import AIDED, kind_of, stated_kind
 
-    found = estimate_ins_errors(
-        flight, settings=settings, aircraft_class=known.aircraft.ins_class, excluded_s=known.excluded_s
-    )
+    compared = differences(flight, settings=settings, excluded_s=known.excluded_s)
+    kind = kind_of(compared, settings, stated_kind(known.aircraft.ins_kind, flight.metadata))
+    if kind[0] == AIDED:
+        return Found(*compare_aided(flight, kind[1], settings=settings, excluded_s=known.excluded_s))
+    found = estimate_compared(flight, compared, kind, settings=settings, aircraft_class=known.aircraft.ins_class)
     return Found(found.result, found.findings, found)
 
 
@@ -42,7 +47,9 @@ def _run_forecast(_flight: "Flight", known: Known, settings: InertialSettings) -
 
     estimation = known.workings_of(Estimation)
     if estimation is None:
-        raise NotAssessableError("forecast", "the errors of the INS were not estimated")
+        inertial = known.answer(InertialResult)
+        why = f" ({inertial.kind_reason})" if inertial is not None else ""
+        raise NotAssessableError("forecast", f"GNSS corrects this INS already{why}: nothing of it is estimated")
     phases = known.phases
     return Found(assess_forecast(estimation, settings=settings, phase_of=phases.at, take_off_s=take_off_s(phases)))
 
@@ -68,7 +75,9 @@ def _sentence(answers: Answers) -> str:
     if inertial is None:
         return ""
     if inertial.kind == "gnss_aided":
-        return "INS corrected by GNSS already, no forecast"
+        position = inertial.difference("position")
+        within = "" if position is None else f", within {position.p95:.1f} m of it (95 %)"
+        return f"INS corrected by GNSS{within}: no errors, no forecast"
     if inertial.kind == "unknown":
         return "INS errors estimated, too little to tell whether GNSS corrects it"
     parts = []

@@ -20,7 +20,7 @@ from groundstation.estimators.inertial.filter import (
     run_filter,
     smooth,
 )
-from groundstation.estimators.inertial.kind import AIDED, UNAIDED, kind_of
+from groundstation.estimators.inertial.kind import UNAIDED, kind_of
 from groundstation.estimators.inertial.model import POSITION, STATES, ChannelModel, FloatArray
 from groundstation.estimators.inertial.noise import InsNoise, choose_class
 from groundstation.estimators.inertial.outages import Bridged, bridge_outages
@@ -91,14 +91,28 @@ def estimate_ins_errors(
     with the known drag of meridians that converge; INS resets open the position and velocity again.
     """
     settings = settings or InertialSettings()
-    noise, origin = choose_class(settings, aircraft_class, flight.metadata.get("ins_class", ""))
     compared = differences(flight, settings=settings, excluded_s=excluded_s)
+    return estimate_compared(
+        flight, compared, kind_of(compared, settings), settings=settings, aircraft_class=aircraft_class
+    )
+
+
+def estimate_compared(
+    flight: Flight,
+    compared: Differences,
+    kind: tuple[str, str],
+    *,
+    settings: InertialSettings,
+    aircraft_class: str = "",
+) -> Estimation:
+    """Estimate the errors of an INS that is compared with GNSS already; ``kind`` and the reason for it are known."""
+    noise, origin = choose_class(settings, aircraft_class, flight.metadata.get("ins_class", ""))
     model = ChannelModel.at(*_mean_place(compared), noise.beta_per_s, settings.transition)
     used = only_used(compared.epochs, settings)
     run = run_filter(used, model, noise, gate=settings.gate_sigmas**2, initial=initial_of(used, noise))
     run = replace(run, epochs=compared.epochs)  # what the filter may not use still judges it
     smoothed, bridged = smooth(run), bridge_outages(flight, compared, run, settings)
-    result = _result(flight, compared, run, smoothed, bridged, settings, origin)
+    result = _result(flight, compared, run, smoothed, bridged, settings, origin, kind)
     findings = (*compared.findings, *_findings(compared, run, result))
     return Estimation(compared, noise, run, smoothed, bridged.error_m, result, findings)
 
@@ -127,9 +141,9 @@ def _result(
     bridged: Bridged,
     settings: InertialSettings,
     origin: str,
+    kind: tuple[str, str],
 ) -> InertialResult:
     visible, epochs = observability(run), run.epochs
-    kind, kind_reason = kind_of(compared, settings)
     radial, velocity = np.hypot(*run.measured(0).T), run.measured(1)
     rate_50, rate_95 = _radial_rates(epochs, radial)
     speed = velocity[np.isfinite(velocity).all(axis=1)]
@@ -138,8 +152,8 @@ def _result(
         gnss_topic=compared.gnss_topic,
         ins_class=run.noise.name,
         ins_class_origin=origin,
-        kind=kind,
-        kind_reason=kind_reason,
+        kind=kind[0],
+        kind_reason=kind[1],
         transition=run.model.transition,
         epochs=len(epochs),
         gnss_seconds=seconds_covered(epochs.time_s[epochs.has_gnss], settings.outage_s),
@@ -150,14 +164,14 @@ def _result(
         velocity_error_rms_mps=float(np.sqrt(np.mean(np.sum(speed**2, axis=1)))) if len(speed) else None,
         largest_radial_error_m=float(np.nanmax(radial)) if np.isfinite(radial).any() else None,
         outages=bridged.outages,
-        azimuth=estimate_azimuth(compared, run, settings) if kind == UNAIDED else None,
+        azimuth=estimate_azimuth(compared, run, settings) if kind[0] == UNAIDED else None,
         reopened=run.reopened,
         other_ins=tuple(name for name in topics_of_kind("ins", flight.topics()) if name != compared.ins_topic),
         settings=_flat(settings) | _flat(run.noise, "noise."),
         figures=(
             figures.states_figure(run, smoothed),
             figures.observability_figure(run, visible),
-            figures.track_figure(compared, bridged.error_m, smoothed.x[:, POSITION], run),
+            figures.track_figure(compared, bridged.error_m, smoothed.x[:, POSITION]),
         ),
     )
 
@@ -218,9 +232,6 @@ def _radial_rates(epochs: Epochs, radial_m: FloatArray) -> tuple[float | None, f
 
 
 def _findings(compared: Differences, run: FilterRun, result: InertialResult) -> list[Finding]:
-    if result.kind == AIDED:  # the model is of an INS that is left alone: what it says of this one is not told
-        text = f"this INS is corrected by GNSS already ({result.kind_reason}): a forecast from it means nothing"
-        return [Finding("info", "inertial.gnss_aided", text, compared.ins_topic)]
     found = []
     rejected = int((run.used == -1).any(axis=2).sum())
     if rejected:

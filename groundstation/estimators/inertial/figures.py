@@ -16,6 +16,8 @@ from groundstation.estimators.inertial.model import POSITION, STATES, VELOCITY, 
 from groundstation.estimators.inertial.noise import RADPS2_PER_DPHPH, RADPS_PER_DPH
 from groundstation.estimators.inertial.skill import Claimed
 from groundstation.results.figures import FigureData
+from groundstation.tables.own_filter import OwnInnovations
+from groundstation.tables.table import Flight
 
 CHANNELS = ("north", "east")
 ROWS = 4000
@@ -33,15 +35,14 @@ SHOWN = (
 DIGITS = {"time_s": 2, "start_s": 1, "lead_s": 1, "horizon_min": 2}
 
 
-def thinned(run: FilterRun) -> Int64Array:
+def thinned(count: int) -> Int64Array:
     """Epochs that are shown: evenly spaced, the last among them."""
-    n = len(run.epochs)
-    return np.unique(np.linspace(0, n - 1, min(n, ROWS)).round().astype(np.int64))
+    return np.unique(np.linspace(0, count - 1, min(count, ROWS)).round().astype(np.int64))
 
 
 def states_figure(run: FilterRun, smoothed: Smoothed) -> FigureData:
     """States with sigma, what was measured, and the smoothed errors, over time."""
-    rows = thinned(run)
+    rows = thinned(len(run.epochs))
     epochs = run.epochs
     has_gnss = epochs.has_gnss[rows]
     columns: dict[str, NDArray[Any]] = {"time_s": epochs.time_s[rows], "is_forecast": ~has_gnss}
@@ -69,29 +70,63 @@ def _normalised(run: FilterRun, channel: int) -> FloatArray:
 
 def observability_figure(run: FilterRun, observability: FloatArray) -> FigureData:
     """How far each state's sigma is below what it would be without GNSS; ``observability`` has shape (n, 6, c)."""
-    rows = thinned(run)
+    rows = thinned(len(run.epochs))
     columns: dict[str, FloatArray] = {"time_s": run.epochs.time_s[rows]}
     for channel, name in enumerate(CHANNELS):
         columns |= {f"{name}_{state}": observability[rows, index, channel] for index, state in enumerate(STATES)}
     return FigureData("inertial_observability", columns, DIGITS)
 
 
-def track_figure(compared: Differences, corrected_m: FloatArray, smoothed_m: FloatArray, run: FilterRun) -> FigureData:
+def track_figure(compared: Differences, corrected_m: FloatArray, smoothed_m: FloatArray) -> FigureData:
     """Track of the INS, of GNSS, of the INS minus its estimated error, and minus its smoothed error."""
-    rows = thinned(run)
     measured = compared.epochs.position_m
-    columns: dict[str, FloatArray] = {"time_s": run.epochs.time_s[rows]}
-    for name, error_m in (
-        ("ins", np.zeros_like(measured)),
-        ("gnss", measured),
-        ("corrected", corrected_m),
-        ("reference", smoothed_m),
-    ):
-        latitude, longitude = _moved(compared, error_m)
-        columns |= {f"{name}_latitude_deg": latitude[rows], f"{name}_longitude_deg": longitude[rows]}
+    rows = thinned(len(measured))
+    errors_m = {"ins": np.zeros_like(measured), "gnss": measured, "corrected": corrected_m, "reference": smoothed_m}
+    columns = _tracks(compared, rows, errors_m)
     columns["ins_error_m"] = np.hypot(*measured.T)[rows]
     columns["corrected_error_m"] = np.hypot(*(measured - corrected_m).T)[rows]
+    return _track_figure(columns)
+
+
+def plain_track_figure(compared: Differences) -> FigureData:
+    """Track of the INS and of GNSS."""
+    measured = compared.epochs.position_m
+    errors_m = {"ins": np.zeros_like(measured), "gnss": measured}
+    return _track_figure(_tracks(compared, thinned(len(measured)), errors_m))
+
+
+def _track_figure(columns: dict[str, FloatArray]) -> FigureData:
     return FigureData("inertial_track", columns, DIGITS | {name: 7 for name in columns if name.endswith("_deg")})
+
+
+def _tracks(compared: Differences, rows: Int64Array, errors_m: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    columns: dict[str, FloatArray] = {"time_s": compared.epochs.time_s[rows]}
+    for name, error_m in errors_m.items():
+        latitude, longitude = _moved(compared, error_m)
+        columns |= {f"{name}_latitude_deg": latitude[rows], f"{name}_longitude_deg": longitude[rows]}
+    return columns
+
+
+def differences_figure(compared: Differences) -> FigureData:
+    """INS minus GNSS over time."""
+    epochs = compared.epochs
+    rows = thinned(len(epochs))
+    columns: dict[str, FloatArray] = {"time_s": epochs.time_s[rows]}
+    for channel, name in enumerate(CHANNELS):
+        columns[f"{name}_position_m"] = epochs.position_m[rows, channel]
+        columns[f"{name}_velocity_mps"] = epochs.velocity_mps[rows, channel]
+    return FigureData("inertial_differences", columns, DIGITS)
+
+
+def own_innovations_figure(flight: Flight, own: OwnInnovations) -> FigureData:
+    """Innovations of the INS's own filter over time, with its sigma where it logs one."""
+    rows = thinned(len(own.time_ns))
+    columns: dict[str, FloatArray] = {"time_s": flight.seconds(own.time_ns[rows])}
+    for channel, name in enumerate(CHANNELS):
+        for place, (quantity, unit) in enumerate((("position", "m"), ("velocity", "mps"))):
+            columns[f"{name}_{quantity}_{unit}"] = own.innovation[rows, place, channel]
+            columns[f"{name}_{quantity}_sigma_{unit}"] = np.sqrt(own.variance[rows, place, channel])
+    return FigureData("inertial_own_innovations", columns, DIGITS)
 
 
 def _moved(compared: Differences, error_m: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -13,7 +13,7 @@ from groundstation.estimators.inertial.estimate import Estimation
 from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.gaps import gap_rows
 from groundstation.estimators.inertial.hindcast import Hindcast, hindcast, leads_of, start_epochs
-from groundstation.estimators.inertial.kind import AIDED, UNKNOWN
+from groundstation.estimators.inertial.kind import UNKNOWN
 from groundstation.estimators.inertial.model import POSITION, FloatArray
 from groundstation.estimators.inertial.replay import LEAST_STARTS, Plan, map_grid, plan_replay
 from groundstation.estimators.inertial.settings import InertialSettings
@@ -47,8 +47,7 @@ def assess_forecast(
     Raises
     ------
     NotAssessableError
-        For an INS that GNSS corrects already, or of which that cannot be told, and a flight too short for any replayed
-        outage.
+        For an INS of which it cannot be told whether GNSS corrects it, and a flight too short for any replayed outage.
 
     Notes
     -----
@@ -56,10 +55,6 @@ def assess_forecast(
     outages of the same flight that were over before. The position is known when it begins.
     """
     result, run = estimation.result, estimation.run
-    if result.kind == AIDED:
-        raise NotAssessableError(
-            "forecast", f"the INS is corrected by GNSS already ({result.kind_reason}): a forecast from it means nothing"
-        )
     if result.kind == UNKNOWN:
         raise NotAssessableError("forecast", result.kind_reason)
     plan = plan_replay(run, settings)

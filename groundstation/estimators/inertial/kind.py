@@ -1,26 +1,45 @@
 """Whether GNSS corrects an INS already: then there is nothing to forecast."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from groundstation.estimators.inertial.differences import Differences
 from groundstation.estimators.inertial.settings import InertialSettings
 
 UNAIDED, AIDED, UNKNOWN = "unaided", "gnss_aided", "unknown"
+STATED = (UNAIDED, AIDED)
 HALF = 0.5
 MINUTE_S, LEAST_MINUTES = 60.0, 5.0
 AT_REST_MPS = 5.0
 DRIFT_MPS = 0.005  # an INS that stays below has not drifted: 0.01 nmi/h
 
 
-def kind_of(compared: Differences, settings: InertialSettings) -> tuple[str, str]:
+def stated_kind(aircraft_kind: str, metadata: Mapping[str, str]) -> tuple[str, str]:
+    """What the aircraft file, else the head of the log (``ins_kind``) says of the INS, and who said it; or nothing.
+
+    Examples
+    --------
+    >>> stated_kind("", {"ins_kind": "GNSS_aided"}), stated_kind("unaided", {"ins_kind": "gnss_aided"})
+    (('gnss_aided', 'the head of the log says so'), ('unaided', 'the aircraft file says so'))
+    """
+    logged = metadata.get("ins_kind", "").strip().lower()
+    if aircraft_kind in STATED:
+        return aircraft_kind, "the aircraft file says so"
+    return (logged, "the head of the log says so") if logged in STATED else ("", "")
+
+
+def kind_of(compared: Differences, settings: InertialSettings, stated: tuple[str, str] = ("", "")) -> tuple[str, str]:
     """Say whether GNSS corrects the INS, and why it is thought so.
 
-    Its own mode says so, or it never drifts: 95 % of the minute means of the position difference lie nearer to their
-    median than ``aided_radial_m``, and than an INS of 0.01 nmi/h would drift in the time. Of an INS at rest, and of a
-    few minutes, nothing can be said.
+    It is stated, its own mode says so, or it never drifts: 95 % of the minute means of the position difference lie
+    nearer to their median than ``aided_radial_m``, and than an INS of 0.01 nmi/h would drift in the time. Of an INS at
+    rest, and of a few minutes, nothing can be said.
     """
+    if stated[0]:
+        return stated
     if compared.aided_share > HALF:
-        return AIDED, "its own mode says that GNSS corrects it"
+        return AIDED, "its mode in the log is gnss_aided"
     epochs = compared.epochs
     known = np.isfinite(epochs.position_m).all(axis=1)
     minute = np.floor(epochs.time_s[known] / MINUTE_S).astype(np.int64)

@@ -96,6 +96,25 @@ class Now(NamedTuple):
     in_a_row: Int64Array  # (kinds,) rejections
 
 
+class Room(NamedTuple):
+    """What the filter works in; contents mean nothing before and after."""
+
+    w: FloatArray  # (n, n)
+    g: FloatArray  # (n,)
+    K: FloatArray  # (n,)
+    moved: FloatArray  # (c,)
+
+
+class Back(NamedTuple):
+    """What a smoother works in, see ``smoother_runs``; contents mean nothing before and after."""
+
+    a: FloatArray  # (c, n)
+    A: FloatArray  # (n, n)
+    C: FloatArray  # (n, n)
+    w: FloatArray  # (n, n)
+    u: FloatArray  # (n,)
+
+
 class Record(NamedTuple):
     """What a run writes down; an array of no length is left out (but not y, S, mark).
 

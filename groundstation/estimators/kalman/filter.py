@@ -22,6 +22,7 @@ from groundstation.estimators.kalman.arrays import (
     Marks,
     Now,
     Record,
+    Room,
     Rules,
     Schedule,
 )
@@ -301,6 +302,7 @@ def run_filter(
         measurements.value,
         considered,
         now,
+        Room(np.zeros((size, size)), np.zeros(size), np.zeros(size), np.zeros(channels)),
         record,
     )
     end = Start(frozen(now.x.T), frozen(now.p), frozen(now.in_a_row))
@@ -365,5 +367,7 @@ def forecast(
     built_up = np.zeros((len(step) // every, *x.shape[1:]))
     moved = Drive(drive.state, frozen(drive.mix), frozen(drive.push))
     steps, before = frozen(np.ascontiguousarray(step, dtype=np.int64)), frozen(np.ascontiguousarray(known))
-    runs.run_forecast(transition.dynamics, steps, moved, before, every, x, np.empty_like(x), built_up)
+    runs.run_forecast(
+        transition.dynamics, steps, moved, before, every, x, np.empty_like(x), np.empty(x.shape[1:]), built_up
+    )
     return built_up

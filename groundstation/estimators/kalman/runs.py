@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from groundstation.base.compile import compiled
+from groundstation.base.compile import in_place
 from groundstation.base.records import Int64Array
 from groundstation.estimators.kalman.arrays import (
     ABSENT,
@@ -15,6 +15,7 @@ from groundstation.estimators.kalman.arrays import (
     Marks,
     Now,
     Record,
+    Room,
     Rules,
     Schedule,
     States,
@@ -29,7 +30,7 @@ from groundstation.estimators.kalman.kernels import (
 )
 
 
-@compiled
+@in_place
 def open_again(
     starts: Int64Array,
     columns: Int64Array,
@@ -60,7 +61,7 @@ def open_again(
             S[m] = predicted_variance(columns, values, starts[r], starts[r + 1], p) + variance[r]
 
 
-@compiled
+@in_place
 def run_filter(
     states: States,
     dynamics: Dynamics,
@@ -71,6 +72,7 @@ def run_filter(
     z: FloatArray,
     held: Int64Array,
     now: Now,
+    room: Room,
     out: Record,
 ) -> int:
     """Run the filter over epochs; ``z`` (m, c) are the measurements, NaN absent. Return how often it was opened."""
@@ -82,7 +84,7 @@ def run_filter(
     driven, mix, push = drive
     x, p, in_a_row = now
     out_x, out_P, out_variance, out_K, y, S, mark, judged_innovation, judged_variance = out
-    w, g, K, moved = np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(channels)
+    w, g, K, moved = room
     reopened = 0
     for k in range(len(step)):
         if step[k] >= 0:
@@ -197,7 +199,7 @@ def run_filter(
     return reopened
 
 
-@compiled
+@in_place
 def run_forecast(
     dynamics: Dynamics,
     step: Int64Array,
@@ -206,6 +208,7 @@ def run_forecast(
     every: int,
     x: FloatArray,
     w: FloatArray,
+    dragged: FloatArray,
     built_up: FloatArray,
 ) -> None:
     """Carry the states of many starts forward together and write down one of them: what it builds up.
@@ -220,15 +223,16 @@ def run_forecast(
         ``mix`` of shape (k, c, c, s), or of no length; it drags what stands in the state and ``known`` together.
     known : ndarray, shape (c, s)
         What the state had built up before the start.
-    x, w : ndarrays, shape (n, c, s)
-        States of s starts, changed in place, and room.
+    x : ndarray, shape (n, c, s)
+        States of s starts, changed in place.
+    w, dragged : ndarrays, shapes (n, c, s), (c, s)
+        Room.
     built_up : ndarray, shape (leads, c, s)
         Filled: the driven state after every ``every`` steps.
     """
     rows, starts, columns = dynamics.pattern
     F, driven, mix = dynamics.F, drive.state, drive.mix
     channels, count = x.shape[1], x.shape[2]
-    dragged = np.zeros((channels, count))
     for k in range(len(step)):
         for c in range(channels if len(mix) > 0 else 0):
             for s in range(count):

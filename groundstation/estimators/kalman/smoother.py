@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from groundstation.base.records import Int64Array, frozen
-from groundstation.estimators.kalman.arrays import Dynamics, FloatArray, Lines, Record, Schedule, States
+from groundstation.estimators.kalman.arrays import Back, Dynamics, FloatArray, Lines, Record, Schedule, States
 from groundstation.estimators.kalman.filter import FilterRun
 
 
@@ -64,8 +64,8 @@ def lag_covariances(run: FilterRun, begin: Int64Array, end: Int64Array) -> tuple
     return smoothed, closed
 
 
-def _history(run: FilterRun) -> tuple[States, Dynamics, Schedule, Lines, Record]:
-    """What the smoothers go back over.
+def _history(run: FilterRun) -> tuple[States, Dynamics, Schedule, Lines, Record, Back]:
+    """What the smoothers go back over, and room.
 
     Raises
     ------
@@ -77,7 +77,9 @@ def _history(run: FilterRun) -> tuple[States, Dynamics, Schedule, Lines, Record]
         raise ValueError("a run with held states cannot be smoothed: estimate them")
     if not len(run.x) == len(run.P) == n or len(run.record.K) != len(run.measurements):
         raise ValueError("smoothing needs states, covariances and gains: run the filter with them kept")
-    return run.transition.states, run.transition.dynamics, run.schedule, run.measurements.lines, run.record
+    size, channels = run.x.shape[1:]
+    room = Back(np.zeros((channels, size)), *(np.zeros((size, size)) for _ in range(3)), np.zeros(size))
+    return run.transition.states, run.transition.dynamics, run.schedule, run.measurements.lines, run.record, room
 
 
 def _index(values: Int64Array) -> Int64Array:

@@ -12,12 +12,11 @@ interval smoothing with discrete measurements, Int. J. Control 18, 1973, equatio
 H. E. Rauch, F. Tung, C. T. Striebel, Maximum likelihood estimates of linear dynamic systems, AIAA Journal 3, 1965.
 """
 
-import numpy as np
-
-from groundstation.base.compile import compiled, inlined
+from groundstation.base.compile import in_place, inlined
 from groundstation.base.records import Int64Array
 from groundstation.estimators.kalman.arrays import (
     USED,
+    Back,
     Dynamics,
     FloatArray,
     Lines,
@@ -159,13 +158,14 @@ def carry_states_back(states: States, pattern: Pattern, F: FloatArray, step: int
             a[c, j] = w[0, j]
 
 
-@compiled
+@in_place
 def run_smoother(
     states: States,
     dynamics: Dynamics,
     schedule: Schedule,
     lines: Lines,
     record: Record,
+    room: Back,
     begin: int,
     end: int,
     xs: FloatArray,
@@ -185,7 +185,8 @@ def run_smoother(
     step, bounds, row = schedule.step, schedule.first, schedule.row
     starts, columns, values = lines.starts, lines.columns, lines.values
     x, P, K, y, S, mark = record.x, record.P, record.K, record.y, record.S, record.mark
-    a, A, w, u = np.zeros((channels, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
+    a, A, _, w, u = room
+    a[:], A[:] = 0.0, 0.0
     for k in range(end, begin - 1, -1):
         for i in range(n):
             total = P[k, i, i]
@@ -210,13 +211,14 @@ def run_smoother(
             carry_covariance_back(states, pattern, F, step[k], A, w)
 
 
-@compiled
+@in_place
 def run_fixed_lag(
     states: States,
     dynamics: Dynamics,
     schedule: Schedule,
     lines: Lines,
     record: Record,
+    room: Back,
     begin: Int64Array,
     end: Int64Array,
     past: FloatArray,
@@ -227,7 +229,7 @@ def run_fixed_lag(
     step, bounds, row = schedule.step, schedule.first, schedule.row
     starts, columns, values = lines.starts, lines.columns, lines.values
     x, P, K, y, S, mark = record.x, record.P, record.K, record.y, record.S, record.mark
-    a, w = np.zeros((channels, n)), np.zeros((n, n))
+    a, _, _, w, _ = room
     for s in range(len(begin)):
         a[:] = 0.0
         for k in range(end[s], begin[s], -1):
@@ -246,13 +248,14 @@ def run_fixed_lag(
                 past[s, i, c] = total
 
 
-@compiled
+@in_place
 def run_lag_covariance(
     states: States,
     dynamics: Dynamics,
     schedule: Schedule,
     lines: Lines,
     record: Record,
+    room: Back,
     begin: Int64Array,
     end: Int64Array,
     smoothed: FloatArray,
@@ -272,7 +275,7 @@ def run_lag_covariance(
     step, bounds, row = schedule.step, schedule.first, schedule.row
     starts, columns, values = lines.starts, lines.columns, lines.values
     P, K, S, mark = record.P, record.K, record.S, record.mark
-    A, w, C, u = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
+    _, A, C, w, u = room
     nothing = record.y[:0]
     for s in range(len(begin)):
         for i in range(n):

@@ -49,6 +49,7 @@ def align(
     aligned_at_s = used.reference_time_s or 0.0
     drift, drift_sigma = _drift(used, gyros, prior)
     hours = (figure_at_s - aligned_at_s) / S_PER_H
+    sigma = _sigma(used)
     origin = f"{where}, verdict {used.verdict}" + (" for noise that sigma holds" if used.verdict == "reject" else "")
     if used is runs.together and runs.since:
         origin += f", after {runs.since}"
@@ -57,9 +58,9 @@ def align(
     return Alignment(
         origin,
         used.error_deg + drift * hours,
-        math.hypot(used.standard_error_deg, drift_sigma * hours),
+        math.hypot(sigma, drift_sigma * hours),
         used.error_deg,
-        used.standard_error_deg,
+        sigma,
         drift,
         drift_sigma,
         aligned_at_s,
@@ -80,6 +81,15 @@ def _why_not(heading: HeadingResult | None, ins_topic: str) -> str:
     if not (math.isfinite(heading.error_deg) and math.isfinite(heading.standard_error_deg)):
         return "the heading error is not a number"
     return ""
+
+
+def _sigma(heading: HeadingResult) -> float:
+    """Of the error: what the ground shows, with the steady sideslip and mounting that the aircraft file states.
+
+    Where it states none, A holds them.
+    """
+    is_stated = heading.steady_origin == "aircraft file"
+    return heading.standard_error_deg if is_stated else heading.measured_sigma_deg
 
 
 def _is_carried_by_sigma(heading: HeadingResult) -> bool:

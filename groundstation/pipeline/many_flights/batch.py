@@ -7,8 +7,8 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePath
 
-from groundstation.base.errors import UsageError
-from groundstation.pipeline.many_flights.found_sessions import Asked, find_sessions, run_sessions
+from groundstation.base.errors import UnclaimedLogError, UsageError
+from groundstation.pipeline.many_flights.found_sessions import Asked, FoundSessions, find_sessions, run_sessions
 from groundstation.pipeline.many_flights.inputs import collect, flight_folders, is_ours, session_folders
 from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
 from groundstation.pipeline.many_flights.output import LocalOutput, RemoteOutput
@@ -16,11 +16,12 @@ from groundstation.pipeline.many_flights.placement import Placement
 from groundstation.pipeline.many_flights.publishing import FLEET_FILES, write_beside, write_index_of
 from groundstation.pipeline.many_flights.remote import far_logs, is_remote
 from groundstation.pipeline.many_flights.remote_runs import RemoteJob, run_remote
-from groundstation.pipeline.many_flights.session import load_stations
+from groundstation.pipeline.many_flights.session import load_stations, planned_session
 from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJob, Crew, cores, in_turn, side_by_side
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job, run_flight
-from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.one_flight.log import open_log
+from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, finished_flights
 
@@ -210,8 +211,9 @@ def plan_many(
     *,
     with_pdf: bool = True,
     redo: bool = False,
+    stations: Path | None = None,
 ) -> tuple[Outcome, ...]:
-    """Say what :func:`run_many` would do of each log; nothing is written.
+    """Say what :func:`run_many` would do of each log, and of the sessions among finished flights; nothing is written.
 
     Raises
     ------
@@ -226,10 +228,34 @@ def plan_many(
     work = [Job(Path(log), out, configuration, is_named=named, with_pdf=with_pdf) for log, named in inputs]
     outcomes = []
     for _number, job, twin in _with_steps(work, known):
-        text = PLANS[job.step] if twin is None else f"same content as {work[twin].log}, listed once"
-        flight_id = job.finished.flight_id if job.finished else ""
-        outcomes.append(Outcome(job.log, "done", text, flight_id=flight_id))
-    return tuple(outcomes)
+        if twin is not None:
+            outcomes.append(Outcome(job.log, "done", f"same content as {work[twin].log}, listed once"))
+        else:
+            outcomes.append(_planned(job))
+    ground = None if stations is None else load_stations(stations)
+    asked = Asked(out, configuration, ground, "none", with_pdf, redo)
+    return (*outcomes, *_planned_sessions(asked, outcomes))
+
+
+def _planned(job: Job) -> Outcome:
+    """What would become of a log."""
+    if job.finished is not None:
+        is_there = job.step == "nothing"
+        return Outcome(job.log, "done", PLANS[job.step], flight_id=job.finished.flight_id, was_finished=is_there)
+    try:
+        open_log(job.path, job.configuration.profile_path)
+    except UnclaimedLogError as error:
+        return Outcome(job.log, "failed" if job.is_named else "skipped", str(error))
+    except Exception as error:
+        return Outcome(job.log, "failed", reason_of(job.name, error)[0])
+    return Outcome(job.log, "done", PLANS[job.step])
+
+
+def _planned_sessions(asked: Asked, planned: Sequence[Outcome]) -> list[Outcome]:
+    """Sessions among the flights that are finished; those of the other logs are found when they have been read."""
+    flight_ids = {one.flight_id for one in planned if one.flight_id}
+    found = find_sessions(asked, flight_ids) if flight_ids else FoundSessions()
+    return [*map(planned_session, found.jobs), *(one for one in found.told if one.state == "failed")]
 
 
 def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configuration) -> tuple[tuple[str, bool], ...]:

@@ -8,13 +8,15 @@ from groundstation.base.errors import UsageError
 from groundstation.pipeline.one_flight.deviation_to_apply import CORRECTED
 from groundstation.pipeline.one_flight.log import as_log
 from groundstation.reports.index import INDEX_CSV, INDEX_JSON
-from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY
+from groundstation.results.files import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY
 
 FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, STUDY_MARK = MANIFEST, INDEX_JSON, ".groundstation-study"
-SESSION_MARK = f"{ARRAYS}/session_clocks.parquet"  # of a session of several aircraft, which is no flight
+SESSION_ARRAYS = "session_clocks.parquet"  # what a session of several aircraft has and no flight
+SESSION_MARKS = tuple(f"{folder}/{SESSION_ARRAYS}" for folder in (ARRAYS, OLD_ARRAYS))
 PLAN_MARK = "plan.toml"  # the scenario of a plan, which is no flight
 COMPARISON_MARKS = "compare.html", "compare.csv"
 COMPARISON_RECORDING = "compare.rrd"
+NO_LOGS = ".toml"  # settings, stations, aircraft, profiles: they stand beside logs and are none
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ def collect(paths: Sequence[Path], out: Path | None = None) -> tuple[Input, ...]
     """List the files that ``paths`` (files or folders, recursive) stand for, in a stable order, each once.
 
     OUT and folders that groundstation made (they hold its manifest or index) are never inputs of a folder walk; nor
-    are hidden files. A folder that is a bag of ROS 2 is one log, named by its metadata.
+    are hidden files and settings (TOML). A folder that is a bag of ROS 2 is one log, named by its metadata.
 
     Raises
     ------
@@ -59,7 +61,7 @@ def is_ours(folder: Path) -> bool:
 
 def is_session(folder: Path) -> bool:
     """Whether a folder is that of a session of several aircraft."""
-    return (folder / SESSION_MARK).is_file()
+    return any((folder / mark).is_file() for mark in SESSION_MARKS)
 
 
 def no_log(folder: Path) -> UsageError:
@@ -91,7 +93,7 @@ def file_in(folder: Path, ending: str, *others: str) -> Path:
 
 def flight_folders(out: Path) -> list[Path]:
     """Flight folders in an OUT, in the order of their names."""
-    marks = SESSION_MARK, PLAN_MARK
+    marks = *SESSION_MARKS, PLAN_MARK
     return [folder for folder in _finished_folders(out) if not any((folder / mark).is_file() for mark in marks)]
 
 
@@ -120,7 +122,7 @@ def _walk(folder: Path, out: Path | None) -> list[Path]:
     except OSError:
         return [folder]  # it fails in its turn, with its name, and stops nothing else
     for entry in entries:
-        if entry.name.startswith("."):
+        if entry.name.startswith(".") or entry.suffix.lower() == NO_LOGS:
             continue
         if entry.is_dir() and not entry.is_symlink():
             files += _walk(entry, out)

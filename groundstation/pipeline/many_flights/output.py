@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import Protocol
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, SESSION_MARK
+from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, SESSION_ARRAYS
 from groundstation.pipeline.many_flights.remote import RemoteFolder
 from groundstation.pipeline.many_flights.remote_runs import BY_LOG, STAGING, array_files
 from groundstation.pipeline.one_flight.flight import is_made, place, remove
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports.flight_report import PDF, REPORT
-from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY
+from groundstation.results.files import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY
 
-FLEET_ARRAYS = ("heading_samples",)  # of a flight's arrays, what the fleet is made from
+FLEET_ARRAYS = ("heading_samples.parquet",)  # of a flight's arrays, what the fleet is made from
 
 
 class Output(Protocol):
@@ -106,11 +106,11 @@ class RemoteOutput:
         folder.mkdir()
         (folder / ARRAYS).mkdir()
         for name in names:
-            if "." in name and name != ARRAYS:
+            if "." in name and name != OLD_ARRAYS:
                 (folder / name).touch()
         there = array_files(self._out, flight_id)
-        wanted = {f"{ARRAYS}/{name}.parquet" for name in FLEET_ARRAYS}
-        kept = there if SESSION_MARK in there else [name for name in there if name in wanted]
+        files = [name.rpartition("/")[2] for name in there]
+        kept = there if SESSION_ARRAYS in files else [name for name in there if name.endswith(FLEET_ARRAYS)]
         for name in (SUMMARY, MANIFEST, *kept):
             self._out.fetch(f"{flight_id}/{name}", folder / name)
 

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from groundstation.base.errors import GroundstationError, UsageError
-from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK
+from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, NO_LOGS, OUT_FOLDER_MARK
 
 
 def is_remote(place: str) -> bool:
@@ -166,5 +166,7 @@ def far_logs(url: str) -> list[tuple[str, bool]]:
 
 
 def _is_left_out(path: PurePosixPath, ours: set[PurePosixPath]) -> bool:
-    """Whether a file is hidden, or lies in a folder that groundstation made."""
+    """Whether a file is hidden, holds settings, or lies in a folder that groundstation made."""
+    if path.suffix.lower() == NO_LOGS:
+        return True
     return any(part.startswith(".") for part in path.parts) or not ours.isdisjoint(path.parents)

@@ -17,7 +17,7 @@ from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, finished
 from groundstation.reports.flight_report import PDF
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
-from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY
+from groundstation.results.files import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY
 
 STAGING, BY_LOG = ".staging", ".logs"  # in an OUT elsewhere: what is on its way; flight ids by digest of the log
 
@@ -105,7 +105,8 @@ def _planned(job: Job, out: RemoteFolder, scratch: Path) -> Job:
 
 def array_files(out: RemoteFolder, flight_id: str) -> list[str]:
     """Files of a flight that hold the arrays behind its figures."""
-    return [f"{ARRAYS}/{name}" for name in out.names(f"{flight_id}/{ARRAYS}")]
+    folders = ARRAYS, OLD_ARRAYS
+    return [f"{folder}/{name}" for folder in folders for name in out.names(f"{flight_id}/{folder}")]
 
 
 def _fetched(out: RemoteFolder, flight_id: str, scratch: Path) -> Finished | None:

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from groundstation.base.clock import Clock
 from groundstation.base.errors import GroundstationError, NotAssessableError
@@ -158,9 +158,18 @@ def sessions_of(out: Path) -> Iterator[tuple[Path, Manifest]]:
             continue
 
 
-def _finished(job: SessionJob, watch: Stopwatch) -> Outcome | None:
-    """The outcome of a session that is finished, its reports made again where they are missing; None without one."""
+class _Kept(NamedTuple):
+    """A session of the same logs and settings that an earlier run left; ``is_finished``: nothing of it is missing."""
+
+    folder: Path
+    manifest: Manifest
+    resume: Resume
+    is_finished: bool
+
+
+def _kept(job: SessionJob) -> _Kept | None:
     keys = job.keys()
+    wanted = (REPORT, PDF) if job.with_pdf else (REPORT,)
     for folder, manifest in sessions_of(job.out):
         resume = manifest.resume
         if resume is None or manifest.source.sha256 != job.sha256:
@@ -169,15 +178,33 @@ def _finished(job: SessionJob, watch: Stopwatch) -> Outcome | None:
         is_whole = (folder / f"{folder.name}.rrd").is_file() and resume.keys.analysis == keys.analysis
         if not is_of_the_verb and (job.redo or not is_whole):
             continue
-        problem, wanted = "", (REPORT, PDF) if job.with_pdf else (REPORT,)
         is_told = is_of_the_verb or resume.keys.reports == keys.reports
-        if not is_told or not all((folder / name).is_file() for name in wanted):
-            with watch.stage("reporting"):
-                problem = write_flight_report(folder, ANSWER_TYPES, with_pdf=job.with_pdf).problem
-            save_manifest(folder, replace(manifest, resume=replace(resume, keys=keys)))
-        state = state_of(worst(load_document(folder).findings), resume.has_lost_data, job.fail_on)
-        return _outcome(job, state, "; ".join(filter(None, (resume.text, problem))), folder, watch)
+        return _Kept(folder, manifest, resume, is_told and all((folder / name).is_file() for name in wanted))
     return None
+
+
+def _finished(job: SessionJob, watch: Stopwatch) -> Outcome | None:
+    """The outcome of a session that is finished, its reports made again where they are missing; None without one."""
+    kept = _kept(job)
+    if kept is None:
+        return None
+    folder, resume, problem = kept.folder, kept.resume, ""
+    if not kept.is_finished:
+        with watch.stage("reporting"):
+            problem = write_flight_report(folder, ANSWER_TYPES, with_pdf=job.with_pdf).problem
+        save_manifest(folder, replace(kept.manifest, resume=replace(resume, keys=job.keys())))
+    state = state_of(worst(load_document(folder).findings), resume.has_lost_data, job.fail_on)
+    found = _outcome(job, state, "; ".join(filter(None, (resume.text, problem))), folder, watch)
+    return replace(found, was_finished=kept.is_finished)
+
+
+def planned_session(job: SessionJob) -> Outcome:
+    """What :func:`run_one` would do of a session; nothing is written."""
+    kept = _kept(job)
+    if kept is None:
+        return Outcome(job.name, "done", "session to run", is_session=True)
+    text = "session finished, nothing to do" if kept.is_finished else "session to report again"
+    return Outcome(job.name, "done", text, kept.folder.name, is_session=True, was_finished=kept.is_finished)
 
 
 def _run_into(partial: Path, job: SessionJob, watch: Stopwatch) -> Outcome:

@@ -13,6 +13,7 @@ from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
 from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.integrity.limits import Thresholds, thresholds_from
 from groundstation.pipeline.one_flight.deviation_to_apply import Apply, asked_for
+from groundstation.readers.icd import named_icd
 from groundstation.tables.session_settings import SessionSettings
 
 S = TypeVar("S")
@@ -61,6 +62,8 @@ class Configuration:
     exclude, force : tuple of Interval
     profile : str, optional
         Path of the layout of logs that no reader knows.
+    icds : tuple of str
+        Files, or names of shipped ones, that tell what the words of a recording's buses mean.
     files : mapping
         The file that a table was read from, for messages.
     apply : Apply, optional
@@ -76,6 +79,7 @@ class Configuration:
     exclude: tuple[Interval, ...] = ()
     force: tuple[Interval, ...] = ()
     profile: str | None = None
+    icds: tuple[str, ...] = ()
     files: Mapping[str, str] = field(default_factory=dict)
     apply: Apply | None = None
     settings: UserSettings = field(init=False, repr=False, compare=False)
@@ -116,6 +120,8 @@ class Configuration:
                 document[name] = intervals
         if self.profile:
             document["profile"] = Path(self.profile).name
+        if self.icds:
+            document["icds"] = [Path(one).name for one in self.icds]
         if self.apply:
             document["apply"] = self.apply.to_dict()
         return document
@@ -144,6 +150,7 @@ def load_configuration(
     intervals: Settings | None = None,
     profile: Path | None = None,
     thresholds: Settings | None = None,
+    icds: Iterable[str] | None = None,
 ) -> Configuration:
     """Put the user's settings, files or what would stand in them, into one configuration.
 
@@ -154,6 +161,8 @@ def load_configuration(
     SettingsError
         For an unreadable file, an unknown section, or a value of the wrong kind, naming file and key.
     """
+    for one in icds or ():
+        named_icd(one)  # a slip in it is told before anything is read
     document = _content(config) if config else {}
     _refuse_unknown(document, SECTIONS, _name(config))
     own = {"aircraft": aircraft, "site": site, "thresholds": thresholds}
@@ -173,6 +182,7 @@ def load_configuration(
         exclude=_intervals(document.get("exclude", []), f"{_name(intervals or config)}, exclude"),
         force=_intervals(document.get("force", []), f"{_name(intervals or config)}, force"),
         profile=str(profile) if profile else None,
+        icds=tuple(icds or ()),
         files={name: str(path) for name, path in files.items() if isinstance(path, Path)},
     )
 

@@ -25,7 +25,7 @@ from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, Keys, Step, keys_of, remember_reports
 from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
-from groundstation.results.files import ARRAYS, MANIFEST, SUMMARY, TABLES
+from groundstation.results.files import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import Resume
 from groundstation.tables.table import Flight
@@ -84,7 +84,7 @@ class Job:
     def asked(self) -> tuple[str, Keys] | None:
         """Digest of its log and the keys of what is asked for; None when only its run can tell what is wrong."""
         try:
-            source = open_log(self.path, self.configuration.profile_path).source
+            source = open_log(self.path, self.configuration.profile_path, self.configuration.icds).source
             return source.sha256, keys_of(source, self.configuration, with_pdf=self.with_pdf)
         except Exception:
             return None
@@ -108,7 +108,7 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
         if job.finished is not None and job.step in ("nothing", "reports"):
             return _run_reports(job, job.finished, watch)
         version = _version(job.path)
-        log = open_log(job.path, job.configuration.profile_path)
+        log = open_log(job.path, job.configuration.profile_path, job.configuration.icds)
         sha256 = log.source.sha256
         job.out.mkdir(parents=True, exist_ok=True)
         partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=job.out))
@@ -195,6 +195,7 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
         folder=str(finished.folder),
         sha256=finished.sha256,
         times_s=watch.times_s,
+        was_finished=job.step == "nothing",
     )
 
 
@@ -238,8 +239,11 @@ def sentence(results: FlightResults) -> str:
     found = [text for analysis in FLIGHT_ANALYSES if (text := analysis.sentence(results.answers))]
     if found:
         return "; ".join(found)
-    reasons = "; ".join(f"{entry.analysis}: {entry.reason}" for entry in results.not_assessable)
-    return f"not assessable: {reasons or 'no analysis applies'}"
+    if not results.not_assessable:
+        return "not assessable: no analysis applies"
+    first, *others = results.not_assessable
+    more = f" (of {len(others)} more the report says why)" if others else ""
+    return f"not assessable: {first.analysis}: {first.reason}{more}"
 
 
 def is_made(name: str, identity: str) -> bool:
@@ -250,8 +254,8 @@ def is_made(name: str, identity: str) -> bool:
     >>> is_made("tables/heading.csv", "NOTIME_abababab"), is_made("notes.txt", "NOTIME_abababab")
     (True, False)
     """
-    made = SUMMARY, MANIFEST, ARRAYS, TABLES, REPORT, f"{identity}.mcap", f"{identity}.rrd", *optional_files(identity)
-    return PurePosixPath(name).parts[0] in made
+    made = SUMMARY, MANIFEST, ARRAYS, OLD_ARRAYS, TABLES, REPORT, f"{identity}.mcap", f"{identity}.rrd"
+    return PurePosixPath(name).parts[0] in (*made, *optional_files(identity))
 
 
 def optional_files(identity: str) -> tuple[str, ...]:
@@ -279,6 +283,7 @@ def place(partial: Path, target: Path) -> None:
     (target / MANIFEST).unlink(missing_ok=True)  # the mark of a whole folder goes first and comes back last
     for name in optional_files(target.name):
         (target / name).unlink(missing_ok=True)
+    shutil.rmtree(target / OLD_ARRAYS, ignore_errors=True)
     for entry in sorted(partial.iterdir(), key=lambda path: path.name == MANIFEST):
         old = target / entry.name
         if old.is_dir() and not old.is_symlink():

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.records import Item, RecordBatch
+from groundstation.base.signals import BUS_PREFIX
 from groundstation.pipeline.one_flight.identity import sha256_of
 from groundstation.results.flight import Source
 
 if TYPE_CHECKING:
+    from groundstation.readers.icd import Icd
     from groundstation.readers.source import Source as LogFile
 
 REPLAY_LIMIT_BYTES = 96 << 20  # an hour of CSV at 100 Hz is kept; the peak of a conversion has this part in it
@@ -21,13 +23,16 @@ REPLAY_LIMIT_BYTES = 96 << 20  # an hour of CSV at 100 Hz is kept; the peak of a
 class Log:
     """A log that a reader (or the store) claims.
 
-    ``is_store``: an MCAP that groundstation wrote; its records carry corrected time already.
+    ``is_store``: an MCAP that groundstation wrote; its records carry corrected time already. ``icds`` are files or
+    names of shipped ones; with ``has_new_names`` it is an MCAP whose bus words they name, and read as its log again.
     """
 
     path: Path
     source: Source
     is_store: bool
     profile: Path | None = None
+    icds: tuple[str, ...] = ()
+    has_new_names: bool = False
 
     def items(self) -> Iterator[Item]:
         """Read the log from its beginning, in bounded batches."""
@@ -35,13 +40,24 @@ class Log:
             from groundstation.store.reader import read
 
             return read(self.path)
+        if self.has_new_names:
+            from groundstation.pipeline.one_flight.renamed import items_named
+
+            return items_named(self.path, self.loaded_icds)
         from groundstation.readers.registry import read as read_log
 
-        return read_log(self._file, self.profile)
+        return read_log(self._file, self.profile, self.loaded_icds)
 
     def replay(self) -> "Replay":
         """The items for two passes; of a file that is larger than what may be kept, nothing is."""
         return Replay(self.items, REPLAY_LIMIT_BYTES if self.source.size_bytes <= REPLAY_LIMIT_BYTES else 0)
+
+    @cached_property
+    def loaded_icds(self) -> "tuple[Icd, ...]":
+        """The ICDs, read and checked."""
+        from groundstation.readers.icd import named_icd
+
+        return tuple(named_icd(one) for one in self.icds)
 
     @cached_property
     def _file(self) -> "LogFile":
@@ -77,8 +93,8 @@ def _files_of(path: Path) -> tuple[Path, ...]:
     return (path, *(file for file in files_of(path) if file.is_file()))
 
 
-def open_log(path: Path, profile: Path | None = None) -> Log:
-    """Find out who can read a file.
+def open_log(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()) -> Log:
+    """Find out who can read a file. ``icds``, files or names, tell what the words of its buses mean.
 
     Raises
     ------
@@ -95,10 +111,12 @@ def open_log(path: Path, profile: Path | None = None) -> Log:
     if _is_store(path, profile):
         info = read_info(path)  # the flight is that of the log, whichever of the two is run
         name, sha256 = info.source_name or path.name, info.source_sha256 or sha256_of(path)
-        return Log(path, Source(name, sha256, size, f"groundstation-mcap of {info.reader}"), True, profile)
+        source = Source(name, sha256, size, f"groundstation-mcap of {info.reader}")
+        is_renamed = bool(icds) and any(topic.startswith(BUS_PREFIX) for topic in info.ledger.topics)
+        return Log(path, source, not is_renamed, profile, icds, has_new_names=is_renamed)
     claim = identify(path, profile)
     size = sum(file.stat().st_size for file in _files_of(path))
-    return Log(path, Source(log_name(path), digest_of(path), size, claim.title), False, profile)
+    return Log(path, Source(log_name(path), digest_of(path), size, claim.title), False, profile, icds)
 
 
 def _is_store(path: Path, profile: Path | None) -> bool:

@@ -32,6 +32,8 @@ class Outcome:
         Where an internal error came from; shown on request.
     is_session : bool
         Whether it is of a session: ``source`` are then the names of its logs, and ``flight_id`` is that of the session.
+    was_finished : bool
+        Whether an earlier run had finished it, so that nothing was computed.
     """
 
     source: str
@@ -43,6 +45,7 @@ class Outcome:
     times_s: Mapping[str, float] = field(default_factory=dict)
     trace: str = ""
     is_session: bool = False
+    was_finished: bool = False
 
     @property
     def code(self) -> int:

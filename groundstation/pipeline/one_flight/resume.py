@@ -116,7 +116,7 @@ def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool) -> 
     tables = dict(configuration.tables)
     thresholds = tables.pop("thresholds", {})
     conversion = _digest(
-        asdict(source), _profile_of(configuration), thresholds, dict(versions()), platform.python_version()
+        asdict(source), _layouts_of(configuration), thresholds, dict(versions()), platform.python_version()
     )
     intervals = [[asdict(part) for part in listed] for listed in (configuration.exclude, configuration.force)]
     apply = None if configuration.apply is None else asdict(configuration.apply)
@@ -128,13 +128,17 @@ def _digest(*parts: Any) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
 
 
-def _profile_of(configuration: Configuration) -> str:
-    if not configuration.profile:
-        return ""
+def _layouts_of(configuration: Configuration) -> list[str]:
+    """The content of the profile and the ICDs; the name of a shipped one."""
+    profile = [_content_of(configuration.profile)] if configuration.profile else []
+    return profile + [_content_of(one) if Path(one).is_file() else one for one in configuration.icds]
+
+
+def _content_of(file: str) -> str:
     try:
-        return hashlib.sha256(Path(configuration.profile).read_bytes()).hexdigest()
+        return hashlib.sha256(Path(file).read_bytes()).hexdigest()
     except OSError as error:
-        raise GroundstationError(configuration.profile, error.strerror or "cannot be read", "a profile") from error
+        raise GroundstationError(file, error.strerror or "cannot be read", "a profile") from error
 
 
 def remember_reports(flight: "Finished", *, with_pdf: bool) -> None:

@@ -71,19 +71,17 @@ def check_many(
     UsageError
         When a log is missing, is a folder, or a threshold is wrong.
     """
-    thresholds = configuration.settings.thresholds
     paths = [as_log(path) for path in paths]
     for path in paths:
         if not path.exists():
             raise UsageError(str(path), "no such file")
         if path.is_dir():
             raise no_log(path)
-    profile = configuration.profile_path
     listen(Event("begin", total=len(paths)))
     found = []
     for path in paths:
         listen(Event("stage", path.name, "reading"))
-        found.append(_check_or_reason(path, profile, thresholds, fail_on))
+        found.append(_check_or_reason(path, configuration, fail_on))
         listen(Event("end", path.name, found[-1].outcome.text))
     return tuple(found)
 
@@ -97,9 +95,10 @@ def check_log(log: Log, thresholds: Thresholds | None = None, *, fail_on: str = 
     return _stored(log, limits, fail_on) if log.is_store else _recorded(log, limits, fail_on)
 
 
-def _check_or_reason(path: Path, profile: Path | None, thresholds: Thresholds, fail_on: str) -> Checked:
+def _check_or_reason(path: Path, configuration: Configuration, fail_on: str) -> Checked:
     try:
-        return check_log(open_log(path, profile), thresholds, fail_on=fail_on)
+        log = open_log(path, configuration.profile_path, configuration.icds)
+        return check_log(log, configuration.settings.thresholds, fail_on=fail_on)
     except Exception as error:
         reason, trace = reason_of(path.name, error)
     return Checked(Outcome(str(path), "failed", reason, trace=trace), {}, Ledger(), Clock(), ())

@@ -98,7 +98,7 @@ def clip(
     limits = settings.settings.thresholds
     source = file_in(path, ".mcap") if path.is_dir() else path
     _expect_free(source, target, with_recording, force)
-    log = open_log(source, settings.profile_path)
+    log = open_log(source, settings.profile_path, settings.icds)
     listen(Event("begin", total=1))
     listen(Event("stage", path.name, "cutting"))
     with told_in_a_line(str(target)):

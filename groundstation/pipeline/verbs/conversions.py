@@ -1,14 +1,17 @@
-"""Recorded logs to MCAP files, one by one."""
+"""Recorded logs to MCAP files, one by one; a flight to Chapter 10."""
 
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.base.signals import is_canonical
 from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.convert import convert_log
-from groundstation.pipeline.one_flight.log import as_log, log_name, open_log
+from groundstation.pipeline.one_flight.convert import Converted, convert_log
+from groundstation.pipeline.one_flight.flight import read_flight
+from groundstation.pipeline.one_flight.log import Log, as_log, log_name, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
@@ -23,7 +26,8 @@ def convert_many(
 ) -> tuple[Outcome, ...]:
     """Convert logs to MCAP: one to the file ``output``, several into the folder ``output``.
 
-    Of the configuration, the profile and the thresholds of the ledger count.
+    A file ``*.ch10`` is written as Chapter 10, with the ICD of its buses beside it. Of the configuration, the profile,
+    the ICDs and the thresholds of the ledger count.
 
     Raises
     ------
@@ -31,8 +35,6 @@ def convert_many(
         When a log is missing, the target exists and ``force`` is not given, or a threshold is wrong.
     """
     configuration = configuration or Configuration()
-    thresholds = configuration.settings.thresholds
-    profile = configuration.profile_path
     logs = [as_log(log) for log in logs]
     for log in logs:
         if not log.exists():
@@ -53,16 +55,33 @@ def convert_many(
     outcomes = []
     for log, target in zip(logs, targets, strict=True):
         listen(Event("stage", log.name, "converting"))
-        outcomes.append(_convert_one(log, target, profile, thresholds))
+        outcomes.append(_convert_one(log, target, configuration))
         listen(Event("end", log.name, outcomes[-1].text))
     return tuple(outcomes)
 
 
-def _convert_one(path: Path, target: Path, profile: Path | None, thresholds: Thresholds) -> Outcome:
+def _convert_one(path: Path, target: Path, configuration: Configuration) -> Outcome:
+    told, thresholds = "", configuration.settings.thresholds
     try:
-        converted = convert_log(open_log(path, profile), target, thresholds)
+        log = open_log(path, configuration.profile_path, configuration.icds)
+        if target.suffix == ".ch10":
+            converted, told = _to_chapter10(log, target, thresholds)
+        else:
+            converted = convert_log(log, target, thresholds)
     except GroundstationError as error:
         return Outcome(str(path), "failed", str(error))
     grave = [finding.text for finding in converted.findings if finding.severity != "info"]
-    text = f"-> {target}" + (f" ({'; '.join(grave)})" if grave else "")
+    text = f"-> {target}{told}" + (f" ({'; '.join(grave)})" if grave else "")
     return Outcome(str(path), "data_lost" if converted.has_lost_data else "done", text, folder=str(target))
+
+
+def _to_chapter10(log: Log, target: Path, thresholds: Thresholds) -> tuple[Converted, str]:
+    """Write the flight of a log as Chapter 10; what became of the log, and which topics are on no bus."""
+    from groundstation.simulation.chapter10_writer import write_chapter10
+
+    with TemporaryDirectory(prefix="groundstation-") as folder:
+        mcap = Path(folder) / "flight.mcap"
+        converted = convert_log(log, mcap, thresholds)
+        icd, left_out = write_chapter10(target, read_flight(mcap, converted))
+    without = [topic for topic in left_out if is_canonical(topic)]
+    return converted, f" and {icd.name}" + (f", without {', '.join(without)}" if without else "")

@@ -78,7 +78,7 @@ def _opened(files: Sequence[Path], configuration: Configuration) -> tuple[tuple[
     logs, failed = [], []
     for path in dict.fromkeys(files):
         try:
-            logs.append(open_log(path, configuration.profile_path))
+            logs.append(open_log(path, configuration.profile_path, configuration.icds))
         except Exception as error:
             reason, trace = reason_of(path.name, error)
             failed.append(Outcome(str(path), "failed", reason, trace=trace))

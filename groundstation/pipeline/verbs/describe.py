@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
@@ -11,6 +12,9 @@ from groundstation.base.records import Damage, RecordBatch
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.log import Log, as_log, open_log
 from groundstation.store.info import StoreInfo
+
+if TYPE_CHECKING:
+    from groundstation.readers.chapter10.contents import BusContents
 
 
 @dataclass(frozen=True)
@@ -25,21 +29,37 @@ class TopicDescription:
 
 
 @dataclass(frozen=True)
+class BusWord:
+    """Messages of one terminal and subaddress, or words of one label, of a bus.
+
+    ``place`` is the channel, of ARINC 429 with the number of the bus behind a dot; ``names`` are those that ICDs give.
+    """
+
+    place: str
+    bus: str
+    what: str
+    count: int
+    rate_hz: float | None
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Description:
-    """A log described: facts for people (name to text), topics, findings."""
+    """A log described: facts for people (name to text), topics, findings, and what is on its buses."""
 
     facts: dict[str, str]
     topics: tuple[TopicDescription, ...]
     findings: tuple[Finding, ...]
     has_lost_data: bool
+    buses: tuple[BusWord, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
         return asdict(self)
 
 
-def describe(path: Path, profile: Path | None = None) -> Description:
-    """Describe a recorded log or a groundstation MCAP.
+def describe(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()) -> Description:
+    """Describe a recorded log or a groundstation MCAP; ``icds`` name the words of its buses.
 
     Raises
     ------
@@ -53,34 +73,77 @@ def describe(path: Path, profile: Path | None = None) -> Description:
     path = as_log(path)
     if path.is_dir():
         raise no_log(path)
-    log = open_log(path, profile)
+    log = open_log(path, profile, icds)
     return _stored(log) if log.is_store else _recorded(log)
 
 
 def _recorded(log: Log) -> Description:
     from groundstation.integrity.ledger_findings import ledger_findings
     from groundstation.integrity.survey import survey
+    from groundstation.readers.chapter10.contents import BusContents
 
     items = log.replay()
     found = survey(items)
     fields: dict[str, dict[str, None]] = {}
+    buses = BusContents()
     for item in items:
+        buses.add(item)
         if isinstance(item, RecordBatch):
             fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
     ledger = found.ledger.document()
     facts = facts_of(log, dict(found.header.metadata), ledger)
     lost = any(damage.loses_data for damage in found.damages)
-    return Description(facts, _topics(ledger, fields), ledger_findings(found.ledger), lost)
+    return Description(facts, _topics(ledger, fields), ledger_findings(found.ledger), lost, _buses(buses, log))
+
+
+def _buses(contents: "BusContents", log: Log) -> tuple[BusWord, ...]:
+    """What is on the buses, in the order of the channels."""
+    from groundstation.readers.chapter10.contents import named_by
+
+    return tuple(
+        BusWord(
+            str(one.channel) if one.sub_channel is None else f"{one.channel}.{one.sub_channel}",
+            one.bus,
+            one.title,
+            one.count,
+            one.rate_hz if isfinite(one.rate_hz) else None,
+            tuple(holder.name for holder in named_by(one, log.loaded_icds)),
+        )
+        for one in contents.entries()
+    )
+
+
+def suggest_icd(path: Path) -> str:
+    """The beginning of an ICD, as YAML, from what is on the buses of a log.
+
+    Raises
+    ------
+    UsageError
+        When the log has no bus words.
+    """
+    from groundstation.base.errors import UsageError
+    from groundstation.readers.chapter10.contents import BusContents
+    from groundstation.readers.icd import suggest
+
+    buses = BusContents()
+    for item in open_log(path).items():
+        buses.add(item)
+    entries = buses.entries()
+    if not entries:
+        raise UsageError(path.name, "no words of 1553 or ARINC-429 buses", "a Chapter 10 recording, or its MCAP")
+    return suggest(entries)
 
 
 def _stored(log: Log) -> Description:
     from groundstation.pipeline.one_flight.convert import damage_finding
+    from groundstation.readers.chapter10.contents import BusContents
     from groundstation.store.reader import read_info
 
     info = read_info(log.path)
     fields: dict[str, dict[str, None]] = {}
-    damages = []
+    damages, buses = [], BusContents()
     for item in log.items():
+        buses.add(item)
         if isinstance(item, RecordBatch):
             fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
         elif isinstance(item, Damage):
@@ -88,7 +151,7 @@ def _stored(log: Log) -> Description:
     facts = facts_of(log, dict(info.metadata), info.ledger)
     facts["log"] = f"{info.source_name}, read as {info.reader}"
     findings = (*info.findings, *(damage_finding(damage) for damage in damages))
-    return Description(facts, _topics(info.ledger, fields), findings, _has_lost(info, damages))
+    return Description(facts, _topics(info.ledger, fields), findings, _has_lost(info, damages), _buses(buses, log))
 
 
 def _has_lost(info: StoreInfo, damages: list[Damage]) -> bool:

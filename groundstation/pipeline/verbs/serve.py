@@ -61,11 +61,11 @@ def serve(
             raise GroundstationError(str(out), "no recording can be read", next_step="run the logs again")
         fleet_too = ", and fleet.rrd" if catalog.has_fleet else ""
         tell(catalog.url)
-        say(f"{recordings} recordings{fleet_too}; open them with: groundstation view {catalog.url}")
+        say(f"{recordings} recordings{fleet_too}; open them with: groundstation view {catalog.table_url}")
         say("Ctrl-C ends")
         try:
             if web:
-                _serve_page(catalog.url, host)
+                _serve_page(catalog.table_url, host)
             while not web and not stop.wait(PATIENCE_S):
                 pass
         except KeyboardInterrupt:

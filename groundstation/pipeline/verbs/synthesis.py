@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.many_flights.inputs import STUDY_MARK
@@ -23,33 +23,45 @@ STUDIES = {
 }
 
 
-def simulate_to(scenario: str, folder: Path, *, seed: int | None = None, force: bool = False) -> list[Path]:
+def simulate_to(
+    scenario: str, folder: Path, *, seed: int | None = None, form: Literal["csv", "ch10"] = "csv", force: bool = False
+) -> list[Path]:
     """Simulate a scenario (a shipped name or a TOML file) into ``<folder>/<scenario>.csv``.
 
-    A session of several aircraft gives one log for each, ``<folder>/<session>-<aircraft>.csv``, with stations.toml and
-    settings.toml beside them; landing aids give the site file that belongs to them, ``<scenario>.site.toml``.
+    With ``form`` ch10 it is ``<scenario>.ch10``, and the ICD of its buses ``<scenario>.icd.yaml``. A session of several
+    aircraft gives one log for each, ``<folder>/<session>-<aircraft>.csv``, with stations.toml and settings.toml beside
+    them; landing aids give the site file that belongs to them, ``<scenario>.site.toml``.
 
     Raises
     ------
     UsageError
-        When the log is there already and ``force`` is not given, or there is no such scenario.
+        When the log is there already and ``force`` is not given, there is no such scenario, or it has no such form.
     """
     from groundstation.results.files import write_text
+    from groundstation.simulation.chapter10_writer import write_chapter10
     from groundstation.simulation.flight import simulate
     from groundstation.simulation.landing_aids import site_of
     from groundstation.simulation.samples import write_log
     from groundstation.simulation.scenario import load_scenario
 
+    if form != "csv" and (is_session(scenario) or is_approach(scenario)):
+        raise UsageError(scenario, f"--format {form}", "a scenario of one flight")
     if is_session(scenario):
         return _session_to(scenario, folder, seed, force=force)
     if is_approach(scenario):
         return [_approach_to(scenario, folder, seed, force=force)]
     loaded = load_scenario(scenario)
-    target = folder / f"{loaded.name}.csv"
+    target = folder / f"{loaded.name}.{form}"
     if target.exists() and not force:
         raise UsageError(str(target), "a file that exists", "a new folder", "-f overwrites it")
     simulated = simulate(loaded, seed)
-    paths, site = [write_log(simulated, folder)], site_of(simulated.trajectory, loaded)
+    site = site_of(simulated.trajectory, loaded)
+    if form == "csv":
+        paths = [write_log(simulated, folder)]
+    else:
+        folder.mkdir(parents=True, exist_ok=True)
+        icd, _left_out = write_chapter10(target, simulated.damaged, cut_bytes=loaded.log.cut_bytes)
+        paths = [target, icd]
     if site:
         paths.append(folder / f"{loaded.name}.site.toml")
         write_text(paths[-1], site)

@@ -1,5 +1,6 @@
 """``view``: whatever stands for a flight - folder, recording, MCAP or log - opens in the Rerun viewer."""
 
+import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -42,13 +43,16 @@ def look_at(
     GroundstationError
         When the log cannot be run, the file is no recording, or the viewer does not start.
     """
-    from groundstation.viewer.launch import open_viewer
+    from groundstation.viewer.launch import open_viewer, require_display
 
     path = Path(what)
-    if what.startswith(ADDRESSES):
-        code = open_viewer(what, web=web, host=host, port=port)
-    elif not path.exists():
+    is_address = what.startswith(ADDRESSES)
+    if not is_address and not path.exists():
         raise UsageError(what, "no such file or folder")
+    if not web:
+        require_display(os.environ)  # before anything is computed
+    if is_address:
+        code = open_viewer(what, web=web, host=host, port=port)
     elif path.is_dir() or path.suffix == ".rrd":
         code = open_viewer(_recording(path), web=web, host=host, port=port)
     else:

@@ -5,6 +5,8 @@ import re
 import numpy as np
 
 from groundstation.base.records import Int64Array, Remark
+from groundstation.base.signals import RAW_PREFIX
+from groundstation.base.source_units import PREFIX
 from groundstation.base.timescales import gps_week_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.dataflash.overview import GpsTimes, Overview
@@ -37,7 +39,7 @@ def metadata(found: Overview) -> dict[str, str]:
     for name, definition in sorted(found.types.items()):
         units = found.units.describe(definition)
         if units and name not in ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"):
-            facts[f"units.raw.{name}"] = units
+            facts[f"{PREFIX}{RAW_PREFIX}{name}"] = units
     return facts
 
 

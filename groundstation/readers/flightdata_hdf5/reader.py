@@ -9,6 +9,7 @@ import numpy as np
 
 from groundstation.base.records import MAX_BATCH_ROWS, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.signals import RAW_PREFIX
+from groundstation.base.source_units import PREFIX, units_entry
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.flightdata_hdf5.canonical import TRACK, Feed, feeds_of, track_feed, values_at
 from groundstation.readers.flightdata_hdf5.container import FAILURES, HIGHEST_RATE_HZ, Container, Parameter, opened
@@ -42,10 +43,11 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
     with opened(source) as container:
         start = container.start_utc_s
         utc_ns = None if start is None else round(start * NS_PER_S)
-        yield LogHeader(reader_name, {}, utc_ns, has_counting_clock=True)
+        topics, losses, steps = _raw_topics(container), _Losses(), _Steps()
+        units = {PREFIX + topic: units_entry({"value": one.unit}) for topic, one in topics.items() if one.unit}
+        yield LogHeader(reader_name, units, utc_ns, has_counting_clock=True)
         feeds, said = feeds_of(container)
         track = track_feed(container) if any(one.field.name == SPEED for one in feeds.get("ins", ())) else None
-        topics, losses, steps = _raw_topics(container), _Losses(), _Steps()
         next_index, end_ns = 0, max(_end_ns(parameter) for parameter in container.parameters)
         for start_ns in range(0, end_ns + 1, round(SLICE_S * NS_PER_S)):
             batches = [

@@ -138,15 +138,15 @@ def law(results: FlightResults) -> Drawing | None:
                 drawn.append(values)
             low, high = d.padded(float(d.finite(*drawn).min()), float(d.finite(*drawn).max()), 0.1, 0.5)
             axes.set_ylim(low, high)
-            for value, text in ((row.low, "low"), (row.high, "high")):
+            for value in (row.low, row.high):
                 if low <= value <= high:
-                    d.limit_line(axes, value, text)
+                    d.limit_line(axes, value, "")
             axes.set_ylabel(f"{d.label(row.aircraft, 12)}: {row.control}, {'m/s' if is_speed else '°'}")
             d.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number == len(answer.controls) - 1)
             if not number:
                 d.legend_above(axes, 3)
 
-    caption = "The laws of control with time; the straight grey line is no control."
+    caption = "The laws of control with time; straight grey: no control; dashed: bounds."
     svg = d.draw("control-law", height, paint)
     return Drawing("Laws of control", caption, "Controls with time.", svg, ("control_paths",))
 

@@ -1,4 +1,4 @@
-"""Figures of the forecast: growth by horizon, calibration, the hindcast map, the paper's four starts."""
+"""Figures of the forecast: growth by horizon, calibration, the hindcast map."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import has_values, plain_log
-from groundstation.results.figures import FigureData, numbers
+from groundstation.results.figures import numbers
 from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import FEWEST_STARTS, METHODS, CalibrationRow, ForecastResult
 
@@ -97,9 +97,10 @@ def _paint_bands(axes: Any, rows: list[CalibrationRow]) -> None:
     inside = np.array([[row.inside50, row.inside68, row.inside95] for row in rows])
     for shares, nominal, colour in zip(inside.T, NOMINAL, (d.INS, d.GNSS, d.USED), strict=True):
         axes.plot(horizon, 100.0 * shares, "o-", color=colour, markersize=3.0, linewidth=1.0)
-        d.limit_line(axes, 100.0 * nominal, f"{100.0 * nominal:.0f} % wanted", colour=colour)
+        d.limit_line(axes, 100.0 * nominal, "", colour=colour)
     axes.set_ylim(0.0, 105.0)
     axes.set_ylabel("errors inside the band, %")
+    axes.set_yticks([0.0, 25.0, *(100.0 * nominal for nominal in NOMINAL), 100.0])
     axes.set_title("Bands of 50, 68 and 95 %")
 
 
@@ -151,51 +152,3 @@ def hindcast_map(results: FlightResults) -> Drawing | None:
     )
     alt = "Maps of the forecast error by start and horizon for the shipped method and the raw INS."
     return Drawing("Hindcast map", caption, alt, d.draw("map-hindcast", 74, paint), ("forecast_map",))
-
-
-def classic(results: FlightResults) -> Drawing | None:
-    """The paper's figure 2: east error after each of four starts, measured, forecast without and with windows."""
-    answer, data = results.answer(ForecastResult), results.figure_with_rows("forecast_classic")
-    if answer is None or data is None or not has_values(data, "start_s", "time_s", "measured_east_m"):
-        return None
-    starts = np.unique(d.finite(numbers(data, "start_s")))[:4]
-    hours = sorted({row.start_h for row in answer.classic_starts})
-    titles = [f"{part:g} h after take-off" for part in hours] if len(hours) == len(starts) else [""] * len(starts)
-
-    def paint(figure: Any) -> None:
-        for place, start in enumerate(starts.tolist()):
-            left, bottom = 18.0 + 86.0 * (place % 2), 12.0 + 52.0 * (1 - place // 2)
-            axes = d.place(figure, left, bottom, left + 70, bottom + 38)
-            _paint_start(axes, data, start)
-            axes.set_title(titles[place])
-            if place % 2 == 0:
-                axes.set_ylabel("east position error, m")
-            if place >= len(starts) - 2:
-                axes.set_xlabel("flight time, h")
-            if place == 0:
-                handles, texts = axes.get_legend_handles_labels()
-                figure.legend(handles, texts, loc="upper center", ncols=4, borderpad=0.1, columnspacing=1.6)
-
-    caption = (
-        "Figure 2 of the paper on this flight: forecast switched on 1.5, 2, 2.5 and 3 h after the start. Compare "
-        "panels at equal times after their start: what is left of the flight shrinks."
-    )
-    alt = "Four panels: measured east error and its forecasts with and without windows."
-    return Drawing("The paper's four starts", caption, alt, d.draw("classic", 114, paint), ("forecast_classic",))
-
-
-def _paint_start(axes: Any, data: FigureData, start: float) -> None:
-    rows = numbers(data, "start_s") == start
-    hours = numbers(data, "time_s")[rows] / 3600.0
-    for column, text, colour, width in (
-        ("measured_east_m", "measured (INS − GNSS)", d.INK, 1.4),
-        ("last_estimate_east_m", "forecast without windows", d.GNSS, 1.0),
-        ("windows_east_m", "forecast with windows", d.INS, 1.0),
-        ("default_east_m", "shipped method", d.USED, 1.4),
-    ):
-        values = numbers(data, column)[rows]
-        if np.isfinite(values).any():
-            d.line(axes, hours, values, colour, width, 1000, label=text)
-    judged = d.finite(np.where(np.isfinite(numbers(data, "measured_east_m")[rows]), hours, np.nan))
-    if judged.size > 1:
-        axes.set_xlim(*d.padded(float(judged.min()), float(judged.max()), 0.03))

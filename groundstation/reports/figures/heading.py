@@ -16,13 +16,17 @@ TAXI_SPEED_MARGIN = 1.6  # the take-off run leaves the figure, or the taxi would
 SLOWEST_TRACK_MPS = 1.0  # below it the direction of motion is noise and is not drawn
 
 
-def taxi_window(samples: FigureData) -> tuple[float, float]:
-    """Flight times the taxi figures span: the used samples and a little around; all there are when none is used."""
+def taxi_windows(samples: FigureData) -> list[tuple[float, float]]:
+    """Spans of flight time that the taxi figures show, one for each ground run that was used; of all where none was."""
     time, used = numbers(samples, "time_s"), flags(samples, "used")
-    known = d.finite(time[used]) if used.any() else d.finite(time)
-    if not known.size:
-        return 0.0, 1.0
-    return d.padded(float(known.min()), float(known.max()), 0.05, 5.0)
+    return d.windows(time[used] if used.any() else time)
+
+
+def _within(samples: FigureData, span: tuple[float, float]) -> FigureData:
+    """The samples of a span of flight time."""
+    time = numbers(samples, "time_s")
+    rows = (time >= span[0]) & (time <= span[1])
+    return FigureData(samples.name, {name: values[rows] for name, values in samples.columns.items()}, samples.digits)
 
 
 def difference(results: FlightResults) -> Drawing | None:
@@ -31,24 +35,23 @@ def difference(results: FlightResults) -> Drawing | None:
     if samples is None:
         return None
     time, value, used = numbers(samples, "time_s"), numbers(samples, "difference_deg"), flags(samples, "used")
-    low, high = taxi_window(samples)
+    spans = taxi_windows(samples)
     count = int(np.count_nonzero(used & np.isfinite(value)))
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 16, 12, 174, 66)
-        d.dots(axes, time[~used], value[~used], d.UNUSED, 1.5, 2500, zorder=1.5, label="not used")
-        d.dots(axes, time[used], value[used], d.USED, 1.7, 3500, zorder=2, alpha=0.7, label="used")
-        if running is not None:
-            _running_band(axes, running)
-        axes.set_ylabel("INS heading − GNSS track, °")
-        axes.set_ylim(*_sample_range(value, used))
-        d.time_axis(axes, low, high)
-        d.legend_above(axes)
+        panels = d.time_panels(figure, (16, 12, 174, 66), spans)
+        for axes, (low, high) in zip(panels, spans, strict=True):
+            left, kept = ((time >= low) & (time <= high) & rows for rows in (~used, used))
+            d.dots(axes, time[left], value[left], d.UNUSED, 1.5, 2500, zorder=1.5, label="not used")
+            d.dots(axes, time[kept], value[kept], d.USED, 1.7, 3500, zorder=2, alpha=0.7, label="used")
+            if running is not None:
+                _running_band(axes, _within(running, (low, high)))
+        panels[0].set_ylabel("INS heading − GNSS track, °")
+        panels[0].set_ylim(*_sample_range(value, used))
+        d.legend_above(panels[-1])
 
-    caption = (
-        f"Each dot is one GNSS epoch; n = {number(count, 0)} used. Black: running mean of the paper; shaded: its "
-        "honest 95 % interval; dotted: ± e. Grey epochs failed a gate; those outside the axis are not drawn."
-    )
+    caption = f"A dot is one GNSS epoch, n = {number(count, 0)} used; running mean and e as in Markelov 2015."
+    caption += " A panel for each ground run." if len(spans) > 1 else ""
     names = ("heading_samples",) if running is None else ("heading_samples", "heading_running")
     alt = "Scatter of heading minus track over flight time with the running mean settling."
     return Drawing("Heading minus track over time", caption, alt, d.draw("difference", 74, paint), names)
@@ -115,7 +118,7 @@ def convergence(results: FlightResults) -> Drawing | None:
             axes.plot(cycles[keep], values, color=colour, linewidth=1.0, label=text)
             limit = next((value for name, value in limits.items() if gate and name.startswith(gate)), None)
             if is_number(limit):
-                d.limit_line(axes, limit, f"limit of {text} {limit:g}°", colour=colour)
+                d.limit_line(axes, limit, f"limit {limit:g}°", colour=colour)
         _plain_log_labels(axes.yaxis)
         axes.set_xlabel("cycles (distinct GNSS epochs used)")
         axes.set_ylabel("angle, °")
@@ -123,10 +126,7 @@ def convergence(results: FlightResults) -> Drawing | None:
         axes.set_xlim(0, max(float(known.max()), 2.0) if known.size else 1.0)
         d.legend_above(axes)
 
-    caption = (
-        "How the figures of merit settle as samples come in; dashed: limits of the gates. The honest width falls more "
-        "slowly than e because neighbouring errors are alike."
-    )
+    caption = "How the figures of merit settle; dashed: limits of the gates."
     alt = "Precision, quality and honest half width against the number of cycles on a logarithmic axis."
     return Drawing("Convergence", caption, alt, d.draw("convergence", 60, paint), ("heading_running",))
 
@@ -175,10 +175,7 @@ def density(results: FlightResults) -> Drawing | None:
 
     count = number(None if answer is None else answer.samples, 0)
     deviation = number(None if answer is None else answer.estimate_sd_deg, 3, "°")
-    caption = (
-        f"Distribution of the n = {count} used differences, standard deviation {deviation}, and the normal curve "
-        "fitted to them. Near-normal is a condition for taking the mean as the error."
-    )
+    caption = f"n = {count} used differences, standard deviation {deviation}."
     alt = "Histogram of the heading error with a fitted normal curve."
     names = ("heading_distribution",) if normal is None else ("heading_distribution", "heading_normal")
     return Drawing("Density of the heading error", caption, alt, d.draw("density", 70, paint), names)
@@ -191,63 +188,63 @@ def taxi(results: FlightResults) -> Drawing | None:
         return None
     lanes, answer = results.figure_with_rows("heading_lanes"), results.answer(HeadingResult)
     speed_limit_mps = None if answer is None else answer.settings.get("taxi_speed_min_mps")
-    low, high = taxi_window(samples)
-    states = _lane_states(lanes, low, high)
+    spans = taxi_windows(samples)
+    states = _lane_states(lanes, spans)
     lane_mm = 4.6 * len(states)
 
     def paint(figure: Any) -> None:
         base = 12.0 + lane_mm + (3.0 if states else 0.0)
-        upper = d.place(figure, 27, base + 30, 174, base + 72)
-        lower = d.place(figure, 27, base, 174, base + 26)
-        _paint_angles(upper, samples, low, high)
-        _paint_speed(lower, samples, speed_limit_mps)
-        d.time_axis(upper, low, high, title=False)
-        d.time_axis(lower, low, high, title=not states)
-        d.legend_above(upper)
+        upper = d.time_panels(figure, (27, base + 33, 174, base + 75), spans, title=False, shared=False)
+        lower = d.time_panels(figure, (27, base, 174, base + 26), spans, title=not states)
+        _paint_angles(upper, samples, spans)
+        _paint_speed(lower, samples, spans, speed_limit_mps)
+        d.legend_above(upper[-1])
+        d.legend_above(lower[-1])
         if states and lanes is not None:
-            strip = d.place(figure, 27, 12, 174, 12 + lane_mm)
             start, end, state = numbers(lanes, "start_s"), numbers(lanes, "end_s"), texts(lanes, "state")
-            d.lanes(strip, start, end, state, states, {"used": d.USED})
-            d.time_axis(strip, low, high)
+            strips = d.time_panels(figure, (27, 12, 174, 12 + lane_mm), spans)
+            for axes, (low, high) in zip(strips, spans, strict=True):
+                mine = (end >= low) & (start <= high)
+                d.lanes(axes, start[mine], end[mine], state[mine], states, {"used": d.USED})
+                axes.tick_params(labelleft=axes is strips[0])
 
-    caption = (
-        "Heading and track agree on straight taxi up to the heading error; the lanes show which epochs are used, and "
-        "what kept the others out."
-    )
+    caption = "The lanes show which epochs are used, and what kept the others out."
     alt = "INS heading, GNSS track and ground speed during the taxi with lanes for each gate."
     names = ("heading_samples",) if lanes is None else ("heading_samples", "heading_lanes")
-    height = 12.0 + lane_mm + (3.0 if states else 0.0) + 80.0
+    height = 12.0 + lane_mm + (3.0 if states else 0.0) + 83.0
     return Drawing("Taxi: heading, track, speed and gates", caption, alt, d.draw("taxi", height, paint), names)
 
 
-def _paint_angles(axes: Any, samples: FigureData, low: float, high: float) -> None:
-    time, nose, speed = (numbers(samples, name) for name in ("time_s", "heading_deg", "ground_speed_mps"))
-    track = np.where(speed > SLOWEST_TRACK_MPS, numbers(samples, "track_deg"), np.nan)
-    d.line(axes, time, d.broken_at_wrap(track), d.GNSS, 0.8, 3000, label="GNSS track")
-    d.line(axes, time, d.broken_at_wrap(nose), d.INS, 1.0, 3000, label="INS heading")
-    axes.set_ylabel("angle from true north, °")
-    shown = (time >= low) & (time <= high)
-    angles = d.finite(nose[shown], track[shown])
-    if angles.size:
-        axes.set_ylim(*d.padded(float(angles.min()), float(angles.max()), 0.06, 1.0))
+def _paint_angles(panels: list[Any], samples: FigureData, spans: list[tuple[float, float]]) -> None:
+    for axes, span in zip(panels, spans, strict=True):
+        mine = _within(samples, span)
+        time, nose, speed = (numbers(mine, name) for name in ("time_s", "heading_deg", "ground_speed_mps"))
+        track = np.where(speed > SLOWEST_TRACK_MPS, numbers(mine, "track_deg"), np.nan)
+        d.line(axes, time, d.broken_at_wrap(track), d.GNSS, 0.8, 3000, label="GNSS track")
+        d.line(axes, time, d.broken_at_wrap(nose), d.INS, 1.0, 3000, label="INS heading")
+        angles = d.finite(nose, track)
+        if angles.size:
+            axes.set_ylim(*d.padded(float(angles.min()), float(angles.max()), 0.06, 1.0))
+    panels[0].set_ylabel("angle from true north, °")
 
 
-def _paint_speed(axes: Any, samples: FigureData, limit_mps: Any) -> None:
-    speed = numbers(samples, "ground_speed_mps")
-    driven = d.finite(speed[flags(samples, "used")])
-    d.line(axes, numbers(samples, "time_s"), speed, d.GNSS, 0.9, 3000)
-    axes.set_ylabel("ground speed, m/s")
-    axes.set_ylim(0.0, TAXI_SPEED_MARGIN * float(driven.max()) if driven.size else None)
-    if is_number(limit_mps):
-        d.limit_line(axes, limit_mps, f"used above {limit_mps:g} m/s")
+def _paint_speed(panels: list[Any], samples: FigureData, spans: list[tuple[float, float]], limit_mps: Any) -> None:
+    driven = d.finite(numbers(samples, "ground_speed_mps")[flags(samples, "used")])
+    for axes, span in zip(panels, spans, strict=True):
+        mine = _within(samples, span)
+        d.line(axes, numbers(mine, "time_s"), numbers(mine, "ground_speed_mps"), d.GNSS, 0.9, 3000)
+        if is_number(limit_mps):
+            d.limit_line(axes, limit_mps, f"used above {limit_mps:g} m/s")
+    panels[0].set_ylabel("ground speed, m/s")
+    panels[0].set_ylim(0.0, TAXI_SPEED_MARGIN * float(driven.max()) if driven.size else None)
 
 
-def _lane_states(lanes: FigureData | None, low: float, high: float) -> list[str]:
+def _lane_states(lanes: FigureData | None, spans: list[tuple[float, float]]) -> list[str]:
     if lanes is None:
         return []
     start, end, state = numbers(lanes, "start_s"), numbers(lanes, "end_s"), texts(lanes, "state")
-    seen = sorted(set(state[(end >= low) & (start <= high)].tolist()), key=lambda name: (name != "used", name))
-    return seen[:12]
+    shown = np.any([(end >= low) & (start <= high) for low, high in spans], axis=0)
+    return sorted(set(state[shown].tolist()), key=lambda name: (name != "used", name))[:12]
 
 
 def forest(results: FlightResults) -> Drawing | None:
@@ -279,10 +276,10 @@ def forest(results: FlightResults) -> Drawing | None:
 
     more = f" The first {len(shown)} of {len(segments)} segments." if len(shown) < len(segments) else ""
     whole = interval(answer.confidence95_deg, 3, "°")
+    blue = "; blue: directions of travel" if answer.directions else ""
     caption = (
-        "Dot: estimate; bar: ± 1.96 σ. Green: straight segments; blue: directions of travel; black: the whole run with "
-        f"its 95 % interval {whole}. Opposite directions that disagree point to side-slip or mounting.{more} "
-        "Numbers: summary.json, results.heading."
+        f"Bar: ± 1.96 σ. Green: straight segments{blue}; black: the whole run, 95 % interval {whole}, thick what this "
+        f"taxi shows by itself. Opposite directions that disagree point to side-slip or mounting.{more}"
     )
     alt = "Forest plot of the heading error by segment and by direction."
     return Drawing("Estimates by segment and direction", caption, alt, d.draw("forest", height, paint))
@@ -295,7 +292,10 @@ def _overall(axes: Any, answer: HeadingResult, place: int) -> None:
     axes.axvline(error, color=d.INK, linewidth=0.6)
     if all(map(is_number, bounds)):
         axes.axvspan(bounds[0], bounds[1], color=d.INK, alpha=0.08, linewidth=0)
-        axes.plot(bounds, [place, place], color=d.INK, linewidth=1.8, solid_capstyle="butt")
+        axes.plot(bounds, [place, place], color=d.INK, linewidth=0.8, solid_capstyle="butt")
+    measured = answer.confidence95_measured_deg or bounds
+    if all(map(is_number, measured)):
+        axes.plot(measured, [place, place], color=d.INK, linewidth=2.4, solid_capstyle="butt")
     axes.plot([error], [place], "D", color=d.INK, markersize=4.5)
 
 
@@ -320,10 +320,7 @@ def spectrum(results: FlightResults) -> Drawing | None:
         axes.set_ylabel("spectral density, °²/Hz")
         d.legend_above(axes)
 
-    caption = (
-        "Residuals of the used samples by frequency. What counts for the error of the mean is the density at the low "
-        "end: slow GNSS velocity errors sit there, sway at 0.2 to 0.6 Hz averages out."
-    )
+    caption = "The low end counts for the error of the mean: slow GNSS errors sit there; sway averages out."
     alt = "Spectral density of the heading residuals with the fitted noise model, logarithmic axes."
     drawn = d.draw("spectrum", 60, paint)
     return Drawing("Spectrum of the residuals", caption, alt, drawn, ("heading_spectrum",))

@@ -176,10 +176,12 @@ def innovations(results: FlightResults) -> Drawing | None:
             axes = d.place(figure, 18, bottom, 174, bottom + 28)
             values = numbers(data, f"{channel}_normalised_innovation")
             d.dots(axes, numbers(data, "time_s"), values, d.INS, 1.6, MOST_DOTS, zorder=2)
-            for limit, text in ((NORMAL_95, "+1.96"), (-NORMAL_95, "−1.96")):
+            for limit, text in ((NORMAL_95, "± 1.96 σ"), (-NORMAL_95, "")):
                 d.limit_line(axes, limit, text)
             axes.set_ylim(*_symmetric(values))
             axes.set_ylabel(f"{channel} innovation, σ")
+            if channel == "north":
+                d.legend_above(axes)
             d.time_axis(axes, low, high, title=channel == "east")
 
     caption = (
@@ -221,3 +223,67 @@ def observability(results: FlightResults) -> Drawing | None:
     alt = "Observability of the six states of both channels over flight time."
     svg = d.draw("inertial-observability", 58, paint)
     return Drawing("Observability", caption, alt, svg, ("inertial_observability",))
+
+
+def differences(results: FlightResults, quantity: str) -> Drawing | None:
+    """INS minus GNSS of an INS that GNSS corrects, north and east."""
+    data = results.figure_with_rows("inertial_differences")
+    names = [f"{channel}_{quantity}_{SUFFIXES[quantity]}" for channel in CHANNELS]
+    if data is None or not has_values(data, *names):
+        return None
+    low, high = span(data)
+
+    def paint(figure: Any) -> None:
+        for bottom, channel, name in ((46.0, "north", names[0]), (12.0, "east", names[1])):
+            axes = d.place(figure, 18, bottom, 174, bottom + 28)
+            _zero(axes)
+            d.dots(axes, numbers(data, "time_s"), numbers(data, name), d.INS, 1.6, MOST_DOTS, zorder=2)
+            axes.set_ylabel(f"{channel}, {UNITS[quantity]}")
+            d.time_axis(axes, low, high, title=channel == "east")
+
+    caption = "Every epoch in which both were there. A slow wave here is no Schuler oscillation."
+    alt = f"INS minus GNSS, {quantity} north and east, over flight time."
+    svg = d.draw(f"inertial-differences-{quantity}", 80, paint)
+    return Drawing(f"INS − GNSS, {quantity}", caption, alt, svg, ("inertial_differences",))
+
+
+def own_innovations(results: FlightResults) -> Drawing | None:
+    """Innovations that the INS's own filter logged, with its band where it logged one."""
+    data = results.figure_with_rows("inertial_own_innovations")
+    if data is None:
+        return None
+    low, high = span(data)
+    time = numbers(data, "time_s")
+    has_band = has_values(data, "north_position_sigma_m")
+
+    def paint(figure: Any) -> None:
+        for row, (quantity, unit) in enumerate((("position", "m"), ("velocity", "mps"))):
+            for column, channel in enumerate(CHANNELS):
+                bottom = 12.0 + 40.0 * (1 - row)
+                axes = d.place(figure, 18 + 90 * column, bottom, 84 + 90 * column, bottom + 32)
+                values = numbers(data, f"{channel}_{quantity}_{unit}")
+                half = NORMAL_95 * numbers(data, f"{channel}_{quantity}_sigma_{unit}")
+                if np.isfinite(half).any():
+                    axes.fill_between(time, -half, half, color=d.USED, alpha=0.2, linewidth=0)
+                _zero(axes)
+                d.dots(axes, time, values, d.INS, 1.6, MOST_DOTS, zorder=2)
+                axes.set_ylim(*_most_of(values))
+                axes.set_ylabel(f"{channel} {quantity}, {UNITS[quantity]}")
+                d.time_axis(axes, low, high, title=row == 1, most=5)
+
+    band = " Shaded: ± 1.96 of the filter's own σ; 95 % should lie inside." if has_band else ""
+    caption = f"GNSS − what the INS's own filter predicted.{band} Rare large ones are off the axis."
+    alt = "Innovations of the INS's own filter in position and velocity, north and east, over flight time."
+    svg = d.draw("inertial-own-innovations", 92, paint)
+    return Drawing("Innovations of the INS's own filter", caption, alt, svg, ("inertial_own_innovations",))
+
+
+def _zero(axes: Any) -> None:
+    axes.axhline(0.0, color=d.FAINT, linewidth=0.6, zorder=1)
+
+
+def _most_of(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Limits that hold all but one in a hundred."""
+    known = np.abs(d.finite(values))
+    largest = 1.3 * float(np.quantile(known, 0.99)) if known.size else 1.0
+    return -max(largest, 1e-3), max(largest, 1e-3)

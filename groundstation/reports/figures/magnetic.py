@@ -162,23 +162,25 @@ def modulus(results: FlightResults) -> Drawing | None:
     if answer is None or data is None:
         return None
     time = numbers(data, "time_s")
+    spans = d.windows(time)
     horizontal, down = answer.declination.horizontal_nt, answer.declination.down_nt
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 16, 12, 174, 62)
-        for column, colour, name in (
-            ("before_nt", d.UNUSED, "as read"),
-            *((f"{name}_nt", METHOD_COLOURS[name], METHOD_TITLES[name]) for name in METHOD_TITLES),
-        ):
-            values = numbers(data, column)
-            if np.isfinite(values).any():
-                broken_time, broken = d.broken_at_gaps(time, values / 1e3)
-                d.line(axes, broken_time, broken, colour, 1.0, label=name)
-        if horizontal is not None and down is not None:
-            d.limit_line(axes, float(np.hypot(horizontal, down)) / 1e3, "field of the model")
-        axes.set_ylabel("modulus of the field, µT")
-        d.time_axis(axes, *d.padded(float(time.min()), float(time.max())))
-        d.legend_above(axes, 4)
+        panels = d.time_panels(figure, (16, 12, 174, 62), spans)
+        for axes, (low, high) in zip(panels, spans, strict=True):
+            mine = (time >= low) & (time <= high)
+            for column, colour, name in (
+                ("before_nt", d.UNUSED, "as read"),
+                *((f"{name}_nt", METHOD_COLOURS[name], METHOD_TITLES[name]) for name in METHOD_TITLES),
+            ):
+                values = numbers(data, column)
+                if np.isfinite(values).any():
+                    broken_time, broken = d.broken_at_gaps(time[mine], values[mine] / 1e3)
+                    d.line(axes, broken_time, broken, colour, 1.0, label=name)
+            if horizontal is not None and down is not None:
+                d.limit_line(axes, float(np.hypot(horizontal, down)) / 1e3, "field of the model")
+        panels[0].set_ylabel("modulus of the field, µT")
+        d.legend_above(panels[-1], 4)
 
     caption = "Readings of the figures alone. A modulus that still waves after the fit is iron the model does not know."
     alt = "Modulus of the magnetic field over flight time before and after the fit."

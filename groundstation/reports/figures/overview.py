@@ -15,6 +15,9 @@ from groundstation.results.heading import HeadingResult, TaxiSegment
 
 SMALLEST_TAXI_M = 10.0  # less is no taxi worth enlarging: a receiver at rest, or a start by hand
 SMALLEST_MAP_M = 2.0  # side of the map of an aircraft that did not move
+ALTITUDES = ("altitude_m", "pressure_altitude_m", "height_above_airfield_m")
+SPEEDS = ("ground_speed_mps", "true_airspeed_mps")
+HEADINGS = ("heading_deg", "magnetic_heading_deg")
 MOST_MODES = 12
 STATE_COLOURS = {"armed": "#b3261e", "on the ground": "#3a86c8"}
 GNSS_COLOURS = {"good": d.USED, "integrity lost": "#b3261e", "no GNSS": "#b3261e"}
@@ -44,10 +47,9 @@ def track_map(results: FlightResults) -> Drawing | None:
         if zoom:
             _map(d.place(figure, 104, 12, 174, 84), north[taxi], east[taxi], used[taxi], "Taxi")
 
-    caption = (
-        f"Distances north and east of the first position (latitude {number(origin[0], 5, '°')}, longitude "
-        f"{number(origin[1], 5, '°')}), equal scales. Ring: start; green: straight stretches the heading error was "
-        "taken from."
+    start = f"{number(origin[0], 5, '°')}, {number(origin[1], 5, '°')}"
+    caption = f"Ring: start ({start})." + (
+        " Green: straight taxi the heading error was taken from." if used.any() else ""
     )
     alt = "Map of the track in metres north and east of the start."
     return Drawing("Track", caption, alt, d.draw("map", 92, paint), ("overview",))
@@ -101,8 +103,7 @@ def profile(results: FlightResults) -> Drawing | None:
         return None
     phases, gnss = results.figure_with_rows("phases"), results.figure_with_rows("gnss_lanes")
     time = numbers(data, "time_s")
-    altitude = "altitude_m" if np.isfinite(numbers(data, "altitude_m")).any() else "pressure_altitude_m"
-    altitude = altitude if altitude in data.columns else "altitude_m"
+    altitude, speed = _first_known(data, ALTITUDES), _first_known(data, SPEEDS)
     times = d.finite(time)
     low, high = (float(times.min()), float(times.max())) if times.size else (0.0, 1.0)
     states = (
@@ -110,13 +111,21 @@ def profile(results: FlightResults) -> Drawing | None:
     )
     lane_mm = 4.6 * len(states) + (3.0 if states else 0.0)
 
+    panels = [
+        panel
+        for panel in (
+            (altitude, f"{words(altitude.removesuffix('_m'))}, m", d.INS),
+            (speed, f"{words(speed.removesuffix('_mps'))}, m/s", d.GNSS),
+        )
+        if np.isfinite(numbers(data, panel[0])).any()
+    ]
+    if not panels:
+        return None
+
     def paint(figure: Any) -> None:
         base = 12.0 + lane_mm
-        upper, lower = d.place(figure, 30, base + 35, 174, base + 66), d.place(figure, 30, base, 174, base + 31)
-        for axes, column, text, colour in (
-            (upper, altitude, f"{words(altitude.removesuffix('_m'))}, m", d.INS),
-            (lower, "ground_speed_mps", "ground speed, m/s", d.GNSS),
-        ):
+        places = [d.place(figure, 30, base + 35 * row, 174, base + 35 * row + 31) for row in range(len(panels))]
+        for axes, (column, text, colour) in zip(reversed(places), panels, strict=True):
             if phases is not None:
                 d.spans(
                     axes, numbers(phases, "start_s"), numbers(phases, "end_s"), texts(phases, "phase"), d.PHASE_COLOURS
@@ -124,24 +133,57 @@ def profile(results: FlightResults) -> Drawing | None:
             values = numbers(data, column)
             d.line(axes, time, values, colour, 1.0)
             axes.set_ylabel(text)
-            if not np.isfinite(values).any():
-                d.nothing(axes, f"no {text.partition(',')[0]} in the log")
-        d.time_axis(upper, low, high, title=False)
-        d.time_axis(lower, low, high, title=not states)
-        d.legend_above(upper)
+            d.time_axis(axes, low, high, title=axes is places[0] and not states)
+        d.legend_above(places[-1])
         if states and gnss is not None:
             strip = d.place(figure, 30, 12, 174, 9 + lane_mm)
             d.lanes(strip, numbers(gnss, "start_s"), numbers(gnss, "end_s"), texts(gnss, "state"), states, GNSS_COLOURS)
             d.time_axis(strip, low, high)
 
     names = tuple(name for name in ("overview", "phases", "gnss_lanes") if results.figure_with_rows(name) is not None)
-    caption = (
-        "Altitude and ground speed; the background is the phase of flight. Lanes: usability of GNSS."
-        if states
-        else ("Altitude and ground speed; the background is the phase of flight.")
+    caption = "Ground: phase of flight." + (" Lanes: usability of GNSS." if states else "")
+    alt = "Altitude and speed over flight time with phases shaded."
+    return Drawing(
+        "Altitude, speed and phases", caption, alt, d.draw("profile", 16 + lane_mm + 35 * len(panels), paint), names
     )
-    alt = "Altitude and ground speed over flight time with phases shaded."
-    return Drawing("Altitude, speed and phases", caption, alt, d.draw("profile", 12 + lane_mm + 74, paint), names)
+
+
+def _first_known(data: FigureData, names: Sequence[str]) -> str:
+    """The first of the columns that has a value, else the first."""
+    return next((name for name in names if np.isfinite(numbers(data, name)).any()), names[0])
+
+
+def attitude(results: FlightResults) -> Drawing | None:
+    """Roll, pitch and heading over time, as far as they are known; None where none is."""
+    data = results.figure_with_rows("overview")
+    if data is None:
+        return None
+    heading = _first_known(data, HEADINGS)
+    panels = [
+        (names, unit)
+        for names, unit in ((("roll_deg", "pitch_deg"), "attitude, °"), ((heading, "track_deg"), "direction, °"))
+        if any(np.isfinite(numbers(data, name)).any() for name in names)
+    ]
+    times = d.finite(numbers(data, "time_s"))
+    if not panels or not times.size:
+        return None
+    height = 14.0 + 36.0 * len(panels)
+
+    def paint(figure: Any) -> None:
+        for place, (names, unit) in enumerate(reversed(panels)):
+            axes = d.place(figure, 30, 12 + 36 * place, 174, 42 + 36 * place)
+            for name, colour in zip(names, (d.INS, d.GNSS), strict=True):
+                values = numbers(data, name)
+                if np.isfinite(values).any():
+                    shown = values if name in ("roll_deg", "pitch_deg") else d.broken_at_wrap(values)
+                    text = words(name.removesuffix("_deg"))
+                    d.line(axes, numbers(data, "time_s"), shown, colour, 0.9, label=text)
+            axes.set_ylabel(unit)
+            d.time_axis(axes, float(times.min()), float(times.max()), title=place == 0)
+            d.legend_above(axes)
+
+    alt = "Roll, pitch and heading over flight time."
+    return Drawing("Attitude", "", alt, d.draw("attitude", height, paint), ("overview",))
 
 
 def states(results: FlightResults) -> Drawing | None:

@@ -25,7 +25,10 @@ from groundstation.results.fleet import AircraftRow, FleetResults
 MOST_DOTS = 2000
 RATE = "radial_error_rate_50_nmiph"
 WORST_RATE = "radial_error_rate_95_nmiph"
-HEADING_LEAD = "Does an aircraft's INS, or its mounting, err in one direction? The mean of each over its flights."
+HEADING_LEAD = (
+    "Does an aircraft's INS, or its mounting, err in one direction? The mean of each over its flights; those with the "
+    "verdict reject enter no mean."
+)
 RATE_LEAD = (
     "How fast the position of the unaided INS drifts: radial error over time, half of each flight below the rate shown."
 )
@@ -43,7 +46,7 @@ def heading(fleet: FleetResults) -> Section:
 
 def _forest(fleet: FleetResults, assessed: list[AircraftRow]) -> Drawing:
     by_name = {row.aircraft: row for row in assessed}
-    shown = [by_name[name] for name in rows_shown({row.aircraft: row.assessed for row in assessed})]
+    shown = [by_name[name] for name in rows_shown({row.aircraft: row.averaged for row in assessed})]
     error, owner = fleet.flights["error_deg"], fleet.flights["aircraft"]
     whole = fleet.by_aircraft[0].mean_deg
     most = max(MOST_DOTS // len(shown), 20)
@@ -61,12 +64,13 @@ def _forest(fleet: FleetResults, assessed: list[AircraftRow]) -> Drawing:
         if whole is not None:
             axes.axvline(whole, color=d.INK, linewidth=0.6)
         axes.axvline(0.0, color=d.FAINT, linewidth=0.6, linestyle=":")
-        name_axis(axes, [f"{d.label(row.aircraft, 20)}  ·  {plural(row.assessed, 'flight')}" for row in shown])
+        name_axis(axes, [f"{d.label(row.aircraft, 20)}  ·  {plural(row.averaged, 'flight')}" for row in shown])
         axes.set_xlabel("heading error, °")
 
     caption = (
-        "Green: mean over the flights with its 95 % interval, from the spread between flights; grey: single flights. "
-        f"Line: mean over all flights of the fleet.{left_out(len(shown), len(assessed))}"
+        "Green: mean over the flights with its 95 % interval, from the spread between flights; grey: single flights, "
+        "the rejected among them. "
+        f"Line: mean over the whole fleet.{left_out(len(shown), len(assessed))}"
     )
     alt = "Forest plot of the mean heading error of each aircraft with its 95 percent interval."
     return Drawing("Mean error of each aircraft", caption, alt, d.draw("fleet-forest", height, paint))
@@ -74,14 +78,14 @@ def _forest(fleet: FleetResults, assessed: list[AircraftRow]) -> Drawing:
 
 def _table(fleet: FleetResults) -> Grid:
     heads = (
-        *(Head("Aircraft"), Head("Flights", True), Head("Assessed", True), Head("Accepted", True)),
+        *(Head("Aircraft"), Head("Flights", True), Head("Assessed", True), Head("In the mean", True)),
         *(Head("Mean error, °", True), Head("95 % interval", True)),
         *(Head("Between flights, °", True), Head("Within, °", True), Head("Unexplained", True), Head("Samples", True)),
     )
     rows = [
         (
             aircraft_name(row.aircraft) if place else "Whole fleet",
-            *(number(count, 0) for count in (row.flights, row.assessed, row.accepted)),
+            *(number(count, 0) for count in (row.flights, row.assessed, row.averaged)),
             bounded(row.mean_deg, 3, signed=True),
             span_of(row.confidence95_deg, 3, "°"),
             *(bounded(value, 3) for value in (row.sigma_between_deg, row.sigma_within_deg)),

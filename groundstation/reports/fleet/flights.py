@@ -17,11 +17,11 @@ LEAD = "Every flight of the fleet, with what is out of the ordinary about it."
 GRAVITY: tuple[Tone, ...] = ("bad", "warn", "plain")
 HEADS = (
     *(Head("Flight"), Head("Aircraft"), Head("Start, UTC"), Head("Verdict")),
-    *(Head("Error, °", True), Head("±, °", True), Head("To enter, °", True), Head("Reference, ′", True)),
+    *(Head("Error, °", True), Head("± 95 %, °", True), Head("To enter, °", True), Head("Reference, ′", True)),
     *(Head("INS, nmi/h", True), Head("60 min, m", True), Head("Remarks")),
 )
 CAPTION = (
-    "Error: INS heading − true heading, with half of its 95 % interval; reference: corrected parking heading less it; "
+    "Error: INS heading − true heading; ± 95 %: half of its interval; reference: corrected parking heading less it; "
     "INS: radial error rate, half of the time below; 60 min: RMS error of the forecast after that long without GNSS."
 )
 LINKED = (("recording", "rrd"), ("mcap", "mcap"))

@@ -112,9 +112,12 @@ def _judged(fleet: FleetResults) -> str:
 
 def _figures(fleet: FleetResults) -> tuple[tuple[str, str, str], ...]:
     figures = []
-    if normal := fleet.normal():
-        remark = f"σ {bounded(normal.sigma_deg, 3, '°')} over {number(normal.samples, 0)} samples"
-        figures.append(("Heading error, all samples", bounded(normal.mean_deg, 3, "°", signed=True), remark))
+    whole = fleet.by_aircraft[0] if fleet.by_aircraft else None
+    if whole is not None and whole.mean_deg is not None:
+        rejected = whole.assessed - whole.averaged
+        remark = f"mean over {plural(whole.averaged, 'flight')}"
+        remark += f"; {number(rejected, 0)} rejected left out" if rejected else ""
+        figures.append(("Heading error", bounded(whole.mean_deg, 3, "°", signed=True), remark))
     rate, flights = median_rate(fleet)
     if rate is not None:
         figures.append(("INS drift", bounded(rate, 2, "nmi/h"), f"median of {plural(flights, 'unaided flight')}"))

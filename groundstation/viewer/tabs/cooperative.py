@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
@@ -63,7 +62,8 @@ def _errors(recorder: Recorder, answer: CooperativeResult, results: FlightResult
         path = f"cooperative/errors/{part}"
         time_ns = recorder.time_ns(numbers(tracks, "time_s")[rows])
         bound, error = (numbers(tracks, column)[rows] for column in ("two_sigma_r_m", "error_m"))
-        _band(recorder, f"{path}/a_band", time_ns, bound)
+        line = Line("2σ_r as computed, m", colours.HONEST, THIN)
+        recorder.band(f"{path}/a_band", time_ns, np.zeros(len(bound)), bound, line)
         if np.isfinite(error).any():
             line = Line("error against the truth, m", colours.ANSWER, BOLD)
             recorder.lines(f"{path}/b_error", time_ns, error[:, None], [line], gap_after(time_ns))
@@ -76,17 +76,6 @@ def _ceiling(*series: FloatArray) -> float:
     """Upper end of an axis from 0 on which bands and lines are seen: Rerun scales by the lines alone."""
     known = np.concatenate([values[np.isfinite(values)] for values in series])
     return ROOM * float(known.max()) if known.size and known.max() > 0.0 else 1.0
-
-
-def _band(recorder: Recorder, path: str, time_ns: NDArray[np.int64], half_m: FloatArray) -> None:
-    """A filled band of plus and minus ``half_m`` around zero: Rerun fills one sigma of a measurement."""
-    known = np.isfinite(half_m)
-    variance = np.where(known, half_m, 0.0) ** 2
-    values = np.where(known, 0.0, np.nan)
-    style = rr.Measurements.from_fields(names=["2σ_r as computed, m"], colors=[colours.HONEST], widths=[THIN])
-    recorder.static(path, style)
-    columns = rr.Measurements.columns(values=values, variances=variance)
-    recorder.stream.send_columns(path, recorder.indexes(time_ns), columns)
 
 
 def _geometry(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:

@@ -23,13 +23,13 @@ MARGIN = 1.08
 FAN_HEIGHT, GROWTH_HEIGHT = 140.0, 115.0
 SHOWN = Line("GNSS showed", colours.GNSS, BOLD)
 FORECAST = Line("forecast", colours.ANSWER, BOLD)
-CLAIMED = Line("± 1.96 σ", colours.HONEST, THIN)
+CLAIMED = Line("95 % as claimed", colours.HONEST, THIN)
 
 
 def forecast(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
-    """Log the forecast tab; None when the flight was not assessed and no reason is known."""
+    """Log the forecast tab; None when the flight was not assessed: the overview says why."""
     section, answer = chapter(results), results.answer(ForecastResult)
-    if section is None:
+    if section is None or answer is None:
         return None
     recorder.document("forecast/answer", markdown(section))
     text = document("How far a forecast can be trusted", "forecast/answer")
@@ -72,8 +72,7 @@ def _fan(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
         axis = Axis(f"{channel.capitalize()} error, m,", -size, size)
         chart = Chart(recorder, f"forecast/fan_{channel}", x, axis, FAN_HEIGHT)
         chart.legend([FORECAST, CLAIMED, SHOWN])
-        curves = [(expected - half, CLAIMED), (expected + half, CLAIMED), (expected, FORECAST), (actual, SHOWN)]
-        _starts(chart, fan, minutes, curves)
+        _starts(chart, fan, minutes, [(expected, FORECAST), (actual, SHOWN)], (expected - half, expected + half))
         views.append(chart.view())
     return [*views, _radial(recorder, fan, minutes, x)]
 
@@ -104,22 +103,29 @@ def _largest(*values: FloatArray) -> float:
     return MARGIN * max(float(np.abs(known).max(initial=0.0)), 1.0)
 
 
-def _starts(chart: Chart, fan: FigureData, minutes: FloatArray, curves: list[tuple[FloatArray, Line]]) -> None:
+def _starts(
+    chart: Chart,
+    fan: FigureData,
+    minutes: FloatArray,
+    curves: list[tuple[FloatArray, Line]],
+    band: tuple[FloatArray, FloatArray] | None = None,
+) -> None:
+    """Log the curves of each start from its time on; before the first one they are its own."""
     starts = numbers(fan, "start_s")
     each = np.unique(starts[np.isfinite(starts)])
-    if each.size and each[0] > 0.0:
-        first = _clock(float(each[0]))
-        chart.note("start", f"move the playhead past the first start, {first}", 0.0)
-    for start in each.tolist():
-        rows = starts == start
-        chart.curves("latest", [(minutes[rows], values[rows], line) for values, line in curves], start)
-        chart.note("start", f"GNSS taken away at {_clock(start)}", start)
+    for place, start in enumerate(each.tolist()):
+        rows, at_s = starts == start, start if place else min(start, 0.0)
+        if band is not None:
+            low, high = band
+            chart.band("claimed", minutes[rows], low[rows], high[rows], CLAIMED.colour, at_s)
+        chart.curves("latest", [(minutes[rows], values[rows], line) for values, line in curves], at_s)
+        chart.note("start", f"GNSS taken away at {_clock(start)}", at_s)
 
 
 # ---------------------------------------------------------------------------------------------------- skill
 
 
-def _growth(recorder: Recorder, results: FlightResults, answer: ForecastResult | None) -> list[rrb.View]:
+def _growth(recorder: Recorder, results: FlightResults, answer: ForecastResult) -> list[rrb.View]:
     """RMS by horizon over methods, the shipped one bold; both axes logarithmic."""
     growth = figure_of(results, "forecast_growth", "horizon_min")
     if growth is None:
@@ -132,7 +138,7 @@ def _growth(recorder: Recorder, results: FlightResults, answer: ForecastResult |
     times = horizon[np.isfinite(horizon) & (horizon > 0.0)]
     if not values.size or not times.size:
         return []
-    default = "" if answer is None else answer.default_method
+    default = answer.default_method
     x = Axis("horizon, min", float(times.min()) / MARGIN, float(times.max()) * MARGIN, True)
     y = Axis("RMS radial error over all starts, m,", float(values.min()) / 1.3, float(values.max()) * 1.3, True)
     chart = Chart(recorder, "forecast/growth", x, y, GROWTH_HEIGHT)
@@ -166,7 +172,7 @@ def method_colours(default: str) -> dict[str, colours.Colour]:
     return {name: fixed[name] if name in fixed else next(left) for name in METHODS}
 
 
-def _map(recorder: Recorder, results: FlightResults, answer: ForecastResult | None) -> list[rrb.View | rrb.Container]:
+def _map(recorder: Recorder, results: FlightResults, answer: ForecastResult) -> list[rrb.View | rrb.Container]:
     """The hindcast map, one tensor a method: radial error by start and horizon, all on one colour scale."""
     figure = figure_of(results, "forecast_map", "start_s", "horizon_min")
     if figure is None:
@@ -179,7 +185,7 @@ def _map(recorder: Recorder, results: FlightResults, answer: ForecastResult | No
     cubes = {name: numbers(figure, f"{name}_m").reshape(shape) for name in known}
     reference = cubes.get("raw_ins", cubes[known[0]])
     top = float(np.nanmax(reference)) if np.isfinite(reference).any() else 1.0
-    default = "" if answer is None else answer.default_method
+    default = answer.default_method
     order = [name for name in (default, "raw_ins") if name in known]
     views: list[rrb.View] = []
     for name in [*order, *(name for name in known if name not in order)]:

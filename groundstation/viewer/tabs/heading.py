@@ -3,7 +3,6 @@
 import numpy as np
 import rerun.blueprint as rrb
 
-from groundstation.chapters.assessed import reason_of
 from groundstation.chapters.heading import heading as heading_chapter
 from groundstation.chapters.markdown import markdown
 from groundstation.results.figures import FigureData
@@ -13,22 +12,21 @@ from groundstation.viewer import colours
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after, wraps_after
 from groundstation.viewer.tabs import distribution
+from groundstation.viewer.tabs.heading_runs import AFTER_TAXI, heading_runs, range_of_used, speed_limit_mps
 from groundstation.viewer.tabs.overview import log_lane
 from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
 
-SPEED_LIMIT_MPS = 6.0  # the paper's; the result's own settings stand above it
 THIN, BOLD, DOT = 1.0, 2.5, 1.6
-AFTER_TAXI = ("too fast", "airborne")
-MARGIN, SMALLEST_MARGIN_DEG = 0.15, 0.05
 
 
 def heading(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
-    """Log the heading tab; None when the flight was not assessed and no reason is known."""
-    if results.answer(HeadingResult) is None and not reason_of(results, "heading"):
+    """Log the heading tab; None when the flight was not assessed: the overview says why."""
+    if results.answer(HeadingResult) is None:
         return None
     recorder.document("heading/verdict", markdown(heading_chapter(results)))
     verdict = document("Verdict and the number to type", "heading/verdict")
     plots = [*_difference(recorder, results), *_taxi(recorder, results), *_lanes(recorder, results)]
+    runs = heading_runs(recorder, results)
     pictures = [
         *distribution.heading_error(recorder, results),
         *_standstill(recorder, results),
@@ -36,16 +34,18 @@ def heading(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     ]
     columns: list[rrb.View | rrb.Container] = []
     if plots:
-        columns.append(rrb.Vertical(contents=plots, row_shares=[3.0, 2.0, 2.0, 1.0][: len(plots)]))
+        shares = [3.0, 2.0, 2.0, 1.0][: len(plots)]
+        whole = rrb.Vertical(contents=plots, row_shares=shares, name="The whole flight")
+        columns.append(rrb.Tabs(contents=[runs, whole], active_tab=0) if runs is not None else whole)
     columns.append(verdict)
     if pictures:
         columns.append(rrb.Vertical(contents=pictures))
-    shares = {1: [1.0], 2: [3.0, 2.0], 3: [5.0, 4.0, 3.5]}[len(columns)]
-    return rrb.Horizontal(contents=columns, column_shares=shares, name="Heading")
+    widths = {1: [1.0], 2: [3.0, 2.0], 3: [5.0, 4.0, 3.5]}[len(columns)]
+    return rrb.Horizontal(contents=columns, column_shares=widths, name="Heading")
 
 
 def _difference(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    """Differences d as dots, the running mean, and two bands of thin lines about it: the honest one and the paper's."""
+    """Differences d as dots, the running mean, and two filled bands about it: the honest one and the paper's."""
     path = "heading/difference"
     samples = figure_of(results, "heading_samples", "time_s", "difference_deg", "used")
     running = figure_of(results, "heading_running", "time_s", "mean_deg")
@@ -61,32 +61,19 @@ def _difference(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
         _running(recorder, f"{path}/running", running)
     if samples is None and running is None:
         return []
-    name = "Heading difference d = INS heading − GNSS track, deg"
-    return [plot(name, path, axis_range=None if samples is None else _range_of_used(samples))]
-
-
-def _range_of_used(samples: FigureData) -> tuple[float, float] | None:
-    """Axis on which all samples used are seen: the bands of the first few samples are far wider than anything else."""
-    values = numbers(samples, "difference_deg")[samples["used"].astype(bool)]
-    values = values[np.isfinite(values)]
-    if not len(values):
-        return None
-    margin = max(MARGIN * float(np.ptp(values)), SMALLEST_MARGIN_DEG)
-    return float(values.min()) - margin, float(values.max()) + margin
+    name = "d = INS heading − GNSS track, deg: samples grey, mean ± honest 95 % green, ± e yellow"
+    return [plot(name, path, axis_range=None if samples is None else range_of_used(samples), legend=False)]
 
 
 def _running(recorder: Recorder, path: str, running: FigureData) -> None:
     time_ns, mean = recorder.time_ns(numbers(running, "time_s")), numbers(running, "mean_deg")
-    columns, lines = [mean], [Line("running mean, deg", colours.ANSWER, BOLD)]
-    for column, name, colour in (
-        ("honest_half_width_deg", "mean ± honest 95 % interval, deg", colours.HONEST),
-        ("precision_deg", "mean ± e (the paper's precision), deg", colours.PAPER),
+    gaps = gap_after(time_ns)
+    for column, part, line in (
+        ("precision_deg", "a_precision", Line("mean ± e (the paper's precision), deg", colours.PAPER, THIN)),
+        ("honest_half_width_deg", "b_honest", Line("mean ± honest 95 % interval, deg", colours.ANSWER, BOLD)),
     ):
         if column in running.columns:
-            half = numbers(running, column)
-            columns += [mean + half, mean - half]
-            lines += [Line(name, colour, THIN), Line(name, colour, THIN)]
-    recorder.lines(path, time_ns, np.column_stack(columns), lines, gap_after(time_ns))
+            recorder.band(f"{path}/{part}", time_ns, mean, numbers(running, column), line, gaps)
 
 
 def _taxi(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
@@ -105,21 +92,14 @@ def _taxi(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
         ("track", track_deg, Line("GNSS track above the speed threshold, deg", colours.GNSS)),
     ):
         recorder.lines(f"heading/taxi/{name}", time_ns, values[:, None], [line], gaps | wraps_after(values))
-    limit = _speed_limit(results)
+    limit = speed_limit_mps(results)
     limits = np.full(len(speed), limit)
     lines = [Line("GNSS ground speed, m/s", colours.GNSS), Line(f"threshold {limit:g} m/s", colours.LIMIT, THIN)]
     recorder.lines("heading/speed", time_ns, np.column_stack([speed, limits]), lines, gaps)
     return [
-        plot("INS heading and GNSS track on the ground, deg", "heading/taxi"),
-        plot("Ground speed on the ground, m/s", "heading/speed"),
+        plot("On the ground: INS heading (blue), GNSS track (orange), deg", "heading/taxi", legend=False),
+        plot(f"GNSS ground speed (orange), threshold {limit:g} m/s (red)", "heading/speed", legend=False),
     ]
-
-
-def _speed_limit(results: FlightResults) -> float:
-    answer = results.answer(HeadingResult)
-    settings = {} if answer is None else answer.settings
-    value = settings.get("taxi_speed_min_mps", SPEED_LIMIT_MPS)
-    return float(value) if isinstance(value, int | float) else SPEED_LIMIT_MPS
 
 
 def _lanes(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
@@ -135,4 +115,4 @@ def _standstill(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     values: FloatArray = np.column_stack([numbers(figure, "velocity_north_mps"), numbers(figure, "velocity_east_mps")])
     lines = [Line("GNSS velocity north, m/s", colours.BLUE), Line("GNSS velocity east, m/s", colours.GNSS)]
     recorder.lines("heading/standstill", time_ns, values, lines, gap_after(time_ns))
-    return [plot("GNSS velocity at standstill, m/s", "heading/standstill")]
+    return [plot("GNSS velocity at standstill, m/s: north dark blue, east orange", "heading/standstill", legend=False)]

@@ -12,10 +12,12 @@ from groundstation.results.inertial import InertialResult
 from groundstation.viewer import colours
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after, runs
+from groundstation.viewer.tabs.aided_ins import aided_pages
 from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
 
 CHANNELS = ("north", "east")
 THIN, BOLD, DOT = 1.0, 2.0, 1.6
+ESTIMATE = Line("estimate ± 95 %", colours.ANSWER, BOLD)
 MARGIN = 0.12
 BAND_QUANTILES = (10.0, 90.0)  # the band of the first minutes and of long outages may leave the picture
 FAST = (  # state, unit, whether GNSS measures it and the smoother is drawn
@@ -36,14 +38,14 @@ TITLES = {
 
 
 def inertial(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
-    """Log the tab of the INS errors; None when the flight was not assessed and no reason is known."""
+    """Log the tab of the INS errors; None when the flight was not assessed: the overview says why."""
     section = chapter(results)
-    if section is None:
+    if section is None or results.answer(InertialResult) is None:
         return None
     recorder.document("inertial/answer", markdown(section))
-    right: list[rrb.View] = [document("How good this INS is", "inertial/answer")]
+    right: list[rrb.View] = [document("What GNSS says of this INS", "inertial/answer")]
     states = figure_of(results, "inertial_states", "time_s", "north_position_m", "east_position_m")
-    pages: list[rrb.Container] = []
+    pages = aided_pages(recorder, results)
     if states is not None:
         pages = _pages(recorder, results, states)
     right += _radial(recorder, results)
@@ -68,7 +70,10 @@ def _pages(recorder: Recorder, results: FlightResults, states: FigureData) -> li
         first.append(rrb.Vertical(contents=[view for view in fast if view is not None]))
         second.append(rrb.Vertical(contents=[view for view in slow if view is not None]))
     return [
-        rrb.Horizontal(contents=first, name="Position, velocity, tilt, drift"),
+        rrb.Horizontal(
+            contents=first,
+            name="Position, velocity, tilt, drift: estimate ± 95 % green, INS − GNSS grey, smoothed yellow",
+        ),
         rrb.Horizontal(contents=second, name="Slow drifts, innovations, observability"),
     ]
 
@@ -76,12 +81,13 @@ def _pages(recorder: Recorder, results: FlightResults, states: FigureData) -> li
 def _state(
     recorder: Recorder, states: FigureData, channel: str, name: str, suffix: str, unit: str, is_measured: bool
 ) -> rrb.View | None:
-    """One state: measured where GNSS shows it, smoothed, estimate, and its 95 % band of two thin lines."""
+    """One state: measured where GNSS shows it, smoothed, estimate, and its filled 95 % band."""
     column = f"{channel}_{name}_{suffix}"
     if column not in states.columns:
         return None
     path = f"inertial/{channel}/{name}"
     time_ns = recorder.time_ns(numbers(states, "time_s"))
+    gaps = gap_after(time_ns)
     estimate = numbers(states, column)
     shown, series, lines = [estimate], [], []
     measured = f"measured_{column}"
@@ -98,13 +104,14 @@ def _state(
     if sigma in states.columns:
         half = NORMAL_95 * numbers(states, sigma)
         band = [estimate + half, estimate - half]
-        series += band
-        lines += [Line(f"estimate ± 1.96 σ, {unit}", colours.HONEST, THIN)] * 2
-    series.append(estimate)  # last: drawn over the others
-    lines.append(Line(f"estimate, {unit}", colours.ANSWER, BOLD))
-    recorder.lines(path, time_ns, np.column_stack(series), lines, gap_after(time_ns))
+        recorder.band(f"{path}/b_band", time_ns, estimate, half, ESTIMATE, gaps)  # over the others
+    else:
+        series.append(estimate)
+        lines.append(ESTIMATE)
+    if series:
+        recorder.lines(f"{path}/a_lines", time_ns, np.column_stack(series), lines, gaps)
     title = f"{channel.capitalize()} {TITLES[name]}, {unit}"
-    return plot(title, path, axis_range=_range(shown, band), legend=channel == CHANNELS[-1])
+    return plot(title, path, axis_range=_range(shown, band), legend=False)
 
 
 def _range(shown: list[FloatArray], band: list[FloatArray]) -> tuple[float, float] | None:

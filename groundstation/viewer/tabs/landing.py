@@ -4,7 +4,6 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from groundstation.base.records import Int64Array
 from groundstation.chapters.landing import landing as chapter
 from groundstation.chapters.markdown import markdown
 from groundstation.results.figures import FigureData
@@ -14,8 +13,9 @@ from groundstation.results.landing_categories import CATEGORIES
 from groundstation.viewer import colours
 from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.recorder import Line, Recorder
-from groundstation.viewer.series import FloatArray, gap_after
-from groundstation.viewer.views import document, figure_of, numbers, plot
+from groundstation.viewer.run_chart import RunChart, runs_of
+from groundstation.viewer.series import FloatArray
+from groundstation.viewer.views import document, figure_of, numbers
 
 SEEN_M = 6_000.0  # of the final, before the threshold
 ENLARGED = 10.0  # across and up against along: corridors of metres along kilometres
@@ -48,7 +48,7 @@ def _approach(recorder: Recorder, results: FlightResults, one: Approach, data: F
     column = {name: numbers(data, name)[mine] for name in data.columns}
     path = f"landing/{one.number}"
     left = _space(recorder, f"{path}/space", column)
-    left += _motion(recorder, f"{path}/motion", recorder.time_ns(column["time_s"]), column)
+    left += _motion(recorder, f"{path}/motion", column)
     left += _protection(recorder, f"{path}/protection", results, one)
     right = _deviation(recorder, f"{path}/lateral", "Right of the course, m", column, "lateral")
     right += _deviation(recorder, f"{path}/vertical", "Above the path, m", column, "vertical")
@@ -138,15 +138,27 @@ def _deviation(recorder: Recorder, path: str, title: str, column: dict[str, Floa
     return [chart.view()]
 
 
-def _motion(recorder: Recorder, path: str, time_ns: Int64Array, column: dict[str, FloatArray]) -> list[rrb.View]:
+def _motion(recorder: Recorder, path: str, column: dict[str, FloatArray]) -> list[rrb.View]:
     """Sink rate and bank."""
     lines = {"sink_rate_mps": Line("sink rate, m/s", colours.INS), "bank_deg": Line("bank, deg", colours.GNSS)}
     known = [name for name in lines if np.isfinite(column[name]).any()]
     if not known:
         return []
-    values = np.column_stack([column[name] for name in known])
-    recorder.lines(path, time_ns, values, [lines[name] for name in known], gap_after(time_ns))
-    return [plot("Sink rate, m/s (blue), and bank, deg (orange)", path, legend=False)]
+    series = {lines[name]: column[name] for name in known}
+    return _over_time(recorder, path, "Sink rate, m/s, and bank, deg,", column["time_s"], series)
+
+
+def _over_time(
+    recorder: Recorder, path: str, title: str, time_s: FloatArray, series: dict[Line, FloatArray]
+) -> list[rrb.View]:
+    """Lines over the time since the approach began; none without two samples."""
+    runs = runs_of(time_s, np.inf)
+    if not runs:
+        return []
+    chart = RunChart(recorder, path, title, runs[0], list(series.values()))
+    for number, (line, values) in enumerate(series.items()):
+        chart.line(f"line/{number}", time_s, values, line)
+    return [chart.view(list(series))]
 
 
 def _protection(recorder: Recorder, path: str, results: FlightResults, one: Approach) -> list[rrb.View]:
@@ -156,15 +168,13 @@ def _protection(recorder: Recorder, path: str, results: FlightResults, one: Appr
         return []
     mine = np.flatnonzero(numbers(data, "approach") == one.number)
     lines = {
-        "horizontal_protection_m": Line("horizontal protection level, m", colours.GNSS, BOLD),
-        "vertical_protection_m": Line("vertical protection level, m", colours.ANSWER, BOLD),
-        "horizontal_alarm_limit_m": Line("horizontal alarm limit, m", colours.LIMIT, THIN),
-        "vertical_alarm_limit_m": Line("vertical alarm limit, m", colours.HONEST, THIN),
+        "horizontal_protection_m": Line("horizontal level", colours.GNSS, BOLD),
+        "vertical_protection_m": Line("vertical level", colours.ANSWER, BOLD),
+        "horizontal_alarm_limit_m": Line("horizontal limit", colours.LIMIT, THIN),
+        "vertical_alarm_limit_m": Line("vertical limit", colours.HONEST, THIN),
     }
     known = [name for name in lines if np.isfinite(numbers(data, name)[mine]).any()]
     if not known:
         return []
-    time_ns = recorder.time_ns(numbers(data, "time_s")[mine])
-    values = np.column_stack([numbers(data, name)[mine] for name in known])
-    recorder.lines(path, time_ns, values, [lines[name] for name in known], gap_after(time_ns))
-    return [plot("Protection levels, m: horizontal orange, vertical green; alarm limit red", path, legend=False)]
+    series = {lines[name]: numbers(data, name)[mine] for name in known}
+    return _over_time(recorder, path, "Protection levels, m,", numbers(data, "time_s")[mine], series)

@@ -28,14 +28,12 @@ def landing_beacons(recorder: Recorder, results: FlightResults) -> rrb.Container
     views: list[rrb.View] = []
     for column, title, most in DEVIATIONS:
         half = LINEAR_95 * numbers(data, f"{column}_sigma_m")
-        values = np.column_stack([numbers(data, f"{column}_m"), half, -half])
-        lines = [
-            Line("deviation, m", colours.ANSWER, BOLD),
-            Line("95 % of one place, m", colours.DIM, THIN),
-            Line("95 %, other side, m", colours.DIM, THIN),
-        ]
-        path = f"landing_beacons/{column}"
-        recorder.lines(path, time_ns, np.clip(values, -most, most), lines, gap_after(time_ns))
+        path, gaps = f"landing_beacons/{column}", gap_after(time_ns)
+        place = np.clip(numbers(data, f"{column}_m"), -most, most)
+        name = Line("95 % of one place, m", colours.HONEST, THIN)
+        recorder.band(f"{path}/a_band", time_ns, np.zeros(len(half)), np.clip(half, 0.0, most), name, gaps)
+        line = Line("deviation, m", colours.ANSWER, BOLD)
+        recorder.lines(f"{path}/b_deviation", time_ns, place[:, None], [line], gaps)
         views.append(plot(f"{title} (cut at {most:g} m)", path, axis_range=(-most, most)))
     path = "landing_beacons/distance"
     far = numbers(data, "before_threshold_m")[:, None]

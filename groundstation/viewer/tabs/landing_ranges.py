@@ -148,11 +148,12 @@ def _errors(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
         first = honest & (trial == 1)
         band = LINEAR_95 * numbers(data, f"sigma_{axis}_m")[first]
         rows = [numbers(data, f"error_{axis}_m")[honest & (trial == one)] for one in range(1, count + 1)]
-        lines = [Line("95 %, m", colours.LIMIT, BOLD), Line("95 %, other side, m", colours.LIMIT, BOLD)]
-        lines += [Line(f"approach {one}", colours.DIM, THIN) for one in range(1, count + 1)]
+        lines = [Line(f"approach {one}", colours.LIGHT, THIN) for one in range(1, count + 1)]
         entity, most = f"landing_ranges/error_{axis}", 6.0 if axis == "right" else 20.0
-        values = np.clip(np.column_stack([band, -band, *rows]), -most, most)
-        recorder.lines(entity, recorder.time_ns(numbers(data, "time_s")[first]), values, lines)
+        time_ns = recorder.time_ns(numbers(data, "time_s")[first])
+        half, name = np.clip(band, 0.0, most), Line("95 % as computed, m", colours.HONEST, THIN)
+        recorder.band(f"{entity}/a_band", time_ns, np.zeros(len(band)), half, name)
+        recorder.lines(f"{entity}/b_errors", time_ns, np.clip(np.column_stack(rows), -most, most), lines)
         title = f"Error {axis} of simulated approaches, m (cut at {most:g})"
         views.append(plot(title, entity, axis_range=(-most, most), legend=False))
     return views

@@ -1,34 +1,36 @@
-"""Log: findings, what could not be assessed, events and gaps, as lines in time."""
-
-import re
+"""Log: findings and events as lines in time, beside the findings by their gravity; gaps apart, lest they bury them."""
 
 import numpy as np
 import rerun.blueprint as rrb
 
-from groundstation.base.findings import Finding
+from groundstation.base.findings import SEVERITIES, Finding, place_time_ns
 from groundstation.base.signals import RAW_PREFIX, topics_of_kind
-from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
+from groundstation.chapters.findings import findings
+from groundstation.chapters.markdown import markdown
 from groundstation.results.flight import FlightResults
 from groundstation.results.grouped_findings import grouped
 from groundstation.tables.table import Flight
 from groundstation.viewer.names import topic_label
 from groundstation.viewer.recorder import Recorder
-from groundstation.viewer.views import figure_of, numbers
+from groundstation.viewer.views import document, figure_of, numbers
 
 MAX_GAPS = 2_000  # of all topics; the lanes of the data quality tab show every one
-_AT_UTC = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z")
-_AT_SECONDS = re.compile(r"(?:^|\bat )\+?(\d+(?:\.\d+)?) s\b")
 
 
 def log(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Container:
     """Log the text log; lines without a time of their own stand at flight time zero."""
     _findings(recorder, flight, results)
     _events(recorder, flight)
-    _gaps(recorder, results)
     columns = rrb.TextLogColumns(text_log_columns=["loglevel", "body"])  # and the time on the timeline chosen
-    view = rrb.TextLogView(name="Findings, events and gaps", origin="/log", columns=columns)
-    return rrb.Vertical(contents=[view], name="Log")
+    paths = ["+ /log/findings", "+ /log/events"]
+    left: list[rrb.View] = [rrb.TextLogView(name="Findings and events in time", contents=paths, columns=columns)]
+    if _gaps(recorder, results):
+        left.append(rrb.TextLogView(name="Gaps in time", origin="/log/gaps", columns=columns))
+    recorder.document("log/by_gravity", markdown(findings(results)))
+    gravest = document("Findings, the gravest first", "log/by_gravity")
+    column = rrb.Vertical(contents=left, row_shares=[2.0, 1.0][: len(left)])
+    return rrb.Horizontal(contents=[column, gravest], name="Log")
 
 
 def _findings(recorder: Recorder, flight: Flight, results: FlightResults) -> None:
@@ -44,7 +46,7 @@ def _findings(recorder: Recorder, flight: Flight, results: FlightResults) -> Non
     ]
     if not entries:
         entries = [(0.0, "no findings", "info")]
-    entries.sort(key=lambda entry: entry[0])
+    entries.sort(key=lambda entry: (entry[0], -SEVERITIES.index(entry[2])))
     times, texts, severities = zip(*entries, strict=True)
     recorder.texts("log/findings", recorder.time_ns(np.array(times)), texts, severities)
 
@@ -57,10 +59,8 @@ def place_s(place: str, flight: Flight) -> float:
     >>> place_s("at 12.4 s", Flight({})), place_s("row 7", Flight({}))
     (0.0, 0.0)
     """
-    seconds, utc = _AT_SECONDS.search(place), _AT_UTC.search(place)
-    found = float(seconds.group(1)) if seconds else 0.0
-    if utc and flight.has_utc:
-        found = (iso_to_utc_ns(utc.group(0))[0] - flight.start_ns) / NS_PER_S
+    time_ns = place_time_ns(place, flight.start_ns, has_utc=flight.has_utc)
+    found = 0.0 if time_ns is None else (time_ns - flight.start_ns) / NS_PER_S
     return found if 0.0 <= found <= flight.duration_s else 0.0
 
 
@@ -80,17 +80,19 @@ def _events(recorder: Recorder, flight: Flight) -> None:
             recorder.texts("log/events", events.time_ns[said], texts, ["info"] * len(texts))
 
 
-def _gaps(recorder: Recorder, results: FlightResults) -> None:
+def _gaps(recorder: Recorder, results: FlightResults) -> bool:
+    """Log the longest gaps; False where there are none."""
     gaps = figure_of(results, "gaps", "topic", "start_s", "length_s")
     if gaps is None:
-        return
+        return False
     start, length = numbers(gaps, "start_s"), numbers(gaps, "length_s")
     # One drop-out hits everything: a hundred raw topics would only repeat it. Theirs are findings and lanes.
     ours = np.flatnonzero([not topic.startswith(RAW_PREFIX) for topic in gaps["topic"].tolist()])
     rows = np.sort(ours[np.argsort(-length[ours], kind="stable")[:MAX_GAPS]])
     if not rows.size:
-        return
+        return False
     texts = [f"gap of {length[row]:.3f} s in {gaps['topic'][row]}" for row in rows]
     if len(rows) < len(gaps):
         texts[0] += f" ({len(rows)} of {len(gaps)} gaps are listed here; the tab Data quality shows every one)"
     recorder.texts("log/gaps", recorder.time_ns(start[rows]), texts, ["info"] * len(texts))
+    return True

@@ -1,5 +1,7 @@
 """Magnetic: the deviation by each method against heading, the branches, the errors and the field over time."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import rerun.blueprint as rrb
 
@@ -23,9 +25,9 @@ RUN, FITTED = Line("ground runs", colours.INS, BOLD), Line("A to E", colours.ANS
 
 
 def magnetic(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
-    """Log the tab of the magnetic deviation; None when the flight was not assessed and no reason is known."""
+    """Log the tab of the magnetic deviation; None when the flight was not assessed: the overview says why."""
     section = chapter(results)
-    if section is None:
+    if section is None or not any(results.answer(kind) for kind in (MagneticResult, GroundDeviation)):
         return None
     recorder.document("magnetic/answer", markdown(section))
     text = document("Verdict and card", "magnetic/answer")
@@ -46,24 +48,31 @@ def _axis(title: str, curves: list[FloatArray]) -> Axis | None:
 
 
 def _chart(
-    recorder: Recorder, path: str, title: str, heading: FloatArray, curves: list[tuple[FloatArray, Line]]
+    recorder: Recorder,
+    path: str,
+    title: str,
+    heading: FloatArray,
+    curves: list[tuple[FloatArray, Line]],
+    bands: Sequence[tuple[FloatArray, FloatArray, colours.Colour]] = (),
 ) -> list[rrb.View]:
-    """Curves against magnetic heading, each with its name; the view, none without a number to draw."""
-    y = _axis(title, [values for values, _ in curves])
+    """Curves against magnetic heading, each with its name, over filled bands; the view, none without a number."""
+    y = _axis(title, [*(values for values, _ in curves), *(edge for low, high, _ in bands for edge in (low, high))])
     if y is None:
         return []
     chart = Chart(recorder, path, Axis("magnetic heading as read, deg", 0.0, 360.0), y)
+    for number, (low, high, shade) in enumerate(bands):
+        chart.band(f"band/{number}", heading, low, high, shade)
     chart.curves("curves", [(heading, values, line) for values, line in curves])
     chart.legend([line for _, line in curves if line.name])
     return [chart.view()]
 
 
 def _deviation(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    """Deviation to be added, by each method, with its 95 % band of two thin lines."""
+    """Deviation to be added, by each method, with its filled 95 % band."""
     figure = figure_of(results, "magnetic_curves", "magnetic_heading_deg")
     if figure is None:
         return []
-    curves = []
+    curves, bands = [], []
     for name, title in METHOD_TITLES.items():
         columns = f"deviation_{name}_deg", f"sigma_{name}_deg"
         if not set(columns) <= set(figure.columns):
@@ -71,10 +80,11 @@ def _deviation(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
         value, sigma = (numbers(figure, column) for column in columns)
         if np.isfinite(value).any():
             shade = SHADES[name]
-            curves += [(value + sign * NORMAL_95 * sigma, Line("", shade, THIN)) for sign in (1.0, -1.0)]
+            bands.append((value - NORMAL_95 * sigma, value + NORMAL_95 * sigma, shade))
             curves.append((value, Line(title, shade, BOLD)))
     heading = numbers(figure, "magnetic_heading_deg")
-    return _chart(recorder, "magnetic/deviation", "Deviation to be added, deg", heading, curves)
+    title = "Deviation to be added and 95 %, deg"
+    return _chart(recorder, "magnetic/deviation", title, heading, curves, bands)
 
 
 def _branches(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
@@ -132,7 +142,8 @@ def _errors(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     for name, title, shade in (("error_before_deg", "before", colours.SAMPLES), (column, "after", colours.ANSWER)):
         values = numbers(figure, name)[mine]
         recorder.dots(f"magnetic/error/{title}", time_ns, values, Line(f"{title}, deg", shade, DOT))
-    return [plot("Error of magnetic heading where no fit has seen, deg", "magnetic/error")]
+    title = "Error of magnetic heading where no fit has seen, deg: before grey, after green"
+    return [plot(title, "magnetic/error", legend=False)]
 
 
 def _applied(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
@@ -147,7 +158,8 @@ def _applied(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     time_ns = recorder.time_ns(numbers(figure, "time_s"))
     for column, (title, shade) in shown.items():
         recorder.dots(f"magnetic/heading/{title}", time_ns, numbers(figure, column), Line(f"{title}, deg", shade, DOT))
-    return [plot("Magnetic heading with the deviation applied, deg", "magnetic/heading")]
+    title = "Magnetic heading, deg: as read grey, with the deviation applied green"
+    return [plot(title, "magnetic/heading", legend=False)]
 
 
 def _modulus(recorder: Recorder, results: FlightResults) -> list[rrb.View]:

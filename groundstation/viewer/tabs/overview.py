@@ -1,11 +1,10 @@
-"""Overview: where the aircraft went, how high, how fast, where it pointed, and in what state it was."""
+"""Overview: where the aircraft went, how high, how fast, its attitude and state, and a row for each answer."""
 
 import numpy as np
 import rerun.blueprint as rrb
 
-from groundstation.chapters.findings import not_assessable
 from groundstation.chapters.front import front
-from groundstation.chapters.markdown import front_markdown, part_markdown
+from groundstation.chapters.markdown import front_markdown
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.viewer import colours
@@ -14,19 +13,55 @@ from groundstation.viewer.names import path_parts
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import gap_after, wraps_after
 from groundstation.viewer.tabs.track import track
-from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
+from groundstation.viewer.views import document, figure_of, lanes, numbers, plot, told_by_colour
 
-LANE_SHARE = 0.35  # height of a lane, of that of a plot
+LANE_SHARE = 0.45  # height of a lane, of that of a plot
 MARGIN_DEG = 10.0  # beyond 0 and 360: a nose that points north would be drawn on the frame
+CIRCULAR = ("heading_deg", "magnetic_heading_deg", "track_deg")
+# Rows of plots: entity, unit, columns of the figure with their names, range of the axis.
+PLOTS: tuple[tuple[str, str, dict[str, str], tuple[float, float] | None], ...] = (
+    (
+        "height",
+        "m",
+        {
+            "altitude_m": "altitude",
+            "pressure_altitude_m": "pressure altitude",
+            "height_above_airfield_m": "height above the airfield",
+        },
+        None,
+    ),
+    (
+        *("speed", "m/s"),
+        {
+            "ground_speed_mps": "ground speed",
+            "true_airspeed_mps": "true airspeed",
+            "indicated_airspeed_mps": "indicated airspeed",
+        },
+        None,
+    ),
+    ("climb", "m/s", {"climb_mps": "climb"}, None),
+    (
+        *("directions", "deg"),
+        {"heading_deg": "INS true heading", "magnetic_heading_deg": "INS magnetic heading", "track_deg": "GNSS track"},
+        (-MARGIN_DEG, 360.0 + MARGIN_DEG),
+    ),
+    ("attitude", "deg", {"roll_deg": "roll, right wing down", "pitch_deg": "pitch, nose up"}, None),
+)
+SHADES = {
+    **dict.fromkeys(("altitude_m", "heading_deg", "climb_mps", "roll_deg"), colours.INS),
+    **dict.fromkeys(("ground_speed_mps", "track_deg", "pitch_deg"), colours.GNSS),
+    **dict.fromkeys(("pressure_altitude_m", "height_above_airfield_m", "magnetic_heading_deg"), colours.HONEST),
+    **dict.fromkeys(("true_airspeed_mps", "indicated_airspeed_mps"), colours.ANSWER),
+}
 
 
 def overview(recorder: Recorder, results: FlightResults) -> rrb.Container:
     """Log the overview: whatever there is of track, plots and lanes, and always the summary."""
-    recorder.document("summary", _summary(results))
+    recorder.document("summary", front_markdown(front(results)))
     summary = document("Flight", "summary")
     figure = figure_of(results, "overview", "time_s")
     ground = None if figure is None else track(recorder, results, figure)
-    left = summary if ground is None else rrb.Vertical(contents=[ground, summary], row_shares=[2.0, 1.0])
+    left = summary if ground is None else rrb.Vertical(contents=[ground, summary], row_shares=[1.5, 1.0])
     right: list[rrb.View] = [] if figure is None else _plots(recorder, figure)
     shares = [1.0] * len(right)
     lane_paths = [
@@ -38,7 +73,7 @@ def overview(recorder: Recorder, results: FlightResults) -> rrb.Container:
         right.append(lanes("Flight phase, states and GNSS", lane_paths))
         shares.append(max(1.0, LANE_SHARE * len(lane_paths)))
     columns = [left, *([rrb.Vertical(contents=right, row_shares=shares)] if right else [])]
-    return rrb.Horizontal(contents=columns, name="Overview")
+    return rrb.Horizontal(contents=columns, column_shares=[1.0, 1.2][: len(columns)], name="Overview")
 
 
 def log_lane(
@@ -71,38 +106,17 @@ def _state_lanes(recorder: Recorder, results: FlightResults) -> list[str]:
 
 
 def _plots(recorder: Recorder, figure: FigureData) -> list[rrb.View]:
+    """A view for each row of PLOTS that the flight has; its title names the lines, for a legend would cover them."""
     views: list[rrb.View] = []
-    for column, name, line in (
-        ("altitude_m", "Altitude, m", Line("altitude, m", colours.INS)),
-        ("pressure_altitude_m", "Pressure altitude, m", Line("pressure altitude, m", colours.INS)),
-        ("ground_speed_mps", "Ground speed, m/s", Line("ground speed, m/s", colours.GNSS)),
-    ):
-        if column in figure.columns and np.isfinite(numbers(figure, column)).any():
-            path = f"overview/{column.rpartition('_')[0]}"
-            time_ns = recorder.time_ns(numbers(figure, "time_s"))
-            recorder.lines(path, time_ns, numbers(figure, column)[:, None], [line], gap_after(time_ns))
-            views.append(plot(name, path, legend=False))
-    directions = [
-        ("heading_deg", "overview/directions/heading", Line("INS true heading, deg", colours.INS)),
-        ("track_deg", "overview/directions/track", Line("GNSS track, deg", colours.GNSS)),
-    ]
-    paths = [path for column, path, line in directions if _direction(recorder, figure, column, path, line)]
-    if paths:
-        views.append(plot("INS heading and GNSS track, deg", paths, axis_range=(-MARGIN_DEG, 360.0 + MARGIN_DEG)))
+    time_ns = recorder.time_ns(numbers(figure, "time_s"))
+    for path, unit, columns, axis_range in PLOTS:
+        known = [name for name in columns if name in figure.columns and np.isfinite(numbers(figure, name)).any()]
+        for name in known:
+            values, line = numbers(figure, name), Line(f"{columns[name]}, {unit}", SHADES[name])
+            breaks = gap_after(time_ns) | wraps_after(values) if name in CIRCULAR else gap_after(time_ns)
+            recorder.lines(f"overview/{path}/{name}", time_ns, values[:, None], [line], breaks)
+        if known:
+            title = told_by_colour([Line(columns[name], SHADES[name]) for name in known], unit)
+            paths = [f"overview/{path}/{name}" for name in known]
+            views.append(plot(title, paths, axis_range=axis_range, legend=False))
     return views
-
-
-def _direction(recorder: Recorder, figure: FigureData, column: str, path: str, line: Line) -> bool:
-    """Log a heading or a track, interrupted where it crosses north; False when it has no value."""
-    if column not in figure.columns or not np.isfinite(numbers(figure, column)).any():
-        return False
-    time_ns, values = recorder.time_ns(numbers(figure, "time_s")), numbers(figure, column)
-    recorder.lines(path, time_ns, values[:, None], [line], gap_after(time_ns) | wraps_after(values))
-    return True
-
-
-def _summary(results: FlightResults) -> str:
-    """The front of the report, and what could not be assessed."""
-    missing = not_assessable(results)
-    parts = [front_markdown(front(results)), *([] if missing is None else [part_markdown(missing)])]
-    return "\n\n".join(parts)

@@ -4,6 +4,7 @@ Topics that are no series (parameters, definitions, single records: most rows at
 """
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ import rerun.blueprint as rrb
 
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.signals import RAW_PREFIX, TOPICS, field_of, kind_of
+from groundstation.base.source_units import source_units
 from groundstation.chapters.markdown import table
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight, Table
@@ -33,6 +35,7 @@ from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
 SCALARS = 1_200_000  # numbers in this tab: about 25 MB, an hour at 100 Hz
 VIEWS_OF_A_COLUMN, FEWEST_COLUMNS, MOST_COLUMNS = 6, 2, 4  # more views in a column are too low to be read
 CIRCULAR = ("heading", "track")
+COUNTS = ("satellites_used", "cycles", "rank", "slot")
 STATES = "states"  # part of the path of every lane: no family may have it
 MAX_VIEWS = 24  # of one topic; the fields of the families beyond share the last one
 MAX_TOPICS = 300  # with a page: the SDK never returns from sending a layout of some 5000 views
@@ -50,7 +53,7 @@ class Family:
     """Fields of one topic that belong on one axis and share their rows.
 
     ``breaks`` tells after which rows the lines end, shape (n - 1,). ``name`` is the field's own, without unit, where
-    the family has one field alone.
+    the family has one field alone. ``unit`` is the source's for topics that are not ours.
     """
 
     topic: str
@@ -60,13 +63,16 @@ class Family:
     values: FloatArray
     breaks: BoolArray
     is_circular: bool
+    is_stepped: bool = False
+    unit: str = ""
 
     @property
     def title(self) -> str:
         """Title of the view, with the unit."""
         topic = _title(self.topic)
         if self.topic.startswith(RAW_PREFIX):  # units only as the source spells them
-            return f"{topic} {source_label(self.fields[0] if len(self.fields) == 1 else self.name)}"
+            name = source_label(self.fields[0] if len(self.fields) == 1 else self.name)
+            return ", ".join(filter(None, (f"{topic} {name}", clean_text(self.unit))))
         if len(self.fields) == 1:
             return f"{topic} {label(self.fields[0])}"
         unit = split_unit(self.fields[0])[1]
@@ -86,7 +92,8 @@ def raw(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Conta
             families[topic] = []
             continue
         starts = np.zeros(0) if gaps is None else numbers(gaps, "start_s")[gaps["topic"] == topic]
-        families[topic] = _families(flight[topic], recorder.time_ns(starts))
+        units = source_units(flight.metadata, topic, flight[topic].columns)
+        families[topic] = _families(flight[topic], recorder.time_ns(starts), units)
     everyone = [family for own in families.values() for family in own]
     limit = rows_that_fit([len(one.time_ns) for one in everyone], [len(one.fields) for one in everyone], SCALARS)
     kept: dict[str, int] = {}
@@ -197,20 +204,25 @@ def family_of(topic: str, field: str) -> str:
     return _AXES.sub("", name) or name
 
 
-def _families(table_of_topic: Table, gap_starts_ns: Int64Array) -> list[Family]:
-    """Numeric fields by family and by the rows where they are present: absent is not a gap, NaN from the device is."""
-    groups: dict[tuple[str, str, bytes], list[str]] = {}
+def _families(table_of_topic: Table, gap_starts_ns: Int64Array, units: Mapping[str, str]) -> list[Family]:
+    """Numeric fields by family and by the rows where they are present: absent is not a gap, NaN from the device is.
+
+    ``units`` are those that the source tells. Counts and codes, which hold until the next one, are stepped.
+    """
+    groups: dict[tuple[str, str, bool, bytes], list[str]] = {}
     for field, column in table_of_topic.columns.items():
         if column.values.dtype.kind not in "fiu" or not len(column) or not column.mask.any():
             continue
         if repeats_the_time(table_of_topic, field):
             continue
         presence = b"" if column.present is None else np.packbits(column.present).tobytes()
-        key = (family_of(table_of_topic.topic, field), split_unit(field)[1], presence)
+        is_stepped = column.values.dtype.kind in "iu" or field in COUNTS
+        unit = units.get(field) or split_unit(field)[1]
+        key = (family_of(table_of_topic.topic, field), unit, is_stepped, presence)
         groups.setdefault(key, []).append(field)
     found = []
     breaks_of: dict[bytes, BoolArray] = {}
-    for (name, _unit, presence), fields in groups.items():
+    for (name, _unit, is_stepped, presence), fields in groups.items():
         mask = table_of_topic.columns[fields[0]].mask
         time_ns = table_of_topic.time_ns[mask]
         values = np.column_stack([np.asarray(table_of_topic.columns[field].values, float)[mask] for field in fields])
@@ -221,7 +233,9 @@ def _families(table_of_topic: Table, gap_starts_ns: Int64Array) -> list[Family]:
             )
         title = name if len(fields) > 1 else split_unit(fields[0])[0]
         breaks = breaks_of[presence]
-        found.append(Family(table_of_topic.topic, title, tuple(fields), time_ns, values, breaks, name in CIRCULAR))
+        unit = units.get(fields[0], "")
+        of_topic = table_of_topic.topic, title, tuple(fields), time_ns, values
+        found.append(Family(*of_topic, breaks, name in CIRCULAR, is_stepped, unit))
     return found
 
 
@@ -259,7 +273,7 @@ def _log_families(
         breaks = family.breaks[rows[:-1]]
         if family.is_circular:
             breaks = breaks | wraps_after(values)
-        recorder.lines(path, time_ns, values, lines, breaks)
+        recorder.lines(path, time_ns, values, lines, breaks, is_stepped=family.is_stepped)
         most = max(most, len(rows))
     views: list[rrb.View] = [
         plot(family.title, path, legend=len(family.fields) > 1) for family, path in zip(families, paths, strict=True)

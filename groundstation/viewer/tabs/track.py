@@ -1,4 +1,4 @@
-"""The track from above: a plan in metres or kilometres that asks nobody for anything, and a map for who wants one.
+"""The track in space and from above: a plan that asks nobody for anything, and a map for who wants one.
 
 Rerun's map fetches tiles over the network for the very place flown over, whatever the provider. The plan is therefore
 what opens; the map is behind its own tab, and a hidden tab fetches nothing.
@@ -16,6 +16,7 @@ from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour
 from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.series import FloatArray
+from groundstation.viewer.tabs.flight_space import flight_space
 from groundstation.viewer.views import figure_of, numbers
 
 LINE, MARK, GRID_LINE = 1.6, 5.0, 0.5  # widths and radii in points of the screen
@@ -27,30 +28,31 @@ SMALLEST_M = 20.0  # side of the plan of an aircraft that never moved
 
 
 def track(recorder: Recorder, results: FlightResults, figure: FigureData) -> rrb.Container | None:
-    """Log the track by flight phase with a marker at the cursor; None without positions on Earth."""
-    if not {"latitude_deg", "longitude_deg"} <= set(figure.columns):
-        return None
-    time_s = numbers(figure, "time_s")
-    positions = np.column_stack(on_earth(numbers(figure, "latitude_deg"), numbers(figure, "longitude_deg")))
-    known = np.asarray(np.isfinite(positions).all(axis=1), dtype=bool)
+    """Log the track by flight phase with the aircraft at the cursor; None without positions on Earth and attitude."""
+    time_s, positions, known = numbers(figure, "time_s"), np.zeros((len(figure), 2)), np.zeros(len(figure), dtype=bool)
+    if {"latitude_deg", "longitude_deg"} <= set(figure.columns):
+        positions = np.column_stack(on_earth(numbers(figure, "latitude_deg"), numbers(figure, "longitude_deg")))
+        known = np.asarray(np.isfinite(positions).all(axis=1), dtype=bool)
     if not known.any():
-        return None
+        space = flight_space(recorder, figure, None, [], [])
+        return None if space is None else rrb.Tabs(contents=[space])
     pieces, shades = _pieces(results, time_s, known)
-    plan = _plan(recorder, time_s, positions, known, pieces, shades)
-    return rrb.Tabs(contents=[plan, _map(recorder, time_s, positions, known, pieces, shades)], active_tab=0)
+    north, east = north_east_m(positions[:, 0], positions[:, 1], *positions[known][0].tolist())
+    space = flight_space(recorder, figure, np.column_stack([east, north]), pieces, shades)
+    plan = _plan(recorder, time_s, np.column_stack([east, -north]), known, pieces, shades)
+    views = [plan, _map(recorder, time_s, positions, known, pieces, shades)]
+    return rrb.Tabs(contents=[*([] if space is None else [space]), *views], active_tab=0)
 
 
 def _plan(
     recorder: Recorder,
     time_s: FloatArray,
-    positions: FloatArray,
+    points: FloatArray,
     known: BoolArray,
     pieces: list[slice],
     shades: list[Colour],
 ) -> rrb.Spatial2DView:
-    origin = positions[known][0]
-    north, east = north_east_m(positions[:, 0], positions[:, 1], float(origin[0]), float(origin[1]))
-    points = np.column_stack([east, -north])  # the axes of a Rerun picture run right and down
+    """Log the plan: ``points`` are metres east and south, for the axes of a Rerun picture run right and down."""
     low, high = bounds_of(points[known])
     recorder.static("plan/grid", grid(low, high))
     recorder.static(
@@ -77,7 +79,7 @@ def _plan(
     )
     bounds = rrb.VisualBounds2D(x_range=[low[0], high[0]], y_range=[low[1], high[1]])
     unit = grid_unit(float((high - low).max()))[0]
-    name = f"Track by flight phase, {unit} east and north of the first position"
+    name = f"Plan, {unit} east and north"
     return rrb.Spatial2DView(name=name, origin="/plan", visual_bounds=bounds)
 
 
@@ -147,7 +149,7 @@ def _map(
     recorder.static("map/now", rr.GeoPoints.from_fields(colors=[colours.PAPER], radii=rr.Radius.ui_points(MARK)))
     rows = recorder.time_ns(time_s[known])
     recorder.stream.send_columns("map/now", recorder.indexes(rows), rr.GeoPoints.columns(positions=positions[known]))
-    name = "Map (asks openstreetmap.org for this area)"
+    name = "Map (asks openstreetmap.org)"
     return rrb.MapView(name=name, origin="/map", zoom=zoom_of(positions[known]))
 
 

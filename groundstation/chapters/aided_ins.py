@@ -1,0 +1,84 @@
+"""Chapter: an INS that GNSS corrects already: INS - GNSS, and the innovations that its own filter logged."""
+
+from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Part, Section
+from groundstation.chapters.wording import ABSENT, any_value, clock, number, percent, typeset, unit_sign
+from groundstation.results.inertial import Difference, InertialResult, OwnInnovation
+
+TITLE = "INS against GNSS"
+HEADLINE = "GNSS corrects this INS"
+LEAD = "INS − GNSS shows how closely this INS follows its receiver, not how good either of them is."
+PLACES = {"m": 2, "mps": 3}
+
+
+def aided(answer: InertialResult) -> Section:
+    """The chapter of an INS that GNSS corrects."""
+    position = answer.difference("position")
+    within = "" if position is None else f": within {number(position.p95, 1, 'm')} of it (95 %)"
+    parts: tuple[Part | None, ...] = (
+        _why(answer),
+        _differences(answer.differences),
+        Figure("inertial.differences", of="position"),
+        Figure("inertial.differences", of="velocity"),
+        _innovations(answer),
+        Figure("inertial.own_innovations"),
+        _pair(answer),
+    )
+    return Section("inertial", TITLE, LEAD, tuple(part for part in parts if part is not None), f"{HEADLINE}{within}")
+
+
+def _why(answer: InertialResult) -> Note:
+    reason = typeset(answer.kind_reason).strip().rstrip(".")
+    text = (
+        f"GNSS corrects this INS already: {reason}. What GNSS takes out cannot be seen against GNSS, so its errors are "
+        "not estimated, nothing is corrected, and nothing is forecast."
+    )
+    return Note(text)
+
+
+def _differences(rows: tuple[Difference, ...]) -> Grid | None:
+    heads = (Head("INS − GNSS"), *(Head(title, True) for title in ("Mean", "Median", "95 %", "Largest", "Epochs")))
+    caption = "Mean with its sign; median, 95 % and largest of the magnitude."
+    cells = [(_title(row), *_sizes(row), _of(row, row.largest), number(row.samples, 0)) for row in rows]
+    return Grid("INS − GNSS", heads, cells, caption, ("inertial_differences",)) if cells else None
+
+
+def _innovations(answer: InertialResult) -> Grid | None:
+    rows = answer.own_innovations
+    titles = ["Mean", "Median", "95 %"]
+    has_sigma = any(row.sigma is not None for row in rows)
+    has_gate = any(row.share_rejected is not None for row in rows)
+    titles += ["Its σ", "Inside ± 1.96 σ"] if has_sigma else []
+    titles += ["Beyond its gate"] if has_gate else []
+    cells = []
+    for row in rows:
+        judged = [_of(row, row.sigma), percent(row.share_inside95, 1)] if has_sigma else []
+        judged += [percent(row.share_rejected, 1)] if has_gate else []
+        cells.append((_title(row), *_sizes(row), *judged, number(row.samples, 0)))
+    heads = (Head("Innovation"), *(Head(title, True) for title in (*titles, "Samples")))
+    caption = (
+        f"GNSS − what the INS's own filter predicted, from topic {answer.own_filter}. A mean far from zero or many "
+        "samples beyond the gate: the filter and its receiver disagree."
+    )
+    return Grid("Innovations of the INS's own filter", heads, cells, caption) if cells else None
+
+
+def _title(row: Difference | OwnInnovation) -> str:
+    return f"{row.quantity.capitalize()} {row.axis}, {unit_sign(row.unit)}"
+
+
+def _sizes(row: Difference | OwnInnovation) -> tuple[str, str, str]:
+    mean = ABSENT if row.axis == "horizontal" else number(row.mean, PLACES.get(row.unit, 3), signed=True)
+    return mean, _of(row, row.median), _of(row, row.p95)
+
+
+def _of(row: Difference | OwnInnovation, value: float | None) -> str:
+    return number(value, PLACES.get(row.unit, 3))
+
+
+def _pair(answer: InertialResult) -> Facts:
+    others = f"not used: {any_value(answer.other_ins)}" if answer.other_ins else ""
+    pairs = (
+        ("Pair used", f"{answer.ins_topic} against {answer.gnss_topic}", others),
+        ("Epochs compared", number(answer.epochs, 0), f"{clock(answer.gnss_seconds)} of the flight with GNSS"),
+    )
+    return Facts("What was compared", pairs)

@@ -1,0 +1,39 @@
+"""Satellite receivers: UBX, NMEA 0183 and NovAtel OEM in one stream, RTCM 3 between them counted."""
+
+import re
+from collections.abc import Iterator
+
+from groundstation.base.records import Item
+from groundstation.readers.receiver.checksums import binary_frame_at, is_sentence
+from groundstation.readers.source import Claim, Source
+
+NAME = "receiver"
+_START = re.compile(rb"\xb5\x62|\xaa\x44[\x12\x13]|(?<![ -~])[$!](?=[A-Z][A-Z0-9]{2,9},)")
+_LOOKED_AT = 1 << 16
+_MOST_TRIED, _ENOUGH = 200, 3
+_LEADING = 2  # bytes in front of the first frame that are still a beginning: the end of a line
+
+
+def sniff(source: Source) -> Claim | None:
+    """Claim what begins with a frame, or holds several in its first 64 KiB."""
+    head = source.head[:_LOOKED_AT]
+    found = 0
+    for tried, match in enumerate(_START.finditer(head)):
+        at = match.start()
+        if tried == _MOST_TRIED:
+            break
+        if not (is_sentence(head, at) if head[at] in b"$!" else binary_frame_at(head, at)):
+            continue
+        if at <= _LEADING:
+            return Claim(NAME)
+        found += 1
+        if found == _ENOUGH:
+            return Claim(NAME, confidence=0.7)
+    return None
+
+
+def read(source: Source) -> Iterator[Item]:
+    """Yield the header, batches, remarks and damages of a stream."""
+    from groundstation.readers.receiver.reader import items  # brings numba
+
+    return items(source)

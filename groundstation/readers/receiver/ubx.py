@@ -1,0 +1,161 @@
+"""UBX messages of a block: their names, times, and the full times that they tell."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.records import BoolArray, Column, Int64Array
+from groundstation.base.units import NS_PER_S
+from groundstation.readers.receiver import scan
+from groundstation.readers.receiver.layouts import layout
+from groundstation.readers.receiver.messages import Messages
+from groundstation.readers.receiver.stream import Frames
+from groundstation.readers.receiver.times import (
+    Anchors,
+    calendar_ns,
+    fine_utc_ns,
+    gps_to_utc_ns,
+)
+from groundstation.readers.receiver.ubx_messages import LAYOUTS, name_of
+
+HEADER_BYTES = 6
+FIRST_WEEK, LAST_WEEK = 1_000, 4_000  # 1999 to 2056: other numbers are no date of a log
+S_PER_WEEK = 604_800.0
+_SECONDS = {"NAV-PVT": "second", "NAV-PVAT": "sec", "NAV-TIMEUTC": "sec"}
+_NAV_CLASS = 0x01
+_ITOW_AT_4 = (0x14, 0x13, 0x3C, 0x3B)  # HPPOSLLH, HPPOSECEF, RELPOSNED, SVIN have a version in front
+
+
+def messages_of(frames: Frames) -> Iterator[Messages]:
+    """UBX messages of a block by name; those shorter than the layout apart, by their length."""
+    which = frames.of(scan.UBX)
+    at = frames.offsets[which]
+    code = frames.data[at + 2].astype(np.int64) * 256 + frames.data[at + 3]
+    sizes = frames.lengths[which] - scan.UBX_EXTRA
+    for number in np.unique(code).tolist():
+        of_code = np.flatnonzero(code == number)
+        for size in np.unique(sizes[of_code]).tolist():
+            name = name_of(number, size)
+            known = layout(LAYOUTS[name]) if name in LAYOUTS else None
+            is_open = known is None or size >= known.size
+            rows = of_code[sizes[of_code] >= size] if is_open else of_code[sizes[of_code] == size]
+            yield Messages(name, frames, frames.places[which[rows]], at[rows] + HEADER_BYTES, sizes[rows], known)
+            if is_open:
+                break
+
+
+def time_of(messages: Messages, anchors: Anchors) -> Column:
+    """UTC of each message; absent for those that tell no time."""
+    if messages.has("iTOW"):
+        return anchors.of_week(messages.places, messages.head()["iTOW"].astype(np.int64))
+    if messages.has("rcvTow"):
+        head = messages.head()
+        sound = _is_gps_time(head["week"], head["rcvTow"])
+        utc_ns = gps_to_utc_ns(np.where(sound, head["week"], 0), np.where(sound, head["rcvTow"], 0.0))
+        return Column(np.where(sound, utc_ns, 0), None if sound.all() else sound)
+    return Column(np.zeros(len(messages), dtype=np.int64), np.zeros(len(messages), dtype=bool))
+
+
+def timed(frames: Frames, anchors: Anchors) -> list[tuple[Messages, Column]]:
+    """Messages of a block with their times; one that tells none has that of the message with a time before it."""
+    several = [(messages, time_of(messages, anchors)) for messages in messages_of(frames)]
+    known = [(messages.places[time.mask], time.values[time.mask]) for messages, time in several]
+    if not known:
+        return several
+    places, utc_ns = (np.concatenate(parts) for parts in zip(*known, strict=True))
+    order = np.argsort(places, kind="stable")
+    places, utc_ns = places[order], utc_ns[order]
+    return [(messages, _filled(messages, time, places, utc_ns)) for messages, time in several]
+
+
+def _filled(messages: Messages, time: Column, places: Int64Array, utc_ns: Int64Array) -> Column:
+    if time.mask.any() or not len(places):  # a message that tells its time is not given another
+        return time
+    at = np.searchsorted(places, messages.places) - 1
+    return Column(np.where(at >= 0, utc_ns[np.maximum(at, 0)], 0), at >= 0)
+
+
+def _is_gps_time(week: NDArray[Any], week_s: NDArray[Any]) -> BoolArray:
+    return np.asarray((week >= FIRST_WEEK) & (week < LAST_WEEK) & (week_s >= 0.0) & (week_s < S_PER_WEEK))
+
+
+@dataclass
+class FullTimes:
+    """Gathers the full times that the messages of a stream tell.
+
+    ``wrong_leaps`` counts the fixes whose UTC had another number of leap seconds than the day has, by the difference.
+    """
+
+    _places: list[Int64Array] = field(default_factory=list)
+    _utc_ns: list[Int64Array] = field(default_factory=list)
+    _week_ms: list[Int64Array] = field(default_factory=list)
+    wrong_leaps: dict[int, int] = field(default_factory=dict)
+
+    def take(self, messages: Messages) -> None:
+        """Take in messages that may tell the full time."""
+        head = messages.head() if messages.layout is not None and len(messages) and messages.has("iTOW") else None
+        if messages.name in _SECONDS and head is not None:
+            self._of_calendar(messages, head)
+        elif messages.name == "NAV-TIMEGPS" and head is not None:
+            self._of_week(messages, head)
+        elif messages.name == "RXM-RAWX" and messages.has("rcvTow"):
+            self.take_time(messages.places, time_of(messages, self.anchors()))
+
+    def take_time(self, places: Int64Array, time: Column) -> None:
+        """Take in messages of which each tells its full time."""
+        self._add(places, time.values, np.full(len(places), -1), time.mask)
+
+    def anchors(self) -> Anchors:
+        """What was gathered, in the order of the file."""
+        if not self._places:
+            nothing = np.zeros(0, dtype=np.int64)
+            return Anchors(nothing, nothing, nothing)
+        places, utc_ns, week_ms = (np.concatenate(parts) for parts in (self._places, self._utc_ns, self._week_ms))
+        order = np.argsort(places, kind="stable")
+        return Anchors(places[order], utc_ns[order], week_ms[order])
+
+    def _add(self, places: Int64Array, utc_ns: Int64Array, week_ms: Int64Array, sound: BoolArray) -> None:
+        if sound.any():
+            self._places.append(places[sound])
+            self._utc_ns.append(utc_ns[sound])
+            self._week_ms.append(week_ms[sound])
+
+    def _of_week(self, messages: Messages, head: NDArray[Any]) -> None:
+        week_ms = head["iTOW"].astype(np.int64)
+        sound = (head["valid"] & 3 == 3) & _is_gps_time(head["week"], week_ms / 1e3) & (np.abs(head["fTOW"]) <= 500_000)
+        utc_ns = gps_to_utc_ns(np.where(sound, head["week"], 0), np.where(sound, week_ms, 0) / 1e3) + head["fTOW"]
+        self._add(messages.places, utc_ns, week_ms, np.asarray(sound))
+
+    def _of_calendar(self, messages: Messages, head: NDArray[Any]) -> None:
+        """Dates and times of fixes that are called valid. Nanoseconds may be negative: they are added."""
+        year, month, day = (head[name].astype(np.int64) for name in ("year", "month", "day"))
+        midnight_ns, sound = calendar_ns(year, month, day)
+        needed = 7 if messages.name == "NAV-TIMEUTC" else 3
+        sound = sound & (head["valid"] & needed == needed) & (np.abs(head["nano"]) <= NS_PER_S)
+        second_s = (head["hour"].astype(np.int64) * 60 + head["min"]) * 60 + head[_SECONDS[messages.name]]
+        week_ms = head["iTOW"].astype(np.int64)
+        sound &= (second_s <= 86_400) & (week_ms < 604_800_000)
+        told_ns = np.where(sound, midnight_ns + second_s * NS_PER_S + head["nano"], 0)
+        utc_ns, wrong_s = fine_utc_ns(told_ns, np.where(sound, week_ms, 0))
+        sound &= np.abs(wrong_s) <= 60
+        for wrong, count in zip(*np.unique(wrong_s[sound], return_counts=True), strict=True):
+            if wrong:
+                self.wrong_leaps[int(wrong)] = self.wrong_leaps.get(int(wrong), 0) + int(count)
+        self._add(messages.places, utc_ns, week_ms, sound)
+
+
+def epoch_start(frames: Frames) -> int:
+    """Number of the first navigation message of the last epoch in a block, ``len(frames)`` where there is none."""
+    which = frames.of(scan.UBX)
+    at = frames.offsets[which]
+    is_navigation = (frames.data[at + 2] == _NAV_CLASS) & (frames.lengths[which] >= scan.UBX_EXTRA + 8)
+    which, at = which[is_navigation], at[is_navigation]
+    if not len(which):
+        return len(frames)
+    shift = np.where(np.isin(frames.data[at + 3], _ITOW_AT_4), 4, 0)
+    week_ms = frames.bytes_at(at + HEADER_BYTES + shift, 4).copy().view("<u4")[:, 0]
+    earlier = np.flatnonzero(week_ms != week_ms[-1])
+    return int(which[earlier[-1] + 1]) if len(earlier) else int(which[0])

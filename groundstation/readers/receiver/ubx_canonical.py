@@ -1,0 +1,225 @@
+"""Canonical topics from UBX messages: ``gnss`` by epochs, ``ins`` where the receiver knows how the vehicle points."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import wrap_180, wrap_360
+from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
+from groundstation.readers.receiver.messages import Block, Columns, occupied
+from groundstation.readers.receiver.times import Anchors
+from groundstation.readers.receiver.ubx import time_of
+
+DEAD_RECKONING, FIX_2D, FIX_3D, WITH_SENSORS = 1, 2, 3, 4
+FLOAT, FIXED = 1, 2
+MM = 1e-3
+POSITION_SOURCES = ("NAV-PVT", "NAV-PVAT", "NAV-HPPOSLLH", "NAV-POSLLH")  # the first that a log has leads
+ATTITUDE_SOURCES = ("NAV-PVAT", "NAV-ATT", "NAV-RELPOSNED", "NAV-PVT")
+_FIXES = np.array(["none", "dead_reckoning", "2d", "3d", "gnss_ins", "none"])
+MOVING_MPS, SAME_DEG = 1.0, 2e-5
+INS_MODE = "gnss_aided"
+
+
+def gnss_batch(block: Block, leader: str, anchors: Anchors) -> RecordBatch | None:
+    """One row an epoch: the leading message and what others of the same time of the week add."""
+    messages, fields = block.get(leader), block.fields(leader)
+    if messages is None or fields is None or "iTOW" not in fields:
+        return None
+    columns = _solution(fields) if leader in ("NAV-PVT", "NAV-PVAT") else _position(fields, _is_valid(fields))
+    if leader != "NAV-PVT" and leader != "NAV-PVAT":
+        columns |= _added(block, "NAV-VELNED", fields, _velocity_ned)
+        columns |= _added(block, "NAV-STATUS", fields, _status)
+    columns |= _precise(block, fields, columns)
+    columns = _added(block, "NAV-DOP", fields, _dilution) | columns
+    return occupied("gnss", messages.places, time_of(messages, anchors), columns)
+
+
+def ins_batch(block: Block, source: str, anchors: Anchors) -> RecordBatch | None:
+    """Attitude of the vehicle from the message that tells it; position and velocity stay those of ``gnss``."""
+    messages, fields = block.get(source), block.fields(source)
+    if messages is None or fields is None or "iTOW" not in fields:
+        return None
+    columns = _ATTITUDES[source](fields)
+    if source in ("NAV-PVAT", "NAV-ATT"):
+        columns |= _added(block, "ESF-INS", fields, _rates)
+    heading = columns.get("true_heading_deg")
+    if heading is not None:
+        columns["mode"] = Column(np.full(len(messages), INS_MODE), heading.present)
+    return occupied("ins", messages.places, time_of(messages, anchors), columns)
+
+
+def has_attitude(block: Block, source: str) -> bool:
+    """Whether a message tells how the vehicle points, at least once in a block."""
+    fields = block.fields(source)
+    heading = None if fields is None else _ATTITUDES[source](fields).get("true_heading_deg")
+    return heading is not None and bool(heading.mask.any())
+
+
+def heading_as_track(block: Block, source: str) -> tuple[int, int]:
+    """How many fixes of a moving vehicle tell the same heading as track, and how many there are."""
+    fields = block.fields(source)
+    if fields is None or source != "NAV-PVAT":
+        return 0, 0
+    is_moving = fields["vehHeadingValid"] & (fields["gSpeed"] * MM > MOVING_MPS)
+    apart_deg = wrap_180(fields["vehHeading"][is_moving] - fields["motHeading"][is_moving])
+    return int((np.abs(apart_deg) <= SAME_DEG).sum()), int(is_moving.sum())
+
+
+def _solution(fields: Mapping[str, NDArray[Any]]) -> Columns:
+    """NAV-PVT and NAV-PVAT."""
+    kind = fields["fixType"]
+    is_ok = fields["gnssFixOk"] if "gnssFixOk" in fields else fields["gnssFixOK"]
+    has_fix = (kind >= DEAD_RECKONING) & (kind <= WITH_SENSORS)
+    has_height = has_fix & (kind != FIX_2D)
+    has_place = has_fix & ~fields["invalidLlh"] if "invalidLlh" in fields else has_fix
+    track = fields["headMot"] if "headMot" in fields else fields["motHeading"]
+    columns = _position(fields, has_place, has_height & has_place)
+    columns |= {
+        "velocity_north_mps": Column(fields["velN"] * MM, has_fix),
+        "velocity_east_mps": Column(fields["velE"] * MM, has_fix),
+        "velocity_down_mps": Column(fields["velD"] * MM, has_height),
+        "ground_speed_mps": Column(fields["gSpeed"] * MM, has_fix),
+        "track_deg": Column(wrap_360(track), has_fix),
+        "velocity_sigma_mps": Column(fields["sAcc"] * MM, has_fix),
+        "satellites_used": Column(fields["numSV"].astype(np.float64)),
+        "integrity_ok": Column(is_ok.copy()),
+        "fix": Column(_fix(kind, fields["carrSoln"], fields["diffSoln"])),
+    }
+    if "pDOP" in fields:
+        columns["pdop"] = Column(fields["pDOP"], has_fix)
+    return columns
+
+
+def _fix(kind: NDArray[Any], carrier: NDArray[Any], differential: BoolArray) -> NDArray[np.str_]:
+    fixes: NDArray[np.str_] = _FIXES[np.minimum(kind, len(_FIXES) - 1)].astype("<U16")
+    fixes[(kind == FIX_3D) & differential] = "dgnss"
+    is_fix = (kind >= FIX_2D) & (kind <= WITH_SENSORS)
+    fixes[is_fix & (carrier == FLOAT)] = "rtk_float"
+    fixes[is_fix & (carrier == FIXED)] = "rtk_fixed"
+    return fixes
+
+
+def _is_valid(fields: Mapping[str, NDArray[Any]]) -> BoolArray:
+    if "invalidLlh" in fields:
+        return np.asarray(~fields["invalidLlh"])
+    return np.asarray((fields["lat"] != 0.0) | (fields["lon"] != 0.0))  # both zero: not known yet
+
+
+def _position(fields: Mapping[str, NDArray[Any]], present: BoolArray, has_height: BoolArray | None = None) -> Columns:
+    up = present if has_height is None else has_height
+    return {
+        "latitude_deg": Column(fields["lat"].astype(np.float64), present),
+        "longitude_deg": Column(fields["lon"].astype(np.float64), present),
+        "altitude_ellipsoid_m": Column(fields["height"] * MM, up),
+        "altitude_msl_m": Column(fields["hMSL"] * MM, up),
+        "horizontal_sigma_m": Column(fields["hAcc"] * MM, present),
+        "vertical_sigma_m": Column(fields["vAcc"] * MM, up),
+    }
+
+
+def _precise(block: Block, fields: Mapping[str, NDArray[Any]], columns: Columns) -> Columns:
+    """The finer position of NAV-HPPOSLLH where it is of the same epoch and valid, the leading message's elsewhere."""
+    precise = block.fields("NAV-HPPOSLLH")
+    if precise is None:
+        return {}
+    at, known = _same_epoch(fields, precise)
+    finer = _position(precise, _is_valid(precise))
+    mixed = {}
+    for name, column in finer.items():
+        used = known & column.mask[at] & columns[name].mask
+        mixed[name] = Column(np.where(used, column.values[at], columns[name].values), columns[name].present)
+    return mixed
+
+
+def _velocity_ned(fields: Mapping[str, NDArray[Any]]) -> Columns:
+    names = {"velocity_north_mps": "velN", "velocity_east_mps": "velE", "velocity_down_mps": "velD"}
+    names |= {"ground_speed_mps": "gSpeed", "velocity_sigma_mps": "sAcc"}
+    columns = {name: Column(fields[source] * 1e-2) for name, source in names.items()}  # cm/s
+    return columns | {"track_deg": Column(wrap_360(fields["heading"]))}
+
+
+def _status(fields: Mapping[str, NDArray[Any]]) -> Columns:
+    fix = Column(_fix(fields["gpsFix"], fields["carrSoln"], fields["diffSoln"]))
+    return {"integrity_ok": Column(fields["gpsFixOk"].copy()), "fix": fix}
+
+
+def _dilution(fields: Mapping[str, NDArray[Any]]) -> Columns:
+    return {name: Column(fields[source]) for name, source in (("gdop", "gDOP"), ("pdop", "pDOP"), ("hdop", "hDOP"))}
+
+
+def _rates(fields: Mapping[str, NDArray[Any]]) -> Columns:
+    """Rates of ESF-INS; its accelerations are without gravity, no specific force, and stay raw."""
+    return {f"rate_{axis}_dps": Column(fields[f"{axis}AngRate"], fields[f"{axis}AngRateValid"]) for axis in "xyz"}
+
+
+def _of_pvat(fields: Mapping[str, NDArray[Any]]) -> Columns:
+    columns: Columns = {}
+    for name, part in (("roll", "Roll"), ("pitch", "Pitch"), ("true_heading", "Heading")):
+        present = fields[f"veh{part}Valid"]
+        columns[f"{name}_deg"] = Column(fields[f"veh{part}"], present)
+        columns[f"{name}_sigma_deg"] = Column(fields[f"acc{part}"], present)
+    return _on_the_circle(columns)
+
+
+def _of_att(fields: Mapping[str, NDArray[Any]]) -> Columns:
+    """An accuracy of zero says that the angle is not known."""
+    columns: Columns = {}
+    for name, source in (("roll", "roll"), ("pitch", "pitch"), ("true_heading", "heading")):
+        sigma = fields[f"acc{source.capitalize()}"]
+        columns[f"{name}_deg"] = Column(fields[source], sigma > 0.0)
+        columns[f"{name}_sigma_deg"] = Column(sigma, sigma > 0.0)
+    return _on_the_circle(columns)
+
+
+def _of_relative(fields: Mapping[str, NDArray[Any]]) -> Columns:
+    """Heading of the line from one antenna to the other; a base that does not move is none of this vehicle's."""
+    present = fields["relPosHeadingValid"] & fields["relPosValid"] & fields["isMoving"] & fields["gnssFixOK"]
+    columns = {
+        "true_heading_deg": Column(fields["relPosHeading"], present),
+        "true_heading_sigma_deg": Column(fields["accHeading"], present),
+    }
+    return _on_the_circle(columns)
+
+
+def _of_pvt(fields: Mapping[str, NDArray[Any]]) -> Columns:
+    """Heading of the vehicle by sensor fusion; elsewhere the field repeats the track."""
+    if "headVeh" not in fields:
+        return {}
+    return _on_the_circle({"true_heading_deg": Column(fields["headVeh"], fields["headVehValid"])})
+
+
+_ATTITUDES: Mapping[str, Callable[[Mapping[str, NDArray[Any]]], Columns]] = {
+    "NAV-PVAT": _of_pvat,
+    "NAV-ATT": _of_att,
+    "NAV-RELPOSNED": _of_relative,
+    "NAV-PVT": _of_pvt,
+}
+
+
+def _on_the_circle(columns: Columns) -> Columns:
+    heading = columns["true_heading_deg"]
+    return columns | {"true_heading_deg": Column(wrap_360(heading.values), heading.present)}
+
+
+def _added(
+    block: Block,
+    name: str,
+    fields: Mapping[str, NDArray[Any]],
+    columns_of: Callable[[Mapping[str, NDArray[Any]]], Columns],
+) -> Columns:
+    """Columns of another message, on the rows whose epoch it is of."""
+    other = block.fields(name)
+    if other is None:
+        return {}
+    at, known = _same_epoch(fields, other)
+    return {key: Column(one.values[at], known & one.mask[at]) for key, one in columns_of(other).items()}
+
+
+def _same_epoch(fields: Mapping[str, NDArray[Any]], other: Mapping[str, NDArray[Any]]) -> tuple[Int64Array, BoolArray]:
+    """For each row the last row of another message with its time of the week, and whether there is one."""
+    order = np.argsort(other["iTOW"], kind="stable")
+    at = np.searchsorted(other["iTOW"], fields["iTOW"], side="right", sorter=order) - 1
+    at = order[np.maximum(at, 0)]
+    return at, np.asarray(other["iTOW"][at] == fields["iTOW"])

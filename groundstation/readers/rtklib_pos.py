@@ -1,0 +1,306 @@
+"""RTKLIB solutions (.pos): position and velocity of a receiver with their covariances, every column kept.
+
+The line of names says which form it is: latitude and longitude (degrees, or degrees, minutes and seconds), ECEF, or a
+baseline east, north, up from the base station; in GPS time, UTC or Japan's, as date and time or as week and second.
+
+Source: Takasu, RTKLIB ver. 2.4.2 manual (2013), appendix B.1.
+"""
+
+import io
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray
+from groundstation.base.ecef import ecef_from_n, ecef_m, geodetic_deg_m
+from groundstation.base.records import Column, Item, LogHeader, RecordBatch, Remark
+from groundstation.base.timescales import gps_to_utc_ns, gps_week_to_utc_ns
+from groundstation.base.units import NS_PER_S
+from groundstation.readers.dialect import Dialect, Line, head_lines
+from groundstation.readers.layout import Layout, Rule, TimeRule
+from groundstation.readers.source import Claim, Source
+
+if TYPE_CHECKING:
+    from _typeshed import WriteableBuffer
+
+NAME = "rtklib-pos"
+RAW = "raw.pos"
+_NAMES = re.compile(r"%\s*(GPST|UTC|JST)\b.*\b(latitude|x-ecef|e-baseline)\b.*\bQ\b\s*[,;]?\s*\bns\b")
+_PARTING = re.compile(rb"[ \t]+(?:[,;][ \t]*)?|[,;][ \t]*")
+_OF_NO_ROW = re.compile(rb"(?m)^\t?%[^\n]*|^\t|\t?\r?$")  # of lines whose cells are parted by tabs
+_REFERENCE = re.compile(r"ref pos\s*:\s*(-?[\d.]+)\s+(-?[\d.]+)\s+(-?[\d.]+)")
+_FIXES = np.array(["none", "rtk_fixed", "rtk_float", "dgnss", "dgnss", "3d", "ppp", "dead_reckoning"])
+_JST_NS = 9 * 3_600 * NS_PER_S
+_PIECE_BYTES, _LONGEST_LINE = 1 << 20, 1 << 16
+_MS = 1_000
+
+
+@dataclass(frozen=True)
+class _Form:
+    """What the lines above the data say.
+
+    ``names`` are those of the cells, date and time (or week and second) first.
+    """
+
+    names: tuple[str, ...]
+    scale: str
+    has_week: bool
+    heights: str
+    reference: tuple[float, float, float] | None
+    metadata: Mapping[str, str]
+    first: Line
+
+
+def sniff(source: Source) -> Claim | None:
+    """Claim a file with RTKLIB's line of names."""
+    if not source.head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"%"):
+        return None
+    return Claim(NAME) if _form_of(source) is not None else None
+
+
+def read(source: Source) -> Iterator[Item]:
+    """Yield the header, rows as ``raw.pos`` and as ``gnss``, then remarks and damages."""
+    from groundstation.base.errors import UnreadableLogError
+    from groundstation.readers.table_reader import TableReader
+
+    form = _form_of(source)
+    if form is None:
+        raise UnreadableLogError(source.name, "no line of names", "%  GPST latitude(deg) ... of RTKLIB")
+    dialect = Dialect("utf-8", "\t", len(form.names), 0, form.first.number + 1)
+    time = TimeRule("seconds", (1,), ("tow",)) if form.has_week else _CALENDAR
+    rules = [Rule(at, RAW, name, "double") for at, name in enumerate(form.names) if at >= 2]
+    rules += [Rule(0, RAW, "week", "double")] if form.has_week else []
+    table = TableReader(_Tabbed(source.path, form.first.next_byte), dialect, Layout(time, tuple(rules)))
+    items = table.items(LogHeader(NAME, form.metadata, 0))
+    yield next(items)
+    yield from _remarks(form)
+    for item in items:
+        if not isinstance(item, RecordBatch):
+            yield item
+            continue
+        batch = _in_utc(item, form)
+        yield batch
+        gnss = _gnss(batch, form)
+        if gnss is not None:
+            yield gnss
+
+
+_CALENDAR = TimeRule("local", (0, 1), ("date", "time"), date_formats=("%Y/%m/%d",))
+
+
+def _form_of(source: Source) -> _Form | None:
+    top: list[Line] = []
+    for line in head_lines(source, "utf-8"):
+        if not line.text.lstrip().startswith("%"):
+            break
+        top.append(line)
+    named = next((line for line in reversed(top) if _NAMES.match(line.text)), None)
+    if named is None:
+        return None
+    text = "\n".join(line.text for line in top)
+    words = re.sub(r"[,;]", " ", named.text.lstrip("% ")).split()
+    names = ["date", "time"]
+    for word in words[1:]:
+        name, _, unit = word.partition("(")
+        names += [f"{name}_deg", f"{name}_min", f"{name}_s"] if unit.startswith("d'") else [name]
+    row = source.head[named.next_byte :].lstrip(b" \r\n")[:12]
+    reference = _REFERENCE.search(text)
+    heights = next((word for word in ("ellipsoidal", "geodetic") if word in text), "")
+    facts = {key: found[1].strip() for key, found in _facts(text)}
+    place = None if reference is None else (float(reference[1]), float(reference[2]), float(reference[3]))
+    return _Form(tuple(names), words[0], b"/" not in row, heights, place, facts, named)
+
+
+def _facts(text: str) -> Iterator[tuple[str, re.Match[str]]]:
+    """Program and settings of the solution, as metadata."""
+    for key, name in (
+        ("program", "program"),
+        ("pos mode", "pos_mode"),
+        ("ref pos", "ref_pos"),
+        ("solution", "solution"),
+    ):
+        found = re.search(rf"(?m)^%\s*{key}\s*:\s*(.{{1,200}})$", text)
+        if found is not None:
+            yield f"rtklib.{name}", found
+
+
+class _Tabs(io.RawIOBase):
+    """The rows of a file with one tab between cells; lines stay lines."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream, self._rest, self._ready = stream, b"", b""
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        """The rows are read once, from the first on."""
+        return 0
+
+    def close(self) -> None:
+        self._stream.close()
+        super().close()
+
+    def readinto(self, buffer: "WriteableBuffer") -> int:
+        view = memoryview(buffer).cast("B")
+        while not self._ready:
+            data = self._stream.read(_PIECE_BYTES)
+            whole = self._rest + data
+            end = whole.rfind(b"\n") + 1 if data and len(self._rest) < _LONGEST_LINE else len(whole)
+            self._rest, self._ready = whole[end:], _OF_NO_ROW.sub(b"", _PARTING.sub(b"\t", whole[:end]))
+            if not data:
+                break
+        count = min(len(view), len(self._ready))
+        view[:count], self._ready = self._ready[:count], self._ready[count:]
+        return count
+
+
+@dataclass(frozen=True)
+class _Tabbed(Source):
+    """A source whose rows are parted by tabs; ``first_byte`` is where they begin in the file."""
+
+    first_byte: int = 0
+
+    def open(self) -> BinaryIO:
+        """The rows, from the first on."""
+        stream = super().open()
+        stream.seek(self.first_byte)
+        return io.BufferedReader(_Tabs(stream))
+
+
+def _in_utc(batch: RecordBatch, form: _Form) -> RecordBatch:
+    time = batch.device_time_ns
+    present = time.mask
+    if form.has_week:
+        week = batch.columns["week"]
+        present = present & week.mask & (np.abs(week.values) < 1e4)
+        whole_ms, rest_ns = np.divmod(time.values, 1_000_000)
+        gps_week = np.where(present, week.values, 0.0).astype(np.int64)
+        utc_ns = gps_week_to_utc_ns(gps_week, whole_ms) + rest_ns
+    elif form.scale == "GPST":
+        utc_ns = gps_to_utc_ns(time.values)
+    else:
+        utc_ns = time.values - (_JST_NS if form.scale == "JST" else 0)
+    when = Column(np.where(present, utc_ns, 0), None if present.all() else present)
+    return RecordBatch(batch.topic, batch.record_index, when, batch.columns)
+
+
+def _gnss(batch: RecordBatch, form: _Form) -> RecordBatch | None:
+    """The canonical row of each solution."""
+    columns = _Cells(batch)
+    found = _position(columns, form)
+    if "Q" in columns:
+        quality = columns["Q"]
+        known = quality.mask & (quality.values >= 0) & (quality.values < len(_FIXES))
+        found["fix"] = Column(_FIXES[np.where(known, quality.values, 0).astype(np.int64)], known)
+    if "ns" in columns:
+        found["satellites_used"] = columns["ns"]
+    rows = np.logical_or.reduce([column.mask for column in found.values()]) if found else np.zeros(len(batch), bool)
+    batch = RecordBatch("gnss", batch.record_index, batch.device_time_ns, found)
+    return None if not rows.any() else batch if rows.all() else batch.take(rows)
+
+
+class _Cells(dict[str, Column]):
+    """Columns of a batch by RTKLIB's name."""
+
+    def __init__(self, batch: RecordBatch) -> None:
+        super().__init__(batch.columns)
+
+    def vector(self, *names: str) -> tuple[FloatArray, Any] | None:
+        """Three columns as (n, 3), and where all are present; None where the form lacks one."""
+        if not all(name in self for name in names):
+            return None
+        parts = [self[name] for name in names]
+        return np.stack([part.values for part in parts], axis=-1), np.logical_and.reduce([part.mask for part in parts])
+
+    def spread(self, one: str, other: str) -> Column | None:
+        """Root of the sum of two variances."""
+        if one not in self or other not in self:
+            return None
+        return Column(np.hypot(self[one].values, self[other].values), self[one].mask & self[other].mask)
+
+
+def _position(columns: _Cells, form: _Form) -> dict[str, Column]:
+    for name in ("latitude", "longitude"):
+        if f"{name}_deg" in columns:
+            columns[name] = _of_minutes(columns, name)
+    if "latitude" in columns:
+        found = {"latitude_deg": columns["latitude"], "longitude_deg": columns["longitude"]}
+        heights = "altitude_msl_m" if form.heights == "geodetic" else "altitude_ellipsoid_m"
+        found |= {heights: columns["height"]} if "height" in columns else {}
+        velocity = columns.vector("vn", "ve", "vu")
+        return found | _sigmas(columns, "n", "e", "u") | _velocities(velocity)
+    return _of_vectors(columns, form)
+
+
+def _of_minutes(columns: _Cells, name: str) -> Column:
+    degrees, minutes, seconds = (columns[f"{name}_{part}"] for part in ("deg", "min", "s"))
+    size = np.abs(degrees.values) + minutes.values / 60.0 + seconds.values / 3600.0
+    return Column(np.copysign(size, degrees.values), degrees.mask & minutes.mask & seconds.mask)
+
+
+def _of_vectors(columns: _Cells, form: _Form) -> dict[str, Column]:
+    """Positions in ECEF, or east, north, up of a base station whose place the file tells."""
+    ecef, baseline = (
+        columns.vector("x-ecef", "y-ecef", "z-ecef"),
+        columns.vector("e-baseline", "n-baseline", "u-baseline"),
+    )
+    if ecef is not None:
+        position_m, present = ecef
+    elif baseline is not None and form.reference is not None:
+        enu_m, present = baseline
+        axes = ecef_from_n(*form.reference[:2])
+        position_m = ecef_m(*form.reference) + (enu_m[:, [1, 0, 2]] * (1.0, 1.0, -1.0)) @ axes.T
+    else:
+        return {}
+    with np.errstate(invalid="ignore", over="ignore"):
+        latitude, longitude, height = geodetic_deg_m(np.where(present[:, None], position_m, 1.0))
+    found = {
+        "latitude_deg": Column(latitude, present),
+        "longitude_deg": Column(longitude, present),
+        "altitude_ellipsoid_m": Column(height, present),
+    }
+    velocity = columns.vector("vx", "vy", "vz") if ecef is not None else columns.vector("vn", "ve", "vu")
+    if ecef is not None and velocity is not None:
+        ned = np.einsum("nij,ni->nj", ecef_from_n(latitude, longitude), velocity[0])
+        velocity = ned * (1.0, 1.0, -1.0), velocity[1] & present
+    return found | (_sigmas(columns, "n", "e", "u") if ecef is None else {}) | _velocities(velocity)
+
+
+def _sigmas(columns: _Cells, *axes: str) -> dict[str, Column]:
+    north, east, up = (f"sd{axis}" for axis in axes)
+    found = {"horizontal_sigma_m": columns.spread(north, east), "velocity_sigma_mps": columns.spread("sdvn", "sdve")}
+    if up in columns:
+        found["vertical_sigma_m"] = columns[up]
+    return {name: column for name, column in found.items() if column is not None}
+
+
+def _velocities(velocity: tuple[FloatArray, Any] | None) -> dict[str, Column]:
+    """Velocities from north, east, up."""
+    if velocity is None:
+        return {}
+    (north, east, up), present = velocity[0].T, velocity[1]
+    return {
+        "velocity_north_mps": Column(north, present),
+        "velocity_east_mps": Column(east, present),
+        "velocity_down_mps": Column(-up, present),
+    }
+
+
+def _remarks(form: _Form) -> Iterator[Remark]:
+    if form.scale == "GPST":
+        yield Remark("converted", "times are GPS time: UTC is less the leap seconds of the day", "gnss")
+    elif form.scale == "JST":
+        yield Remark("converted", "times are Japan's: UTC is 9 h less", "gnss")
+    if "latitude" in form.names or "latitude_deg" in form.names:
+        if not form.heights:
+            text = "the file does not say above what its heights are: taken as above the ellipsoid, RTKLIB's default"
+            yield Remark("assumed", text, "gnss", ("altitude_ellipsoid_m",))
+    elif "e-baseline" in form.names and form.reference is None:
+        yield Remark("no_position", "baselines from a base station whose place the file does not tell: no position")

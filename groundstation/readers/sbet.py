@@ -1,0 +1,322 @@
+"""SBET, the smoothed best estimate of trajectory of an INS with GNSS: records of 17 doubles without a header.
+
+Times are seconds of the GPS week; which week, the file does not say: a date in its name does (``sbet_20250708.out``),
+else the flight has no date. Beside ``sbet_X.out`` stands ``smrmsg_X.out`` with the accuracies, which are read along.
+Heading and velocity are those of a platform that a wander angle turns from north: which way, the positions tell.
+
+Source: Applanix, POSPac MMS file formats (SBET, SMRMSG).
+"""
+
+import re
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import FloatArray, wrap_180, wrap_360
+from groundstation.base.errors import UnreadableLogError
+from groundstation.base.geodesy import curvature_radii_m
+from groundstation.base.records import MAX_BATCH_ROWS, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
+from groundstation.base.timescales import gps_week_to_utc_ns, iso_to_utc_ns
+from groundstation.base.units import ARCMIN_PER_DEG, DEG_PER_RAD, MPS2_PER_G, NS_PER_S
+from groundstation.readers.receiver.times import GPS_EPOCH_NS, calendar_ns, unrolled
+from groundstation.readers.skipped import SkippedBytes, bytes_place
+from groundstation.readers.source import Claim, Source
+
+NAME = "sbet"
+_FIELDS = (
+    "time latitude longitude altitude x_velocity y_velocity z_velocity roll pitch platform_heading wander_angle "
+    "x_acceleration y_acceleration z_acceleration x_rate y_rate z_rate"
+)
+RECORD = np.dtype([(name, "<f8") for name in _FIELDS.split()])
+_ACCURACIES = "time north_m east_m down_m north_mps east_mps down_mps roll_arcmin pitch_arcmin heading_arcmin"
+ACCURACY = np.dtype([(name, "<f8") for name in _ACCURACIES.split()])
+S_PER_WEEK = 604_800
+_LOOKED_AT, _FEWEST, _FIRST, _ENOUGH = 200, 5, 20, 0.9
+_IN_A_ROW, _SEARCHED = 3, 1 << 16
+_LONGEST_STEP_S, _FASTEST_MPS = 10.0, 1_000.0
+_DATE = re.compile(r"(?<!\d)(20\d\d)[-_.]?([01]\d)[-_.]?([0-3]\d)(?!\d)")
+_MODE = "gnss_aided"
+_MOST_APART_S = 5.0  # of two accuracies between which one is interpolated
+_NS_PER_MS = 1_000_000
+_SPECIFIC_FORCE = (0.8 * MPS2_PER_G, 1.2 * MPS2_PER_G)
+
+
+@dataclass(frozen=True)
+class _Sense:
+    """What the file does not say and its data tell: ``wander_sign`` turns heading and velocity back, ``force_sign``
+    makes the accelerations a specific force (0: they are without gravity)."""
+
+    wander_sign: int
+    force_sign: int
+
+
+def sniff(source: Source) -> Claim | None:
+    """Claim a file whose first records are places on Earth, moments in order and speeds that fit the way between."""
+    count = min(len(source.head) // RECORD.itemsize, _LOOKED_AT)
+    if count < _FEWEST:
+        return None
+    is_sound = _follow(np.frombuffer(source.head, RECORD, count))
+    is_one = is_sound[:_FIRST].all() or is_sound.mean() >= _ENOUGH
+    return Claim(NAME, confidence=0.6) if is_one and is_sound.sum() >= _FEWEST else None
+
+
+def read(source: Source) -> Iterator[Item]:
+    """Yield the header, then ``ins`` and ``raw.sbet``, remarks, and a last record that was cut."""
+    head = np.frombuffer(source.head, RECORD, len(source.head) // RECORD.itemsize)
+    if not len(head):
+        raise UnreadableLogError(source.name, "less than one record", f"{RECORD.itemsize} bytes", "the file was cut")
+    week, sense = _week_of(source.name, float(head["time"][0])), _sense_of(head)
+    accuracies = _accuracies(source.path)
+    yield LogHeader(NAME, {"ins_kind": _MODE}, None if week is None else 0)
+    yield from _remarks(week, sense, accuracies)
+    walk, last_s, first = _Walk(source), np.zeros(0), 0
+    for records in walk:
+        week_s = unrolled_s(np.concatenate((last_s, records["time"])))[len(last_s) :]
+        last_s = week_s[-1:]
+        yield from _batches(records, first, _time(week, week_s), week_s, sense, accuracies)
+        first += len(records)
+    yield from walk.damages()
+
+
+class _Walk:
+    """Iterates over the sound records of a file; behind a damaged one the next is looked for at every byte."""
+
+    def __init__(self, source: Source) -> None:
+        self._source, self._skipped = source, SkippedBytes("record")
+        self._cut: tuple[int, int] | None = None
+        self._count = self._skipped_to = 0
+
+    def __iter__(self) -> Iterator[NDArray[Any]]:
+        data, base = b"", 0
+        with self._source.open() as stream:
+            while content := stream.read(MAX_BATCH_ROWS * RECORD.itemsize):
+                data += content
+                done = yield from self._of(data, base)
+                data, base = data[done:], base + done
+        if data:
+            self._finish(base, base + len(data))
+
+    def damages(self) -> Iterator[Damage]:
+        """What belongs to no record, and a last record that was cut."""
+        yield from self._skipped.damages()
+        if self._cut is not None:
+            what = "bytes of a record that was cut"
+            yield Damage("truncated", bytes_place(*self._cut), self._cut[1] - self._cut[0], what)
+
+    def _of(self, data: bytes, base: int) -> Generator[NDArray[Any], None, int]:
+        """Records of the data at hand; returns how many bytes are done with."""
+        at = 0
+        while len(data) - at >= RECORD.itemsize:
+            records = np.frombuffer(data, RECORD, (len(data) - at) // RECORD.itemsize, at)
+            sound = _is_sound(records)
+            count = len(records) if sound.all() else int(np.argmin(sound))
+            for start in range(0, count, MAX_BATCH_ROWS):
+                yield records[start : min(start + MAX_BATCH_ROWS, count)]
+            self._count += count
+            at += count * RECORD.itemsize
+            if len(data) - at < RECORD.itemsize:
+                break
+            found = _next_start(data, at + 1)
+            if found is None:  # what is left may begin a record that the next block ends
+                found = max(at + 1, len(data) - (_IN_A_ROW + 1) * RECORD.itemsize)
+            self._skipped.add(base + at, base + found, self._count)
+            self._skipped_to = base + found
+            at = found
+        return at
+
+    def _finish(self, start: int, end: int) -> None:
+        if self._skipped_to == start:
+            self._skipped.add(start, end, self._count)
+        else:
+            self._cut = start, end
+
+
+def _next_start(data: bytes, at: int) -> int | None:
+    """The next byte at which several sound records in a row begin, one step of time apart from each other."""
+    span = _IN_A_ROW * RECORD.itemsize
+    aligned = at - 1 + RECORD.itemsize  # most often one record alone is damaged
+    while at + span <= len(data):
+        width = min(_SEARCHED, len(data) - at - span + 1)
+        every = np.ndarray((width,), "<f8", data, at, (1,))
+        following = np.ndarray((width,), "<f8", data, at + RECORD.itemsize, (1,))
+        with np.errstate(invalid="ignore", over="ignore"):
+            steps = following - every
+            plausible = (every >= 0.0) & (every < 2 * S_PER_WEEK) & (steps > 0.0) & (steps < _LONGEST_STEP_S)
+        candidates = at + np.flatnonzero(plausible)
+        for place in sorted(candidates.tolist(), key=lambda place: (place != aligned, place)):
+            if _follow(np.frombuffer(data, RECORD, _IN_A_ROW, place)).all():
+                return int(place)
+        at += width
+    return None
+
+
+def unrolled_s(week_s: FloatArray) -> FloatArray:
+    """Seconds of the week that count on past its end; what is no number stays."""
+    finite = np.isfinite(week_s) & (np.abs(week_s) < 1e9)
+    ms = unrolled((np.where(finite, week_s, 0.0) * 1e3).astype(np.int64), S_PER_WEEK * 1000)
+    turns = np.round((ms / 1e3 - np.where(finite, week_s, 0.0)) / S_PER_WEEK)
+    return np.asarray(week_s + S_PER_WEEK * turns)
+
+
+def _is_sound(records: NDArray[Any]) -> NDArray[np.bool_]:
+    """Whether records are places on Earth with angles and speeds that exist, shape (n,)."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        time, latitude, longitude = records["time"], records["latitude"], records["longitude"]
+        sound = (time >= 0.0) & (time < 2 * S_PER_WEEK) & (np.abs(latitude) <= np.pi / 2) & (np.abs(longitude) <= np.pi)
+        sound &= (np.abs(records["altitude"]) < 100_000.0) & (np.abs(records["wander_angle"]) <= 2 * np.pi)
+        sound &= (np.abs(records["roll"]) <= np.pi) & (np.abs(records["pitch"]) <= np.pi / 2)
+        sound &= np.abs(records["platform_heading"]) <= 4 * np.pi
+        sound &= np.hypot(records["x_velocity"], records["y_velocity"]) < _FASTEST_MPS
+        sound &= (latitude != 0.0) | (longitude != 0.0)
+    return np.asarray(sound)
+
+
+def _follow(records: NDArray[Any]) -> NDArray[np.bool_]:
+    """Whether records are sound and each a small step of time behind the one before, shape (n,)."""
+    sound = _is_sound(records)
+    with np.errstate(invalid="ignore", over="ignore"):
+        steps = np.diff(unrolled_s(records["time"]))
+    sound[1:] &= (steps > 0.0) & (steps < _LONGEST_STEP_S)
+    return sound
+
+
+def _week_of(name: str, first_s: float) -> int | None:
+    """GPS week by the date in the name of the file: that of the day, or the one in which the first second lies."""
+    match = _DATE.search(name)
+    if match is None:
+        return None
+    parts: list[Int64Array] = [np.array([int(text)]) for text in match.groups()]
+    midnight_ns, exists = calendar_ns(*parts)
+    if not exists[0]:
+        return None
+    noon_s = (int(midnight_ns[0]) - GPS_EPOCH_NS) / NS_PER_S + 43_200.0
+    return round((noon_s - first_s % S_PER_WEEK) / S_PER_WEEK)
+
+
+def _time(week: int | None, week_s: FloatArray) -> Column:
+    sound = np.isfinite(week_s) & (np.abs(week_s) < 1e9)
+    ns = np.round(np.where(sound, week_s, 0.0) * 1e9).astype(np.int64)
+    if week is not None:
+        whole_ms, rest_ns = np.divmod(ns, _NS_PER_MS)
+        ns = gps_week_to_utc_ns(week, whole_ms) + rest_ns
+    return Column(ns, None if sound.all() else sound)
+
+
+def _sense_of(records: NDArray[Any]) -> _Sense:
+    """Compare the velocities with the way between the first records, and the accelerations with gravity."""
+    with np.errstate(all="ignore"):
+        meridian, normal = curvature_radii_m(np.rad2deg(records["latitude"]))
+        step_s = np.diff(records["time"])
+        north = np.diff(records["latitude"]) * (meridian + records["altitude"])[1:] / step_s
+        east = np.deg2rad(wrap_180(np.rad2deg(np.diff(records["longitude"]))))
+        east = east * ((normal + records["altitude"]) * np.cos(records["latitude"]))[1:] / step_s
+        misfits = {}
+        for sign in (-1, 1, 0):
+            told_north, told_east = _turned(records, sign)
+            off = np.hypot(told_north[1:] - north, told_east[1:] - east)
+            misfits[sign] = float(np.nanmedian(off)) if np.isfinite(off).any() else np.inf
+        best = min(misfits, key=lambda sign: misfits[sign])
+        force = np.sqrt(sum(np.square(records[f"{axis}_acceleration"]) for axis in "xyz"))
+        is_force = _SPECIFIC_FORCE[0] < np.nanmedian(force) < _SPECIFIC_FORCE[1]
+        force_sign = int(-np.sign(np.nanmedian(records["z_acceleration"]))) if is_force else 0
+    return _Sense(-1 if misfits[-1] <= misfits[best] + 1e-9 else best, force_sign)
+
+
+def _turned(records: NDArray[Any], wander_sign: int) -> tuple[FloatArray, FloatArray]:
+    """Velocities north and east, the platform's x axis standing at ``wander_sign`` times the wander angle."""
+    azimuth = wander_sign * records["wander_angle"]
+    x, y = records["x_velocity"], records["y_velocity"]
+    return x * np.cos(azimuth) - y * np.sin(azimuth), x * np.sin(azimuth) + y * np.cos(azimuth)
+
+
+def _batches(
+    records: NDArray[Any], first: int, time: Column, week_s: FloatArray, sense: _Sense, accuracies: NDArray[Any]
+) -> Iterator[RecordBatch]:
+    index = np.arange(first, first + len(records), dtype=np.int64)
+    with np.errstate(invalid="ignore", over="ignore"):
+        north, east = _turned(records, sense.wander_sign)
+        heading = records["platform_heading"] + sense.wander_sign * records["wander_angle"]
+        columns = {
+            "latitude_deg": records["latitude"] * DEG_PER_RAD,
+            "longitude_deg": records["longitude"] * DEG_PER_RAD,
+            "altitude_ellipsoid_m": records["altitude"].copy(),
+            "velocity_north_mps": north,
+            "velocity_east_mps": east,
+            "velocity_down_mps": records["z_velocity"].copy(),
+            "roll_deg": records["roll"] * DEG_PER_RAD,
+            "pitch_deg": records["pitch"] * DEG_PER_RAD,
+            "true_heading_deg": wrap_360(heading * DEG_PER_RAD),
+        }
+        columns |= {f"rate_{axis}_dps": records[f"{axis}_rate"] * DEG_PER_RAD for axis in "xyz"}
+        if sense.force_sign:
+            columns |= {f"accel_{axis}_mps2": sense.force_sign * records[f"{axis}_acceleration"] for axis in "xyz"}
+    found = {name: Column(values) for name, values in columns.items()} | _sigmas(week_s, accuracies)
+    found["mode"] = Column(np.full(len(records), _MODE))
+    yield RecordBatch("ins", index, time, found)
+    raw = {name: Column(records[name].copy()) for name in RECORD.names or () if name != "time"}
+    yield RecordBatch("raw.sbet", index, time, raw)
+
+
+def _accuracies(path: Path) -> NDArray[Any]:
+    """Records of the file of accuracies beside an SBET; none where there is no such file."""
+    if not re.match(r"(?i)sbet", path.name):
+        return np.zeros(0, ACCURACY)
+    beside = path.with_name(re.sub(r"(?i)^sbet", "smrmsg", path.name))
+    try:
+        content = beside.read_bytes() if beside.stat().st_size < 1 << 28 else b""
+    except OSError:
+        return np.zeros(0, ACCURACY)
+    records = np.frombuffer(content, ACCURACY, len(content) // ACCURACY.itemsize)
+    sound = np.logical_and.reduce(
+        [np.isfinite(records[name]) & (records[name] >= 0.0) for name in ACCURACY.names or ()]
+    )
+    records = records[sound]
+    return records[np.append(True, np.diff(records["time"]) > 0.0)] if len(records) else records
+
+
+def _sigmas(week_s: FloatArray, accuracies: NDArray[Any]) -> dict[str, Column]:
+    """Accuracies at the times of the records, interpolated between two that are near."""
+    if len(accuracies) < 2:
+        return {}
+    times = unrolled_s(accuracies["time"])
+    after = np.clip(np.searchsorted(times, week_s), 1, len(times) - 1)
+    present = (times[after] - times[after - 1] <= _MOST_APART_S) & (week_s >= times[0]) & (week_s <= times[-1])
+
+    def at(*names: str) -> Column:
+        size = np.sqrt(sum(np.square(accuracies[name]) for name in names))
+        return Column(np.interp(week_s, times, size), present)
+
+    found = {
+        "horizontal_sigma_m": at("north_m", "east_m"),
+        "vertical_sigma_m": at("down_m"),
+        "velocity_sigma_mps": at("north_mps", "east_mps"),
+    }
+    for name, source in (("roll", "roll"), ("pitch", "pitch"), ("true_heading", "heading")):
+        column = at(f"{source}_arcmin")
+        found[f"{name}_sigma_deg"] = Column(column.values / ARCMIN_PER_DEG, present)
+    return found
+
+
+def _remarks(week: int | None, sense: _Sense, accuracies: NDArray[Any]) -> Iterator[Remark]:
+    if week is None:
+        text = (
+            "times are seconds of a GPS week that the file does not name: the flight has no date; put the date in the "
+            "name of the file (sbet_20250708.out) to give it one"
+        )
+        yield Remark("week_unknown", text)
+    else:
+        first = iso_to_utc_ns("1980-01-06T00:00:00Z")[0] + week * S_PER_WEEK * NS_PER_S
+        day = np.datetime64(first, "ns").astype("datetime64[D]")
+        yield Remark("assumed", f"GPS week {week} (from {day} on) by the date in the name of the file")
+    turned = {-1: "less", 1: "plus", 0: "without"}[sense.wander_sign]
+    text = f"true heading is the platform's {turned} the wander angle, velocities likewise: so they fit the positions"
+    yield Remark("converted", text, "ins", ("true_heading_deg", "velocity_north_mps", "velocity_east_mps"))
+    if not sense.force_sign:
+        text = "accelerations are without gravity, no specific force: they stay raw"
+        yield Remark("mapped", text, "ins")
+    if len(accuracies):
+        yield Remark("mapped", f"accuracies from the smrmsg file beside it ({len(accuracies)} records)", "ins")

@@ -1,0 +1,137 @@
+"""NovAtel OEM messages: fields against NovAtel's own decoder, canonical topics, times, damage."""
+
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from groundstation.readers.receiver.layouts import layout
+from groundstation.readers.receiver.novatel_messages import LAYOUTS, NAMES
+from tests.receiver_writer import nmea, novatel, novatel_frame, pvt
+from tests.test_receiver import Read
+
+NOON_MS = 129_618_000  # of GPS week 2417: 2026-05-04 12:00:00 UTC
+_RESERVED = ("rsvd_field_for_velocity_logs", "float_1", "ushort", "ulong")
+NUMBERS = {name: number for number, name in NAMES.items()}
+TRAILING = {"BESTVEL": 4, "BESTGNSSVEL": 4, "PSRVEL": 4}  # reserved bytes behind what the layouts name
+
+
+def body_of(name: str, rng: np.random.Generator) -> bytes:
+    """A body of plausible values, each another."""
+    dtype = layout(LAYOUTS[name]).head.dtype
+    record = np.zeros(1, dtype)
+    for member in dtype.names or ():
+        kind = dtype[member].kind
+        if kind == "f":
+            record[member] = rng.normal(scale=100.0)
+        elif kind == "S":
+            record[member] = b"%04d" % rng.integers(0, 9999)
+        else:
+            record[member] = 61 if member == "datum_id" else rng.integers(0, 4)  # WGS 84
+    return record.tobytes() + bytes(TRAILING.get(name, 0))
+
+
+def flat(values: list[Any]) -> list[Any]:
+    found: list[Any] = []
+    for value in values:
+        found += list(value) if isinstance(value, list | tuple | np.ndarray) else [value]
+    return found
+
+
+def test_fields_equal_those_of_the_makers_decoder(tmp_path: Path) -> None:
+    oem = pytest.importorskip("novatel_edie.oem")
+    rng = np.random.default_rng(3)
+    names = [name for name in LAYOUTS if layout(LAYOUTS[name]).group is None]
+    frames = b"".join(novatel_frame(NUMBERS[name], body_of(name, rng), 2417, NOON_MS) for name in names * 3)
+    read, parser, compared = Read(tmp_path, frames), oem.Parser(), 0
+    parser.write(frames)
+    for number, name in enumerate(names * 3):
+        message = parser.read()
+        assert message.name == name
+        fields = message.get_field_names()
+        values = zip(fields, message.get_field_values(), strict=True)
+        theirs = flat([value for key, value in values if key not in _RESERVED])
+        batch = read.batches(f"raw.{name}")[0]
+        ours = [column.values[number // len(names)] for column in batch.columns.values()]
+        assert len(theirs) == len(ours), name
+        for key, their, our in zip(batch.columns, theirs, ours, strict=True):
+            assert our == (their if isinstance(their, str) else float(their)), (name, key)
+            compared += 1
+    assert compared > 600
+
+
+def bestpos(week_ms: int, status: int = 180, **members: int | float) -> bytes:
+    usual = {"latitude": 51.5, "longitude": -0.7, "orthometric_height": 100.0, "undulation": 47.0, "position_type": 50}
+    spread = {"latitude_std_dev": 0.03, "longitude_std_dev": 0.04, "height_std_dev": 0.08, "num_soln_svs": 14}
+    return novatel("BESTPOS", week_ms, status, **(usual | spread | members))
+
+
+def test_position_velocity_and_dilution_of_one_moment(tmp_path: Path) -> None:
+    velocity = {"horizontal_speed": 10.0, "ground_track": 90.0, "vertical_speed": 2.0}
+    content = bestpos(NOON_MS) + novatel("BESTVEL", NOON_MS, **velocity)
+    content += novatel("PSRDOP", NOON_MS, gdop=1.5, pdop=1.25, hdop=0.75) + bestpos(NOON_MS + 1000, solution_status=1)
+    read = Read(tmp_path, content)
+    row = {name: read.values("gnss", name)[0] for name in read.batches("gnss")[0].columns}
+    assert row["latitude_deg"] == 51.5 and row["altitude_ellipsoid_m"] == 147.0 and row["altitude_msl_m"] == 100.0
+    assert row["velocity_east_mps"] == pytest.approx(10.0) and row["velocity_down_mps"] == -2.0
+    assert row["horizontal_sigma_m"] == pytest.approx(0.05) and row["gdop"] == 1.5 and row["satellites_used"] == 14.0
+    assert read.values("gnss", "fix") == ["rtk_fixed", "none"] and read.values("gnss", "latitude_deg") == [51.5, None]
+    assert read.times("gnss")[0] == "2026-05-04T12:00:00.000000000Z"
+
+
+def inspva(status: int, **members: int | float) -> bytes:
+    values = {"week": 2417, "seconds": NOON_MS / 1e3 + 0.005, "latitude": 51.5, "longitude": -0.7, "height": 147.0}
+    motion = {"north_vel": 1.0, "east_vel": 2.0, "up_vel": 3.0, "roll": 4.0, "pitch": -5.0, "azimuth": 360.0}
+    return novatel("INSPVAS", NOON_MS, is_short=True, ins_solution_status=status, **(values | motion | members))
+
+
+def test_inertial_solution_and_its_covariance(tmp_path: Path) -> None:
+    squares = {"pos_cov_1": 0.0009, "pos_cov_5": 0.0016, "pos_cov_9": 0.0064}
+    squares |= {"att_cov_1": 0.01, "att_cov_5": 0.04, "att_cov_9": 0.09}
+    covariance = novatel("INSCOVS", NOON_MS, is_short=True, week=2417, seconds=NOON_MS / 1e3, **squares)
+    read = Read(tmp_path, bestpos(NOON_MS) + inspva(3) + covariance)
+    row = {name: read.values("ins", name)[0] for name in read.batches("ins")[0].columns}
+    assert (row["velocity_north_mps"], row["velocity_east_mps"], row["velocity_down_mps"]) == (1.0, 2.0, -3.0)
+    assert (row["roll_deg"], row["pitch_deg"], row["true_heading_deg"]) == (4.0, -5.0, 0.0)
+    assert row["true_heading_sigma_deg"] == pytest.approx(0.3) and row["roll_sigma_deg"] == pytest.approx(0.2)
+    assert row["horizontal_sigma_m"] == pytest.approx(0.05) and row["altitude_ellipsoid_m"] == 147.0
+    assert row["mode"] == "gnss_aided" and read.header.metadata["ins_kind"] == "gnss_aided"
+    assert read.times("ins") == ["2026-05-04T12:00:00.005000000Z"]
+
+
+@pytest.mark.parametrize(("status", "mode"), [(1, "align"), (6, "nav"), (7, "gnss_aided"), (0, None)])
+def test_mode_of_the_inertial_solution(tmp_path: Path, status: int, mode: str | None) -> None:
+    read = Read(tmp_path, inspva(status))
+    assert read.values("ins", "mode") == [mode]
+    assert read.values("ins", "roll_deg") == [4.0 if mode in ("nav", "gnss_aided") else None]
+
+
+def test_heading_of_two_antennas(tmp_path: Path) -> None:
+    content = bestpos(NOON_MS) + novatel("HEADING2", NOON_MS, heading=123.5, heading_std_dev=0.25, position_type=50)
+    read = Read(tmp_path, content + novatel("HEADING2", NOON_MS + 1000, heading=1.0, solution_status=1))
+    assert read.values("ins", "true_heading_deg") == [123.5] and read.values("ins", "true_heading_sigma_deg") == [0.25]
+
+
+def test_a_time_that_the_receiver_does_not_know_is_absent(tmp_path: Path) -> None:
+    read = Read(tmp_path, bestpos(5_000, status=20) + bestpos(NOON_MS))
+    assert read.times("gnss") == [None, "2026-05-04T12:00:00.000000000Z"]
+
+
+def test_frames_beside_sentences_and_damaged_ones(tmp_path: Path) -> None:
+    bad = bytearray(bestpos(NOON_MS))
+    bad[60] ^= 1
+    read = Read(tmp_path, bestpos(NOON_MS) + nmea("GPHDT,1.0,T") + bytes(bad) + bestpos(NOON_MS + 1000) + b"\xaaD\x12")
+    assert len(read.times("gnss")) == 2 and read.values("ins", "true_heading_deg") == [1.0]
+    assert [one.count for one in read.damages] == [len(bad), 3]
+
+
+def test_messages_that_are_not_known_and_answers_keep_their_bytes(tmp_path: Path) -> None:
+    unknown = novatel_frame(5555, b"\x01\x02\x03", 2417, NOON_MS)
+    answer = bytearray(bestpos(NOON_MS))[:-4]
+    answer[6] = 0x80
+    content = bytes(answer) + (zlib.crc32(bytes(answer), 0xFFFFFFFF) ^ 0xFFFFFFFF).to_bytes(4, "little")
+    read = Read(tmp_path, pvt("2026-05-04T12:00:00Z") + unknown + content)
+    assert read.values("raw.NOVATEL-5555", "payload") == ["010203"]
+    assert len(read.batches("raw.BESTPOS-answer")) == 1 and not read.batches("raw.BESTPOS")
