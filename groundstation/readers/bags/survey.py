@@ -180,9 +180,9 @@ def _map(found: Survey) -> None:
         kinds.setdefault(_kind_of(unit), []).append(unit)
     alone = [seen for seen in served.values() if MESSAGES[seen.connection.type].role not in _ORDER]
     kinds.setdefault("magnetometer", []).extend([seen] for seen in alone)
-    for seen in kinds.pop("", []):
-        _leave_raw(found, seen[0], "whose it is and along which axes is not told; a profile can say it")
-    for kind in kinds.keys() & told:
+    for seen in (seen for unit in kinds.pop("", []) for seen in unit):
+        _leave_raw(found, seen, "whose it is and along which axes is not told; a profile can say it")
+    for kind in sorted(kinds.keys() & told):
         for one in (seen for unit in kinds.pop(kind) for seen in unit):
             _leave_raw(found, one, f"the profile says what {kind} is")
     for kind, several in kinds.items():
