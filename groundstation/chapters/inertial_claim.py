@@ -1,23 +1,20 @@
 """What the INS errors and the forecast answer at a glance: how fast the INS drifts, and how far a forecast can go."""
 
 from groundstation.chapters.parts import Claim, Mark, Rank, Tone
-from groundstation.chapters.wording import is_number, number, typeset, unit_sign
+from groundstation.chapters.wording import is_number, number, typeset
 from groundstation.results.forecast import ForecastResult, SkillRow
 from groundstation.results.inertial import InertialResult
 
 WORDS: dict[Tone, str] = {"good": "Measured", "warn": "With care", "unknown": "Open"}
-PLACES = {"position": 1, "velocity": 2}  # decimals of INS - GNSS
 HOUR_MIN = 60.0  # the horizon a forecast is judged by at a glance, or the longest below it
 
 
 def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -> Claim:
-    """Drift of an unaided INS; of another one that there is none to tell.
+    """Drift of an INS that GNSS does not correct, or of which that cannot be told.
 
     ``quality`` says in a sentence whether the filter can be trusted; ``is_doubtful`` that its sigmas are too small.
     """
     reason = typeset(answer.kind_reason).strip().rstrip(".")
-    if answer.kind == "gnss_aided":
-        return _aided_claim(answer, reason)
     rate, most = answer.radial_error_rate_50_nmiph, number(answer.radial_error_rate_95_nmiph, 2, "nmi/h")
     drift = number(rate, 2, "nmi/h")
     headline = (
@@ -40,25 +37,6 @@ def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -
         sentences=tuple(filter(None, (doubt, quality))),
         figures=() if is_open else tuple(figure for figure in found if figure[1] != "—"),
     )
-
-
-def _aided_claim(answer: InertialResult, reason: str) -> Claim:
-    """How closely an INS that GNSS corrects follows it."""
-    shown = [(row, PLACES[row.quantity]) for row in map(answer.difference, PLACES) if row is not None]
-    figures = tuple(
-        (
-            f"INS − GNSS, {row.quantity}",
-            number(row.p95, places, unit_sign(row.unit)),
-            f"95 %; median {number(row.median, places, unit_sign(row.unit))}",
-        )
-        for row, places in shown
-    )
-    value = figures[0][1] if figures else ""
-    headline = f"GNSS corrects this INS: within {value} of it (95 %)" if value else "GNSS corrects this INS"
-    why = f"{reason[:1].upper()}{reason[1:]}: it shows no errors of its own." if reason else ""
-    sentences = tuple(filter(None, (why,)))
-    remark = "INS − GNSS, 95 %" if value else "corrected by GNSS"
-    return Claim(Rank.INERTIAL_OPEN, Mark("unknown", "Aided"), headline, value, remark, sentences, figures)
 
 
 def forecast_claim(answer: ForecastResult, sentences: tuple[str, ...], tone: Tone) -> Claim | None:
