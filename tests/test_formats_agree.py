@@ -1,5 +1,5 @@
-"""One simulated flight as flat CSV, PX4 ULog, ArduPilot DataFlash, Chapter 10, UBX, NMEA, NovAtel, .pos and SBET gives
-equal tables, and equal answers where the format has what they need.
+"""One simulated flight as flat CSV, PX4 ULog, ArduPilot DataFlash, Chapter 10, bag, tlog, UBX, NMEA, NovAtel, .pos and
+SBET gives equal tables, and equal answers where the format has what they need.
 
 Each signal agrees within the step that the format stores it in (``RESOLUTION``); the heading error within what those
 steps can move it.
@@ -26,9 +26,11 @@ from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
 from groundstation.tables.table import Flight
+from tests.bag_writer import Messages, enu_quaternion_xyzw, write_ros2
 from tests.dataflash_writer import DataFlash
 from tests.receiver_writer import nmea, novatel, pvt, rmc, ubx
 from tests.trajectory_writer import pos_rows
+from tests.telemetry_writer import Telemetry
 from tests.ulog_writer import ATTITUDE, GPS, GPS_CODE, UlogWriter
 
 BOOT_US = 5_000_000  # both autopilots have run for five seconds when the log begins
@@ -105,6 +107,22 @@ RESOLUTION: Mapping[str, Mapping[str, float]] = {
         "ins.velocity_north_mps": 1e-9,
         "ins.velocity_east_mps": 1e-9,
     },
+    "ros2": {
+        **{f"ins.{name}": 1e-9 for name in ("true_heading_deg", "roll_deg", "pitch_deg")},
+        **{f"{topic}.velocity_{axis}_mps": 1e-9 for topic in ("ins", "gnss") for axis in ("north", "east")},
+        **{f"gnss.{name}": 1e-12 for name in ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m")},
+    },
+    "tlog": {
+        "ins.true_heading_deg": 3e-5,
+        "ins.roll_deg": 2e-5,
+        "ins.pitch_deg": 2e-5,
+        "ins.velocity_north_mps": 0.0051,
+        "ins.velocity_east_mps": 0.0051,
+        "gnss.ground_speed_mps": 0.0051,
+        "gnss.latitude_deg": 0.51e-7,
+        "gnss.longitude_deg": 0.51e-7,
+        "gnss.altitude_msl_m": 0.51e-3,
+    },
     "chapter10": {  # ins by 1553, all else by ARINC 429
         **dict.fromkeys(("ins.true_heading_deg", "ins.roll_deg", "ins.pitch_deg"), HALF * 180 / 2**15),
         **dict.fromkeys(("ins.velocity_north_mps", "ins.velocity_east_mps"), HALF * 0.3048 / 2**18),
@@ -124,10 +142,18 @@ RESOLUTION: Mapping[str, Mapping[str, float]] = {
     },
 }
 # GPS time is told to 1 ms; the words of a sample follow each other on their bus, up to seven of them.
-LATE_NS = {"ulog": 1_000_000, "dataflash": 1_000_000, "chapter10": 7 * WORD_TIME_NS, "arinc429": 7 * WORD_TIME_NS}
+LATE_NS = {
+    "ulog": 1_000_000,
+    "dataflash": 1_000_000,
+    "chapter10": 7 * WORD_TIME_NS,
+    "arinc429": 7 * WORD_TIME_NS,
+    "ros2": 1_000,
+    "tlog": 1_000,
+}
 LATE_NS |= dict.fromkeys(("ubx", "nmea", "novatel", "pos", "sbet"), 1_000_000)
-# Heading steps of 0.01 deg, and speed steps of 0.06 m/s, average out over a thousand samples.
-ANSWER_DEG = {"ulog": 1e-3, "dataflash": 3e-3, "chapter10": 1e-3, "arinc429": 1e-3}
+# Heading steps of 0.01 deg, and speed steps of 0.06 m/s, average out over a thousand samples;
+# telemetry has velocities in steps of 0.01 m/s.
+ANSWER_DEG = {"ulog": 1e-3, "dataflash": 3e-3, "chapter10": 1e-3, "arinc429": 1e-3, "ros2": 1e-6, "tlog": 1e-2}
 
 
 @cache
@@ -308,6 +334,41 @@ def as_sbet(path: Path) -> None:
     path.write_bytes(records.tobytes())
 
 
+def as_ros2(path: Path) -> None:
+    messages = Messages()
+    start_ns = start_utc_ns() - BOOT_US * 1_000
+    fields = ("roll_deg", "pitch_deg", "true_heading_deg", "velocity_north_mps", "velocity_east_mps")
+    for time_us, *angles, north, east in zip(*columns("ins", *fields), strict=True):
+        stamp_ns, quaternion = start_ns + int(time_us) * 1_000, enu_quaternion_xyzw(*angles)
+        messages.imu("/nav/imu", stamp_ns, quaternion)
+        messages.twist("/nav/velocity", stamp_ns, (east, north, np.nan))
+    fields = ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m", "velocity_north_mps", "velocity_east_mps")
+    for time_us, lat, lon, alt, north, east in zip(*columns("gnss", *fields), strict=True):
+        stamp_ns = start_ns + int(time_us) * 1_000
+        messages.fix("/gps/fix", stamp_ns, (lat, lon, alt))
+        messages.twist("/gps/velocity", stamp_ns, (east, north, np.nan))
+    write_ros2(path, messages)
+
+
+def as_tlog(path: Path) -> None:
+    log, start_us = Telemetry(), start_utc_ns() // 1_000 - BOOT_US
+    rows: list[tuple[int, str, tuple[float, ...]]] = []
+    for time_us, *angles in zip(*columns("ins", "roll_deg", "pitch_deg", "true_heading_deg"), strict=True):
+        rows.append((int(time_us), "attitude", (0, *np.deg2rad(angles), 0.0, 0.0, 0.0)))
+    for time_us, north, east in zip(*columns("ins", "velocity_north_mps", "velocity_east_mps"), strict=True):
+        velocity = (round(north * 100), round(east * 100), 0)
+        rows.append((int(time_us), "global_position_int", (0, 1, 1, 0, 0, *velocity, 0)))
+    fields = ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m", "velocity_north_mps", "velocity_east_mps")
+    for time_us, lat, lon, alt, north, east in zip(*columns("gnss", *fields), strict=True):
+        course = round(float(np.rad2deg(np.arctan2(east, north)) % 360.0) * 100) % 36_000
+        place = (round(lat * 1e7), round(lon * 1e7), round(alt * 1e3))
+        fix = (0, 3, *place, 100, 100, round(float(np.hypot(north, east)) * 100), course, 12)
+        rows.append((int(time_us), "gps_raw_int", fix))
+    for time_us, name, values in sorted(rows, key=lambda row: row[:2]):
+        log.add(name, *values, time_us=start_us + time_us)
+    path.write_bytes(log.data)
+
+
 def as_chapter10(path: Path) -> None:
     write_chapter10(path, simulated().flight)
 
@@ -316,6 +377,8 @@ WRITERS = {
     "csv": (as_csv, "x.csv"),
     "ulog": (as_ulog, "x.ulg"),
     "dataflash": (as_dataflash, "x.BIN"),
+    "ros2": (as_ros2, "bag"),
+    "tlog": (as_tlog, "x.tlog"),
     "chapter10": (as_chapter10, "x.ch10"),
     "arinc429": (as_chapter10, "y.ch10"),
 }

@@ -42,8 +42,11 @@ class Feed:
         """Fields of the canonical topic that messages with these columns give; those that have a value."""
         if not columns.keys() >= set(self.needs):
             return {}
-        with np.errstate(over="ignore", invalid="ignore"):  # of absurd numbers: becomes infinite or NaN
-            found = self.columns(Values(columns))
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):  # of absurd numbers: becomes infinite or NaN
+                found = self.columns(Values(columns))
+        except KeyError:  # a type of a common name whose definition lacks a field: its messages stay raw
+            return {}
         return {
             name: column
             for name, column in found.items()
@@ -177,9 +180,9 @@ def _map(found: Survey) -> None:
         kinds.setdefault(_kind_of(unit), []).append(unit)
     alone = [seen for seen in served.values() if MESSAGES[seen.connection.type].role not in _ORDER]
     kinds.setdefault("magnetometer", []).extend([seen] for seen in alone)
-    for seen in kinds.pop("", []):
-        _leave_raw(found, seen[0], "whose it is and along which axes is not told; a profile can say it")
-    for kind in kinds.keys() & told:
+    for seen in (seen for unit in kinds.pop("", []) for seen in unit):
+        _leave_raw(found, seen, "whose it is and along which axes is not told; a profile can say it")
+    for kind in sorted(kinds.keys() & told):
         for one in (seen for unit in kinds.pop(kind) for seen in unit):
             _leave_raw(found, one, f"the profile says what {kind} is")
     for kind, several in kinds.items():
