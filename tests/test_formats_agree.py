@@ -29,8 +29,8 @@ from groundstation.tables.table import Flight
 from tests.bag_writer import Messages, enu_quaternion_xyzw, write_ros2
 from tests.dataflash_writer import DataFlash
 from tests.receiver_writer import nmea, novatel, pvt, rmc, ubx
-from tests.trajectory_writer import pos_rows
 from tests.telemetry_writer import Telemetry
+from tests.trajectory_writer import pos_rows
 from tests.ulog_writer import ATTITUDE, GPS, GPS_CODE, UlogWriter
 
 BOOT_US = 5_000_000  # both autopilots have run for five seconds when the log begins

@@ -99,6 +99,12 @@ def test_commas_and_lines_that_are_cut(tmp_path: Path) -> None:
     assert len(read.times("gnss")) == 2 and [one.kind for one in read.damages] == ["truncated"]
 
 
+@pytest.mark.parametrize("damage", [(b"longitude(deg)", b"lon"), (b"height(m)", b"latitude"), (b" sdu(m)", b" sdn(m)")])
+def test_a_damaged_name_costs_its_column(tmp_path: Path, damage: tuple[bytes, bytes]) -> None:
+    read = Read(tmp_path / "a.pos", pos(GEODETIC, PLACE).replace(*damage, 1))
+    assert read.values("gnss", "latitude_deg") == [LATITUDE] * 3
+
+
 @pytest.mark.real_log
 def test_recorded_solutions() -> None:
     """The walk's solution was made of its receiver's own fixes: positions and velocities are equal."""

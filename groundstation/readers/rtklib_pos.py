@@ -106,6 +106,7 @@ def _form_of(source: Source) -> _Form | None:
     for word in words[1:]:
         name, _, unit = word.partition("(")
         names += [f"{name}_deg", f"{name}_min", f"{name}_s"] if unit.startswith("d'") else [name]
+    names = [name if names.index(name) == at else f"{name}_{at}" for at, name in enumerate(names)]
     row = source.head[named.next_byte :].lstrip(b" \r\n")[:12]
     reference = _REFERENCE.search(text)
     heights = next((word for word in ("ellipsoidal", "geodetic") if word in text), "")
@@ -228,10 +229,11 @@ class _Cells(dict[str, Column]):
 
 def _position(columns: _Cells, form: _Form) -> dict[str, Column]:
     for name in ("latitude", "longitude"):
-        if f"{name}_deg" in columns:
+        if all(f"{name}_{part}" in columns for part in ("deg", "min", "s")):
             columns[name] = _of_minutes(columns, name)
     if "latitude" in columns:
-        found = {"latitude_deg": columns["latitude"], "longitude_deg": columns["longitude"]}
+        places = ("latitude", "longitude")  # damage may have taken one of the names
+        found = {f"{name}_deg": columns[name] for name in places if name in columns}
         heights = "altitude_msl_m" if form.heights == "geodetic" else "altitude_ellipsoid_m"
         found |= {heights: columns["height"]} if "height" in columns else {}
         velocity = columns.vector("vn", "ve", "vu")
