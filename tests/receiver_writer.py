@@ -104,3 +104,41 @@ def rmc(time: str, date: str, speed_mps: float = 10.0, track_deg: float = 90.0, 
     """RMC of a talker GN."""
     knots = speed_mps / MPS_PER_KNOT
     return nmea(f"GNRMC,{time},{status},5130.00000,N,00042.00000,W,{knots:.9f},{track_deg:.4f},{date},,,A")
+
+
+def ubx_log(seconds: int = 120) -> bytes:
+    """A stream of UBX with everything between, some 40 kB."""
+    log = b""
+    for at in range(seconds):
+        utc = f"2026-05-04T12:{at // 60:02d}:{at % 60:02d}Z"
+        itow = week_ms(utc)
+        log += pvt(utc, nano=-250 * at) + ubx("NAV-DOP", iTOW=itow, gDOP=150 + at) + rtcm(1077, at)
+        log += ubx("NAV-ATT", iTOW=itow, heading=at * 100_000, accHeading=1) + ubx_frame(0x0213, bytes(8 + at))
+        log += (
+            gga(f"12{at // 60:02d}{at % 60:02d}.00")
+            + ubx_frame(0x0402, b"notice")
+            + ubx_frame(0x0135, bytes(8 + 12 * 9))
+        )
+    return log
+
+
+def nmea_log(seconds: int = 200) -> bytes:
+    """A stream of sentences, some 40 kB."""
+    log = b""
+    for at in range(seconds):
+        time = f"12{at // 60:02d}{at % 60:02d}.50"
+        log += gga(time) + rmc(time, "040526", at / 10, at) + nmea(f"GNHDT,{at}.25,T")
+        log += nmea("GPGSV,1,1,02,14,55,175,46,40,29,043,18,1")
+        log += nmea(f"PASHR,{time},301.5,T,-1.25,2.5,0.1,.1,.1,.1,2,1")
+    return log
+
+
+def novatel_log(seconds: int = 120) -> bytes:
+    """A stream of NovAtel frames with both headers, some 60 kB."""
+    log = b""
+    for at in range(seconds):
+        ms = 129_618_000 + 1000 * at
+        log += novatel("BESTPOS", ms, latitude=51.5, longitude=at / 1e4, num_soln_svs=9)
+        log += novatel("BESTVEL", ms, horizontal_speed=at / 10.0) + novatel("INSCOVS", ms, is_short=True, week=2417)
+        log += novatel("INSPVAS", ms, is_short=True, week=2417, seconds=ms / 1e3, azimuth=at, ins_solution_status=3)
+    return log

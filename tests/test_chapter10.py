@@ -215,12 +215,12 @@ def test_messages_that_tell_their_length(tmp_path: Path, kind: int, name: str, s
     )
     items = read(tmp_path, made.packet(3, kind, specific.to_bytes(4, "little") + body, 100))
     check(items)
-    found = rows(items, f"raw.{name}.3")
+    found = rows(items, f"raw.bytes.{name}.3")
     assert found["size"].tolist() == [70, 70, 5] and found["piece"].tolist() == [0, 1, 0]
     assert found["bytes_00"][0] == int.from_bytes(bytes(range(8)), "little")
     assert int(found["bytes_00"][2]).to_bytes(8, "little") == b"hello\0\0\0"
     later = 1.0 if is_timed else 0.0
-    np.testing.assert_allclose(found["time_s"], [1e-5, 1e-5, 1e-5 + later])
+    np.testing.assert_allclose(found["time_s"], [1e-5, 1.0001e-5, 1e-5 + later], rtol=0, atol=1e-12)
 
 
 def test_frames_discretes_and_events(tmp_path: Path) -> None:
@@ -231,7 +231,7 @@ def test_frames_discretes_and_events(tmp_path: Path) -> None:
     events = made.packet(0, 0x02, (1).to_bytes(4, "little") + event, 0)
     items = read(tmp_path, made.packet(0, 0x01, TMATS, 0) + frames + discretes + events)
     check(items)
-    pcm = rows(items, "raw.pcm.2")
+    pcm = rows(items, "raw.bytes.pcm.2")
     assert pcm["size"].tolist() == [100, 100] and pcm["specific_word"].tolist() == [0x2000_0000] * 2
     assert rows(items, "raw.discrete.8")["states"].tolist() == [0, 1, 0, 1]
     assert rows(items, "event")["name"].tolist() == ["Release"]
@@ -243,3 +243,26 @@ def test_messages_that_a_packet_lacks_are_told(tmp_path: Path) -> None:
     items = read(tmp_path, made.packet(4, 0x19, bytes(data), 0))
     assert len(rows(items, "raw.bus.1553.4")["word_count"]) == 2
     assert [item.count for item in items if isinstance(item, Damage)] == [3]
+
+
+def test_tmats_that_is_missing_contradicts_the_packets_or_describes_frames(tmp_path: Path) -> None:
+    words = made.packet(7, 0x38, made.words_429([(0, 0, 1)]), 0)
+    assert "no_tmats" in codes(read(tmp_path, words))
+    setup = made.tmats(
+        "R-1\\TK1-1:7;R-1\\CDT-1:1553IN;R-1\\TK1-2:2;R-1\\CDT-2:PCMIN;R-1\\CDLN-2:P1;P-1\\DLN:P1;P-1\\F1:16;"
+    )
+    packet = bytearray(made.packet(0, 0x01, setup, 0, checksum=2))
+    packet[-1] ^= 1
+    items = read(tmp_path, bytes(packet) + words)
+    told = [item.text for item in items if isinstance(item, Remark) and item.code == "tmats_contradicted"]
+    assert told == ["channel 7 is 1553IN by TMATS and has 1 ARINC-429 packets: they are believed"]
+    header = items[0]
+    assert isinstance(header, LogHeader) and header.metadata["pcm.2"] == "F1=16"
+    assert [item.loses_data for item in items if isinstance(item, Damage)] == [False]
+
+
+def test_stamps_that_are_not_read_are_told(tmp_path: Path) -> None:
+    data = made.messages_1553([(99, 0, [0x37A0, 1])])
+    one = made.packet(4, 0x19, data, COUNTS_PER_S, secondary=made.secondary_1588(1_000, 0), flags=0x40)
+    items = read(tmp_path, one)
+    assert rows(items, "raw.bus.1553.4")["time_s"].tolist() == [1.0] and "clock_disagrees" in codes(items)

@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.base.records import RecordBatch
+from groundstation.base.records import LogHeader, RecordBatch, Remark
 from groundstation.readers import registry
 from groundstation.simulation.chapter10_writer import write_chapter10
 from groundstation.simulation.flight import simulate
 from groundstation.simulation.scenario import load_scenario
+from tests import chapter10_packets as made
 from tests.fuzz.bases import chapter10_starts
 
 BUS_1553 = 0x19
@@ -48,3 +49,27 @@ def test_bytes_added_in_a_packet_cost_no_other(recorded: bytes, tmp_path: Path) 
     whole, longer = message_times(tmp_path / "whole"), message_times(tmp_path / "longer")
     assert len(longer) == len(whole) - int.from_bytes(recorded[at - 16 : at - 13], "little")
     assert np.isin(longer, whole).all()
+
+
+def test_a_packet_that_lost_whole_others_costs_itself_alone(recorded: bytes, tmp_path: Path) -> None:
+    """Bytes are lost from the setup on, so that another packet ends where the setup would."""
+    starts = list(chapter10_starts(recorded))
+    length = int.from_bytes(recorded[4:8], "little")
+    kept = next(at for at in starts if at - starts[20] >= length - 400)
+    torn = recorded[:400] + recorded[kept - (length - 400) :]
+    (tmp_path / "whole").write_bytes(recorded)
+    (tmp_path / "torn").write_bytes(torn)
+    behind = [at for at in starts if at >= kept - (length - 400) and recorded[at + 15] == BUS_1553]
+    expected = [int.from_bytes(recorded[at + 28 : at + 34], "little") * 100 for at in behind]  # of the first messages
+    assert set(expected) <= set(message_times(tmp_path / "torn").tolist())
+
+
+@pytest.mark.parametrize("year", ["0204", "2511", "9999"])
+def test_a_year_of_no_recording_is_not_known(tmp_path: Path, year: str) -> None:
+    setup = made.tmats(f"G\\OD:05/07/{year};")
+    packets = made.packet(0, 0x01, setup, 0), made.packet(1, 0x11, made.time_of_day(100, 43_200), 0)
+    (tmp_path / "x").write_bytes(b"".join(packets))
+    header, *items = registry.read(tmp_path / "x")
+    assert isinstance(header, LogHeader)
+    assert header.utc_of_zero_ns is None
+    assert "year_unknown" in {item.code for item in items if isinstance(item, Remark)}

@@ -12,7 +12,8 @@ from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.verbs.describe import describe, suggest_icd
 from groundstation.readers import registry
-from groundstation.readers.chapter10.bus_words import BETWEEN_TERMINALS, TIME_OUT
+from groundstation.readers.chapter10.bus_words import TIME_OUT
+from groundstation.readers.chapter10.scan import BETWEEN_TERMINALS
 from groundstation.readers.icd import Icd, load, shipped
 from groundstation.store.reader import read as read_store
 from tests import chapter10_packets as made

@@ -90,6 +90,19 @@ def test_every_429_word() -> None:
 
 
 @pytest.mark.real_log
+def test_every_message_of_the_message_channel() -> None:
+    path = real_log(f"ch10/{NAMES[0]}")
+    contents = b"".join(one.data for packet in peer_packets(path) if packet.data_type == 0x30 for one in packet)
+    found = []
+    for item in items(Source(path)):
+        if isinstance(item, RecordBatch) and item.topic == "raw.bytes.message.12":
+            numbers = np.stack([item.columns[f"bytes_{at:02d}"].values for at in range(0, 64, 8)], axis=1)
+            rest = np.minimum(item.columns["size"].values - 64 * item.columns["piece"].values.astype(int), 64)
+            found += [row.tobytes()[:size] for row, size in zip(numbers.astype("<u8"), rest.tolist(), strict=True)]
+    assert b"".join(found) == contents and len(contents) > 50_000
+
+
+@pytest.mark.real_log
 def test_a_damaged_copy_keeps_what_is_whole() -> None:
     whole, damaged = real_log(f"ch10/{NAMES[0]}"), real_log("damaged/bad.c10")
     topics = {item.topic for item in items(Source(whole)) if isinstance(item, RecordBatch)}

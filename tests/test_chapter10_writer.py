@@ -211,6 +211,22 @@ def test_two_inertial_systems_have_buses_of_their_own() -> None:
     }
 
 
+def test_words_of_a_bus_do_not_overlap() -> None:
+    assert [bus.name for bus in buses().buses_429] == ["INS", "GNSS", "ADC"]
+    for bus in buses().buses_429:
+        assert np.diff(bus.time_ns).min() >= WORD_TIME_NS
+
+
+def test_words_that_only_arinc_429_has_come_with_the_message() -> None:
+    ins = flown()["ins"]
+    rate = {"rate_z_dps": replace(ins.columns["roll_deg"])}
+    made = buses_of(replace(flown(), tables={"ins": replace(ins, columns={**ins.columns, **rate})}))
+    (message,), (words,) = made.buses_1553, made.buses_429
+    first = words.words[np.isin(words.time_ns, message.time_ns)]
+    assert set(labels_of(first).tolist()) == {0o330}
+    assert [one.signal for word in words.meanings for one in word.elements if one.signal] == ["ins.rate_z_dps"]
+
+
 def test_a_slow_bus_sends_every_second_sample() -> None:
     ins = flown()["ins"]
     fast = replace(ins, time_ns=ins.time_ns[0] + np.arange(len(ins)) * 1_000_000)  # 1000 Hz; five words take 1.8 ms

@@ -126,6 +126,8 @@ def test_an_ins_of_unknown_kind_is_not_called_unaided() -> None:
 def test_of_an_aided_ins_the_differences_are_told_and_no_state() -> None:
     section = chapter(**AIDED)
     assert section.headline == "GNSS corrects this INS: within 3.0\u202fm of it (95 %)"
+    assert section.claim is not None and section.claim.headline == section.headline
+    assert [figure[:2] for figure in section.claim.figures] == [("INS − GNSS, position", "3.0\u202fm")]
     assert notes(section)[0].startswith("GNSS corrects this INS already: its own mode says so. What GNSS takes out")
     assert row(section, "INS − GNSS", "Position north, m") == ("+0.20", "1.00", "2.50", "9.00", "600")
     assert row(section, "Innovations of the INS's own filter", "Velocity east, m/s") == (

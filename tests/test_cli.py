@@ -111,7 +111,7 @@ def test_settings_beside_logs_are_no_logs_and_what_is_skipped_is_told_by_reason(
     code, first, err = groundstation(*arguments)
     assert code == 0 and first.startswith("alt.csv  done  NOTIME_") and "not assessable: heading: " in first
     (line,) = [line for line in err.splitlines() if line.startswith("skipped")]
-    assert line.startswith("skipped 2 files: found text that no reader claims") and line.endswith(": a.txt, b.txt")
+    assert line.startswith("skipped 2 files, a.txt, b.txt: found text that no reader claims")
     _, second, err = groundstation(*arguments)
     assert second == first.replace("  done  ", "  finished before  ")
     assert err.splitlines()[-1].endswith("; 1 was finished before")

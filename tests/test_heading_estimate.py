@@ -16,7 +16,9 @@ from groundstation.estimators.heading.settings import HeadingRequest, HeadingSet
 from groundstation.estimators.known import AircraftData, SiteData, Stand
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import Gate, HeadingResult
-from groundstation.simulation.taxi import TaxiCase, TaxiRun, noiseless, simulate_taxi, taxi_flight
+from groundstation.simulation.taxi import TaxiCase, TaxiRun, noiseless, simulate_taxi, table_of, taxi_flight
+from groundstation.simulation.taxi_disturbance import Disturbance
+from groundstation.tables.phases import flight_phases, ground_mask
 from groundstation.tables.table import Flight, Table
 
 NOISELESS_DEG = 1e-6  # rounding of headings and positions
@@ -450,3 +452,88 @@ def test_figures_agree_with_the_answer(result: HeadingResult) -> None:
     assert last == pytest.approx(bins["density_per_deg"])
     lanes = figures["heading_lanes"]
     assert (lanes["end_s"] >= lanes["start_s"]).all()
+
+
+# What parts of a taxi say against each other
+
+
+def disturbed(disturbance: Disturbance, **changes: object) -> HeadingResult:
+    run = run_of(replace(CASE, disturbance=disturbance, **changes))
+    flight = taxi_flight(run)
+    return estimate(flight, phases=flight_phases(flight))
+
+
+def test_a_step_of_the_ins_heading_is_named_and_the_error_is_that_after_it() -> None:
+    found = disturbed(Disturbance(step_deg=0.5, step_share=0.5))
+    (step,) = found.steps
+    assert step.size_deg == pytest.approx(0.5, abs=0.03)
+    assert (found.verdict, gate_of(found, "steps").value) == ("reject", 1.0)
+    assert f"{step.size_deg:+.2f} deg at {step.time_s:.1f} s" in found.verdict_reason
+    assert found.error_deg == pytest.approx(CASE.heading_error_deg + 0.5, abs=0.15)
+    assert found.reference_time_s is not None and found.reference_time_s > step.time_s
+    assert estimate(taxi_flight(run_of())).steps == ()
+
+
+def test_back_taxi_shows_the_sideslip_of_a_crosswind_and_takes_it_out() -> None:
+    """0.5 deg one way and -0.5 deg on the way back: the term left is less, and segments are said to disagree."""
+    quiet = {"correlated_mps": 0.005, "white_mps": 0.02, "sway_sigma_deg": 0.2, "turns_deg": (180.0,)}
+    back = disturbed(Disturbance(crab_deg=0.5, is_crab_of_wind=True), **quiet, segments_s=(60.0, 30.0))
+    one_way = disturbed(Disturbance(crab_deg=0.5), **(quiet | {"turns_deg": (5.0,)}))
+    assert back.error_deg == pytest.approx(CASE.heading_error_deg, abs=0.1)
+    assert one_way.error_deg == pytest.approx(CASE.heading_error_deg + 0.5, abs=0.1), "nothing shows it"
+    assert one_way.confidence95_deg[0] < CASE.heading_error_deg < one_way.confidence95_measured_deg[0]
+    assert back.steady_sigma_deg < 0.6 * one_way.steady_sigma_deg
+    gate = gate_of(back, "segments")
+    assert (gate.state, back.verdict) == ("failed", "reject")
+    assert "farthest off" in gate.reason and "farthest off" in back.verdict_reason
+
+
+def test_known_wind_says_how_large_the_sideslip_may_be(flight: Flight) -> None:
+    time_ns = flight["gnss"].time_ns
+
+    def blowing(speed_mps: float) -> HeadingResult:
+        wind = {"wind_north_mps": np.zeros(len(time_ns)), "wind_east_mps": np.full(len(time_ns), speed_mps)}
+        return estimate(replace(flight, tables={**flight.tables, "air": table_of("air", time_ns, wind)}))
+
+    calm, gale, unknown = blowing(0.0), blowing(15.0), estimate(flight)
+    assert calm.steady_sigma_deg == pytest.approx(0.1, abs=1e-3), "mounting alone"
+    assert calm.steady_sigma_deg < min(unknown.steady_sigma_deg, gale.steady_sigma_deg)
+
+
+def test_the_take_off_run_is_not_taxi() -> None:
+    found = disturbed(Disturbance(take_off_crab_deg=2.0))
+    figure, gate = figure_of(found, "heading_samples"), gate_of(found, "not_taxi")
+    assert int(np.sum(figure["gate"] == "take-off run")) > 20
+    assert not np.any(figure["used"] & (figure["ground_speed_mps"] > 12.0))
+    assert gate.value is not None and gate.value > 0.0 and not gate.required
+    assert found.error_deg == pytest.approx(CASE.heading_error_deg, abs=0.2)
+
+
+def test_a_gnss_that_moves_at_standstill_on_wheels_fails_the_gate(flight: Flight) -> None:
+    gnss = flight["gnss"]
+    north, east = gnss.values("velocity_north_mps"), gnss.values("velocity_east_mps")
+    drifting = north + 0.5 * (np.hypot(north, east) < 1.0)
+    moved = with_column(flight, "gnss", "velocity_north_mps", drifting)
+    gate = gate_of(estimate(moved), "standstill_speed_of_mean")
+    assert (gate.state, gate.value) == ("failed", pytest.approx(0.5, abs=0.05))
+
+
+@pytest.mark.parametrize("drift_deg_per_h", [5.0, -5.0])
+def test_parking_heading_of_an_ins_that_drifts_holds_the_truth(drift_deg_per_h: float) -> None:
+    run = run_of(replace(CASE, drift_deg_per_h=drift_deg_per_h, standstill_s=200.0))
+    found = estimate(taxi_flight(run))
+    truth = float(np.mean(run.heading_deg[(run.ins_time_s > 150.0) & (run.ins_time_s < 198.0)]))
+    assert found.parking_heading_deg == pytest.approx(truth, abs=2.0 * (found.parking_sigma_deg or 0.0))
+    assert found.parking_heading_deg == pytest.approx(truth, abs=0.15)
+
+
+def test_a_car_is_always_on_the_ground(flight: Flight) -> None:
+    """Without a flag that proves contact, and faster than any taxi for a while: the log says what it is."""
+    bare = replace(flight, tables={name: table for name, table in flight.tables.items() if name != "discrete"})
+    car = replace(bare, metadata={**bare.metadata, "always_on_ground": "true"})
+    proof, phases = ground_mask(car, car["gnss"].time_ns), flight_phases(car)
+    assert proof.mask.all() and proof.method == "said to be always on the ground"
+    assert {part.phase for part in phases.intervals} == {"standstill", "taxi"}
+    found = estimate(car, on_ground=lambda time_ns: ground_mask(car, time_ns), phases=phases)
+    assert found.error_deg == pytest.approx(estimate(flight).error_deg, abs=1e-6)
+    assert gate_of(found, "ground").state == "passed"

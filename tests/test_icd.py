@@ -120,6 +120,13 @@ REFUSED: Mapping[str, tuple[str, str, str]] = {
     "unit of a signal": ('uom: "deg"', 'uom: "kt", signal: ins.latitude_deg', "NAV, latitude: uom"),
     "truth": ('uom: "deg"', 'uom: "deg", signal: truth.latitude_deg', "NAV, latitude: signal"),
     "validity": ('uom: "deg"', 'uom: "deg", valid_if: not_there', "NAV, latitude: valid_if"),
+    "validity of several bits": (
+        'uom: "deg", multifmt: False, class: 0}\n    bit_elem:\n      ok: {offset: 0, cnt: 1, schema: UNSIGNEDBITS,'
+        ' msbval: 1.0, uom: "", msb: 10, lsb: 10, bitcnt: 1}',
+        'uom: "deg", valid_if: ok}\n    bit_elem:\n      ok: {offset: 0, cnt: 1, schema: UNSIGNEDBITS,'
+        ' msbval: 1.0, uom: "", msb: 9, lsb: 10, bitcnt: 2}',
+        "an element of the message of one bit",
+    ),
     "key twice": ("wrdcnt: 32,", "wrdcnt: 32, wrdcnt: 32,", "'wrdcnt' twice"),
 }
 

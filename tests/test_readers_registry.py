@@ -17,7 +17,6 @@ MAGICS = [
     (b"\xa3\x95\x80\x80" + bytes(20), "ArduPilot DataFlash"),
     (b"\x25\xeb\x00\x00" + bytes(20), "Chapter 10"),
     (b"\xb5\x62\x01\x07" + bytes(20), "UBX"),
-    (b"$GNGGA,103607.00,5327.03942,N*2F\r\n", "NMEA"),
     (b"#ROSBAG V1.2\n", "ROS 1 bag older"),
     (b"SQLite format 3\0" + bytes(20), "SQLite"),
     (b"PK\x03\x04" + bytes(20), "zip"),

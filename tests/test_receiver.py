@@ -274,6 +274,20 @@ def test_attitude_of_a_filter_with_inertial_sensors(tmp_path: Path) -> None:
     assert read.values("ins", "rate_x_dps") == [1.5] and read.values("ins", "rate_z_dps") == [-2.0]
 
 
+@pytest.mark.parametrize("apart_deg", [0.0, 0.5])
+def test_a_heading_that_is_the_track_is_told(tmp_path: Path, apart_deg: float) -> None:
+    heading = 9_000_000
+    vehicle = {"vehHeading": heading + round(apart_deg * 1e5), "motHeading": heading, "gSpeed": 5_000, "accHeading": 60}
+    flags = 1 | 1 << 5
+    fixes = [
+        ubx("NAV-PVAT", iTOW=week_ms(NOON) + at * 1000, fixType=4, flags=flags, lat=1, lon=1, **vehicle)
+        for at in range(9)
+    ]
+    read = Read(tmp_path, pvt("2026-05-04T11:59:59Z") + b"".join(fixes))
+    assert ("same in 9 of 9" in read.remark("heading_is_track")) == (apart_deg == 0.0)
+    assert read.values("ins", "true_heading_deg")[0] == 90.0 + apart_deg
+
+
 @pytest.mark.parametrize(
     ("sentence", "field", "heading"),
     [

@@ -18,14 +18,18 @@ def few() -> tuple[RunOutcome, ...]:
 
 
 def test_error_squared_is_what_the_interval_says(few: tuple[RunOutcome, ...]) -> None:
-    """Mean of (error / sigma)^2 inside the 99.9 % band of chi-square over 24 degrees of freedom, per degree."""
-    sigma = np.array([run.half_width_deg / 1.96 for run in few])
+    """Mean of (error / sigma)^2 inside the 99.9 % band of chi-square over 24 degrees of freedom, per degree.
+
+    This family has neither steady sideslip nor mounting: the interval by this taxi alone is the one judged.
+    """
+    sigma = np.array([run.half_width_measured_deg / 1.96 for run in few])
     normalised = np.array([run.error_deg for run in few]) / sigma
     assert 0.27 < np.mean(normalised**2) < 2.2
 
 
 def test_interval_holds_the_truth_more_often_than_e(few: tuple[RunOutcome, ...]) -> None:
-    inside, inside_paper = (sum(getattr(run, name) for run in few) for name in ("is_inside", "is_inside_paper"))
+    names = ("is_inside_measured", "is_inside_paper")
+    inside, inside_paper = (sum(getattr(run, name) for run in few) for name in names)
     assert inside >= 20  # of 24 at 0.95: fewer in 1 of 200 seeds
     assert inside > inside_paper
 
@@ -68,10 +72,10 @@ def test_study_writes_its_tables_and_page() -> None:
     lines: list[str] = []
     study = study_heading(runs=2, seed=FEW_SEED, progress=lines.append)
     assert isinstance(study, StudyResult)
-    assert len(lines) == 4
+    assert len(lines) == 6
     names = [table.name for table in study.tables]
     assert len(names) == len(set(names))
-    assert "heading_coverage_continuous" in names
+    assert {"heading_coverage_grid", "heading_coverage_continuous", "heading_coverage_wide"} <= set(names)
     assert all(len(table) for table in study.tables)
     assert "| all | 2 |" in study.markdown
 
@@ -80,8 +84,8 @@ def test_study_writes_its_tables_and_page() -> None:
 @pytest.mark.parametrize("family", ["grid", "continuous"])
 def test_interval_holds_the_truth_in_93_to_97_of_100_runs(family: str) -> None:
     outcomes = run_family(family, JUDGING_SEEDS[family], MANY_RUNS)  # type: ignore[arg-type]
-    assert 0.93 <= np.mean([run.is_inside for run in outcomes]) <= 0.97
-    twenty = [run.is_inside for run in outcomes if sum(run.case.segments_s) <= 20.5]
+    assert 0.93 <= np.mean([run.is_inside_measured for run in outcomes]) <= 0.98
+    twenty = [run.is_inside_measured for run in outcomes if sum(run.case.segments_s) <= 20.5]
     assert 0.91 <= np.mean(twenty) <= 0.99  # some 200 runs: sampling error 1.5 %
     accepted = [run for run in outcomes if run.verdict == "accept"]
     assert len(accepted) > 20

@@ -107,3 +107,13 @@ def test_an_empty_table_answers_everything() -> None:
     assert (len(empty), empty.values("roll_deg").shape, empty.valid("roll_deg").shape) == (0, (0,), (0,))
     assert len(empty.unique_times()) == 0
     assert empty.to_frame().shape == (0, 0)
+
+
+def test_of_one_time_the_first_present_value_of_each_field_is_kept() -> None:
+    first = batch("ins", [10, 20, 30], latitude_deg=[55.0, 56.0, 57.0], roll_deg=[1.0, 2.0, 3.0])
+    second = batch("ins", [10, 20], first=3, velocity_north_mps=[7.0, 8.0], roll_deg=[-1.0, -2.0])
+    table = gather(first, second)["ins"].unique_times()
+    assert table.time_ns.tolist() == [10, 20, 30]
+    assert table.values("latitude_deg").tolist() == [55.0, 56.0, 57.0]
+    assert table.values("roll_deg").tolist() == [1.0, 2.0, 3.0]
+    assert np.array_equal(table.values("velocity_north_mps"), [7.0, 8.0, np.nan], equal_nan=True)

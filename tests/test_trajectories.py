@@ -14,10 +14,8 @@ from groundstation.readers.sbet import ACCURACY, RECORD
 from tests.real_logs import real_log
 from tests.test_readers_contract import check
 from tests.test_receiver import Read as ReadStream
+from tests.trajectory_writer import GEODETIC, HEIGHT, LATITUDE, LONGITUDE, PLACE, pos, sbet
 
-SIGMAS = "0.0300 0.0400 0.0800 0.0000 0.0000 0.0000"
-VELOCITY = "1.50000 -2.50000 0.25000 0.03000 0.04000 0.05000 0.0 0.0 0.0"
-LATITUDE, LONGITUDE, HEIGHT = 51.5, -0.7, 147.0
 DEGREES = 1e-9
 FIRST_NS = iso_to_utc_ns("2025-08-28T17:30:21.749Z")[0]
 
@@ -29,18 +27,6 @@ class Read(ReadStream):
         path.write_bytes(content)
         self.items = list(registry.read(path))
         check(self.items)
-
-
-def pos(form: str, cells: str, scale: str = "GPST", time: str = "2025/08/28 17:30:39.749", top: str = "") -> bytes:
-    names = f"%  {scale}  {form} Q ns sda(m) sdb(m) sdc(m) sdab(m) sdbc(m) sdca(m) age(s) ratio"
-    names = names.replace("sda", "sdn").replace("sdb", "sde").replace("sdc", "sdu")
-    rows = [f"{time}   {cells}   1  21 {SIGMAS}   0.00  999.9  {VELOCITY}"] * 3
-    velocity = " vn(m/s) ve(m/s) vu(m/s) sdvn sdve sdvu sdvne sdveu sdvun"
-    return "\n".join([f"% program   : RTKLIB ver.2.4.3{top}", names + velocity, *rows, ""]).encode()
-
-
-GEODETIC = "latitude(deg) longitude(deg) height(m)"
-PLACE = f"{LATITUDE:.9f}  {LONGITUDE:.9f}  {HEIGHT:.4f}"
 
 
 def test_geodetic_form_in_gps_time(tmp_path: Path) -> None:
@@ -131,26 +117,6 @@ def test_recorded_solutions() -> None:
 # --- SBET
 
 
-def sbet(wander_rad: float = 0.4, wander_sign: int = -1, count: int = 60, gravity: bool = True) -> np.ndarray:
-    """Two seconds of an aircraft that flies at 50 m/s on track 60 deg; heading 65 deg true."""
-    records = np.zeros(count, RECORD)
-    records["time"] = 408_621.0 + np.arange(count) / 200.0
-    north, east = 50.0 * np.cos(np.deg2rad(60.0)), 50.0 * np.sin(np.deg2rad(60.0))
-    from_start = np.arange(count) / 200.0
-    records["latitude"] = np.deg2rad(LATITUDE) + north * from_start / 6_374_000.0
-    records["longitude"] = np.deg2rad(LONGITUDE) + east * from_start / (6_391_500.0 * np.cos(np.deg2rad(LATITUDE)))
-    records["altitude"], records["wander_angle"] = HEIGHT, wander_rad
-    azimuth = wander_sign * wander_rad  # of the platform's x axis
-    records["x_velocity"] = north * np.cos(azimuth) + east * np.sin(azimuth)
-    records["y_velocity"] = -north * np.sin(azimuth) + east * np.cos(azimuth)
-    records["z_velocity"] = -1.0
-    records["roll"], records["pitch"] = np.deg2rad(2.0), np.deg2rad(-3.0)
-    records["platform_heading"] = np.deg2rad(65.0) - azimuth
-    records["z_acceleration"] = -9.81 if gravity else 0.02
-    records["y_rate"] = np.deg2rad(0.5)
-    return records
-
-
 @pytest.mark.parametrize("wander_sign", [-1, 1])
 def test_sbet_turns_the_platform_back(tmp_path: Path, wander_sign: int) -> None:
     read = Read(tmp_path / "sbet_20250828.out", sbet(wander_sign=wander_sign).tobytes())
@@ -188,6 +154,17 @@ def test_sbet_cut_and_over_the_end_of_the_week(tmp_path: Path) -> None:
     assert [(one.kind, one.count) for one in read.damages] == [("truncated", 86)]
     times = read.batches("ins")[0].device_time_ns.values
     assert (np.diff(times) == 5_000_000).all() and read.times("ins")[0] == "2025-08-30T23:59:41.900000000Z"
+
+
+@pytest.mark.parametrize(("inserted", "lost"), [(0, 1), (7, 0), (13, 0)])
+def test_sbet_behind_damage_is_found_again(tmp_path: Path, inserted: int, lost: int) -> None:
+    content = bytearray(sbet().tobytes())
+    at = 30 * RECORD.itemsize
+    content[at + 8 : at + 16] = b"\xff" * 8 if not inserted else content[at + 8 : at + 16]
+    content[at:at] = b"\x55" * inserted
+    read = Read(tmp_path / "sbet_20250828.out", bytes(content))
+    assert len(read.times("ins")) == 60 - lost and [one.kind for one in read.damages] == ["corrupt"]
+    assert sum(one.count for one in read.damages) == inserted + lost * RECORD.itemsize
 
 
 def test_other_doubles_are_no_sbet(tmp_path: Path) -> None:

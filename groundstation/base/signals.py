@@ -161,6 +161,7 @@ _FIELD_NAMES = frozenset(field.name for fields in TOPICS.values() for field in f
 INS_MODES = ("align", "nav", "attitude", "gnss_aided")
 FIXES = ("none", "2d", "3d", "dgnss", "rtk_float", "rtk_fixed", "ppp", "gnss_ins", "dead_reckoning", "other")
 RAW_PREFIX = "raw."
+BUS_PREFIX, BYTES_PREFIX = "raw.bus.", "raw.bytes."  # words and bytes as recorded: no numbers to look at
 
 
 def kind_of(topic: str) -> str:
@@ -183,6 +184,17 @@ def is_canonical(topic: str) -> bool:
     (True, False, False)
     """
     return kind_of(topic) in TOPICS
+
+
+def has_values(topic: str) -> bool:
+    """Whether the columns of a topic are values, not words or bytes that mean something only by an ICD or the like.
+
+    Examples
+    --------
+    >>> has_values("ins"), has_values("raw.irig_time.1"), has_values("raw.bus.429.7")
+    (True, True, False)
+    """
+    return not topic.startswith((BUS_PREFIX, BYTES_PREFIX))
 
 
 def field_of(topic: str, name: str) -> Field | None:

@@ -1,6 +1,6 @@
 """Chapter: an INS that GNSS corrects already: INS - GNSS, and the innovations that its own filter logged."""
 
-from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Part, Section
+from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
 from groundstation.chapters.wording import ABSENT, any_value, clock, number, percent, typeset, unit_sign
 from groundstation.results.inertial import Difference, InertialResult, OwnInnovation
 
@@ -21,16 +21,31 @@ def aided(answer: InertialResult) -> Section:
         Figure("inertial.differences", of="velocity"),
         _innovations(answer),
         Figure("inertial.own_innovations"),
-        _pair(answer),
     )
-    return Section("inertial", TITLE, LEAD, tuple(part for part in parts if part is not None), f"{HEADLINE}{within}")
+    headline = f"{HEADLINE}{within}"
+    return Section(
+        "inertial", TITLE, LEAD, kept(parts), headline, claim=_claim(answer, headline), appendix=(_pair(answer),)
+    )
+
+
+def _claim(answer: InertialResult, headline: str) -> Claim:
+    rows = [row for row in (answer.difference("position"), answer.difference("velocity")) if row is not None]
+    figures = tuple(
+        (f"INS − GNSS, {row.quantity}", number(row.p95, PLACES.get(row.unit, 3), unit_sign(row.unit)), "95 %")
+        for row in rows
+    )
+    reason = typeset(answer.kind_reason).strip().rstrip(".")
+    sentences = (f"{reason[:1].upper()}{reason[1:]}.",) if reason else ()
+    value = figures[0][1] if figures else ""
+    remark = "INS − GNSS, 95 %; its own drift cannot be seen" if figures else "its own drift cannot be seen"
+    return Claim(Rank.INERTIAL_OPEN, Mark("unknown", "Aided"), headline, value, remark, sentences, figures)
 
 
 def _why(answer: InertialResult) -> Note:
     reason = typeset(answer.kind_reason).strip().rstrip(".")
     text = (
-        f"GNSS corrects this INS already: {reason}. What GNSS takes out cannot be seen against GNSS, so its errors are "
-        "not estimated, nothing is corrected, and nothing is forecast."
+        f"GNSS corrects this INS already: {reason}. What GNSS takes out cannot be seen against GNSS, so nothing is "
+        "estimated, corrected or forecast."
     )
     return Note(text)
 

@@ -4,7 +4,7 @@ from groundstation.chapters.generic import titled
 from groundstation.chapters.parts import Note, Section
 from groundstation.chapters.wording import typeset, words
 from groundstation.results.flight import FlightResults
-from groundstation.results.reasons import explained
+from groundstation.results.reasons import explained, in_plain_words
 
 # By the name of the analysis; others are called by their name.
 SUBJECTS = {
@@ -29,7 +29,7 @@ def reason_of(results: FlightResults, analysis: str) -> str:
 def not_assessed(results: FlightResults) -> tuple[tuple[str, str], ...]:
     """Subject and reason of every analysis that could not be carried out."""
     return tuple(
-        (SUBJECTS.get(one.analysis) or titled(words(one.analysis)), typeset(explained(one.analysis, one.reason)))
+        (SUBJECTS.get(one.analysis) or titled(words(one.analysis)), typeset(in_plain_words(one.reason)))
         for one in results.not_assessable
     )
 

@@ -6,7 +6,7 @@ from groundstation.base.findings import Finding
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Part, Section
 from groundstation.chapters.wording import number
 from groundstation.results.flight import FlightResults
-from groundstation.results.grouped_findings import grouped
+from groundstation.results.grouped_findings import NAMED, grouped
 from groundstation.results.reasons import explained
 
 MOST_FINDINGS = 200
@@ -28,7 +28,23 @@ def findings(results: FlightResults) -> Section:
     parts: list[Part] = [_table(grave) if grave else Note("No warnings.", "good")]
     if remarks:
         parts.append(Note(f"{number(len(remarks), 0)} remarks stand in the appendix."))
-    return Section("findings", TITLE, LEAD, parts, appendix=(_table(remarks),) if remarks else ())
+    return Section("findings", TITLE, LEAD, parts, appendix=(_table(_one_of_each(remarks)),) if remarks else ())
+
+
+def _one_of_each(remarks: Sequence[Finding]) -> list[Finding]:
+    """The first remark of every kind, with the topics and the sum of the counts of all of that kind."""
+    kinds: dict[str, list[Finding]] = {}
+    for remark in remarks:
+        kinds.setdefault(remark.code, []).append(remark)
+    return [alike[0] if len(alike) == 1 else _joined(alike) for alike in kinds.values()]
+
+
+def _joined(alike: Sequence[Finding]) -> Finding:
+    topics = list(dict.fromkeys(remark.topic for remark in alike if remark.topic))
+    more = f" and {len(topics) - NAMED} more" if len(topics) > NAMED else ""
+    counts = [remark.count for remark in alike if remark.count is not None]
+    text = f"{alike[0].text}; {len(alike) - 1} more of this kind"
+    return Finding("info", alike[0].code, text, ", ".join(topics[:NAMED]) + more, "", sum(counts) if counts else None)
 
 
 def not_assessable(results: FlightResults) -> Grid | None:
@@ -40,7 +56,7 @@ def not_assessable(results: FlightResults) -> Grid | None:
 def _table(found: Sequence[Finding]) -> Grid:
     rows: list[tuple[Cell, ...]] = []
     for item in sorted(found, key=lambda item: GRAVITY[item.severity])[:MOST_FINDINGS]:
-        where = " · ".join(text for text in (item.topic, item.place) if text)
+        where = " · ".join(text for text in (item.topic, item.place) if text and text not in item.text)
         count = "" if item.count is None else number(item.count, 0)
         rows.append((MARKS[item.severity], item.text, where, count))
     more = len(found) - len(rows)

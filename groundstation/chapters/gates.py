@@ -35,7 +35,7 @@ def _row(gate: Gate) -> tuple[Cell, ...]:
         value,
         limit_text(gate),
         "decides" if gate.required else "informs",
-        typeset(gate.reason),
+        "" if gate.state == "passed" else typeset(gate.reason),
     )
 
 

@@ -76,6 +76,7 @@ def _estimates(answer: HeadingResult) -> Grid:
         name: number(getattr(answer, f"{name}_deg"), places, "°", signed=name.endswith("error"))
         for name, places in (("error", 4), ("paper_error", 4), ("precision", 4), ("uncorrected_error", 4))
     }
+    alone = interval(answer.confidence95_measured_deg, 3, "°")
     rows = (
         (
             "Heading error, robust and weighted by speed",
@@ -83,11 +84,10 @@ def _estimates(answer: HeadingResult) -> Grid:
             interval(answer.confidence95_deg, 3, "°"),
             "corrected by; allows for errors correlated over seconds, steady sideslip and mounting",
         ),
-        (
-            "The same by this taxi alone",
-            value["error"],
-            interval(answer.confidence95_measured_deg, 3, "°"),
-            "without steady sideslip and mounting",
+        *(
+            (("The same by this taxi alone", value["error"], alone, "without steady sideslip and mounting"),)
+            if answer.confidence95_measured_deg
+            else ()
         ),
         (
             "Heading error, running mean of Markelov 2015",

@@ -42,7 +42,7 @@ def inertial(results: FlightResults) -> Section | None:
     if answer is None:
         return without_answer(results, "inertial", TITLE, LEAD)
     if answer.kind == "gnss_aided":
-        return replace(aided(answer), claim=inertial_claim(answer, "", is_doubtful=False))
+        return aided(answer)
     parts: tuple[Part | None, ...] = (
         *_conclusions(answer),
         Figure("inertial.state", of="position"),

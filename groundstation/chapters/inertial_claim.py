@@ -10,18 +10,11 @@ HOUR_MIN = 60.0  # the horizon a forecast is judged by at a glance, or the longe
 
 
 def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -> Claim:
-    """Drift of an unaided INS; of another one that there is none to tell.
+    """Drift of an INS that GNSS does not correct, or of which that cannot be told.
 
     ``quality`` says in a sentence whether the filter can be trusted; ``is_doubtful`` that its sigmas are too small.
     """
     reason = typeset(answer.kind_reason).strip().rstrip(".")
-    if answer.kind == "gnss_aided":
-        position = answer.difference("position")
-        within = "" if position is None else number(position.p95, 1, "m")
-        headline = "GNSS corrects this INS: it shows no drift of its own"
-        remark = "INS − GNSS, 95 %; corrected by GNSS" if within else "corrected by GNSS"
-        sentences = (f"{reason[:1].upper()}{reason[1:]}.",) if reason else ()
-        return Claim(Rank.INERTIAL_OPEN, Mark("unknown", "Aided"), headline, within, remark, sentences)
     rate, most = answer.radial_error_rate_50_nmiph, number(answer.radial_error_rate_95_nmiph, 2, "nmi/h")
     drift = number(rate, 2, "nmi/h")
     headline = (

@@ -31,7 +31,6 @@ from groundstation.chapters.wording import (
 )
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing import Approach, LandingResult, PositionError, StabilisedAt
-from groundstation.results.landing_categories import CATEGORIES
 
 LEAD = "How each approach was flown against its runway, and where it touched down."
 TITLE = "Approaches"
@@ -60,7 +59,7 @@ def landing(results: FlightResults) -> Section | None:
     parts += [_left_out(answer), *(Note(sentence(remark)) for remark in answer.remarks)]
     workings = (
         *(_basis(one) for one in told),
-        *(_categories(), Note(HOW), setting_facts(answer.settings, "landing")),
+        *(Note(HOW), setting_facts(answer.settings, "landing")),
     )
     headline, claim = _headline(answer), _claim(answer)
     return Section("landing", TITLE, LEAD, kept(parts), headline, claim=claim, appendix=kept(workings))
@@ -317,16 +316,3 @@ def _left_out(answer: LandingResult) -> Note | None:
         return None
     rows = "; ".join(f"{clock(one.time_s)} {typeset(one.reason)}" for one in answer.left_out[:5])
     return Note(f"Not told as approaches: {rows}.")
-
-
-def _categories() -> Grid:
-    heads = (Head("Category"), *(Head(title, True) for title in ("Horizontal, m", "Vertical, m", "ILS course line, m")))
-    rows = [
-        (one.label, number(one.horizontal_m, 1), number(one.vertical_m, 1), f"± {number(one.course_line_m, 1)}")
-        for one in CATEGORIES
-    ]
-    caption = (
-        "95 % accuracy, after ICAO Annex 10 (Satellite Navigation 1, 2020). ILS look-alike rows are derived from what "
-        "an ILS delivers. The course line is a tolerance of the line at the threshold, not a total error."
-    )
-    return Grid("What categories ask for", heads, rows, caption)

@@ -7,7 +7,7 @@ from groundstation.chapters.wording import ABSENT, clean, number
 from groundstation.results.flight import FlightResults, Source
 
 LONG_LISTS = ("parameter.", "units.")  # of autopilot logs, hundreds of them
-MOST_METADATA = 12
+MOST_METADATA = 8
 REST = "More metadata in summary.json."
 CHECKS = "Every number stands in summary.json or tables/*.csv; versions and configuration in manifest.json."
 

@@ -109,7 +109,7 @@ def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:
     --------
     >>> notes = [Outcome(name, "skipped", f"{name}: no log") for name in ("a.txt", "b.txt")]
     >>> skipped_lines(notes, 1), skipped_lines(notes[:1], 1)
-    (['skipped 2 files: no log: a.txt and 1 more'], ['skipped: a.txt: no log'])
+    (['skipped 2 files, a.txt and 1 more: no log'], ['skipped: a.txt: no log'])
     """
     by_reason: dict[str, list[str]] = {}
     for outcome in done:
@@ -122,7 +122,7 @@ def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:
             lines.append(printable(f"skipped: {names[0]}: {reason}"))
             continue
         more = f" and {len(names) - most} more" if len(names) > most else ""
-        lines.append(printable(f"skipped {len(names)} files: {reason}: {', '.join(names[:most])}{more}"))
+        lines.append(printable(f"skipped {len(names)} files, {', '.join(names[:most])}{more}: {reason}"))
     return lines
 
 

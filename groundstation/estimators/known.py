@@ -35,9 +35,11 @@ class AircraftData:
     gnss_latency_s, gnss_latency_sigma_s : float or None
         How much later GNSS velocities are logged than the INS shows the same motion, known; None: estimated.
     ins_class : str
-        For the record.
+        Class of its INS: noise of system 2, prior of the azimuth drift.
     ins_kind : str
         Whether GNSS corrects the INS already, ``gnss_aided`` or ``unaided``; empty: the log shows it.
+    always_on_ground : bool
+        A car: nothing need prove ground contact.
     """
 
     antenna_arm_m: float | None = number(None, -50.0, 50.0)
@@ -50,6 +52,7 @@ class AircraftData:
     gnss_latency_sigma_s: float = number(0.01, 0.0, 10.0)
     ins_class: str = ""
     ins_kind: Literal["", "unaided", "gnss_aided"] = ""
+    always_on_ground: bool = False
 
     def __post_init__(self) -> None:
         check_ranges(self)

@@ -26,6 +26,7 @@ from groundstation.readers import (
     receiver,
     rtklib_pos,
     sbet,
+    tlog,
     ulog,
     utias,
 )
@@ -38,7 +39,10 @@ if TYPE_CHECKING:
 ENTRY_POINT_GROUP = "groundstation.readers"
 FLAT_CSV = f"the flat CSV ({flat_csv.PAGE})"
 _OF_TEXT: tuple[Reader, ...] = (csv_profile, flat_csv, miluv, rtklib_pos, utias)
-_BUILT_IN: tuple[Reader, ...] = (chapter10, dataflash, ulog, flightdata_hdf5, receiver, sbet, bags, *_OF_TEXT)
+_BUILT_IN: tuple[Reader, ...] = (
+    *(chapter10, dataflash, ulog, flightdata_hdf5, receiver, sbet, bags, tlog),
+    *_OF_TEXT,
+)
 
 
 @dataclass(frozen=True)

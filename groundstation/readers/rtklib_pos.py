@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 NAME = "rtklib-pos"
 RAW = "raw.pos"
 _NAMES = re.compile(r"%\s*(GPST|UTC|JST)\b.*\b(latitude|x-ecef|e-baseline)\b.*\bQ\b\s*[,;]?\s*\bns\b")
-_PARTING = re.compile(rb"[ \t]*[,;][ \t]*|[ \t]+")
-_OF_NO_ROW = re.compile(rb"(?m)^(?:%[^\n]*|[ \t]+)|[ \t\r]+$")
+_PARTING = re.compile(rb"[ \t]+(?:[,;][ \t]*)?|[,;][ \t]*")
+_OF_NO_ROW = re.compile(rb"(?m)^\t?%[^\n]*|^\t|\t?\r?$")  # of lines whose cells are parted by tabs
 _REFERENCE = re.compile(r"ref pos\s*:\s*(-?[\d.]+)\s+(-?[\d.]+)\s+(-?[\d.]+)")
 _FIXES = np.array(["none", "rtk_fixed", "rtk_float", "dgnss", "dgnss", "3d", "ppp", "dead_reckoning"])
 _JST_NS = 9 * 3_600 * NS_PER_S
@@ -153,7 +153,7 @@ class _Tabs(io.RawIOBase):
             data = self._stream.read(_PIECE_BYTES)
             whole = self._rest + data
             end = whole.rfind(b"\n") + 1 if data and len(self._rest) < _LONGEST_LINE else len(whole)
-            self._rest, self._ready = whole[end:], _PARTING.sub(b"\t", _OF_NO_ROW.sub(b"", whole[:end]))
+            self._rest, self._ready = whole[end:], _OF_NO_ROW.sub(b"", _PARTING.sub(b"\t", whole[:end]))
             if not data:
                 break
         count = min(len(view), len(self._ready))

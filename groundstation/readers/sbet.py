@@ -8,7 +8,7 @@ Source: Applanix, POSPac MMS file formats (SBET, SMRMSG).
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ from groundstation.base.records import MAX_BATCH_ROWS, Column, Damage, Int64Arra
 from groundstation.base.timescales import gps_week_to_utc_ns, iso_to_utc_ns
 from groundstation.base.units import ARCMIN_PER_DEG, DEG_PER_RAD, MPS2_PER_G, NS_PER_S
 from groundstation.readers.receiver.times import GPS_EPOCH_NS, calendar_ns, unrolled
-from groundstation.readers.skipped import bytes_place
+from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Claim, Source
 
 NAME = "sbet"
@@ -35,7 +35,8 @@ RECORD = np.dtype([(name, "<f8") for name in _FIELDS.split()])
 _ACCURACIES = "time north_m east_m down_m north_mps east_mps down_mps roll_arcmin pitch_arcmin heading_arcmin"
 ACCURACY = np.dtype([(name, "<f8") for name in _ACCURACIES.split()])
 S_PER_WEEK = 604_800
-_LOOKED_AT, _FEWEST = 200, 5
+_LOOKED_AT, _FEWEST, _FIRST, _ENOUGH = 200, 5, 20, 0.9
+_IN_A_ROW, _SEARCHED = 3, 1 << 16
 _LONGEST_STEP_S, _FASTEST_MPS = 10.0, 1_000.0
 _DATE = re.compile(r"(?<!\d)(20\d\d)[-_.]?([01]\d)[-_.]?([0-3]\d)(?!\d)")
 _MODE = "gnss_aided"
@@ -58,7 +59,9 @@ def sniff(source: Source) -> Claim | None:
     count = min(len(source.head) // RECORD.itemsize, _LOOKED_AT)
     if count < _FEWEST:
         return None
-    return Claim(NAME, confidence=0.6) if _is_sound(np.frombuffer(source.head, RECORD, count)).all() else None
+    is_sound = _follow(np.frombuffer(source.head, RECORD, count))
+    is_one = is_sound[:_FIRST].all() or is_sound.mean() >= _ENOUGH
+    return Claim(NAME, confidence=0.6) if is_one and is_sound.sum() >= _FEWEST else None
 
 
 def read(source: Source) -> Iterator[Item]:
@@ -70,31 +73,97 @@ def read(source: Source) -> Iterator[Item]:
     accuracies = _accuracies(source.path)
     yield LogHeader(NAME, {"ins_kind": _MODE}, None if week is None else 0)
     yield from _remarks(week, sense, accuracies)
-    last_s = np.zeros(0)
-    with source.open() as stream:
-        first = 0
-        while content := stream.read(MAX_BATCH_ROWS * RECORD.itemsize):
-            records = np.frombuffer(content, RECORD, len(content) // RECORD.itemsize)
-            if len(records):
-                week_s = unrolled_s(np.concatenate((last_s, records["time"])))[len(last_s) :]
-                last_s = week_s[-1:]
-                yield from _batches(records, first, _time(week, week_s), week_s, sense, accuracies)
-            left = len(content) - len(records) * RECORD.itemsize
-            if left:
-                start = (first + len(records)) * RECORD.itemsize
-                yield Damage("truncated", bytes_place(start, start + left), left, "bytes of a record that was cut")
-            first += len(records)
+    walk, last_s, first = _Walk(source), np.zeros(0), 0
+    for records in walk:
+        week_s = unrolled_s(np.concatenate((last_s, records["time"])))[len(last_s) :]
+        last_s = week_s[-1:]
+        yield from _batches(records, first, _time(week, week_s), week_s, sense, accuracies)
+        first += len(records)
+    yield from walk.damages()
+
+
+class _Walk:
+    """Iterates over the sound records of a file; behind a damaged one the next is looked for at every byte."""
+
+    def __init__(self, source: Source) -> None:
+        self._source, self._skipped = source, SkippedBytes("record")
+        self._cut: tuple[int, int] | None = None
+        self._count = self._skipped_to = 0
+
+    def __iter__(self) -> Iterator[NDArray[Any]]:
+        data, base = b"", 0
+        with self._source.open() as stream:
+            while content := stream.read(MAX_BATCH_ROWS * RECORD.itemsize):
+                data += content
+                done = yield from self._of(data, base)
+                data, base = data[done:], base + done
+        if data:
+            self._finish(base, base + len(data))
+
+    def damages(self) -> Iterator[Damage]:
+        """What belongs to no record, and a last record that was cut."""
+        yield from self._skipped.damages()
+        if self._cut is not None:
+            what = "bytes of a record that was cut"
+            yield Damage("truncated", bytes_place(*self._cut), self._cut[1] - self._cut[0], what)
+
+    def _of(self, data: bytes, base: int) -> Generator[NDArray[Any], None, int]:
+        """Records of the data at hand; returns how many bytes are done with."""
+        at = 0
+        while len(data) - at >= RECORD.itemsize:
+            records = np.frombuffer(data, RECORD, (len(data) - at) // RECORD.itemsize, at)
+            sound = _is_sound(records)
+            count = len(records) if sound.all() else int(np.argmin(sound))
+            for start in range(0, count, MAX_BATCH_ROWS):
+                yield records[start : min(start + MAX_BATCH_ROWS, count)]
+            self._count += count
+            at += count * RECORD.itemsize
+            if len(data) - at < RECORD.itemsize:
+                break
+            found = _next_start(data, at + 1)
+            if found is None:  # what is left may begin a record that the next block ends
+                found = max(at + 1, len(data) - (_IN_A_ROW + 1) * RECORD.itemsize)
+            self._skipped.add(base + at, base + found, self._count)
+            self._skipped_to = base + found
+            at = found
+        return at
+
+    def _finish(self, start: int, end: int) -> None:
+        if self._skipped_to == start:
+            self._skipped.add(start, end, self._count)
+        else:
+            self._cut = start, end
+
+
+def _next_start(data: bytes, at: int) -> int | None:
+    """The next byte at which several sound records in a row begin, one step of time apart from each other."""
+    span = _IN_A_ROW * RECORD.itemsize
+    aligned = at - 1 + RECORD.itemsize  # most often one record alone is damaged
+    while at + span <= len(data):
+        width = min(_SEARCHED, len(data) - at - span + 1)
+        every = np.ndarray((width,), "<f8", data, at, (1,))
+        following = np.ndarray((width,), "<f8", data, at + RECORD.itemsize, (1,))
+        with np.errstate(invalid="ignore", over="ignore"):
+            steps = following - every
+            plausible = (every >= 0.0) & (every < 2 * S_PER_WEEK) & (steps > 0.0) & (steps < _LONGEST_STEP_S)
+        candidates = at + np.flatnonzero(plausible)
+        for place in sorted(candidates.tolist(), key=lambda place: (place != aligned, place)):
+            if _follow(np.frombuffer(data, RECORD, _IN_A_ROW, place)).all():
+                return int(place)
+        at += width
+    return None
 
 
 def unrolled_s(week_s: FloatArray) -> FloatArray:
     """Seconds of the week that count on past its end; what is no number stays."""
     finite = np.isfinite(week_s) & (np.abs(week_s) < 1e9)
-    ms = unrolled(np.where(finite, week_s * 1e3, 0.0).astype(np.int64), S_PER_WEEK * 1000)
+    ms = unrolled((np.where(finite, week_s, 0.0) * 1e3).astype(np.int64), S_PER_WEEK * 1000)
     turns = np.round((ms / 1e3 - np.where(finite, week_s, 0.0)) / S_PER_WEEK)
     return np.asarray(week_s + S_PER_WEEK * turns)
 
 
 def _is_sound(records: NDArray[Any]) -> NDArray[np.bool_]:
+    """Whether records are places on Earth with angles and speeds that exist, shape (n,)."""
     with np.errstate(invalid="ignore", over="ignore"):
         time, latitude, longitude = records["time"], records["latitude"], records["longitude"]
         sound = (time >= 0.0) & (time < 2 * S_PER_WEEK) & (np.abs(latitude) <= np.pi / 2) & (np.abs(longitude) <= np.pi)
@@ -102,10 +171,17 @@ def _is_sound(records: NDArray[Any]) -> NDArray[np.bool_]:
         sound &= (np.abs(records["roll"]) <= np.pi) & (np.abs(records["pitch"]) <= np.pi / 2)
         sound &= np.abs(records["platform_heading"]) <= 4 * np.pi
         sound &= np.hypot(records["x_velocity"], records["y_velocity"]) < _FASTEST_MPS
-        steps = np.diff(unrolled_s(time))
-        sound[1:] &= (steps > 0.0) & (steps < _LONGEST_STEP_S)
         sound &= (latitude != 0.0) | (longitude != 0.0)
     return np.asarray(sound)
+
+
+def _follow(records: NDArray[Any]) -> NDArray[np.bool_]:
+    """Whether records are sound and each a small step of time behind the one before, shape (n,)."""
+    sound = _is_sound(records)
+    with np.errstate(invalid="ignore", over="ignore"):
+        steps = np.diff(unrolled_s(records["time"]))
+    sound[1:] &= (steps > 0.0) & (steps < _LONGEST_STEP_S)
+    return sound
 
 
 def _week_of(name: str, first_s: float) -> int | None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from groundstation.chapters.parts import Part
 from groundstation.chapters.wording import clean, clock
+from groundstation.reports.live import TIME, Svg, panels_of
 
 WIDTH_MM = 178.0  # the printable width of A4
 MAX_POINTS = 5000
@@ -101,7 +102,7 @@ class Drawing(Part):
     ----------
     title, caption, alt : str
         The caption says what one sees, how many samples, what the lines are; alt is for those who cannot see it.
-    svg : str
+    svg : Svg
         The only text that the page passes on unescaped: made by reports.drawing alone.
     numbers : sequence of str
         Names of the figure data; the readable copies are tables/<name>.csv.
@@ -111,7 +112,7 @@ class Drawing(Part):
     title: str
     caption: str
     alt: str
-    svg: str
+    svg: Svg
     numbers: Sequence[str] = ()
 
 
@@ -149,7 +150,7 @@ def report_style() -> Iterator[None]:
         yield
 
 
-def draw(key: str, height_mm: float, paint: Callable[[Any], None], width_mm: float = WIDTH_MM) -> str:
+def draw(key: str, height_mm: float, paint: Callable[[Any], None], width_mm: float = WIDTH_MM) -> Svg:
     """Paint a figure and return it as an SVG element that can stand in a page.
 
     Parameters
@@ -163,7 +164,7 @@ def draw(key: str, height_mm: float, paint: Callable[[Any], None], width_mm: flo
 
     Returns
     -------
-    str
+    Svg
         One ``<svg>`` element without comments, metadata, style sheets or anything from outside.
     """
     import io
@@ -171,7 +172,7 @@ def draw(key: str, height_mm: float, paint: Callable[[Any], None], width_mm: flo
     sketches = _sketches.get()
     if sketches is not None:
         sketches[key] = Sketch(height_mm, paint, width_mm)
-        return key
+        return Svg(key)
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
@@ -181,7 +182,7 @@ def draw(key: str, height_mm: float, paint: Callable[[Any], None], width_mm: flo
         paint(figure)
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return _for_page(buffer.getvalue(), key)
+        return Svg(_for_page(buffer.getvalue(), key), panels_of(figure))
 
 
 def _for_page(svg: str, key: str) -> str:
@@ -234,6 +235,7 @@ def time_axis(axes: Any, low: float, high: float, title: bool = True, most: int 
     step = next((step for step in steps if (high - low) / step <= most), 604800)
     first = int(np.ceil(low / step))
     ticks = [step * count for count in range(first, first + 12) if step * count <= high]
+    axes.set_label(TIME)
     axes.set_xlim(low, high)
     axes.xaxis.set_major_locator(FixedLocator(ticks))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: clock(float(value))))

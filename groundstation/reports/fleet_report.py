@@ -1,7 +1,5 @@
 """The report of a folder of flights: one self-contained HTML file with every flight, and its PDF."""
 
-import base64
-import hashlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +7,7 @@ from groundstation.chapters.parts import Document, Grid, Part
 from groundstation.chapters.wording import number
 from groundstation.reports.fleet import CHAPTERS, flights, front
 from groundstation.reports.flight_report import Written, write_pages
-from groundstation.reports.page import TEMPLATES, render
+from groundstation.reports.page import TEMPLATES, digest_of, render
 from groundstation.results.fleet import FleetResults
 
 PAGE = "summary.html"
@@ -66,7 +64,6 @@ def _shortened(part: Part) -> Part:
 def fleet_report_html(document: Document, fleet: FleetResults) -> str:
     """Render the report of a fleet as a complete HTML document, every flight in its table with links."""
     script = (TEMPLATES / "fleet.js").read_text(encoding="utf-8").strip()
-    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
     return render(
         "fleet.html.j2",
         kind=document.kind,
@@ -78,6 +75,6 @@ def fleet_report_html(document: Document, fleet: FleetResults) -> str:
         lines=flights.lines(fleet),
         table_caption=flights.CAPTION,
         script=script,
-        script_digest=digest,
+        script_digest=digest_of(script),
         style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
     )

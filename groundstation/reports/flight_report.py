@@ -9,7 +9,8 @@ from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.front import front
 from groundstation.chapters.parts import Document
 from groundstation.chapters.plan import is_plan
-from groundstation.reports.page import TEMPLATES, render
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.page import TEMPLATES, live_figures, render
 from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.reports.sections import flight_sections
 from groundstation.reports.steer_card import write_exports
@@ -78,7 +79,9 @@ def flight_document(saved: SavedFlight) -> Document:
 
 
 def flight_report_html(document: Document) -> str:
-    """Render the report of a flight as a complete HTML document."""
+    """Render the report of a flight as a complete HTML document; its figures are drawn live where scripts may run."""
+    parts = (part for section in document.sections for part in section.parts)
+    live = [part.svg.panels for part in parts if isinstance(part, Drawing) and part.svg.panels]
     return render(
         "flight.html.j2",
         kind=document.kind,
@@ -87,5 +90,6 @@ def flight_report_html(document: Document) -> str:
         sections=document.sections,
         verdict_of=VERDICT_OF.get(document.kind, "the heading correction"),
         page_label=_NOT_IN_AN_ID.sub("-", document.label),  # stands inside a CSS string
+        **live_figures(live),
         style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
     )

@@ -1,19 +1,47 @@
-"""Turning report parts into pages: jinja2 with autoescape, one style sheet, no scripts, nothing from outside."""
+"""Turning report parts into pages: jinja2 with autoescape, one style sheet, nothing from outside."""
 
+import base64
+import hashlib
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from groundstation.chapters.wording import clean
+from groundstation.reports.live import Panel, page_data
 
 TEMPLATES = Path(__file__).parent / "templates"
-# Nothing may be loaded or run: the page needs its own style alone. SVG sets style attributes, hence unsafe-inline.
+# Nothing may be loaded, nothing run but scripts that a template names by digest. SVG sets style attributes, hence
+# unsafe-inline.
 CONTENT_SECURITY_POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 
 
 def render(template: str, **context: Any) -> str:
     """Render a template of reports/templates; every value is escaped and cleaned of hidden characters."""
     return str(_environment().get_template(template).render(csp=CONTENT_SECURITY_POLICY, **context))
+
+
+def live_figures(figures: Sequence[tuple[Panel, ...]]) -> dict[str, str]:
+    """What flight.html.j2 needs to draw figures live: data, script with its digest, style; empty texts without any."""
+    if not figures:
+        return dict.fromkeys(("live_data", "script", "script_digest", "live_style"), "")
+    uplot, licence, ours = (
+        (TEMPLATES / name).read_text(encoding="utf-8").strip()
+        for name in ("uplot/uPlot.iife.min.js", "uplot/LICENSE", "live.js")
+    )
+    script = f"/*\n{licence}\n*/\n{uplot.partition('*/')[2].strip()}\n{ours}"
+    style = (TEMPLATES / "uplot/uPlot.min.css").read_text(encoding="utf-8").strip()
+    return {
+        "live_data": page_data(figures),
+        "script": script,
+        "script_digest": digest_of(script),
+        "live_style": style,
+    }
+
+
+def digest_of(script: str) -> str:
+    """The SHA-256 of a script as a content security policy names it."""
+    return base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 
 @cache

@@ -17,7 +17,16 @@ def explained(analysis: str, reason: str) -> str:
     >>> explained("heading", "no straight taxi: of 9 epochs above 6 m/s before lift-off: not proven ground 9")[:91]
     'no straight taxi: of 9 epochs above 6 m/s before lift-off: ground contact not proven for 9.'
     """
-    if analysis != "heading" or not reason.startswith(NO_GROUND_RUN):
-        return reason
-    told = reason.replace("not proven ground ", "ground contact not proven for ")
-    return f"{told}. {WHAT_HEADING_NEEDS}"
+    told = in_plain_words(reason)
+    return f"{told}. {WHAT_HEADING_NEEDS}" if analysis == "heading" and reason.startswith(NO_GROUND_RUN) else told
+
+
+def in_plain_words(reason: str) -> str:
+    """The reason as it stands, but for names of gates.
+
+    Examples
+    --------
+    >>> in_plain_words("no straight taxi: of 9 epochs above 6 m/s before lift-off: not proven ground 9")
+    'no straight taxi: of 9 epochs above 6 m/s before lift-off: ground contact not proven for 9'
+    """
+    return reason.replace("not proven ground ", "ground contact not proven for ")

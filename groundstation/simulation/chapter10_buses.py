@@ -127,20 +127,22 @@ def _bus_429(
 ) -> list[Bus429]:
     """The bus of one piece of equipment; none when it has nothing to send.
 
-    The words of a sample follow each other, each ``WORD_TIME_NS`` after the one before; where samples come faster than
-    the bus carries their words only every second, third ... is sent.
+    The words of a sample follow each other, each ``WORD_TIME_NS`` after the one before, those that no other bus feeds
+    first; where samples come faster than the bus carries their words only every second, third ... is sent.
     """
-    known, meanings, times, made = tuple(words), [], [], []
-    for table in tables:
-        carried = _carried(table, known)
-        rows = slice(None, None, _every(table, len(carried)))
-        for slot, (word, values) in enumerate(carried):
-            (element,) = word.elements
-            times.append(table.time_ns[rows] + slot * WORD_TIME_NS)
+    known, meanings = tuple(words), list[Word429]()
+    times, made = list[Int64Array](), list[NDArray[np.uint32]]()
+    sent = [(table, _carried(table, known)) for table in tables]
+    count = sum(len(carried) for _table, carried in sent)
+    for table, carried in sent:
+        rows = slice(None, None, _every(table, count))
+        units = [(word, values, _of_unit(word.elements[0], table.topic, fed)) for word, values in carried]
+        for word, values, element in sorted(units, key=lambda unit: unit[2].signal is None):
+            times.append(table.time_ns[rows] + len(made) * WORD_TIME_NS)
             made.append(encode_429(word, {element.name: values[rows]}))
             fine_of = f"{name}_{element.fine_of}" if element.fine_of else ""
-            element = replace(_of_unit(element, table.topic, fed), fine_of=fine_of)
-            meanings.append(replace(word, name=f"{name}_{word.name}", bus=name, elements=(element,)))
+            elements = (replace(element, fine_of=fine_of),)
+            meanings.append(replace(word, name=f"{name}_{word.name}", bus=name, elements=elements))
     if not made:
         return []
     time_ns = np.concatenate(times)

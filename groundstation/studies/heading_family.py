@@ -139,6 +139,9 @@ def runs_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
         "standstill_s": column(lambda run: run.case.standstill_s),
         "arm_known": column(lambda run: run.case.is_arm_known),
         "error_arcmin": column(lambda run: run.error_deg * ARCMIN_PER_DEG),
+        "kind": column(lambda run: run.case.disturbance.kind),
+        "low_measured_arcmin": column(lambda run: run.low_measured_deg * ARCMIN_PER_DEG),
+        "high_measured_arcmin": column(lambda run: run.high_measured_deg * ARCMIN_PER_DEG),
         "low_arcmin": column(lambda run: run.low_deg * ARCMIN_PER_DEG),
         "high_arcmin": column(lambda run: run.high_deg * ARCMIN_PER_DEG),
         "paper_error_arcmin": column(lambda run: run.paper_error_deg * ARCMIN_PER_DEG),
@@ -189,7 +192,10 @@ def coverage_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
     paper_error = np.array([outcome.paper_error_deg for outcome in outcomes]) * ARCMIN_PER_DEG
     half_width = np.array([outcome.half_width_deg for outcome in outcomes]) * ARCMIN_PER_DEG
     inside = np.array([outcome.is_inside for outcome in outcomes])
+    inside_measured = np.array([outcome.is_inside_measured for outcome in outcomes])
     inside_paper = np.array([outcome.is_inside_paper for outcome in outcomes])
+    half_measured = np.array([outcome.half_width_measured_deg for outcome in outcomes]) * ARCMIN_PER_DEG
+    accepted = np.array([outcome.verdict == "accept" for outcome in outcomes])
     cells = [(label, mask) for label, mask in _cells(outcomes) if mask.any()]
 
     def column(value: Callable[[BoolArray], float]) -> NDArray[np.float64]:
@@ -199,6 +205,7 @@ def coverage_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
         "cell": np.array([label for label, _mask in cells]),
         "runs": np.array([int(mask.sum()) for _label, mask in cells]),
         "coverage": column(lambda mask: float(np.mean(inside[mask]))),
+        "measured_coverage": column(lambda mask: float(np.mean(inside_measured[mask]))),
         "coverage_sigma": column(lambda mask: float(np.sqrt(0.95 * 0.05 / mask.sum()))),
         "paper_coverage": column(lambda mask: float(np.mean(inside_paper[mask]))),
         "rms_arcmin": column(lambda mask: float(np.sqrt(np.mean(error[mask] ** 2)))),
@@ -206,6 +213,9 @@ def coverage_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
         "max_arcmin": column(lambda mask: float(np.max(np.abs(error[mask])))),
         "paper_rms_arcmin": column(lambda mask: float(np.sqrt(np.mean(paper_error[mask] ** 2)))),
         "half_width_arcmin": column(lambda mask: float(np.median(half_width[mask]))),
+        "measured_half_width_arcmin": column(lambda mask: float(np.median(half_measured[mask]))),
+        "accepted": column(lambda mask: float(np.sum(accepted[mask]))),
+        "accepted_max_arcmin": column(lambda mask: float(np.max(np.abs(error[mask & accepted]), initial=0.0))),
     }
     return FigureData(name, columns, {key: 3 if "coverage" in key else 1 for key in columns})
 

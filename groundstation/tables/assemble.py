@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Int64Array, RecordBatch
+from groundstation.base.signals import has_values
 from groundstation.tables.table import Flight, Table
 
 
@@ -21,7 +22,7 @@ def flight_from_batches(
     batches : iterable of RecordBatch
         Every batch has ``time_ns``. Fields may come and go between the batches of a topic: where a batch lacks a
         field its values are absent. Number types widen to the common one, texts to the longest. Batches without rows
-        leave no table.
+        leave no table, and words and bytes as recorded (:func:`groundstation.base.signals.has_values`) none either.
     metadata, has_utc, source_name
         As in :class:`Flight`.
 
@@ -47,15 +48,18 @@ def flight_from_batches(
     ([1.0, 2.0, nan], 10)
     """
     by_topic: dict[str, list[RecordBatch]] = {}
+    starts_ns: list[int] = []
     for batch in batches:
         if batch.time_ns is None:
             raise GroundstationError(
                 f"{source_name}, {batch.topic}", "records without corrected time", "time_ns", "fit the clock first"
             )
-        if len(batch):
+        if len(batch) and has_values(batch.topic):
             by_topic.setdefault(batch.topic, []).append(batch)
+        elif len(batch):
+            starts_ns.append(int(batch.time_ns.min()))
     tables = {topic: _table(topic, parts) for topic, parts in by_topic.items()}
-    start_ns = min((int(table.time_ns[0]) for table in tables.values()), default=0)
+    start_ns = min((*(int(table.time_ns[0]) for table in tables.values()), *starts_ns), default=0)
     return Flight(tables, metadata, start_ns, has_utc, source_name)
 
 

@@ -36,6 +36,8 @@ SLOWEST_RUN_MPS = 3.0  # what lifts off slower made no run
 LIFTED_M = 1.5  # height at which a lift-off is seen, in smoothed altitudes
 CARRIED_M, CARRIED_S = 5.0, 5.0  # up to that height what is too slow to fly for so long is carried
 SHORTEST_STANDSTILL_S = 3.0
+ALWAYS_ON_GROUND = "always_on_ground"  # metadata of a car's log, from a profile, the log or the aircraft file
+YES = ("true", "yes", "1")
 
 
 @dataclass(frozen=True)
@@ -104,8 +106,9 @@ class Phases:
 def ground_mask(flight: Flight, time_ns: Int64Array, *, settings: GroundSettings | None = None) -> GroundProof:
     """Prove ground contact at given times.
 
-    Weight on wheels (or an autopilot's landed flag) decides where it is logged often enough and is plausible: a flag
-    that stays on the wheels high above the ground at speed is not believed. Else the motion has to prove it, see
+    A log whose metadata say ``always_on_ground`` (a car's) is on the ground throughout. Weight on wheels (or an
+    autopilot's landed flag) decides where it is logged often enough and is plausible: a flag that stays on the wheels
+    high above the ground at speed is not believed. Else the motion has to prove it, see
     :func:`groundstation.tables.detector.detect_ground`.
 
     Parameters
@@ -149,6 +152,7 @@ class _Evidence:
     def __init__(self, flight: Flight, settings: GroundSettings) -> None:
         self.flight, self.settings = flight, settings
         self.contact = contact_of(flight)
+        self.is_always_on_ground = flight.metadata.get(ALWAYS_ON_GROUND, "").strip().lower() in YES
 
     @cached_property
     def grid_ns(self) -> Int64Array:
@@ -174,6 +178,8 @@ class _Evidence:
 
     @property
     def method(self) -> str:
+        if self.is_always_on_ground:
+            return "said to be always on the ground"
         if self.contact is not None and not self.against_flag:
             return self.contact.name
         if not len(self.grid_ns):
@@ -184,6 +190,8 @@ class _Evidence:
         return f"detector: standstills and rolling that adjoins them below {limit:.1f} m/s ({self.against_flag})"
 
     def proof(self, time_ns: Int64Array) -> GroundProof:
+        if self.is_always_on_ground:
+            return GroundProof(np.ones(len(time_ns), dtype=bool), self.method)
         if self.contact is not None and not self.against_flag:
             return GroundProof(held(self.contact, time_ns)[0], self.method)
         size = len(self.grid_ns)
@@ -197,6 +205,8 @@ class _Evidence:
     @property
     def ground(self) -> BoolArray:
         """Proven contact on the grid."""
+        if self.is_always_on_ground:
+            return np.ones(len(self.grid_ns), dtype=bool)
         if self.contact is None:
             return self.detection.ground
         proves, denies = held(self.contact, self.grid_ns)
@@ -208,6 +218,8 @@ class _Evidence:
     @property
     def airborne(self) -> BoolArray:
         """Flight on the grid, from lift-off to touch-down."""
+        if self.is_always_on_ground:
+            return np.zeros(len(self.grid_ns), dtype=bool)
         if self.contact is not None and not self.against_flag:
             return _up_to_the_ground(held(self.contact, self.grid_ns)[1], self.ground)
         return _between_lift_off_and_touch_down(self.motion, self.ground, self.detection)

@@ -134,10 +134,17 @@ class Table:
         )
 
     def unique_times(self) -> Self:
-        """The table without repeated times: of several samples of one time the first is kept."""
+        """The table without repeated times: of several samples of one time the first present value of each field.
+
+        Two messages of a log may give parts of one topic at the same time.
+        """
         keep = np.ones(len(self), dtype=bool)
         keep[1:] = np.diff(self.time_ns) > 0
-        return self if keep.all() else self.take(keep)
+        if keep.all():
+            return self
+        first, group = np.flatnonzero(keep), np.cumsum(keep) - 1
+        columns = {name: _first_present(column, first, group) for name, column in self.columns.items()}
+        return replace(self.take(first), columns=columns)
 
     def to_frame(self) -> "pd.DataFrame":
         """Pandas frame of the columns, index ``time_ns`` (int64 nanoseconds).
@@ -290,6 +297,17 @@ class Flight:
         """Seconds from the first to the last sample of any topic."""
         ends = [int(table.time_ns[-1]) for table in self.tables.values() if len(table)]
         return (max(ends) - self.start_ns) / NS_PER_S if ends else 0.0
+
+
+def _first_present(column: Column, first: NDArray[np.intp], group: NDArray[np.intp]) -> Column:
+    """The first present value of each group of rows, whose first rows are ``first``; absent where there is none."""
+    if column.present is None:
+        return column.take(first)
+    rows = np.flatnonzero(column.present)
+    groups, places = np.unique(group[rows], return_index=True)
+    index = first.copy()
+    index[groups] = rows[places]
+    return column.take(index)
 
 
 class Tables(Mapping[str, TimedTable]):

@@ -64,6 +64,8 @@ GATES: Final[dict[str, Colour]] = {
     "too slow": BLUE,
     "turning": YELLOW,
     "too fast": ORANGE,
+    "take-off run": ORANGE,
+    "landing roll": PINK,
     "no ground run": DIM,
     "airborne": SKY,
     "not proven ground": GREY,

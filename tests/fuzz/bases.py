@@ -15,6 +15,9 @@ from tests.bag_writer import write_ros1, write_ros2
 from tests.dataflash_writer import MAGIC as DATAFLASH_MAGIC
 from tests.dataflash_writer import flight_log
 from tests.real_logs import REAL_LOGS
+from tests.receiver_writer import nmea_log, novatel_log, ubx_log
+from tests.telemetry_writer import telemetry
+from tests.trajectory_writer import PLACE, VELOCITY, pos_rows, sbet
 from tests.ulog_writer import GPS, GPS_CODE, small_flight
 
 SAMPLES = Path(__file__).parents[2] / "sample_logs"
@@ -112,6 +115,16 @@ def dataflash() -> bytes:
     return flight_log(8).content
 
 
+def pos() -> bytes:
+    """A solution of RTKLIB, some 40 kB."""
+    rows = [
+        f"2025/08/28 17:{at // 60:02d}:{at % 60:02d}.000  {PLACE}  {1 + at % 2}  21 "
+        f"{' '.join(['0.0300'] * 6)} 0.00 9.9 {VELOCITY}"
+        for at in range(200)
+    ]
+    return pos_rows(rows)
+
+
 @cache
 def _converted(path: Path) -> bytes:
     from groundstation.pipeline.one_flight.convert import convert_log
@@ -167,26 +180,36 @@ def line_starts(data: bytes) -> Iterator[int]:
         at = data.find(b"\n", at) + 1 or -1
 
 
-def dataflash_starts(data: bytes) -> Iterator[int]:
+def starts_with(magic: bytes) -> Callable[[bytes], Iterator[int]]:
     """Where something that looks like a record begins."""
-    at = data.find(DATAFLASH_MAGIC)
-    while at >= 0:
-        yield at
-        at = data.find(DATAFLASH_MAGIC, at + 3)
+
+    def starts(data: bytes) -> Iterator[int]:
+        at = data.find(magic)
+        while at >= 0:
+            yield at
+            at = data.find(magic, at + len(magic))
+
+    return starts
 
 
 _STARTS: dict[str, Callable[[bytes], Iterator[int]]] = {
     "flat-csv": line_starts,
     "csv-profile": line_starts,
     "ulog": ulog_starts,
-    "dataflash": dataflash_starts,
-    "chapter10": chapter10_starts,
+    "dataflash": starts_with(DATAFLASH_MAGIC),
     "mcap": mcap_starts,
     "gzip": lambda data: iter(range(min(18, len(data)))),
     "zstd": lambda data: iter(range(min(18, len(data)))),
     "robot-mcap": mcap_starts,
     "ros1": ros1_starts,
     "sqlite3": lambda data: iter(range(0, len(data), 4096)),
+    "chapter10": chapter10_starts,
+    "ubx": starts_with(b"\xb5\x62"),
+    "nmea": line_starts,
+    "novatel": starts_with(b"\xaaD"),
+    "pos": line_starts,
+    "sbet": lambda data: iter(range(0, len(data), 136)),
+    "tlog": lambda data: iter(range(0, len(data), 48)),
 }
 FORMATS = tuple(_STARTS)
 _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
@@ -201,6 +224,12 @@ _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
     "robot-mcap": (lambda: _bag("mcap"),),
     "ros1": (lambda: _bag("ros1"),),
     "sqlite3": (lambda: _bag("sqlite3"),),
+    "ubx": (ubx_log,),
+    "nmea": (nmea_log,),
+    "novatel": (novatel_log,),
+    "pos": (pos,),
+    "sbet": (lambda: sbet(count=300).tobytes(),),
+    "tlog": (lambda: bytes(telemetry().data),),
 }
 _RECORDED = {
     "csv-profile": ("g1000/log_220502_135932_EGPN.csv", "fixedwing/umn_thor_flight75.csv"),
@@ -210,6 +239,9 @@ _RECORDED = {
     "mcap": ("g1000/log_220416_161856_LFQA.csv",),
     "robot-mcap": ("foreign/husky_100s_ros1msg_lz4.mcap", "foreign/pntos_120s_json_lz4.mcap"),
     "ros1": ("foreign/pntos_120s_ros1.bag",),
+    "ubx": ("gnss/walk_0827_gnss_1730.ubx", "gnss/ublox_ins_drive_pvat.ubx"),
+    "nmea": ("gnss/inertialsense_Serial38400.nmea",),
+    "pos": ("gnss/walk_0827_gnss_1730_sf.pos",),
 }
 
 

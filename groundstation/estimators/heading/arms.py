@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.units import DEG_PER_RAD
+from groundstation.estimators.heading.gating import NOT_TAXI
 from groundstation.estimators.heading.interval import (
     PRIOR_MEAN,
     Differences,
@@ -100,7 +101,7 @@ def _turning(samples: Samples, settings: HeadingSettings) -> NDArray[np.bool_]:
         )
     if samples.ground_method:
         turning &= samples.on_ground
-    return np.asarray(turning & ~np.isin(samples.gate, ["excluded", "outlier", "too fast", "take-off run"]))
+    return np.asarray(turning & ~np.isin(samples.gate, ["excluded", "outlier", "too fast", *NOT_TAXI]))
 
 
 def _from_turns(

@@ -58,7 +58,7 @@ def estimate_heading_error(
     latencies : Latencies, optional
         Where that of GNSS behind the INS is observed, GNSS times are put back by it; the aircraft file's comes first.
     phases : Phases, optional
-        Phases of the flight: epochs of the take-off run are not used, for power crabs the aircraft.
+        Phases of the flight: take-off run and landing roll are not taxi and not used.
 
     Returns
     -------

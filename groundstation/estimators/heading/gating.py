@@ -1,6 +1,6 @@
 """Why a sample is used or not, and the straight segments."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +13,8 @@ from groundstation.estimators.heading.settings import HeadingRequest, HeadingSet
 from groundstation.estimators.known import Interval
 from groundstation.tables.phases import Phases
 
-TAKE_OFF = "take-off run"  # the phase, and the reason: power crabs the aircraft
+NOT_TAXI = ("take-off run", "landing roll")  # phases, and reasons: power and wind crab the aircraft
+CHANGING_MPS2 = 0.5  # a change of speed that is a run's, and not taxi's
 
 
 def gate_samples(
@@ -22,13 +23,14 @@ def gate_samples(
     """Say of every epoch why it is used or not, and number the straight segments.
 
     Later reasons give way to earlier ones: excluded, no heading, ground, geometry, integrity, too fast, too slow,
-    turning, take-off run, outlier, GNSS gap. A forced interval overrides those from ``too fast`` on.
+    turning, take-off run, landing roll, outlier, GNSS gap. A forced interval overrides those from ``too fast`` on.
     """
     speed = samples.speed_mps
     gate = np.full(len(samples), USED, dtype=GATE_TEXT)
     gate[_outliers(samples, settings)] = "outlier"
     if phases is not None:
-        gate[phases.at(samples.time_s) == TAKE_OFF] = TAKE_OFF
+        for name, mask in _not_taxi(samples, phases):
+            gate[mask] = name
     with np.errstate(invalid="ignore"):
         gate[~(np.abs(samples.rate_dps) <= settings.turn_rate_max_dps)] = "turning"
     gate[~(speed > settings.taxi_speed_min_mps)] = "too slow"
@@ -50,6 +52,20 @@ def gate_samples(
     segment = _segments(samples, gate == USED, settings)
     gate[(gate == USED) & (segment == 0)] = "GNSS gap"  # a single epoch between two gaps
     return replace(samples, gate=gate, segment=segment)
+
+
+def _not_taxi(samples: Samples, phases: Phases) -> Iterator[tuple[str, BoolArray]]:
+    """Epochs of take-off runs and landing rolls, with the slow ones beside them in which the speed still changes."""
+    phase, speed = phases.at(samples.time_s), samples.speed_mps
+    earlier_mps = np.interp(samples.time_s - 0.5, samples.time_s, speed)
+    later_mps = np.interp(samples.time_s + 0.5, samples.time_s, speed)
+    for name, sense in zip(NOT_TAXI, (1.0, -1.0), strict=True):
+        mask = phase == name
+        changing = sense * (later_mps - earlier_mps) > CHANGING_MPS2
+        order = range(len(samples) - 2, -1, -1) if sense > 0.0 else range(1, len(samples))
+        for i in order:
+            mask[i] |= changing[i] and mask[i + int(sense)]
+        yield name, mask
 
 
 def unused_intervals(samples: Samples, request: HeadingRequest) -> tuple[Interval, ...]:

@@ -10,7 +10,7 @@ from groundstation.estimators.known import Interval
 RateKind = Literal["slope", "raw"]
 Runs = Literal["auto", "before_take_off", "all_ground"]
 UseLatency = Literal["when_observed", "never"]
-LEAST_DRAWS = 100  # of a posterior of eight parameters
+LEAST_DRAWS = 100  # of a posterior of eleven parameters
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.estimators.heading.checks import Disagreement, Normality, VarianceRatio, normality_limits
-from groundstation.estimators.heading.gating import TAKE_OFF, is_straight_and_fast
+from groundstation.estimators.heading.gating import NOT_TAXI, is_straight_and_fast
 from groundstation.estimators.heading.samples import Samples
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.wording import told
@@ -146,11 +146,11 @@ def _standstill_gates(standstill: Standstill | None, settings: HeadingSettings) 
 def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings) -> tuple[Gate, ...]:
     outliers, used = int(np.sum(samples.gate == "outlier")), int(samples.is_used.sum())
     later = int(samples.is_after_lift_off[samples.is_used].sum())
-    run = is_straight_and_fast(samples, settings) & (samples.gate == TAKE_OFF)
+    run = is_straight_and_fast(samples, settings) & np.isin(samples.gate, NOT_TAXI)
     return (
         _gate(
-            "take_off_run",
-            "share of the straight epochs that the take-off run has (not used: power crabs the aircraft)",
+            "not_taxi",
+            "share of the straight epochs that take-off run and landing roll have (not used: they crab the aircraft)",
             float(run.sum()) / max(int(run.sum()) + used, 1),
             high=1.0,
             reason=f"{run.sum()} epochs" if run.any() else "",

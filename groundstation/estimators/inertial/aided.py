@@ -4,12 +4,14 @@ Against the GNSS that corrects it an INS cannot show its own errors: tilt and dr
 them, and a model of an INS left alone would find states with small sigmas that mean nothing.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from groundstation.base.findings import Finding
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.inertial.differences import Differences, seconds_covered
+from groundstation.estimators.inertial.differences import Differences, differences, seconds_covered
 from groundstation.estimators.inertial.figures import differences_figure, own_innovations_figure, plain_track_figure
 from groundstation.estimators.inertial.kind import AIDED
 from groundstation.estimators.inertial.model import FloatArray
@@ -18,21 +20,25 @@ from groundstation.results.inertial import CHANNELS, Difference, InertialResult,
 from groundstation.tables.own_filter import OwnInnovations, own_innovations
 from groundstation.tables.table import Flight
 
+ANY_JUMP_M = 1e5  # no jump is too large to be shown
 UNITS = (("position", "m"), ("velocity", "mps"))
 
 
 def compare_aided(
-    flight: Flight, compared: Differences, reason: str, *, settings: InertialSettings
+    flight: Flight, reason: str, *, settings: InertialSettings, excluded_s: tuple[tuple[float, float], ...] = ()
 ) -> tuple[InertialResult, tuple[Finding, ...]]:
     """Describe INS minus GNSS of an INS that GNSS corrects, and the innovations its own filter logged.
+
+    Jumps are shown as they are: which of the two jumped cannot be told, and no filter has to be spared them.
 
     Parameters
     ----------
     flight : Flight
-    compared : Differences
     reason : str
         Why it is taken for such an INS.
     settings : InertialSettings
+    excluded_s : tuple of (float, float)
+        Flight seconds in which GNSS is not used.
 
     Returns
     -------
@@ -41,6 +47,7 @@ def compare_aided(
     findings : tuple of Finding
         Those of the comparison, and that nothing is estimated.
     """
+    compared = differences(flight, settings=replace(settings, jump_m=ANY_JUMP_M), excluded_s=excluded_s)
     epochs, own = compared.epochs, own_innovations(flight)
     figures = (differences_figure(compared), plain_track_figure(compared))
     result = InertialResult(

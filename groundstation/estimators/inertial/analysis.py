@@ -36,7 +36,7 @@ def _run(flight: "Flight", known: Known, settings: InertialSettings) -> Found[In
     compared = differences(flight, settings=settings, excluded_s=known.excluded_s)
     kind = kind_of(compared, settings, stated_kind(known.aircraft.ins_kind, flight.metadata))
     if kind[0] == AIDED:
-        return Found(*compare_aided(flight, compared, kind[1], settings=settings))
+        return Found(*compare_aided(flight, kind[1], settings=settings, excluded_s=known.excluded_s))
     found = estimate_compared(flight, compared, kind, settings=settings, aircraft_class=known.aircraft.ins_class)
     return Found(found.result, found.findings, found)
 

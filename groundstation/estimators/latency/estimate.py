@@ -50,8 +50,9 @@ def estimate_latencies(
     -----
     GNSS velocity is compared with INS velocity, pressure altitude with INS vertical speed added up, the magnetic field
     with a constant one turned by the attitude, a second INS with the first. See :func:`fit_delay` for the method.
-    A sensor that filters its output shows its filter's delay too. Of an INS that GNSS corrects the latency of GNSS is
-    not given: the INS velocity itself follows GNSS with the delay of its filter.
+    A sensor that filters its output shows its filter's delay too. An INS that GNSS corrects follows GNSS slowly; motion
+    of seconds is its gyros' and accelerometers' own. What its filter may hide of the latency of GNSS widens the
+    interval by ``aided_sigma_s``.
     """
     settings = settings or LatencySettings()
     pairs = pairs_of(flight)
@@ -82,12 +83,7 @@ def _assessed(
 
 
 def _row(pair: Pair, fit: DelayFit, unit: str, settings: LatencySettings, is_aided: bool) -> Latency:
-    reason, half_s = _why_not(pair[2], fit, settings), fit.half_width_s
-    if not reason and is_aided and pair[2] == "velocity":
-        reason = (
-            "GNSS corrects this INS, whose velocity already carries the delay of its filter: what is left between the "
-            f"two is {fit.delay_s:+.3f} +- {half_s:.3f} s"
-        )
+    reason, hidden_s = _why_not(pair[2], fit, settings), 0.0
     row = Latency(
         *pair,
         "not_observable",
@@ -102,12 +98,17 @@ def _row(pair: Pair, fit: DelayFit, unit: str, settings: LatencySettings, is_aid
     )
     if reason:
         return row
+    rests_on = f"{MOTIONS[pair[2]]} in {fit.windows} windows of {settings.window_s:g} s"
+    if is_aided and pair[2] == "velocity":
+        hidden_s = settings.aided_sigma_s
+        rests_on += f"; GNSS corrects this INS, whose filter may hide {hidden_s:g} s of it"
+    half_s = float(np.hypot(fit.half_width_s, BOUND95 * hidden_s))
     return replace(
         row,
         state="observed",
-        reason=f"{MOTIONS[pair[2]]} in {fit.windows} windows of {settings.window_s:g} s",
+        reason=rests_on,
         latency_s=fit.delay_s,
-        sigma_s=fit.sigma_s,
+        sigma_s=float(np.hypot(fit.sigma_s, hidden_s)),
         confidence95_s=(fit.delay_s - half_s, fit.delay_s + half_s),
     )
 

@@ -32,6 +32,7 @@ class LatencySettings:
     half_width_max_s: float = number(0.1, 0.0, 10.0)
     freedom_min: float = number(1.5, 1.0, 1000.0)
     explained_min: float = number(0.5, 0.0, 1.0)
+    aided_sigma_s: float = number(0.03, 0.0, 1.0)  # what the filter of an INS that GNSS corrects may hide of it
     azimuth_sigma_deg: float = number(3.0, 0.0, 180.0)
     scale_sigma: float = number(0.03, 0.0, 1.0)
     arm_sigma_m: float = number(5.0, 0.0, 100.0)

@@ -167,7 +167,8 @@ def checks_of(saved: SavedFlight) -> list[Check]:
     found = [_reference_check(heading, saved.results.metadata)]
     found += [_check("runway", runway.difference_deg, runway.sigma_deg) for runway in heading.runway]
     if heading.onboard is not None:
-        found.append(_check("onboard", heading.onboard.difference_error_deg, heading.standard_error_deg))
+        # Steady sideslip and mounting are the same in both.
+        found.append(_check("onboard", heading.onboard.difference_error_deg, heading.measured_sigma_deg))
     return [check for check in found if check is not None]
 
 

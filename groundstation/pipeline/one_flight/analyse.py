@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -27,7 +28,7 @@ from groundstation.results.chosen import chosen_intervals
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
 from groundstation.results.heading import HeadingResult
-from groundstation.tables.phases import flight_phases
+from groundstation.tables.phases import ALWAYS_ON_GROUND, flight_phases
 from groundstation.tables.table import Flight
 
 INFO: Severity = "info"
@@ -68,6 +69,8 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     FlightResults
         Analyses that could not run stand in ``not_assessable`` with their reasons.
     """
+    if configuration.settings.aircraft.always_on_ground:
+        flight = replace(flight, metadata=MappingProxyType({**flight.metadata, ALWAYS_ON_GROUND: "true"}))
     known = known_of(flight, configuration)
     found = run_analyses(FLIGHT_ANALYSES, flight, known)
     thresholds = configuration.settings.thresholds

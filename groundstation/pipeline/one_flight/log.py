@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.records import Item, RecordBatch
+from groundstation.base.signals import BUS_PREFIX
 from groundstation.pipeline.one_flight.identity import sha256_of
 from groundstation.results.flight import Source
 
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
     from groundstation.readers.icd import Icd
     from groundstation.readers.source import Source as LogFile
 
-BUS_PREFIX = "raw.bus."
 REPLAY_LIMIT_BYTES = 96 << 20  # an hour of CSV at 100 Hz is kept; the peak of a conversion has this part in it
 
 

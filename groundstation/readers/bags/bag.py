@@ -9,7 +9,7 @@ from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Damage
 from groundstation.readers.bags.mcap import MAGIC as MCAP_MAGIC
 from groundstation.readers.bags.mcap import Mcap
-from groundstation.readers.bags.messages import Connection, Part
+from groundstation.readers.bags.messages import Block, Connection, Part
 from groundstation.readers.bags.ros1 import MAGIC as ROS1_MAGIC
 from groundstation.readers.bags.ros1 import Ros1Bag
 from groundstation.readers.bags.sqlite import MAGIC as SQLITE_MAGIC
@@ -18,6 +18,7 @@ from groundstation.readers.source import Source
 
 METADATA = "metadata.yaml"
 METADATA_MARK = b"rosbag2_bagfile_information:"
+KEPT_BYTES, MESSAGE_BYTES = 64 << 20, 64  # of messages kept for the second pass; beside its own, of each
 _ENDINGS = ("", ".zstd")  # rosbag2 names a file it compressed later without the ending
 _CONTAINERS: Mapping[bytes, tuple[str, Callable[[Source], Iterable[Part]]]] = {
     MCAP_MAGIC: ("MCAP", Mcap),
@@ -74,7 +75,7 @@ def files_of(metadata: Path) -> tuple[Path, ...]:
 
 @dataclass
 class Bag:
-    """Iterates over the messages of a log; may be iterated over again.
+    """Iterates over the messages of a log; may be iterated over again, then from memory where they are few.
 
     Parameters
     ----------
@@ -82,6 +83,7 @@ class Bag:
     """
 
     source: Source
+    _kept: list[Part] | None = None
 
     def files(self) -> tuple[Source, ...]:
         """The files that hold messages."""
@@ -90,6 +92,23 @@ class Bag:
         return tuple(Source(path) for path in files_of(self.source.path))
 
     def __iter__(self) -> Iterator[Part]:
+        if self._kept is not None:
+            yield from self._kept
+            return
+        kept: list[Part] | None = []
+        size, last_buffer = 0, None
+        for part in self._read():
+            if kept is not None and isinstance(part, Block):
+                size += MESSAGE_BYTES * len(part) + (0 if part.buffer is last_buffer else len(part.buffer))
+                last_buffer = part.buffer
+            if kept is not None:
+                kept.append(part)
+            if size > KEPT_BYTES:
+                kept = last_buffer = None  # it is read again: memory does not grow with the log
+            yield part
+        self._kept = kept
+
+    def _read(self) -> Iterator[Part]:
         known: dict[tuple[str, str, str, bytes], Connection] = {}
         files = self.files()
         first = 0

@@ -86,17 +86,32 @@ class Block:
 Part: TypeAlias = Block | Damage
 
 
-def joined(blocks: list[Block]) -> Block:
-    """One block of several of one connection."""
-    if len(blocks) == 1:
-        return blocks[0]
-    sizes = np.cumsum([0, *(len(block.buffer) for block in blocks[:-1])])
-    return Block(
-        blocks[0].connection,
-        np.concatenate([block.buffer for block in blocks]),
-        np.concatenate([block.starts + shift for block, shift in zip(blocks, sizes, strict=True)]),
-        np.concatenate([block.sizes for block in blocks]),
-        np.concatenate([block.log_time_ns for block in blocks]),
-        np.concatenate([block.publish_time_ns for block in blocks]),
-        np.concatenate([block.record_index for block in blocks]),
+def joined(gathered: dict[int, list[Block]]) -> list[Block]:
+    """One block for each connection, in the order of their numbers; all share one buffer.
+
+    Parameters
+    ----------
+    gathered : dict of connection number to list of Block
+        Those of several connections may share a buffer: they came from one chunk.
+    """
+    blocks = [block for several in gathered.values() for block in several]
+    buffers = {id(block.buffer): block.buffer for block in blocks}
+    ends = np.cumsum([0, *(len(buffer) for buffer in buffers.values())]).tolist()
+    places = dict(zip(buffers, ends[:-1], strict=True))
+    buffer = (
+        next(iter(buffers.values()))
+        if len(buffers) == 1
+        else np.concatenate([np.zeros(0, np.uint8), *buffers.values()])
     )
+    return [
+        Block(
+            several[0].connection,
+            buffer,
+            np.concatenate([block.starts + places[id(block.buffer)] for block in several]),
+            np.concatenate([block.sizes for block in several]),
+            np.concatenate([block.log_time_ns for block in several]),
+            np.concatenate([block.publish_time_ns for block in several]),
+            np.concatenate([block.record_index for block in several]),
+        )
+        for _number, several in sorted(gathered.items())
+    ]

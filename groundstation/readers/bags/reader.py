@@ -101,8 +101,8 @@ class _Topics:
     def batches(self, gathered: dict[int, list[Block]]) -> Iterator[RecordBatch]:
         """Batches of blocks that stand together in the log."""
         canonical: dict[str, list[Part]] = {}
-        for number, blocks in sorted(gathered.items()):
-            block = joined(blocks)
+        for block in joined(gathered):
+            number = block.connection.number
             decoder = self._decoders.setdefault(number, Decoder(block.connection))
             raw: list[Part] = []
             for decoded in decoder.decode(block):

@@ -8,6 +8,7 @@ Source: http://wiki.ros.org/Bags/Format/2.0.
 
 import bz2
 import re
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import BinaryIO, NamedTuple
@@ -30,6 +31,9 @@ SEARCH_BYTES = 1 << 20
 # Every record's header has the field "op" of one byte: 4 bytes of length, "op=", the number.
 _OP = re.compile(rb"\x04\0\0\0op=[\x02-\x07]")
 _OP_OUTSIDE = re.compile(rb"\x04\0\0\0op=[\x04-\x06]")  # of records that stand in no chunk
+
+
+_TIME = struct.Struct("<II")
 
 
 class _Head(NamedTuple):
@@ -103,6 +107,9 @@ class Ros1Bag:
         self._count = 0
         self._unknown = 0
         self._skipped = SkippedBytes("record")
+        # Headers of messages differ in their time alone: where it stands by their length, the connection by the rest.
+        self._time_places: dict[int, int] = {}
+        self._heads: dict[bytes, int] = {}
 
     def __iter__(self) -> Iterator[Part]:
         with self._source.open() as stream:
@@ -181,6 +188,10 @@ class Ros1Bag:
         found: dict[int, _Gathered] = {}
         at = lost = 0
         while at < len(content):
+            end = self._known_message(content, at, found)
+            if end:
+                at = end
+                continue
             head = _head_at(content, at, len(content))
             if head is None or head.end > len(content):
                 match = next((one.start() for one in _OP.finditer(content, at + 5)), len(content))
@@ -192,7 +203,7 @@ class Ros1Bag:
             if head.op == CONNECTION:
                 self._connect(head, content[head.data_at : head.end])
             elif head.op == MESSAGE:
-                self._message(head, found)
+                self._message(content, at, head, found)
             at = head.end
         if lost:
             yield Damage("corrupt", place, lost, "bytes of a chunk's content that are no record")
@@ -209,17 +220,34 @@ class Ros1Bag:
                 np.array(one.index, dtype=np.int64),
             )
 
-    def _message(self, head: _Head, found: dict[int, _Gathered]) -> None:
+    def _message(self, content: bytes, at: int, head: _Head, found: dict[int, _Gathered]) -> None:
         number, time = _number(head.fields, b"conn"), head.fields.get(b"time", b"")
         if number not in self._connections or number is None or len(time) != 8:
             self._unknown += 1
             return
+        time_at = content.find(b"time=" + time, at, head.data_at) + 5 - at
+        length = head.data_at - at - 8
+        self._time_places[length] = time_at
+        self._heads[content[at + 4 : at + time_at] + content[at + time_at + 8 : at + 4 + length]] = number
+        self._known_message(content, at, found)
+
+    def _known_message(self, content: bytes, at: int, found: dict[int, _Gathered]) -> int:
+        """Take in a message whose header is known but for its time; returns where it ends, 0 when it is another."""
+        length = int.from_bytes(content[at : at + 4], "little")
+        place = at + self._time_places.get(length, 0)
+        number = self._heads.get(content[at + 4 : place] + content[place + 8 : at + 4 + length]) if place > at else None
+        start = at + 8 + length
+        end = start + int.from_bytes(content[start - 4 : start], "little")
+        if number is None or end > len(content):
+            return 0
+        seconds, rest_ns = _TIME.unpack_from(content, place)
         one = found.setdefault(number, _Gathered())
-        one.starts.append(head.data_at)
-        one.sizes.append(head.end - head.data_at)
-        one.times.append(int.from_bytes(time[:4], "little") * NS_PER_S + int.from_bytes(time[4:], "little"))
+        one.starts.append(start)
+        one.sizes.append(end - start)
+        one.times.append(seconds * NS_PER_S + rest_ns)
         one.index.append(self._count)
         self._count += 1
+        return end
 
     def _connect(self, head: _Head, data: bytes) -> None:
         number, more = _number(head.fields, b"conn"), parse_header(data)

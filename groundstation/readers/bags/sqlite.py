@@ -108,12 +108,16 @@ def _payload(data: Any) -> bytes:
 def _next_rows(database: sqlite3.Connection, last: int) -> tuple[list[Any], bool]:
     """The rows behind message ``last``, and whether reading failed behind them."""
     rows: list[Any] = []
-    query = "SELECT id, topic_id, timestamp, data FROM messages WHERE id > ? ORDER BY id LIMIT ?"
+    query = "SELECT id, topic_id, timestamp, data FROM messages WHERE id > ? AND {} ORDER BY id LIMIT ?"
+    query = query.format("typeof(topic_id) = 'integer' AND typeof(timestamp) = 'integer'")
+    try:
+        return database.execute(query, (last, ROWS)).fetchall(), False
+    except _FAILURES:
+        pass  # those before the place that cannot be read, one by one
     try:
         cursor = database.execute(query, (last, ROWS))
         while (row := cursor.fetchone()) is not None:
-            if all(isinstance(value, int) for value in row[:3]):
-                rows.append(row)
+            rows.append(row)
     except _FAILURES:
         return rows, True
     return rows, False

@@ -13,17 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Int64Array, RecordBatch
+from groundstation.base.signals import BUS_PREFIX
 from groundstation.readers.chapter10 import scan
 from groundstation.readers.chapter10.packets import NS_PER_COUNT, Block
 
-TOPIC_1553, TOPIC_429 = "raw.bus.1553.", "raw.bus.429."
+TOPIC_1553, TOPIC_429 = f"{BUS_PREFIX}1553.", f"{BUS_PREFIX}429."
 MOST_WORDS = 36  # two commands, 32 data words, two statuses
 _PER_NUMBER = 4
 PACKS = tuple(f"words_{at:02d}" for at in range(0, MOST_WORDS, _PER_NUMBER))
 _HEAD_BYTES, _WORD_BYTES = 14, 8
 
 # Bits of the block status word of a 1553 message. Source: IRIG 106-22 Chapter 11, 11.2.4.1.
-BUS_B, MESSAGE_ERROR, BETWEEN_TERMINALS, FORMAT_ERROR, TIME_OUT = 0x2000, 0x1000, 0x0800, 0x0400, 0x0200
+BUS_B, MESSAGE_ERROR, FORMAT_ERROR, TIME_OUT = 0x2000, 0x1000, 0x0400, 0x0200
 WORD_COUNT_ERROR, SYNC_ERROR, WORD_ERROR = 0x0020, 0x0010, 0x0008
 ANY_ERROR = MESSAGE_ERROR | FORMAT_ERROR | TIME_OUT | WORD_COUNT_ERROR | SYNC_ERROR | WORD_ERROR
 
@@ -40,7 +41,7 @@ def messages_1553(block: Block, channel: int, packets: Int64Array) -> tuple[Reco
     places, times = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
     heads, words = np.empty((room, 3), dtype=np.uint16), np.zeros((room, MOST_WORDS), dtype=np.uint16)
     lost = np.zeros(len(packets), dtype=np.int64)
-    count = scan.messages_1553(block.data, packets, places, times, heads, words, lost)
+    count = scan.messages_1553(block.data, packets, places, times, heads, words.view(np.uint8), lost)
     packs = words[:count].view("<u8")
     word_count = (heads[:count, 2] // 2).astype(np.uint16)
     columns = {

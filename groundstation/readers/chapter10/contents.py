@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import Int64Array, Item, LogHeader, RecordBatch
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.chapter10.bus_words import ANY_ERROR, BETWEEN_TERMINALS, TOPIC_429, TOPIC_1553, words_of
+from groundstation.readers.chapter10 import scan
+from groundstation.readers.chapter10.bus_words import ANY_ERROR, TOPIC_429, TOPIC_1553, words_of
 from groundstation.readers.icd import Icd, Message1553, Word429, labels_of
 
 KEYS = 1 << 16  # command words; buses of a channel and labels as they stand in a word
@@ -85,7 +86,7 @@ class OnBus:
 
 def keys_1553(words: NDArray[np.uint16], block_status: NDArray[np.uint16]) -> tuple[NDArray[np.uint16], ...]:
     """Command words of messages, and the sender's of those between terminals, 0 of all others; shape (n,) each."""
-    return words[:, 0], np.where(block_status & BETWEEN_TERMINALS, words[:, 1], 0).astype(np.uint16)
+    return words[:, 0], np.where(block_status & scan.BETWEEN_TERMINALS, words[:, 1], 0).astype(np.uint16)
 
 
 def keys_429(sub_channel: NDArray[np.uint16], words: NDArray[np.uint32]) -> NDArray[np.uint16]:

@@ -42,13 +42,14 @@ class Seen:
         """Take in a batch of bus words; others are passed over."""
         if batch.topic.startswith(TOPIC_429):
             words, sub_channel = batch.columns["word"].values, batch.columns["sub_channel"].values
-            self._of(batch.topic)[keys_429(sub_channel.astype(np.uint16), words.astype(np.uint32))] = True
+            self.of(batch.topic)[keys_429(sub_channel.astype(np.uint16), words.astype(np.uint32))] = True
         elif batch.topic.startswith(TOPIC_1553):
             commands = keys_1553(words_of(batch), batch.columns["block_status"].values.astype(np.uint16))
             for keys in commands:
-                self._of(batch.topic)[keys] = True
+                self.of(batch.topic)[keys] = True
 
-    def _of(self, topic: str) -> BoolArray:
+    def of(self, topic: str) -> BoolArray:
+        """Which keys a raw topic has, shape (65536,), to be marked."""
         return self._keys.setdefault(topic, np.zeros(KEYS, dtype=bool))
 
     def places(self, holder: Word429 | Message1553, names: BusNames) -> list[tuple[int, int | None]]:

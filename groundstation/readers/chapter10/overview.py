@@ -7,9 +7,10 @@ from datetime import date
 import numpy as np
 
 from groundstation.readers.chapter10 import scan
-from groundstation.readers.chapter10.bus_words import messages_1553, words_429
+from groundstation.readers.chapter10.bus_words import TOPIC_429, TOPIC_1553
+from groundstation.readers.chapter10.kinds import ARINC_429, MIL_STD_1553, TIME, TMATS
 from groundstation.readers.chapter10.naming import Seen
-from groundstation.readers.chapter10.packets import ARINC_429, MIL_STD_1553, NS_PER_COUNT, TIME, TMATS, Block, Walk
+from groundstation.readers.chapter10.packets import NS_PER_COUNT, Block, Walk
 from groundstation.readers.chapter10.timing import Reading, dates_in, reading
 from groundstation.readers.chapter10.tmats import Tmats, parse
 from groundstation.readers.source import Source
@@ -46,8 +47,10 @@ def overview(source: Source, *, with_buses: bool) -> Overview:
         if found.dates.total() < _ENOUGH_DATES and not (found.readings and found.readings[0].year):
             found.dates += _dates(block)
         for kind, channel, packets in block.by_channel() if with_buses else ():
-            if kind in (MIL_STD_1553, ARINC_429):
-                found.seen.add((messages_1553 if kind == MIL_STD_1553 else words_429)(block, channel, packets)[0])
+            if kind == MIL_STD_1553:
+                scan.see_1553(block.data, packets, found.seen.of(f"{TOPIC_1553}{channel}"))
+            elif kind == ARINC_429:
+                scan.see_429(block.data, packets, found.seen.of(f"{TOPIC_429}{channel}"))
     found.tmats = parse(b"".join(texts))
     return found
 

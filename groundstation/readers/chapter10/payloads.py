@@ -1,7 +1,8 @@
 """What is recorded beside bus words: bytes of messages and frames, discretes, events, the times of time packets.
 
-Bytes stand in records of up to 64, eight in a number of 64 bits, the first in its lowest eight: ``bytes_00``,
-``bytes_08`` ...; ``piece`` counts the records of one message from 0, ``size`` is that of the message.
+Bytes, ``raw.bytes.<kind>.<channel>``, stand in records of up to 64, eight in a number of 64 bits, the first in its
+lowest eight: ``bytes_00``, ``bytes_08`` ...; ``piece`` counts the records of one message from 0, ``size`` is that of
+the message. Each is a nanosecond later than the one before, less than the counter can tell.
 """
 
 from collections.abc import Mapping
@@ -11,8 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.records import Column, Int64Array, RecordBatch
+from groundstation.base.signals import BYTES_PREFIX
 from groundstation.readers.chapter10 import scan
-from groundstation.readers.chapter10.packets import DISCRETE, EVENT, NS_PER_COUNT, TIME, Block
+from groundstation.readers.chapter10.kinds import DISCRETE, EVENT, TIME
+from groundstation.readers.chapter10.packets import NS_PER_COUNT, Block
 from groundstation.readers.chapter10.timing import reading
 from groundstation.readers.chapter10.tmats import Tmats
 
@@ -43,7 +46,13 @@ _STAMPED: Mapping[int, _Stamped] = MappingProxyType(
 )
 # Types of which the data of a packet are kept as they are, with their specific word.
 _WHOLE: Mapping[int, str] = MappingProxyType(
-    {0x08: "pcm", 0x09: "pcm", 0x1A: "16pp194", 0x21: "analog", 0x60: "parallel"}
+    {
+        0x08: "pcm",
+        0x09: "pcm",
+        0x1A: "16pp194",
+        0x21: "analog",
+        0x60: "parallel",
+    }
 )
 
 
@@ -55,7 +64,12 @@ def batch_of(block: Block, kind: int, channel: int, packets: Int64Array, tmats: 
         starts, ends = packets[:, scan.BODY], packets[:, scan.BODY_END]
         sizes = np.maximum(ends - starts, 0)
         return _bytes(
-            f"raw.{_WHOLE[kind]}.{channel}", block, starts, sizes, packets[:, scan.RTC], _specific(block, packets)
+            f"{BYTES_PREFIX}{_WHOLE[kind]}.{channel}",
+            block,
+            starts,
+            sizes,
+            packets[:, scan.RTC],
+            _specific(block, packets),
         )
     if kind == DISCRETE:
         return _discretes(block, channel, packets)
@@ -81,7 +95,7 @@ def _messages(block: Block, form: _Stamped, channel: int, packets: Int64Array) -
         parts.append((places[:count], sizes[:count], times[:count]))
     places, sizes, times = (np.concatenate(several) for several in zip(*parts, strict=True))
     order = np.argsort(places, kind="stable")
-    return _bytes(f"raw.{form.name}.{channel}", block, places[order], sizes[order], times[order], None)
+    return _bytes(f"{BYTES_PREFIX}{form.name}.{channel}", block, places[order], sizes[order], times[order], None)
 
 
 def _bytes(
@@ -107,7 +121,7 @@ def _bytes(
         if present.any():
             name = f"bytes_{number * _PER_NUMBER:02d}"
             columns[name] = Column(numbers[:, number].copy(), None if present.all() else present)
-    return RecordBatch(topic, start + block.base, Column(times[which] * NS_PER_COUNT), columns)
+    return RecordBatch(topic, start + block.base, Column(times[which] * NS_PER_COUNT + piece), columns)
 
 
 def _discretes(block: Block, channel: int, packets: Int64Array) -> RecordBatch | None:

@@ -4,9 +4,10 @@ from collections.abc import Iterator, Sequence
 
 from groundstation.base.records import Damage, Item, LogHeader, RecordBatch
 from groundstation.readers.chapter10.bus_words import bounded, messages_1553, words_429
+from groundstation.readers.chapter10.kinds import ARINC_429, EVENT, MIL_STD_1553
 from groundstation.readers.chapter10.naming import named
 from groundstation.readers.chapter10.overview import Overview, overview
-from groundstation.readers.chapter10.packets import ARINC_429, EVENT, MIL_STD_1553, Block, Walk
+from groundstation.readers.chapter10.packets import Block, Walk
 from groundstation.readers.chapter10.payloads import batch_of
 from groundstation.readers.chapter10.timing import start_of
 from groundstation.readers.chapter10.tmats import Tmats
@@ -40,7 +41,7 @@ def _recorded(source: Source, found: Overview) -> Iterator[Item]:
         for batch in _batches(block, found.tmats, lost):
             yield from bounded(batch)
     yield from start.remarks
-    yield walk.tally.remark()
+    yield from walk.tally.remarks(found.tmats)
     yield from walk.damages()
     for topic, count in lost.items():
         what = "messages that packets say they hold and that are not in them"
@@ -56,6 +57,8 @@ def metadata(tmats: Tmats) -> dict[str, str]:
         names = [f"{sub_channel}={name}" for sub_channel, name in sorted(channel.sub_channels.items())]
         if channel.bus or names:
             facts[f"bus.{number}"] = channel.bus or "; ".join(names)
+        if channel.pcm:
+            facts[f"pcm.{number}"] = "; ".join(f"{code}={value}" for code, value in channel.pcm.items())
     return facts
 
 

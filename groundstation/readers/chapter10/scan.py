@@ -1,8 +1,8 @@
 """Compiled loops over the bytes of a recording: packets, and the messages in them.
 
 A header counts when its sync pattern and its checksum are right: 32 bits that noise does not meet. Its packet counts
-where another header (or the end of the file) follows; else its data checksum must be right, or no other header may
-begin inside it: what lost bytes must not pass for whole.
+where its data checksum is right, or it has none and another header (or the end of the file) follows; else no other
+header may begin inside it: what lost bytes must not pass for whole.
 """
 
 from typing import Any
@@ -16,6 +16,8 @@ LAST_COMPUTER_TYPE = 7
 # Columns of a packet: where it begins and ends, its data begin and end (behind the channel-specific word), its header.
 AT, END, BODY, BODY_END, CHANNEL, TYPE, FLAGS, SEQUENCE, RTC, STATE, COLUMNS = range(11)
 WHOLE, WRONG_CHECKSUM, TORN, CUT = range(4)
+BETWEEN_TERMINALS = 0x0800  # of a 1553 message's block status
+IEEE_1588 = 1  # format of a secondary header's time
 HAS_SECONDARY, STAMPS_ARE_SECONDARY, RTC_UNSYNCED, OVERFLOW = 0x80, 0x40, 0x20, 0x10
 
 # Places in the state array.
@@ -134,13 +136,14 @@ def scan(data: Any, halves: Any, words: Any, size: int, is_last: bool, packets: 
         has_checksum = data[at + 14] & 3 != 0
         verdict, resume = WHOLE, end
         is_right = end <= size and has_checksum and _checksum_is_right(data, halves, words, at, body, end)
-        if end > size or not (is_right or end == size or _is_header(data, end, size)):
+        is_wrong = has_checksum and not is_right
+        if end > size or is_wrong or not (is_right or end == size or _is_header(data, end, size)):
             inner = _header_inside(data, at + header, end, size)
             if inner != NOWHERE:
                 verdict, resume = TORN, inner
             elif end > size:
                 verdict, resume = CUT, size
-        if verdict == WHOLE and has_checksum and not is_right:
+        if verdict == WHOLE and is_wrong:
             verdict = WRONG_CHECKSUM
         if skip != NOWHERE:
             spans[state[SPANS], 0], spans[state[SPANS], 1], spans[state[SPANS], 2] = skip, at, count
@@ -166,8 +169,7 @@ def _stamp(data: Any, at: int, packet: Any) -> int:
     if not flags & STAMPS_ARE_SECONDARY or not flags & HAS_SECONDARY:
         return _u48(data, at)
     first = packet[BODY] - 4 - SECONDARY_BYTES
-    kind = (flags >> 2) & 3
-    if kind == 1:  # IEEE 1588: nanoseconds, seconds
+    if (flags >> 2) & 3 == IEEE_1588:  # nanoseconds, seconds
         seconds = _u32(data, at + 4) - _u32(data, first + 4)
         return int(packet[RTC] + seconds * 10_000_000 + (_u32(data, at) - _u32(data, first)) // 100)
     return int(packet[RTC])
@@ -185,8 +187,8 @@ def messages_1553(data: Any, packets: Any, places: Any, times: Any, heads: Any, 
         Where each message begins in ``data``; its time in counts of 100 ns.
     heads : ndarray of uint16, shape (n, 3), out
         Block status, gap times, bytes of the message.
-    words : ndarray of uint16, shape (n, 36), out
-        As recorded; zero behind the last.
+    words : ndarray of uint8, shape (n, 72), out
+        As recorded, two bytes each; as they were behind the last.
     lost : ndarray of int64, shape (m,), out
         Messages that a packet says it has, less those found.
     """
@@ -203,13 +205,34 @@ def messages_1553(data: Any, packets: Any, places: Any, times: Any, heads: Any, 
             places[count], times[count] = at, _stamp(data, at, packet)
             for column in range(3):
                 heads[count, column] = _u16(data, at + 8 + 2 * column)
-            for word in range(min(length // 2, words.shape[1])):
-                words[count, word] = _u16(data, at + 14 + 2 * word)
+            for byte in range(min(length, words.shape[1])):
+                words[count, byte] = data[at + 14 + byte]
             at += 14 + length + length % 2
             count += 1
             found += 1
         lost[k] = stated - found
     return count
+
+
+@compiled
+def see_1553(data: Any, packets: Any, seen: Any) -> None:
+    """Mark the command words of all messages in ``seen``, ndarray of bool of shape (65536,): see messages_1553."""
+    for k in range(len(packets)):
+        at, end = packets[k, BODY], packets[k, BODY_END]
+        while at + 16 <= end:
+            length = _u16(data, at + 12)
+            seen[_u16(data, at + 14)] = True
+            if _u16(data, at + 8) & BETWEEN_TERMINALS and length >= 4 and at + 18 <= end:
+                seen[_u16(data, at + 16)] = True
+            at += 14 + length + length % 2
+
+
+@compiled
+def see_429(data: Any, packets: Any, seen: Any) -> None:
+    """Mark bus (from 0) and label byte of all words in ``seen``, ndarray of bool of shape (65536,)."""
+    for k in range(len(packets)):
+        for at in range(packets[k, BODY], packets[k, BODY_END] - 7, 8):
+            seen[int(data[at + 3]) << 8 | int(data[at + 4])] = True
 
 
 @compiled

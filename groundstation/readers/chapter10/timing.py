@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from groundstation.base.records import Int64Array, Remark
 from groundstation.base.timescales import leap_seconds_at, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.chapter10.tmats import Tmats
+from groundstation.readers.chapter10.tmats import YEARS, Tmats
 
 NS_PER_DAY = 86_400 * NS_PER_S
 _GPS_NATIVE, _NONE = 5, 15
@@ -76,7 +76,7 @@ def reading(channel: int, device_ns: int, specific_word: int, body: bytes) -> Re
             day = date(year, month, digits[8] + 10 * digits[9]).timetuple().tm_yday
         except ValueError:
             return None
-    if not 1 <= day <= 366:
+    if not 1 <= day <= 366 or (year is not None and year not in YEARS):
         return None
     return Reading(channel, device_ns, year, day, time_ns, form == _GPS_NATIVE)
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import date
 
+YEARS = range(1970, 2200)  # of recordings; others are damage
 MOST_CHARACTERS = 4 << 20  # of attributes; real ones have some 100 thousand
 _VALUE_CHARACTERS = 200
 _ATTRIBUTE = re.compile(r"([A-Za-z]{1,4}(?:-\d+)?\\[^:;\r\n]{1,60}):([^;]*);")
@@ -12,6 +13,7 @@ _YEAR_FIRST, _YEAR_LAST = (
     re.compile(pattern)
     for pattern in (r"(?<![-\d])(\d{4})[-/.](\d\d)[-/.](\d\d)", r"(?<![-\d])(\d\d)[-/.](\d\d)[-/.](\d{4})")
 )
+_OF_FRAMES = re.compile(r"D\d|F\d|MF\\N|MF\d|SYNC\d")
 _DATES = (r"R-\d+\\RI4", r"G\\OD", r"G\\COM")
 
 
@@ -29,12 +31,15 @@ class Channel:
         Name of a 1553 bus; empty when there is none.
     sub_channels : mapping of int to str
         Names of the buses of an ARINC-429 channel, by sub-channel number.
+    pcm : mapping of str to str
+        Attributes of its PCM stream: bits of a word, words and bits of a frame, synchronisation (P-d group).
     """
 
     kind: str = ""
     source: str = ""
     bus: str = ""
     sub_channels: Mapping[int, str] = field(default_factory=dict)
+    pcm: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -81,14 +86,18 @@ def parse(text: bytes) -> Tmats:
 def _channels(attributes: Mapping[str, str]) -> Iterator[tuple[int, Channel]]:
     """Number and description of each channel that TMATS gives a number."""
     buses = _buses(attributes)
-    sub_channels = _sub_channels(attributes)
+    sub_channels, streams = _sub_channels(attributes), _pcm_streams(attributes)
     for code, value in attributes.items():
         found = re.fullmatch(r"(R-\d+)\\TK1-(\d+)", code)
         if found and value.isdecimal():
             recorder, place = found.groups()
-            get = {key: attributes.get(f"{recorder}\\{key}-{place}", "") for key in ("CDT", "DSI", "BDLN", "CDLN")}
-            bus = next((buses[link] for link in (get["BDLN"], get["CDLN"], get["DSI"]) if link in buses), "")
-            yield int(value), Channel(get["CDT"], get["DSI"], bus, sub_channels.get((recorder, place), {}))
+            get = {
+                key: attributes.get(f"{recorder}\\{key}-{place}", "") for key in ("CDT", "DSI", "BDLN", "PDLN", "CDLN")
+            }
+            links = [get[key] for key in ("BDLN", "PDLN", "CDLN", "DSI") if get[key]]
+            bus = next((buses[link] for link in links if link in buses), "")
+            pcm = next((streams[link] for link in links if link in streams), {})
+            yield int(value), Channel(get["CDT"], get["DSI"], bus, sub_channels.get((recorder, place), {}), pcm)
 
 
 def _buses(attributes: Mapping[str, str]) -> dict[str, str]:
@@ -100,6 +109,24 @@ def _buses(attributes: Mapping[str, str]) -> dict[str, str]:
         if link and name:
             buses.setdefault(link, name)
     return buses
+
+
+def _pcm_streams(attributes: Mapping[str, str]) -> dict[str, dict[str, str]]:
+    """Attributes of PCM streams by the data link that they are recorded from."""
+    streams: dict[str, dict[str, str]] = {}
+    for code, link in attributes.items():
+        found = re.fullmatch(r"(P-\d+)\\DLN", code)
+        if found and link:
+            group = found.group(1) + "\\"
+            streams.setdefault(
+                link,
+                {
+                    name.removeprefix(group): value
+                    for name, value in attributes.items()
+                    if value and name.startswith(group) and _OF_FRAMES.fullmatch(name.removeprefix(group))
+                },
+            )
+    return streams
 
 
 def _sub_channels(attributes: Mapping[str, str]) -> dict[tuple[str, str], dict[int, str]]:
@@ -127,6 +154,6 @@ def _date_of(text: str) -> date | None:
     else:
         return None
     try:
-        return date(year, month, day)
+        return date(year, month, day) if year in YEARS else None
     except ValueError:
         return None

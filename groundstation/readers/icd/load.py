@@ -277,11 +277,12 @@ class _Checker:
         twice = [word.name for word in words if word.name in by_bit]
         if twice:
             self.fail(f"{place}, {twice[0]}", "a word and a bit element of one name", "names of their own")
+        single = {bit.name for bit in bits if bit.count == 1 and bit.msb == bit.lsb}
         found = []
         for element in (*words, *bits):
             bit = self.text(self.table(entries[element.name], place), "valid_if", f"{place}, {element.name}")
-            if bit and (bit not in by_bit or bit == element.name):
-                self.fail(f"{place}, {element.name}: valid_if", repr(bit), "a bit element of the message")
+            if bit and (bit not in single or bit == element.name):
+                self.fail(f"{place}, {element.name}: valid_if", repr(bit), "an element of the message of one bit")
             found.append(replace(element, valid_if=by_bit[bit]) if bit else element)
         return tuple(found)
 

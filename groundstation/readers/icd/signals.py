@@ -147,7 +147,8 @@ def signal_values(values: FloatArray, element: Element) -> FloatArray:
     if element.transform == "asin_deg":
         sine = np.where(np.abs(values) <= 1.0, values, np.nan)
         values = np.rad2deg(np.arcsin(sine))
-    values = values * element.factor
+    if element.factor != 1.0:
+        values = values * element.factor
     return np.asarray(wrap_360(values)) if _is_heading(element) else values
 
 

@@ -22,6 +22,7 @@ WORDS_OF = {
     **dict.fromkeys(("FLOAT64_IEEE", "FLOAT64_GPS"), 4),
 }
 SIGNED = ("SIGNED16", "SIGNED32", "SIGNEDBITS")
+_INTEGERS = {"SIGNED16": "<i2", "UNSIGNED16": "<u2", "SIGNED32": "<i4", "UNSIGNED32": "<u4"}
 GPS_BIAS = 128
 
 
@@ -45,6 +46,9 @@ def decode_1553(data: Data1553, element: Element1553) -> FloatArray:
     >>> decode_1553(np.array([[0, 0x4000], [0, 0xC000]], dtype=np.uint16), heading)
     array([ 90., -90.])
     """
+    if element.schema in _INTEGERS:  # most of all words: as the processor has them
+        words = np.ascontiguousarray(data[:, element.offset : element.offset + element.count][:, ::-1])
+        return np.asarray(words.view(_INTEGERS[element.schema])[:, 0] * _scale(element), dtype=np.float64)
     field, bits = _field(data, element), _bits(element)
     if element.schema in _FLOATS:
         return _FLOATS[element.schema][0](field)
@@ -57,9 +61,10 @@ def decode_1553(data: Data1553, element: Element1553) -> FloatArray:
 
 def usable_1553(data: Data1553, element: Element1553) -> NDArray[np.bool_]:
     """Whether the message itself says that the element is valid; all are where no bit says so. Shape (n,)."""
-    if element.valid_if is None:
+    bit = element.valid_if
+    if bit is None:
         return np.ones(len(data), dtype=bool)
-    return np.asarray(_field(data, element.valid_if) == 1)
+    return np.asarray(data[:, bit.offset] >> np.uint16(16 - bit.lsb) & np.uint16(1) == 1)
 
 
 def encode_1553(message: Message1553, values: Mapping[str, FloatArray]) -> Data1553:

@@ -28,10 +28,7 @@ def status_of(words: Words429) -> NDArray[np.uint32]:
 
 def has_odd_parity(words: Words429) -> NDArray[np.bool_]:
     """Whether the number of ones in each word is odd, as it is in every sound one."""
-    folded = words
-    for shift in (16, 8, 4, 2, 1):
-        folded = folded ^ (folded >> np.uint32(shift))
-    return np.asarray((folded & np.uint32(1)) == 1)
+    return np.asarray(np.bitwise_count(words) & np.uint8(1) == 1)
 
 
 def decode_429(words: Words429, element: Element429) -> tuple[FloatArray, NDArray[np.bool_]]:
@@ -59,7 +56,7 @@ def decode_429(words: Words429, element: Element429) -> tuple[FloatArray, NDArra
     """
     field = ((words >> np.uint32(element.lsb - 1)) & np.uint32((1 << element.bit_count) - 1)).astype(np.int64)
     status = status_of(words)
-    usable = has_odd_parity(words) & np.isin(status, USABLE[element.status])
+    usable = has_odd_parity(words) & np.isin(range(4), USABLE[element.status])[status]
     if element.schema == "BCD":
         digits = _digits(field, element.bit_count)
         values = np.zeros(len(words))

@@ -130,7 +130,10 @@ def epoch_start(frames: Frames, sentences: Mapping[str, Sentences]) -> int:
 
 
 def full_times(sentences: Mapping[str, Sentences]) -> tuple[Int64Array, Int64Array]:
-    """Places and UTC nanoseconds of the sentences that tell date and time: RMC (two digits of the year) and ZDA."""
+    """Places and UTC nanoseconds of the sentences that tell date and time: RMC (two digits of the year) and ZDA.
+
+    Where an RMC calls its fix valid those that do not are left out: before it a receiver guesses.
+    """
     places, utc_ns = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
     for one in sentences.values():
         if one.formatter not in ("RMC", "ZDA"):
@@ -142,7 +145,8 @@ def full_times(sentences: Mapping[str, Sentences]) -> tuple[Int64Array, Int64Arr
             date, _behind, state = one.numbers(8)
             day, month, year = date // 10_000, date // 100 % 100, date % 100
             year = year + np.where(year < _CENTURY, 2000, 1900)
-            sound &= state == 1
+            is_valid = one.texts(1).values == "A"
+            sound &= (state == 1) & (is_valid | ~is_valid.any())
         else:
             (day, _d, has_day), (month, _m, has_month), (year, _y, has_year) = (one.numbers(at) for at in (1, 2, 3))
             sound &= (has_day == 1) & (has_month == 1) & (has_year == 1)

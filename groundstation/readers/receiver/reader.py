@@ -15,6 +15,7 @@ from groundstation.readers.receiver.stream import Frames, Stream
 from groundstation.readers.source import Source
 
 _NAMES_TOLD = 5
+_NEARLY_ALL = 0.99
 _WITH_CHECKSUM = re.compile(rb"[$!][A-Z][A-Z0-9]{2,9},[^\r\n$*]{0,500}\*[0-9A-Fa-f]{2}")
 
 
@@ -30,7 +31,8 @@ def items(source: Source) -> Iterator[Item]:
     found = overview(source, is_bare)
     if not found.counts:
         raise UnreadableLogError(source.name, "no message or sentence of a receiver", "", "was it cut or damaged?")
-    yield LogHeader(NAME, found.metadata, 0 if len(found.anchors) else None)
+    # Messages of one epoch come late and in any order, with times some microseconds apart: no step of the clock.
+    yield LogHeader(NAME, found.metadata, 0 if len(found.anchors) else None, has_counting_clock=True)
     stream = Stream(source, is_bare, _epoch_start_of(found))
     told = _Told()
     for frames in stream:
@@ -49,9 +51,17 @@ class _Told:
 
     def __init__(self) -> None:
         self.astray = self.gnss = self.bare = 0
+        self.as_track = self.moving = 0
         self.unreadable: Counter[tuple[str, str]] = Counter()
 
     def items(self) -> Iterator[Item]:
+        if self.moving and self.as_track >= _NEARLY_ALL * self.moving:
+            text = (
+                f"heading and track are the same in {self.as_track} of {self.moving} fixes above "
+                f"{ubx_canonical.MOVING_MPS:g} m/s: the receiver lets the nose point along the motion, so its heading "
+                "is no second measurement"
+            )
+            yield Remark("heading_is_track", text, "ins", ("true_heading_deg",))
         if self.astray:
             text = (
                 f"geoid and ellipsoid are said to be over {nmea.MOST_SEPARATION_M:.0f} m apart in {self.astray} rows, "
@@ -95,6 +105,8 @@ def _of_block(frames: Frames, found: Overview, told: _Told) -> Iterator[RecordBa
     else:
         gnss, astray = nmea.gnss_batch(epochs, time)
         told.astray += astray
+    same, moving = ubx_canonical.heading_as_track(block, found.attitude)
+    told.as_track, told.moving = told.as_track + same, told.moving + moving
     told.bare += len(frames.of(scan.BARE_NMEA))
     if gnss is not None:
         told.gnss += int(gnss.columns["latitude_deg"].mask.sum()) if "latitude_deg" in gnss.columns else 0

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.angles import wrap_360
+from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
 from groundstation.readers.receiver.messages import Block, Columns, occupied
 from groundstation.readers.receiver.times import Anchors
@@ -18,6 +18,7 @@ MM = 1e-3
 POSITION_SOURCES = ("NAV-PVT", "NAV-PVAT", "NAV-HPPOSLLH", "NAV-POSLLH")  # the first that a log has leads
 ATTITUDE_SOURCES = ("NAV-PVAT", "NAV-ATT", "NAV-RELPOSNED", "NAV-PVT")
 _FIXES = np.array(["none", "dead_reckoning", "2d", "3d", "gnss_ins", "none"])
+MOVING_MPS, SAME_DEG = 1.0, 2e-5
 INS_MODE = "gnss_aided"
 
 
@@ -54,6 +55,16 @@ def has_attitude(block: Block, source: str) -> bool:
     fields = block.fields(source)
     heading = None if fields is None else _ATTITUDES[source](fields).get("true_heading_deg")
     return heading is not None and bool(heading.mask.any())
+
+
+def heading_as_track(block: Block, source: str) -> tuple[int, int]:
+    """How many fixes of a moving vehicle tell the same heading as track, and how many there are."""
+    fields = block.fields(source)
+    if fields is None or source != "NAV-PVAT":
+        return 0, 0
+    is_moving = fields["vehHeadingValid"] & (fields["gSpeed"] * MM > MOVING_MPS)
+    apart_deg = wrap_180(fields["vehHeading"][is_moving] - fields["motHeading"][is_moving])
+    return int((np.abs(apart_deg) <= SAME_DEG).sum()), int(is_moving.sum())
 
 
 def _solution(fields: Mapping[str, NDArray[Any]]) -> Columns:

@@ -11,7 +11,7 @@ from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.run_chart import Run, RunChart, runs_of
 from groundstation.viewer.views import figure_of, numbers
 
-AFTER_TAXI = ("too fast", "airborne")
+AFTER_TAXI = ("too fast", "take-off run", "landing roll", "airborne")
 SPEED_LIMIT_MPS = 6.0  # the paper's; the result's own settings stand above it
 LONGEST_GAP_S = 60.0  # between two rows of one run
 MOST_RUNS = 4

@@ -1,0 +1,130 @@
+"""What a recording holds and lacks by its packets' headers: types, sums, sequence numbers, what TMATS says of it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from groundstation.base.records import Damage, Int64Array, Remark
+from groundstation.readers.chapter10 import kinds, scan
+from groundstation.readers.chapter10.tmats import Tmats
+from groundstation.readers.skipped import bytes_place
+
+
+class _Wrong(NamedTuple):
+    """A packet that is not whole: verdict, type, place and length."""
+
+    verdict: int
+    kind: int
+    place: int
+    size: int
+
+
+@dataclass
+class _Sequence:
+    """Sequence number of a channel's last packet, and how many packets are missing by it."""
+
+    last: int
+    missing: int = 0
+    first_place: int = 0
+
+
+@dataclass
+class Tally:
+    """Counts of a whole recording."""
+
+    packets: int = 0
+    by_channel: dict[tuple[int, int], int] = field(default_factory=dict)  # of channel and type
+    checked: int = 0
+    secondary: int = 0
+    filler_bytes: int = 0
+    unsynced: int = 0
+    overflows: int = 0
+    unread_stamps: int = 0
+    sequences: dict[int, _Sequence] = field(default_factory=dict)
+    wrong: list[_Wrong] = field(default_factory=list)
+
+    def add(self, packets: Int64Array, base: int) -> None:
+        """Count packets, damaged ones among them; ``base`` is the place of their places."""
+        self.packets += len(packets)
+        flags, channels, types = (packets[:, column] for column in (scan.FLAGS, scan.CHANNEL, scan.TYPE))
+        has_secondary = (flags & scan.HAS_SECONDARY) > 0
+        self.secondary += int(np.count_nonzero(has_secondary))
+        self.unsynced += int(np.count_nonzero(flags & scan.RTC_UNSYNCED))
+        self.overflows += int(np.count_nonzero(flags & scan.OVERFLOW))
+        is_other = has_secondary & ((flags & scan.STAMPS_ARE_SECONDARY) > 0) & ((flags >> 2 & 3) != scan.IEEE_1588)
+        self.unread_stamps += int(np.count_nonzero(is_other))
+        for row in packets[packets[:, scan.STATE] != scan.WHOLE].tolist():
+            wrong = _Wrong(row[scan.STATE], row[scan.TYPE], base + row[scan.AT], row[scan.END] - row[scan.AT])
+            self.wrong.append(wrong)
+        for key, count in zip(*np.unique(channels << 8 | types, return_counts=True), strict=True):
+            pair = int(key) >> 8, int(key) & 0xFF
+            self.by_channel[pair] = self.by_channel.get(pair, 0) + int(count)
+        for channel in np.unique(channels).tolist():
+            self._add_sequence(channel, packets[channels == channel], base)
+
+    def _add_sequence(self, channel: int, packets: Int64Array, base: int) -> None:
+        numbers = packets[:, scan.SEQUENCE]
+        sequence = self.sequences.setdefault(channel, _Sequence(int(numbers[0]) - 1))
+        missing = (np.diff(numbers, prepend=sequence.last) - 1) % 256
+        sequence.last = int(numbers[-1])
+        if missing.any():
+            if not sequence.missing:
+                sequence.first_place = base + int(packets[np.flatnonzero(missing)[0], scan.AT])
+            sequence.missing += int(missing.sum())
+
+    def remarks(self, tmats: Tmats) -> Iterator[Remark]:
+        """What was checked, and where TMATS says otherwise."""
+        types: dict[int, int] = {}
+        for (_channel, kind), count in self.by_channel.items():
+            types[kind] = types.get(kind, 0) + count
+        listed = ", ".join(f"{count} {kinds.name_of(kind)}" for kind, count in sorted(types.items()))
+        wrong = sum(one.verdict == scan.WRONG_CHECKSUM for one in self.wrong)
+        text = (
+            f"{self.packets} packets: {listed}; data checksums of {self.checked}, {wrong} wrong; "
+            f"{self.secondary} secondary headers; {self.filler_bytes} bytes of filler"
+        )
+        if self.unsynced:
+            text += f"; {self.unsynced} packets say that their counter was not in step with its source"
+        yield Remark("packets", text)
+        if self.unread_stamps:
+            text = f"{self.unread_stamps} packets stamp messages in a form that is not read: their time is the packet's"
+            yield Remark("clock_disagrees", text)
+        if not tmats.attributes:
+            yield Remark("no_tmats", "no TMATS: buses have no names, and nothing says what the recording is of")
+        for (channel, kind), count in sorted(self.by_channel.items()):
+            said = tmats.channels[channel].kind if channel in tmats.channels else ""
+            if kind not in kinds.OF_CHANNEL.get(said, (kind,)):
+                held = f"{count} {kinds.name_of(kind)} packets"
+                text = f"channel {channel} is {said} by TMATS and has {held}: they are believed"
+                yield Remark("tmats_contradicted", text)
+
+    def damages(self) -> Iterator[Damage]:
+        """Damaged packets, and packets that were never written."""
+        setup = [one for one in self.wrong if one.kind == kinds.TMATS and one.verdict == scan.WRONG_CHECKSUM]
+        if setup:
+            what = "TMATS packets with a wrong data checksum, read all the same"
+            yield Damage("wrong_checksum", _place(setup), len(setup), what, loses_data=False)
+        for verdict, what in _VERDICTS.items():
+            found = [one for one in self.wrong if one.verdict == verdict and one not in setup]
+            if found:
+                yield Damage("truncated" if verdict == scan.CUT else "corrupt", _place(found), len(found), what)
+        for channel, one in sorted(self.sequences.items()):
+            if one.missing:
+                what = f"packets of channel {channel} are missing by its sequence numbers"
+                yield Damage("lost_packets", bytes_place(one.first_place, one.first_place + 1), one.missing, what)
+        if self.overflows:
+            what = "packets in which the recorder lost data (overflow flag)"
+            yield Damage("lost_packets", "the whole log", self.overflows, what)
+
+
+def _place(found: list[_Wrong]) -> str:
+    return bytes_place(found[0].place, found[-1].place + found[-1].size)
+
+
+_VERDICTS = {
+    scan.WRONG_CHECKSUM: "packets with a wrong data checksum, left out",
+    scan.TORN: "packets that end before their length, left out",
+    scan.CUT: "packet that the end of the file cuts off; its whole messages are kept",
+}

@@ -1,0 +1,289 @@
+// Figures to zoom into: what reports/live.py took from the axes of each figure, drawn by uPlot in place of its picture.
+"use strict";
+(() => {
+  const page = JSON.parse(document.getElementById("live").textContent);
+  const arrays = page.arrays.map((text) => {
+    const bytes = Uint8Array.from(atob(text), (mark) => mark.charCodeAt(0));
+    return Array.from(new Float32Array(bytes.buffer), (value) => (Number.isNaN(value) ? null : value));
+  });
+  const PX_PER_MM = 3.78, NARROW_PX = 560, TITLED_PX = 16, NEAR = 40;
+  const LEFT_PX = 66, NAMES_PX = 124, BESIDE_PX = 46; // room for the vertical axis: of a row's first panel, of the others
+  const timed = []; // plots over flight time: their axes move together
+  const colourOf = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const INKS = { "#1c2530": "--ink", "#6b7683": "--faint" };
+  const shown = (colour) => (INKS[colour] ? colourOf(INKS[colour]) : colour);
+
+  const clock = (seconds) => {
+    const whole = Math.round(Math.abs(seconds)), two = (number) => String(number).padStart(2, "0");
+    const [hours, minutes, rest] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
+    const text = hours ? `${hours}:${two(minutes)}:${two(rest)}` : `${minutes}:${two(rest)}`;
+    return (seconds < -0.5 ? "\u2212" : "") + text;
+  };
+  const plain = (value) => String(Number(value.toPrecision(5))).replace("-", "\u2212");
+  const told = (panel, value) => {
+    if (value == null) return "";
+    if (!panel.time) return plain(value);
+    const tenths = Math.floor((((value % 1) + 1) % 1) * 10);
+    return clock(Math.floor(value)) + (panel.x[1] - panel.x[0] < 600 ? `.${tenths}` : "");
+  };
+  const STEPS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 28800, 86400];
+
+  const nameOf = (panel, curve) => {
+    const isAlone = panel.curves.filter((one) => one.kind === "line" && arrays[one.x].length).length === 1;
+    return curve.name || (curve.kind === "line" && isAlone ? panel.titles[2] : "");
+  };
+
+  function straight(plot, at, first, last) {
+    // Every sample joined to the next, a gap at null: uPlot's own line joins what lies in one column of pixels.
+    const stroke = new Path2D(), [x, y] = [plot.data[0], plot.data[at]];
+    let isOpen = false;
+    for (let row = first; row <= last; row += 1) {
+      if (y[row] === undefined) continue;
+      if (y[row] === null) { isOpen = false; continue; }
+      const place = [plot.valToPos(x[row], "x", true), plot.valToPos(y[row], "y", true)];
+      if (isOpen) stroke.lineTo(...place);
+      else stroke.moveTo(...place);
+      isOpen = true;
+    }
+    return { stroke, fill: null, clip: null, band: null, gaps: null, flags: 1 };
+  }
+
+  function tables(panel) {
+    // Every curve on one horizontal axis; bands become two series.
+    const joined = [], series = [], bands = [];
+    const add = (curve, y, options) => {
+      joined.push([arrays[curve.x], arrays[y]]);
+      series.push(options);
+    };
+    for (const curve of panel.curves) {
+      const colour = shown(curve.colour);
+      if (curve.kind === "lanes" || !arrays[curve.x].length) continue;
+      if (curve.kind === "dots") {
+        const size = Math.max(2, 1.6 * curve.width);
+        add(curve, curve.y, { label: curve.name, stroke: colour, paths: () => null, points: { show: true, size, fill: colour, width: 0 } });
+      } else if (curve.kind === "band") {
+        const quiet = { stroke: "transparent", width: 0, points: { show: false } };
+        add(curve, curve.upper, { ...quiet, label: curve.name });
+        add(curve, curve.y, { ...quiet, label: curve.name });
+        bands.push({ series: [series.length - 1, series.length], fill: colour });
+      } else {
+        const dash = curve.dashed ? [6, 4] : undefined;
+        add(curve, curve.y, { label: nameOf(panel, curve), stroke: colour, width: Math.max(1, 1.3 * curve.width), dash, paths: straight, points: { show: false } });
+      }
+    }
+    const data = joined.length ? uPlot.join(joined) : [panel.x.slice().sort((a, b) => a - b)];
+    if (!joined.length) {
+      data.push([null, null]);
+      series.push({ label: "", points: { show: false } });
+    }
+    return { data, series, bands };
+  }
+
+  function paintGrounds(plot, panel) {
+    const { ctx, bbox } = plot;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    ctx.globalAlpha = matchMedia("(prefers-color-scheme: dark)").matches ? 0.22 : 1;
+    for (const [low, high, colour] of panel.grounds) {
+      const [left, right] = [low, high].map((value) => plot.valToPos(value, "x", true));
+      ctx.fillStyle = colour;
+      ctx.fillRect(Math.min(left, right), bbox.top, Math.abs(right - left), bbox.height);
+    }
+    ctx.restore();
+  }
+
+  function paintMarks(plot, panel) {
+    const { ctx, bbox } = plot, ratio = devicePixelRatio;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    for (const [value, colour] of panel.marks) {
+      const x = plot.valToPos(value, "x", true);
+      ctx.strokeStyle = shown(colour);
+      ctx.lineWidth = ratio;
+      ctx.beginPath();
+      ctx.moveTo(x, bbox.top);
+      ctx.lineTo(x, bbox.top + bbox.height);
+      ctx.stroke();
+    }
+    for (const curve of panel.curves.filter((one) => one.kind === "lanes")) {
+      const [start, y, end] = [arrays[curve.x], arrays[curve.y], arrays[curve.upper]];
+      ctx.fillStyle = shown(curve.colour);
+      start.forEach((low, row) => {
+        const [left, right] = [low, end[row]].map((value) => plot.valToPos(value, "x", true));
+        ctx.fillRect(left, plot.valToPos(y[row], "y", true) - 4 * ratio, Math.max(right - left, 1), 8 * ratio);
+      });
+    }
+    ctx.restore();
+  }
+
+  function nearest(values, at) {
+    // The value at a place, or the next one beside it: curves of unlike samples share one axis.
+    for (let step = 0; step < NEAR; step += 1) {
+      for (const place of [at - step, at + step]) if (values[place] != null) return values[place];
+      if (values[at - step] === null || values[at + step] === null) return null; // a break of the line
+    }
+    return null;
+  }
+
+  function readout(row, panels, hasGrounds) {
+    // One line above the panels of a row: names, and under the cursor their values.
+    const line = row.appendChild(document.createElement("div")), entries = new Map();
+    line.className = "readout";
+    const add = (name, colour, kind) => {
+      if (!name || entries.has(name)) return;
+      const entry = line.appendChild(document.createElement("span"));
+      entry.className = kind;
+      entry.append(Object.assign(document.createElement("i"), { style: `background:${shown(colour)}` }), name);
+      entries.set(name, { entry, value: entry.appendChild(document.createElement("b")) });
+    };
+    for (const panel of panels) {
+      for (const curve of panel.curves) add(nameOf(panel, curve), curve.colour, curve.kind);
+      if (hasGrounds) for (const [, , colour, name] of panel.grounds) add(name, colour, "ground");
+    }
+    const place = line.appendChild(document.createElement("b"));
+    place.className = "place";
+    return (plot, panel, labels) => {
+      const { idx, left } = plot.cursor, isOver = left >= 0 && left <= plot.over.clientWidth && idx != null;
+      const x = isOver ? plot.posToVal(left, "x") : null;
+      place.textContent = isOver ? told(panel, x) : "";
+      const values = new Map();
+      if (isOver) labels.forEach((name, at) => {
+        const value = name && nearest(plot.data[at + 1], idx);
+        if (name && value != null) values.set(name, [...(values.get(name) || []), plain(value)]);
+      });
+      for (const [, , , name] of panel.grounds) entries.get(name)?.entry.classList.remove("here");
+      for (const [low, high, , name] of panel.grounds) if (isOver && x >= low && x <= high) entries.get(name)?.entry.classList.add("here");
+      for (const name of labels) if (name) entries.get(name).value.textContent = (values.get(name) || []).reverse().join(" \u2026 ");
+    };
+  }
+
+  function follow(source, min, max) {
+    for (const { plot, panel } of timed) {
+      const [low, high] = [Math.max(min, panel.x[0]), Math.min(max, panel.x[1])];
+      if (plot !== source && low < high) plot.setScale("x", { min: low, max: high });
+    }
+  }
+
+  function zoom(plot, panel) {
+    const { left, top, width, height } = plot.select;
+    if (width < 3 && height < 3) return;
+    const ends = [left, left + width].map((place) => plot.posToVal(place, "x")).sort((one, two) => one - two);
+    if (width >= 3) plot.setScale("x", { min: ends[0], max: ends[1] });
+    if (height < plot.over.clientHeight) plot.setScale("y", { min: plot.posToVal(top + height, "y"), max: plot.posToVal(top, "y") });
+    plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+    if (panel.time && width >= 3) follow(plot, ...ends);
+  }
+
+  function whole() {
+    for (const { plot, panel } of plots) {
+      plot.setScale("x", { min: Math.min(...panel.x), max: Math.max(...panel.x) });
+      plot.setScale("y", { min: Math.min(...panel.y), max: Math.max(...panel.y) });
+    }
+  }
+
+  const plots = [];
+  function draw(box, panel, width, height, left, hasTimes, tell) {
+    const { data, series, bands } = tables(panel);
+    const labels = series.map((one) => one.label);
+    const line = { stroke: colourOf("--rule"), width: 1 }, font = "12px system-ui, sans-serif";
+    const axis = { stroke: colourOf("--ink"), grid: line, ticks: { ...line, size: 5 }, font, labelFont: font, labelSize: TITLED_PX + 4, labelGap: 0, gap: 3 };
+    const scale = (range, log) => ({
+      time: false, distr: log ? 3 : 1, dir: range[0] > range[1] ? -1 : 1,
+      range: (_, min, max) => [min ?? Math.min(...range), max ?? Math.max(...range)],
+    });
+    const names = new Map(panel.names);
+    const upright = names.size
+      ? { ...axis, grid: { show: false }, size: left, splits: () => [...names.keys()], values: (_, splits) => splits.map((place) => (left > BESIDE_PX ? names.get(place) : "")) }
+      : { ...axis, label: panel.titles[2] || null, size: left - (panel.titles[2] ? axis.labelSize : 0), space: 26, values: (_, splits) => splits.map((value) => (value == null ? "" : plain(value))) };
+    const along = panel.time ? { incrs: STEPS, space: 70, values: (_, splits) => splits.map(hasTimes ? clock : () => "") } : { space: 60 };
+    const plot = new uPlot({
+      width, height, bands,
+      padding: [6, 10, 0, 0],
+      scales: { x: scale(panel.x, panel.log[0]), y: scale(panel.y, panel.log[1]) },
+      series: [{}, ...series],
+      axes: [{ ...axis, label: panel.titles[1] || null, size: hasTimes ? 24 : 4, ...along }, upright],
+      cursor: {
+        y: false,
+        dataIdx: (self, _, at, x) => (x < Math.min(...panel.x) || x > Math.max(...panel.x) ? null : at),
+        drag: { x: true, y: !names.size, uni: 24, setScale: false },
+        points: { size: 6 },
+        ...(panel.time ? { sync: { key: "time", scales: ["x", null], setSeries: false } } : {}),
+        bind: { dblclick: () => () => { whole(); return null; } },
+      },
+      legend: { show: false },
+      hooks: {
+        drawClear: [(self) => paintGrounds(self, panel)],
+        draw: [(self) => paintMarks(self, panel)],
+        setSelect: [(self) => zoom(self, panel)],
+        setCursor: [(self) => tell(self, panel, labels)],
+      },
+    }, data, box);
+    plot.setScale("x", { min: Math.min(...panel.x), max: Math.max(...panel.x) });
+    plot.setScale("y", { min: Math.min(...panel.y), max: Math.max(...panel.y) });
+    plots.push({ plot, panel });
+    if (panel.time) timed.push({ plot, panel });
+  }
+
+  function build(host, panels) {
+    const room = host.clientWidth, isNarrow = room < NARROW_PX;
+    const rows = new Map();
+    for (const panel of panels) {
+      const key = Math.round(panel.place[1]);
+      rows.set(key, [...(rows.get(key) || []), panel]);
+    }
+    const box = document.createElement("div");
+    box.className = "live";
+    host.append(box);
+    host.classList.add("is-live");
+    const first = panels.some((panel) => panel.names.length) ? NAMES_PX : LEFT_PX;
+    for (const row of rows.values()) {
+      const isFirst = box.childElementCount === 0, isLast = row.includes(panels[panels.length - 1]);
+      const hasTimes = isLast || row.some((panel) => !panel.time || panel.titles[1]);
+      const tell = readout(box, row, isFirst);
+      const line = box.appendChild(document.createElement("div"));
+      line.className = "live-row";
+      const sum = row.reduce((total, panel) => total + panel.place[2], 0);
+      const spare = room - first - BESIDE_PX * (row.length - 1);
+      row.forEach((panel, at) => {
+        const cell = line.appendChild(document.createElement("div"));
+        if (panel.titles[0]) cell.append(Object.assign(document.createElement("div"), { className: "panel-title", textContent: panel.titles[0] }));
+        const left = at && !isNarrow ? BESIDE_PX : first;
+        const width = isNarrow ? room : left + (spare * panel.place[2]) / sum;
+        const height = Math.round(panel.place[3] * PX_PER_MM) + (hasTimes ? 34 : 14) + (panel.titles[1] ? TITLED_PX : 0);
+        draw(cell, panel, Math.floor(width), height, left, hasTimes, tell);
+      });
+    }
+  }
+
+  const hosts = [...document.querySelectorAll(".plot[data-live]")];
+  const seen = new IntersectionObserver((entries) => {
+    for (const entry of entries) {
+      if (!entry.isIntersecting || entry.target.classList.contains("is-live")) continue;
+      build(entry.target, page.figures[Number(entry.target.dataset.live)]);
+    }
+  }, { rootMargin: "600px" });
+  hosts.forEach((host) => seen.observe(host));
+
+  function again() {
+    plots.splice(0).forEach(({ plot }) => plot.destroy());
+    timed.length = 0;
+    for (const host of hosts) {
+      host.querySelector(".live")?.remove();
+      host.classList.remove("is-live");
+      seen.unobserve(host);
+      seen.observe(host);
+    }
+  }
+  let width = innerWidth, waiting;
+  addEventListener("resize", () => {
+    if (innerWidth === width) return;
+    width = innerWidth;
+    clearTimeout(waiting);
+    waiting = setTimeout(again, 200);
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
+})();
