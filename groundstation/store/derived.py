@@ -147,30 +147,29 @@ class PoseWriter(DerivedWriter):
     def __init__(self, channel_id: int, source: str, emit: Callable[[Chunk], None], has_utc: bool, origin: Origin):
         message = PoseInFrame_pb2.PoseInFrame.DESCRIPTOR
         super().__init__(channel_id, f"pose.{source}", source, emit, message, has_utc)
-        self._origin, self._place, self._step = origin, np.zeros(3), -1
+        self._origin, self._step = origin, -1
+        self._last: dict[str, float] = {}  # of each coordinate, the last value known
 
     def write(self, batch: RecordBatch) -> None:
         """Take in the first row with an attitude of each step in time."""
-        attitude = np.column_stack([_values(batch, name) for name in ("roll_deg", "pitch_deg", "true_heading_deg")])
-        place = self._held(self._positions(batch))
-        known = np.flatnonzero(np.isfinite(attitude).all(axis=1))
-        if batch.time_ns is None or not len(known):
+        attitude = [batch.columns.get(name) for name in ("roll_deg", "pitch_deg", "true_heading_deg")]
+        known = np.ones(len(batch), dtype=bool)
+        for column in attitude:
+            known &= False if column is None else column.mask & np.isfinite(column.values)
+        rows = np.flatnonzero(known)
+        if batch.time_ns is not None and len(rows):
+            steps = batch.time_ns[rows] // POSE_STEP_NS
+            rows = rows[np.diff(steps, prepend=self._step) != 0]
+            self._step = int(steps[-1])
+        place = self._places(batch, rows)  # of no rows too: it remembers the last one
+        if batch.time_ns is None or not len(rows):
             return
-        steps = batch.time_ns[known] // POSE_STEP_NS
-        rows = known[np.diff(steps, prepend=self._step) != 0]
-        self._step = int(steps[-1])
-        if len(rows):
-            turn = quaternion_enu_from_flu_xyzw(*attitude[rows].T)
-            shown = np.column_stack([place[rows], turn]).astype(np.float32).astype("<f8")
-            columns = {str(number): Column(values) for number, values in enumerate(shown.T.copy())}
-            taken = batch.take(rows)
-            super().write(
-                RecordBatch(
-                    *(self.topic, taken.record_index, taken.device_time_ns, columns),
-                    taken.time_ns,
-                    taken.validity_time_ns,
-                )
-            )
+        turn = quaternion_enu_from_flu_xyzw(*(column.values[rows] for column in attitude if column is not None))
+        shown = np.column_stack([place, turn]).astype(np.float32).astype("<f8")
+        columns = {str(number): Column(values) for number, values in enumerate(shown.T.copy())}
+        validity_ns = None if batch.validity_time_ns is None else batch.validity_time_ns[rows]
+        where = batch.record_index[rows], batch.device_time_ns.take(rows), columns
+        super().write(RecordBatch(self.topic, *where, batch.time_ns[rows], validity_ns))
 
     def slots(self, batch: RecordBatch) -> list[Slot]:
         """Timestamp, frame, position and orientation."""
@@ -179,24 +178,26 @@ class PoseWriter(DerivedWriter):
         values = [Slot(tag, column.values) for tag, column in zip(inside, batch.columns.values(), strict=True)]
         return [*self.timestamp(b"\x0a", batch.time_ns), frame, *values]
 
-    def _positions(self, batch: RecordBatch) -> FloatArray:
-        """Positions of the rows, shape (n, 3), NaN where there is none: geodetic, else of the log's own local frame."""
-        latitude, longitude = on_earth(_values(batch, "latitude_deg"), _values(batch, "longitude_deg"))
-        height = _values(batch, "altitude_ellipsoid_m" if "altitude_ellipsoid_m" in batch.columns else "altitude_msl_m")
-        place = self._origin.enu_m(np.column_stack([latitude, longitude, height]))
+    def _places(self, batch: RecordBatch, rows: Int64Array) -> FloatArray:
+        """East, north and up of rows, shape (n, 3): geodetic, else of the log's own local frame; 0 where not known."""
+        height = "altitude_ellipsoid_m" if "altitude_ellipsoid_m" in batch.columns else "altitude_msl_m"
+        geodetic = [self._held(batch, name, rows) for name in ("latitude_deg", "longitude_deg", height)]
+        local = [self._held(batch, f"position_{axis}_m", rows) for axis in ("east", "north", "down")]
+        geodetic[:2] = on_earth(*geodetic[:2])
+        place = self._origin.enu_m(np.column_stack(geodetic))
         if not np.isfinite(place[:, :2]).any():
-            north, east, down = (_values(batch, f"position_{axis}_m") for axis in ("north", "east", "down"))
-            place = np.column_stack([east, north, -down])
-        return np.where(np.abs(place) < MOST_METRES, place, np.nan)
+            place = np.column_stack(local) * np.array([1.0, 1.0, -1.0])
+        return np.where(np.abs(place) < MOST_METRES, place, 0.0)
 
-    def _held(self, place: FloatArray) -> FloatArray:
-        """Positions with each coordinate held until the next one is known, from batch to batch too."""
-        extended = np.vstack([self._place, place])
-        rows = np.arange(len(extended))[:, None]
-        last = np.maximum.accumulate(np.where(np.isfinite(extended), rows, 0), axis=0)
-        held = np.take_along_axis(extended, last, axis=0)
-        self._place = held[-1]
-        return held[1:]
+    def _held(self, batch: RecordBatch, name: str, rows: Int64Array) -> FloatArray:
+        """Values of a column at rows, shape (n,), held where a row has none, from earlier batches too."""
+        before, column = self._last.get(name, np.nan), batch.columns.get(name)
+        known = np.zeros(0, np.int64) if column is None else np.flatnonzero(column.mask & np.isfinite(column.values))
+        if column is None or not len(known):
+            return np.full(len(rows), before)
+        self._last[name] = float(column.values[known[-1]])
+        at = np.searchsorted(known, rows, side="right") - 1
+        return np.where(at >= 0, column.values[known[np.maximum(at, 0)]], before)
 
 
 class LogWriter(DerivedWriter):

@@ -129,10 +129,15 @@ class Chart:
     def band(
         self, name: str, x: FloatArray, low: FloatArray, high: FloatArray, colour: Colour, at_s: float | None = None
     ) -> None:
-        """Log a filled band between two curves, of upright lines side by side; ``at_s`` as for :meth:`curves`."""
-        places = np.linspace(0.0, 1.0, BAND_COLUMNS)
-        known = np.isfinite(x) & np.isfinite(low) & np.isfinite(high)
-        share = self.x.share(x[known])
+        """Log a filled band between two curves, of upright lines side by side, empty about NaN.
+
+        ``at_s`` is as for :meth:`curves`.
+        """
+        places, share = np.linspace(0.0, 1.0, BAND_COLUMNS), self.x.share(x)
+        known = np.isfinite(share)
+        if not known.any():
+            return
+        share = share[known]
         order = np.argsort(share, kind="stable")
         clipped = (np.clip(edge[known][order], self.y.low, self.y.high) for edge in (low, high))
         ends = [
