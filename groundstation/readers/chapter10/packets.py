@@ -11,6 +11,7 @@ from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Int64Array
 from groundstation.readers.chapter10 import kinds, scan
 from groundstation.readers.chapter10.tally import Tally
+from groundstation.readers.dataflash.scan import magic_places
 from groundstation.readers.skipped import SkippedBytes
 from groundstation.readers.source import Source
 
@@ -115,9 +116,10 @@ class Walk:
         """Packets of the data at hand: one block, more where there are very many damaged places."""
         packets = np.empty((size // _SMALLEST_PACKET + 1, scan.COLUMNS), dtype=np.int64)
         halves, words, state = data.view("<u2"), data.view("<u4"), self._state
+        syncs = magic_places(data[:size], scan.SYNC)
         while True:
             state[scan.COUNT] = state[scan.SPANS] = 0
-            scan.scan(data, halves, words, size, is_last, packets, self._spans, state)
+            scan.scan(data, halves, words, syncs, size, is_last, packets, self._spans, state)
             count = int(state[scan.COUNT])
             found = packets[:count].copy()
             for start, end, before in self._spans[: state[scan.SPANS]].tolist():

@@ -7,9 +7,11 @@ header may begin inside it: what lost bytes must not pass for whole.
 
 from typing import Any
 
+import numpy as np
+
 from groundstation.base.compile import compiled
 
-HEADER_BYTES, SECONDARY_BYTES = 24, 12
+HEADER_BYTES, SECONDARY_BYTES, SYNC = 24, 12, 0xEB25
 MOST_BYTES, MOST_COMPUTER_BYTES = 524_288, 134_217_728  # of a packet, by the standard
 LAST_COMPUTER_TYPE = 7
 
@@ -66,11 +68,13 @@ def _is_header(data: Any, at: int, size: int) -> bool:
 
 
 @compiled
-def _header_inside(data: Any, start: int, end: int, size: int) -> int:
+def _header_inside(data: Any, syncs: Any, start: int, end: int, size: int) -> int:
     """Where a header begins between two places; NOWHERE when none does."""
-    for at in range(start, min(end, size - HEADER_BYTES + 1)):
-        if data[at] == 0x25 and _is_header(data, at, size):
-            return at
+    number = np.searchsorted(syncs, start)
+    while number < len(syncs) and syncs[number] < end:
+        if _is_header(data, syncs[number], size):
+            return int(syncs[number])
+        number += 1
     return NOWHERE
 
 
@@ -101,7 +105,9 @@ def _checksum_is_right(data: Any, halves: Any, words: Any, at: int, start: int, 
 
 
 @compiled
-def scan(data: Any, halves: Any, words: Any, size: int, is_last: bool, packets: Any, spans: Any, state: Any) -> None:
+def scan(
+    data: Any, halves: Any, words: Any, syncs: Any, size: int, is_last: bool, packets: Any, spans: Any, state: Any
+) -> None:
     """Find packets from ``state[POSITION]`` on, until data or room run out.
 
     Parameters
@@ -110,6 +116,8 @@ def scan(data: Any, halves: Any, words: Any, size: int, is_last: bool, packets: 
         Its first ``size`` bytes are of the file.
     halves, words : ndarrays of uint16 and uint32
         The same bytes.
+    syncs : ndarray of int64
+        Where the sync pattern stands in ``data``.
     is_last : bool
         Nothing follows in the file; else a packet that reaches beyond the data waits for more.
     packets : ndarray of int64, shape (m, COLUMNS), out
@@ -138,7 +146,7 @@ def scan(data: Any, halves: Any, words: Any, size: int, is_last: bool, packets: 
         is_right = end <= size and has_checksum and _checksum_is_right(data, halves, words, at, body, end)
         is_wrong = has_checksum and not is_right
         if end > size or is_wrong or not (is_right or end == size or _is_header(data, end, size)):
-            inner = _header_inside(data, at + header, end, size)
+            inner = _header_inside(data, syncs, at + header, end, size)
             if inner != NOWHERE:
                 verdict, resume = TORN, inner
             elif end > size:

@@ -32,9 +32,9 @@ def new_state() -> NDArray[np.int64]:
     return state
 
 
-def magic_places(data: NDArray[np.uint8]) -> NDArray[np.int64]:
+def magic_places(data: NDArray[np.uint8], magic: int = MAGIC_BYTES) -> NDArray[np.int64]:
     """Where the two bytes of magic stand: looked for in pairs of bytes at even places, then at odd ones."""
-    even, odd = (data[start:][: (len(data) - start) // 2 * 2].view("<u2") == MAGIC_BYTES for start in (0, 1))
+    even, odd = (data[start:][: (len(data) - start) // 2 * 2].view("<u2") == magic for start in (0, 1))
     places = np.concatenate((2 * np.flatnonzero(even), 2 * np.flatnonzero(odd) + 1))
     places.sort(kind="stable")
     return places
