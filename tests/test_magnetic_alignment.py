@@ -276,7 +276,9 @@ def test_alignment_begins_with_its_event() -> None:
     assert abs(found.aligned_error_deg - ERROR_DEG) < SIGMAS * found.aligned_sigma_deg
     misled = runs_of(mixed, ANY_SPEED).together
     assert misled is not None
-    assert abs(misled.error_deg - ERROR_DEG) > 0.3
+    assert misled.verdict == "reject", "without the command the step is found, and what follows it counts all the same"
+    assert [step.size_deg for step in misled.steps] == pytest.approx([-3.0], abs=0.1)
+    assert abs(misled.error_deg - ERROR_DEG) < 0.3
 
 
 def test_release_ends_the_alignment_and_a_command_not_given_leaves_it_undone() -> None:
