@@ -21,6 +21,7 @@ from groundstation.readers.icd import (
     has_odd_parity,
     labels_of,
     load,
+    named_icd,
     numbered,
     shipped,
     shipped_names,
@@ -432,6 +433,16 @@ def test_shipped_icds_load_without_a_remark(name: str) -> None:
     assert len(found)
     assert found.notes == ()
     assert not [one.name for _holder, one in found.elements() if one.is_by_name]
+
+
+def test_an_icd_is_a_file_or_a_shipped_name(tmp_path: Path) -> None:
+    (tmp_path / "mine").write_text(WORD, encoding="utf-8")
+    assert named_icd("egi") == shipped("egi")
+    assert len(named_icd(str(tmp_path / "mine"))) == 1
+    with pytest.raises(SettingsError, match="no such file"):
+        named_icd("egi.yaml")
+    with pytest.raises(SettingsError, match="arinc429_inertial"):
+        named_icd("egy")
 
 
 def test_an_unknown_shipped_icd_is_refused() -> None:

@@ -186,7 +186,7 @@ def test_every_figure_of_the_report_can_be_had(flight: OpenLog) -> None:
     shown = flight.figure("heading_distribution")
     assert shown._repr_png_().startswith(b"\x89PNG")
     assert shown.axes[0].get_xlabel() == flight.figure("density").axes[0].get_xlabel()
-    with pytest.raises(UsageError, match="one of difference, density"):
+    with pytest.raises(UsageError, match="one of map, profile, attitude"):
         flight.figure("nonsense")
 
 
@@ -297,7 +297,7 @@ def test_what_cannot_be_opened_is_one_line(folder: Path, tmp_path: Path) -> None
     assert len(one.tables["ins"].to_frame()) == 1
     with pytest.raises(NotAssessableError):
         one.heading()
-    assert "Not assessable" in one._repr_html_()
+    assert "No answer" in one._repr_html_()
 
 
 @pytest.mark.parametrize(

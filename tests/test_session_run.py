@@ -170,7 +170,7 @@ def test_a_second_run_does_nothing_and_the_lines_are_the_same(
     assert session["was_finished"] is True
     assert called(*call, "--dry-run") == 0
     (planned,) = [line for line in capsys.readouterr().out.splitlines() if "session" in line]
-    assert planned.endswith(f"finished before  {IDENTITY}  session finished, nothing to do")
+    assert planned.endswith(f"  {IDENTITY}  session finished, nothing to do")
     (copy / IDENTITY / "report.html").unlink()
     assert called(*call, "--dry-run") == 0 and "session to report again" in capsys.readouterr().out
     assert called(*call) == 0

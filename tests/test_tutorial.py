@@ -46,12 +46,12 @@ def expect_nothing_goes_to_stderr(executed: Any) -> None:
 
 def expect_a_flight_shows_its_verdict(executed: Any) -> None:
     card = outputs_of(executed, "flight = groundstation.open(log)")["text/html"]
-    assert "Accept" in card and "enter −1.2°" in card
+    assert "Accept" in card and "Enter −1.2°" in card
     assert card == outputs_of(executed, "again = groundstation.open")["text/html"]
 
 
 def expect_tables_and_figures_are_shown(executed: Any) -> None:
-    assert "precision e of the paper" in outputs_of(executed, 'to_frame("gates")')["text/html"]
+    assert "precision e of Markelov 2015" in outputs_of(executed, 'to_frame("gates")')["text/html"]
     for name in ("density", "growth"):
         assert len(outputs_of(executed, f'figure("{name}")')["image/png"]) > 10_000
 

@@ -27,7 +27,7 @@ def findings(results: FlightResults) -> Section:
     remarks = [item for item in found if item.severity == "info"]
     parts: list[Part] = [_table(grave) if grave else Note("No warnings.", "good")]
     if remarks:
-        parts.append(Note(f"{number(len(remarks), 0)} remarks stand in the appendix."))
+        parts.append(Note(f"{'One remark' if len(remarks) == 1 else f'{len(remarks)} remarks'} in the appendix."))
     return Section("findings", TITLE, LEAD, parts, appendix=(_table(_one_of_each(remarks)),) if remarks else ())
 
 

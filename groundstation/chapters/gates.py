@@ -92,15 +92,23 @@ def setting_facts(settings: Mapping[str, float | str | bool], table: str = "") -
 
     Examples
     --------
-    >>> facts = setting_facts({"taxi_min_s": 20.0, "turn_rate_kind": "slope"}, "heading")
+    >>> facts = setting_facts({"kurtosis.low": -1.2, "kurtosis.high": 2.0, "turn_rate_kind": "slope"}, "heading")
     >>> facts.title, facts.pairs
-    ('Settings: [heading]', [('taxi_min_s', '20', ''), ('turn_rate_kind', '"slope"', '')])
+    ('Settings: [heading]', [('kurtosis', '[-1.2, 2]', ''), ('turn_rate_kind', '"slope"', '')])
     """
-    pairs = [(clean(name), _in_toml(value), "") for name, value in sorted(settings.items())]
+    pairs = [(clean(name), value, "") for name, value in sorted(_in_toml(settings).items())]
     return Facts(f"Settings: [{table}]" if table else "Settings", pairs, compact=True) if pairs else None
 
 
-def _in_toml(value: float | str | bool) -> str:
+def _in_toml(settings: Mapping[str, float | str | bool]) -> dict[str, str]:
+    """Keys and values as typed; a range, kept as its two ends, is an array again."""
+    told = {name: _value(value) for name, value in settings.items()}
+    for low in [name for name in told if name.endswith(".low") and f"{name[:-4]}.high" in told]:
+        told[low[:-4]] = f"[{told.pop(low)}, {told.pop(f'{low[:-4]}.high')}]"
+    return told
+
+
+def _value(value: float | str | bool) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return json.dumps(clean(value), ensure_ascii=False) if isinstance(value, str) else f"{value:.10g}"

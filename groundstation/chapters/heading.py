@@ -1,6 +1,6 @@
 """Chapter: heading correction (system 1): gates, estimates and the figures of the published method (Markelov 2015)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from groundstation.chapters.assessed import reason_of
 from groundstation.chapters.gates import gate_grid, setting_facts
@@ -15,6 +15,7 @@ TITLE = "Heading correction"
 LEAD = "On straight taxi the nose points where the aircraft moves: INS heading − GNSS track is the heading error."
 WORKINGS = ("density", "convergence", "spectrum")
 STANDSTILL_FIGURES = (Figure("standstill.components"), Figure("standstill.mean_speed"))
+AIRCRAFT = "aircraft."  # what begins the names of settings of the aircraft file
 HELD = "The receiver holds its velocity when standing, so its error at standstill cannot be seen."
 UNKNOWN_REASON = "the log does not hold what the method needs"
 USES = {"exclude": "Left out by hand", "force": "Used by hand against the gates"}
@@ -50,7 +51,7 @@ def heading(results: FlightResults) -> Section:
     workings = (
         *(_estimates(answer), _spread(answer), _geometry(answer), _standstill_facts(answer.standstill)),
         *(Figure(f"heading.{name}") for name in WORKINGS),
-        setting_facts(answer.settings, "heading"),
+        *_settings(answer.settings),
     )
     above: tuple[Part, ...] = (*(Note(sentence) for sentence in told.sentences), Facts("", told.figures))
     return Section("heading", TITLE, LEAD, kept(parts), told.line, above, told, kept(workings))
@@ -232,6 +233,13 @@ def _latency(answer: HeadingResult) -> list[tuple[str, str, str]]:
         return []
     value = _with_sigma(answer.latency_used_s, answer.latency_used_sigma_s, 3, "s")
     return [("GNSS latency taken out", value, f"from the {answer.latency_origin}")]
+
+
+def _settings(settings: Mapping[str, float | str | bool]) -> tuple[Facts | None, Facts | None]:
+    """Those of the settings file, and those of the aircraft file."""
+    own = {name: value for name, value in settings.items() if not name.startswith(AIRCRAFT)}
+    aircraft = {name.removeprefix(AIRCRAFT): value for name, value in settings.items() if name.startswith(AIRCRAFT)}
+    return setting_facts(own, "heading"), setting_facts(aircraft, "aircraft")
 
 
 def _by_hand(chosen: Sequence[ChosenInterval]) -> Facts | None:

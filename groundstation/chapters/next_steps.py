@@ -28,9 +28,10 @@ BY_GATE = {
     "ground": ("Record", "weight on wheels"),
     "gnss_rate": ("Record", "GNSS velocity at 10 Hz (now {value})"),
     "drift": ("Check", "the alignment of the INS: let it settle before taxi"),
+    "steps": ("Check", "the alignment of the INS: its heading stepped"),
     "ins_mode": ("Check", "the alignment of the INS: it changed its mode"),
 }
-SURROUNDINGS = ("outliers", "quality", "variance_ratio", "normal_distance", "skewness", "kurtosis")
+SURROUNDINGS = ("outliers", "segments", "quality", "variance_ratio", "normal_distance", "skewness", "kurtosis")
 REFLECTIONS = ("Check", "the taxiway for reflections and gusts")
 # By a part of the reason for which an analysis could not be carried out.
 BY_REASON = (

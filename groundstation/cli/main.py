@@ -199,7 +199,7 @@ def run(
     configuration = applying(settings, apply)
     if dry_run:
         planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo, stations=stations)
-        printing.outcomes(planned, as_json_text=json, quiet=quiet)
+        printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)
         return DONE
     try:
         with listener("none" if quiet else progress) as listen:

@@ -67,11 +67,16 @@ def _every_bus(buses: Sequence[BusWord]) -> str:
 
 
 def outcomes(
-    done: Sequence[Outcome], *, as_json_text: bool = False, quiet: bool = False, with_times: bool = False
+    done: Sequence[Outcome],
+    *,
+    as_json_text: bool = False,
+    quiet: bool = False,
+    with_times: bool = False,
+    is_plan: bool = False,
 ) -> None:
     """Print what became of each log: a line each on stdout, in the order of the logs: log, state, flight, answer.
 
-    On stderr what was skipped, by reason, then failures, then totals.
+    On stderr what was skipped, by reason, then failures, then totals. Of a plan there is no state and no total.
     """
     if as_json_text:
         typer.echo(as_json([_plain(outcome) for outcome in done]))
@@ -80,6 +85,7 @@ def outcomes(
     for name, outcome in zip(names, done, strict=True):
         if outcome.state not in ("failed", "skipped") and not quiet:
             state = "finished before" if outcome.was_finished else _LINE_WORDS[outcome.state]
+            state = "" if is_plan else state
             typer.echo("  ".join(printable(part) for part in (name, state, outcome.flight_id, outcome.text) if part))
         if with_times and outcome.times_s:
             spent = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in outcome.times_s.items())
@@ -92,7 +98,7 @@ def outcomes(
             typer.echo(f"error: {printable(outcome.text)}", err=True)
             if with_times and outcome.trace:
                 typer.echo(outcome.trace, err=True)
-    if len(done) > 1 and not quiet:
+    if len(done) > 1 and not quiet and not is_plan:
         typer.echo(totals(done), err=True)
 
 

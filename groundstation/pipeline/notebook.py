@@ -224,6 +224,7 @@ class OpenFlight(ABC):
 
         told = front(self._saved().results)
         rows = [(name, value if isinstance(value, str) else value.text) for name, value in told.pairs]
+        rows.insert(0, ("Flight", told.title))
         if told.verdict is not None:
             rows.insert(0, ("Verdict", told.verdict.text))
         rows += [(name, f"{value}, {remark}" if remark else value) for name, value, remark in told.figures]

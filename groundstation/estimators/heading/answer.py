@@ -139,6 +139,7 @@ def _judged_figures(
         precision_deg=float(running.precision_deg[-1]),
         quality_deg=float(running.quality_deg[-1]),
         half_width_deg=0.5 * (error.measured_deg[1] - error.measured_deg[0]),
+        whole_half_width_deg=0.5 * (error.whole_deg[1] - error.whole_deg[0]),
         taxi_seconds=float(sum(part.end_s - part.start_s + interval_s for part in solution.segments)),
         normality=normality(solution.difference_deg),
         variance=variance_ratio(used, assessed, settings.sway_line_s),

@@ -189,10 +189,10 @@ class ErrorPosterior:
         index = np.minimum(np.searchsorted(np.cumsum(self.weight), places), len(self.weight) - 1)
         return np.asarray(self.parameters[index])
 
-    def draws_of_one_piece(self, count: int = 40) -> FloatArray:
-        """The same, the parts of a run taken to have nothing of their own: what they say against each other shows."""
+    def draws_of_ordinary_parts(self, count: int = 40) -> FloatArray:
+        """The same, parts of a run taken to have no more of their own than usual: what they say beyond that shows."""
         draws = self.even_draws(count)
-        draws[:, SPREAD] = NO_SPREAD
+        draws[:, SPREAD] = PRIOR_MEAN[np.array(SPREAD)]
         return draws
 
 
@@ -310,26 +310,26 @@ def error_posterior(
     """
     count = len(differences.time_s)
     checkpoints = np.unique(np.linspace(min(2, count), count, growth).astype(np.int64))
-    target = _Target(standstill, differences)
+    target = _Target(standstill, without_apart(differences))
     scale = PRIOR_SIGMA[target.free]
     mode, has_converged = find_mode(target.log_density, _start(differences, standstill)[target.free], scale)
     points, weight = sample(target.log_density, mode, scale, draws, np.random.default_rng(seed))
     kept = weight > 1e-5 / len(weight)
     points, weight = target.whole(points[kept]), weight[kept] / weight[kept].sum()
-    _log_density, coefficients, variance = target.evaluate(points, target.last)
+    _log_density, coefficients, variance = target.evaluate(points, checkpoints)
     coefficients[:, 0] += target.reference_deg
-    sigma = np.sqrt(np.maximum(variance[:, -1, :], 1e-18))
-    measured = _Target(standstill, without_apart(differences)).evaluate(points, checkpoints)[2][:, :, 0]
-    measured_sigma = np.sqrt(np.maximum(measured, 1e-18))
+    measured = np.sqrt(np.maximum(variance, 1e-18))
+    # The terms told apart widen the interval and do not move the number: from a few directions they would extrapolate.
+    whole = _Target(standstill, differences).evaluate(points, target.last)[2][:, -1, 0]
     return ErrorPosterior(
         mean_deg=coefficients[:, 0],
-        sigma_deg=sigma[:, 0],
-        measured_sigma_deg=measured_sigma[:, -1],
+        sigma_deg=np.maximum(np.sqrt(np.maximum(whole, 1e-18)), measured[:, -1, 0]),
+        measured_sigma_deg=measured[:, -1, 0],
         weight=weight,
         coefficients=coefficients,
-        coefficient_sigma=sigma,
+        coefficient_sigma=measured[:, -1, :],
         growth_samples=checkpoints,
-        growth_sigma_deg=measured_sigma,
+        growth_sigma_deg=measured[:, :, 0],
         parameters=points,
         effective_draws=float(1.0 / np.sum(weight**2)),
         has_converged=has_converged,

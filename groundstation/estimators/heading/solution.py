@@ -144,7 +144,7 @@ def solve(
     weight = sample_weights(differences, posterior.typical())
     current = np.where(used.time_s >= max((step.time_s for step in steps), default=-np.inf), weight, 0.0)
     reference_time_s = float(np.sum(current * used.time_s) / np.sum(current)) if current.any() else steps[-1].time_s
-    draws = posterior.draws_of_one_piece(DRAWS_FOR_PARTS)
+    draws = posterior.draws_of_ordinary_parts(DRAWS_FOR_PARTS)
     drift, drift_sigma = _drift(thinned, reference_time_s, draws)
     segments = tuple(_segment(differences, used, used.segment == number, draws) for number in np.unique(used.segment))
     full_weight = np.zeros(len(samples))

@@ -12,7 +12,7 @@ from groundstation.estimators.heading.wording import told
 from groundstation.results.heading import Gate, HeadingStep, Sense, Standstill, Verdict
 
 # Required gates whose failure more data may cure; the failure of any other required gate rejects.
-CURED_BY_MORE_DATA = frozenset({"standstill_duration", "taxi_seconds", "precision", "half_width"})
+CURED_BY_MORE_DATA = frozenset({"standstill_duration", "taxi_seconds", "precision", "half_width", "whole_half_width"})
 STANDSTILL_GATE = "standstill_speed_of_mean"
 
 
@@ -23,6 +23,7 @@ class Figures:
     precision_deg: float
     quality_deg: float
     half_width_deg: float
+    whole_half_width_deg: float
     taxi_seconds: float
     normality: Normality | None
     variance: VarianceRatio | None
@@ -193,6 +194,14 @@ def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings) -
             figures.half_width_deg,
             high=settings.half_width_max_deg,
             unit="deg",
+        ),
+        _gate(
+            "whole_half_width",
+            "the same with steady sideslip and mounting",
+            figures.whole_half_width_deg,
+            high=settings.whole_half_width_max_deg,
+            unit="deg",
+            required=settings.whole_decides,
         ),
     )
 

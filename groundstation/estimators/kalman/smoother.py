@@ -78,7 +78,8 @@ def _history(run: FilterRun) -> tuple[States, Dynamics, Schedule, Lines, Record,
     if not len(run.x) == len(run.P) == n or len(run.record.K) != len(run.measurements):
         raise ValueError("smoothing needs states, covariances and gains: run the filter with them kept")
     size, channels = run.x.shape[1:]
-    room = Back(np.zeros((channels, size)), *(np.zeros((size, size)) for _ in range(3)), np.zeros(size))
+    A, C, w = (np.zeros((size, size)) for _ in range(3))
+    room = Back(np.zeros((channels, size)), A, C, w, np.zeros(size))
     return run.transition.states, run.transition.dynamics, run.schedule, run.measurements.lines, run.record, room
 
 

@@ -96,7 +96,8 @@ def named_icd(name: str) -> Icd:
     SettingsError
         As :func:`load`, and for a name that is neither.
     """
-    return load(Path(name)) if name not in shipped_names() or Path(name).is_file() else shipped(name)
+    path = Path(name)
+    return load(path) if path.suffix or path.is_file() else shipped(name)
 
 
 @dataclass
