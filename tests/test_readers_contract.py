@@ -80,6 +80,9 @@ def test_hand_written_logs(tmp_path: Path, text: str, monkeypatch: pytest.Monkey
         "damaged/log_220502_095923______.csv",
         "fixedwing/umn_thor_flight75.csv",
         "inertial/gv_ff02.csv",
+        "ch10/kc135_429_1553_1MB.c10",
+        "ch10/iliad_1553.c10",
+        "damaged/bad.c10",
     ],
 )
 def test_recorded_logs(name: str) -> None:
