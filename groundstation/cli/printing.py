@@ -104,8 +104,14 @@ def outcomes(
 
 def _names(done: Sequence[Outcome]) -> list[str]:
     """Logs by the names of their files; by their paths where two files have one name."""
-    files = [PurePath(outcome.source).name if not outcome.is_session else outcome.source for outcome in done]
+    files = [outcome.source if outcome.is_session else _log_name(outcome.source) for outcome in done]
     return [file if files.count(file) == 1 else outcome.source for file, outcome in zip(files, done, strict=True)]
+
+
+def _log_name(source: str) -> str:
+    """Name of a log's file; of a bag of ROS 2, which is opened by its metadata, that of its folder."""
+    path = PurePath(source)
+    return path.parent.name or path.name if path.name == "metadata.yaml" else path.name
 
 
 def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:

@@ -134,7 +134,7 @@ def _standstill_gates(standstill: Standstill | None, settings: HeadingSettings) 
         ),
         _gate(
             "standstill_bound97",
-            "its 0.97 bound, from the effective number of samples",
+            "0.97 bound of the mean speed at standstill, by the effective number of samples",
             None if seen is None else seen.speed_bound97_mps,
             high=settings.speed_of_mean_max_mps,
             unit="m/s",
@@ -197,7 +197,7 @@ def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings) -
         ),
         _gate(
             "whole_half_width",
-            "the same with steady sideslip and mounting",
+            "half width with steady sideslip and mounting",
             figures.whole_half_width_deg,
             high=settings.whole_half_width_max_deg,
             unit="deg",
