@@ -119,7 +119,7 @@ def test_tables_are_subscripted_and_short_when_printed(flight: OpenLog) -> None:
 
 def test_an_unknown_name_is_told_with_those_near_to_it(flight: OpenLog) -> None:
     for ask in (lambda: flight.tables["ins"]["roll"], lambda: flight.tables["ins"].values("roll")):
-        with pytest.raises(UsageError, match=r"^table ins: found no .roll., expected one of roll_deg, roll_sigma_deg$"):
+        with pytest.raises(UsageError, match=r"^table ins: found no .roll., expected (one of )?roll_deg"):
             ask()
     for ask in (lambda: flight.tables["gns"], lambda: flight.flight["gns"]):
         with pytest.raises(UsageError, match="found no 'gns', expected gnss"):

@@ -218,7 +218,7 @@ def test_a_landing_is_planned_into_a_folder_with_its_answer_in_a_line(tmp_path: 
         one.name for one in (folder / "tables").iterdir()
     }
     recording = Contents(folder / "mine.rrd")
-    assert {"/landing/aircraft/now", "/landing/ranges", "/landing_ranges/error_up"} <= set(recording.batches)
+    assert {"/landing/aircraft/now", "/landing/ranges", "/landing_ranges/error_up/b_errors"} <= set(recording.batches)
     assert sum(path.startswith("/landing/corridor/") for path in recording.fixed) == 3
 
 

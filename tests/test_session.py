@@ -431,6 +431,7 @@ def test_view_takes_a_session_folder(out: Path, monkeypatch: pytest.MonkeyPatch)
         return 0
 
     monkeypatch.setattr(launch, "open_viewer", open_viewer)
+    monkeypatch.setenv("DISPLAY", ":0")
     assert called("view", out / IDENTITY) == 0
     assert opened == [out / IDENTITY / f"{IDENTITY}.rrd"]
 

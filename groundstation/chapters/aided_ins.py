@@ -31,7 +31,7 @@ def aided(answer: InertialResult) -> Section:
 def _claim(answer: InertialResult, headline: str) -> Claim:
     rows = [row for row in (answer.difference("position"), answer.difference("velocity")) if row is not None]
     figures = tuple(
-        (f"INS − GNSS, {row.quantity}", number(row.p95, PLACES.get(row.unit, 3), unit_sign(row.unit)), "95 %")
+        (f"INS − GNSS, {row.quantity}", number(row.p95, PLACES.get(row.unit, 3) - 1, unit_sign(row.unit)), "95 %")
         for row in rows
     )
     reason = typeset(answer.kind_reason).strip().rstrip(".")
