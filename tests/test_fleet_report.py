@@ -295,6 +295,7 @@ def test_many_flights_become_bands(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert (tmp_path / PAGE).stat().st_size < lines
 
 
+@pytest.mark.slow
 def test_ten_thousand_flights_stay_usable(tmp_path: Path) -> None:
     """Measured: 3.5 s and 6.9 MB with forty aircraft; the limit here is of size and rows alone, machines differ."""
     fleet = fleet_of(10_000, [f"A{number}" for number in range(40)], samples=40)

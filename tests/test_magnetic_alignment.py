@@ -376,6 +376,7 @@ def test_gyros_count_where_they_know_more_than_the_prior(vertical: float, sigma:
 # Honest, and in a whole flight
 
 
+@pytest.mark.slow
 def test_truth_lies_within_the_sigma_as_often_as_it_should() -> None:
     """Of 40 flights of the family at least 85 % inside two sigma, 95 % expected; both together know more than taxi."""
     family = MagneticFamilySettings(figures=1, straights=0, turn_deg=30.0)

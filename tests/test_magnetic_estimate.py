@@ -141,6 +141,7 @@ def test_turning_the_world_reordering_topics_and_shifting_time_change_nothing() 
 # Honest
 
 
+@pytest.mark.slow
 def test_coverage_over_forty_flights() -> None:
     """A to E within 3 sigma, held-out mean within 2, over irons of 1500 nT and 0.02, seeds 1000 to 1039."""
     within3: list[bool] = []

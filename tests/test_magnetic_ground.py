@@ -200,6 +200,7 @@ def test_every_run_and_the_curve_come_back_without_noise() -> None:
     assert np.all(np.abs(line["error_deg"] - expected) < 3.0 * line["sigma_deg"])
 
 
+@pytest.mark.slow
 def test_sigma_covers_the_truth() -> None:
     """100 logs (seeds 1 to 100) with their own deviation, noise, place errors and declination error."""
     scores, runs = [], []

@@ -171,6 +171,7 @@ def bucket(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     server.stop()
 
 
+@pytest.mark.slow
 def test_a_cluster_loses_nothing_when_a_worker_is_killed(bucket: str, logs: Path, whole: Path, tmp_path: Path) -> None:
     from distributed import LocalCluster
 
