@@ -42,7 +42,7 @@ def _is_ours(source: Source) -> bool:
     """Whether groundstation wrote an MCAP: the store reads it."""
     from groundstation.store.recognition import is_groundstation_mcap
 
-    return is_groundstation_mcap(source.head)
+    return is_groundstation_mcap(source.head) or is_groundstation_mcap(source.path)  # the second: by what is left of it
 
 
 def is_bag_folder(folder: Path) -> bool:
