@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import Damage, RecordBatch
+from groundstation.base.signals import BUS_PREFIX
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.log import Log, as_log, open_log
 from groundstation.store.info import StoreInfo
@@ -80,24 +81,35 @@ def describe(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()
 def _recorded(log: Log) -> Description:
     from groundstation.integrity.ledger_findings import ledger_findings
     from groundstation.integrity.survey import survey
-    from groundstation.readers.chapter10.contents import BusContents
 
     items = log.replay()
     found = survey(items)
+    ledger = found.ledger.document()
     fields: dict[str, dict[str, None]] = {}
-    buses = BusContents()
+    buses = _bus_contents(ledger)
     for item in items:
-        buses.add(item)
+        if buses is not None:
+            buses.add(item)
         if isinstance(item, RecordBatch):
             fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
-    ledger = found.ledger.document()
     facts = facts_of(log, dict(found.header.metadata), ledger)
     lost = any(damage.loses_data for damage in found.damages)
     return Description(facts, _topics(ledger, fields), ledger_findings(found.ledger), lost, _buses(buses, log))
 
 
-def _buses(contents: "BusContents", log: Log) -> tuple[BusWord, ...]:
+def _bus_contents(ledger: Ledger) -> "BusContents | None":
+    """What counts the words on the buses; None of a log that has none, which then needs no numba either."""
+    if not any(topic.startswith(BUS_PREFIX) for topic in ledger.topics):
+        return None
+    from groundstation.readers.chapter10.contents import BusContents
+
+    return BusContents()
+
+
+def _buses(contents: "BusContents | None", log: Log) -> tuple[BusWord, ...]:
     """What is on the buses, in the order of the channels."""
+    if contents is None:
+        return ()
     from groundstation.readers.chapter10.contents import named_by
 
     return tuple(
@@ -136,14 +148,14 @@ def suggest_icd(path: Path) -> str:
 
 def _stored(log: Log) -> Description:
     from groundstation.pipeline.one_flight.convert import damage_finding
-    from groundstation.readers.chapter10.contents import BusContents
     from groundstation.store.reader import read_info
 
     info = read_info(log.path)
     fields: dict[str, dict[str, None]] = {}
-    damages, buses = [], BusContents()
+    damages, buses = [], _bus_contents(info.ledger)
     for item in log.items():
-        buses.add(item)
+        if buses is not None:
+            buses.add(item)
         if isinstance(item, RecordBatch):
             fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
         elif isinstance(item, Damage):
