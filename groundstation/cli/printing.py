@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import Any
 
 import typer
 
 from groundstation.chapters.terminal import columns
 from groundstation.cli.text import as_json, printable
+from groundstation.pipeline.one_flight.log import log_name
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
 from groundstation.pipeline.verbs.describe import BusWord, Description
 
@@ -104,14 +105,8 @@ def outcomes(
 
 def _names(done: Sequence[Outcome]) -> list[str]:
     """Logs by the names of their files; by their paths where two files have one name."""
-    files = [outcome.source if outcome.is_session else _log_name(outcome.source) for outcome in done]
+    files = [outcome.source if outcome.is_session else log_name(Path(outcome.source)) for outcome in done]
     return [file if files.count(file) == 1 else outcome.source for file, outcome in zip(files, done, strict=True)]
-
-
-def _log_name(source: str) -> str:
-    """Name of a log's file; of a bag of ROS 2, which is opened by its metadata, that of its folder."""
-    path = PurePath(source)
-    return path.parent.name or path.name if path.name == "metadata.yaml" else path.name
 
 
 def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:
