@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.base.timescales import GPS_EPOCH_NS, iso_to_utc_ns
 from groundstation.base.units import MPS_PER_KNOT, NS_PER_S
 from groundstation.readers.receiver.layouts import layout
 from groundstation.readers.receiver.novatel_messages import LAYOUTS as NOVATEL_LAYOUTS
@@ -15,7 +15,6 @@ from groundstation.readers.receiver.scan import crc_tables
 from groundstation.readers.receiver.ubx_messages import LAYOUTS
 
 LEAP_S = 18
-GPS_EPOCH_NS = iso_to_utc_ns("1980-01-06T00:00:00Z")[0]
 _CODES_OF = """
     NAV-PVT=0107 NAV-PVAT=0117 NAV-DOP=0104 NAV-HPPOSLLH=0114 NAV-RELPOSNED=013C NAV-ATT=0105 NAV-POSLLH=0102
     NAV-VELNED=0112 NAV-TIMEGPS=0120 NAV-STATUS=0103 ESF-INS=1015

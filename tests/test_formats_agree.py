@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from groundstation.base.angles import wrap_180
-from groundstation.base.timescales import iso_to_utc_ns, utc_ns_to_iso
+from groundstation.base.timescales import GPS_EPOCH_NS, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
@@ -35,7 +35,6 @@ from tests.ulog_writer import ATTITUDE, GPS, GPS_CODE, UlogWriter
 
 BOOT_US = 5_000_000  # both autopilots have run for five seconds when the log begins
 GPS_UTC_LEAP_NS = 18 * NS_PER_S
-GPS_EPOCH_NS = iso_to_utc_ns("1980-01-06T00:00:00Z")[0]
 LOCAL = (
     "vehicle_local_position:uint64_t timestamp;float vx;float vy;float vz;bool v_xy_valid;bool v_z_valid;"
     "uint8_t[2] _padding0;"

@@ -136,6 +136,7 @@ _LEAP_SECONDS = (
     ("2017-01-01", 18),
 )
 _GPS_EPOCH_S = 315_964_800  # 1980-01-06, seconds since 1970
+GPS_EPOCH_NS = _GPS_EPOCH_S * NS_PER_S
 _S_PER_WEEK = 604_800
 
 
@@ -179,5 +180,5 @@ def gps_to_utc_ns(gps_ns: NDArray[np.int64]) -> NDArray[np.int64]:
     >>> utc_ns_to_iso(int(gps_to_utc_ns(np.array([iso_to_utc_ns("2025-08-28T17:30:39.749Z")[0]]))[0]))
     '2025-08-28T17:30:21.749Z'
     """
-    week_ms, rest_ns = np.divmod(np.asarray(gps_ns, dtype=np.int64) - _GPS_EPOCH_S * NS_PER_S, 1_000_000)
+    week_ms, rest_ns = np.divmod(np.asarray(gps_ns, dtype=np.int64) - GPS_EPOCH_NS, 1_000_000)
     return np.asarray(gps_week_to_utc_ns(0, week_ms) + rest_ns, dtype=np.int64)

@@ -20,9 +20,9 @@ from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.records import MAX_BATCH_ROWS, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
-from groundstation.base.timescales import gps_week_to_utc_ns, iso_to_utc_ns
+from groundstation.base.timescales import GPS_EPOCH_NS, gps_week_to_utc_ns, iso_to_utc_ns
 from groundstation.base.units import ARCMIN_PER_DEG, DEG_PER_RAD, MPS2_PER_G, NS_PER_S
-from groundstation.readers.receiver.times import GPS_EPOCH_NS, calendar_ns, unrolled
+from groundstation.readers.receiver.times import calendar_ns, unrolled
 from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Claim, Source
 

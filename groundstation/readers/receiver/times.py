@@ -10,14 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.records import BoolArray, Column, Int64Array
-from groundstation.base.timescales import gps_week_to_utc_ns, iso_to_utc_ns
+from groundstation.base.timescales import GPS_EPOCH_NS, gps_week_to_utc_ns
 from groundstation.base.units import NS_PER_S
 
 WEEK_MS = 604_800_000
 DAY_NS = 86_400 * NS_PER_S
 NS_PER_MS = 1_000_000
 BEFORE_FIRST_NS = 3_600 * NS_PER_S  # a time so long before the first full one is a counter that was not set yet
-GPS_EPOCH_NS = iso_to_utc_ns("1980-01-06T00:00:00Z")[0]
 _MOST_LEAPS_MS = 60_000
 
 
@@ -96,6 +95,7 @@ def fine_utc_ns(utc_ns: Int64Array, week_ms: Int64Array) -> tuple[Int64Array, In
     --------
     A receiver that has no almanac yet and takes 16 leap seconds for 18:
 
+    >>> from groundstation.base.timescales import iso_to_utc_ns
     >>> told, _zone = iso_to_utc_ns("2025-08-28T17:30:23.749542955Z")
     >>> utc_ns, wrong_s = fine_utc_ns(np.array([told]), np.array([408_639_750]))
     >>> int(utc_ns[0]) - told, wrong_s.tolist()
