@@ -9,6 +9,7 @@ from groundstation.base.local_frame import plane_through
 from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.cooperative import REFERENCE, title_of, trusted
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.results.cooperative import CooperativeResult
@@ -50,7 +51,7 @@ def session_map(results: FlightResults) -> Drawing | None:
     when = "at the end" if _is_crowd(answer) else f"at {ELLIPSES} times"
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 18, 12, 174, 104)
+        axes = layout.place(figure, 18, 12, 174, 104)
         for name, colour in zip(answer.vehicle_names, _colours(answer), strict=True):
             mine = np.flatnonzero(vehicle == name)
             if not len(mine):
@@ -62,18 +63,18 @@ def session_map(results: FlightResults) -> Drawing | None:
                 drawn = (plane[row, :2] + larger * ellipses[row]) / M_PER_KM
                 d.line(axes, drawn[:, 1], drawn[:, 0], colour, 0.6)
             if _is_crowd(answer):
-                d.beside(axes, east[0], north[0], d.label(name, 12), colour, axes.transData, "center")
+                layout.beside(axes, east[0], north[0], d.label(name, 12), colour, axes.transData, "center")
         if stations is not None:
             points = _places(stations) if origin is None else origin.from_ecef_m(_places(stations))
             axes.plot(points[:, 1] / M_PER_KM, points[:, 0] / M_PER_KM, "^", color=d.INK, markersize=4.0)
             for point, name in zip(points, texts(stations, "name"), strict=True):
                 text = d.label(str(name), 16)
-                d.beside(axes, point[1] / M_PER_KM, point[0] / M_PER_KM, text, d.INK, axes.transData, "center")
+                layout.beside(axes, point[1] / M_PER_KM, point[0] / M_PER_KM, text, d.INK, axes.transData, "center")
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_xlabel("east, km")
         axes.set_ylabel("north, km")
         if not _is_crowd(answer):
-            d.legend_above(axes, 10)
+            layout.legend_above(axes, 10)
 
     size = f", drawn {larger} times their size" if larger > 1 else ""
     caption = (
@@ -130,7 +131,7 @@ def errors(results: FlightResults) -> Drawing | None:
     def paint(figure: Any) -> None:
         for number, name in enumerate(shown):
             left, top = 14 + 90 * (number % 2), height - 8 - PANEL_MM * (number // 2)
-            axes = d.place(figure, left, top - PANEL_MM + 10, left + 72, top)
+            axes = layout.place(figure, left, top - PANEL_MM + 10, left + 72, top)
             mine, reckoned = ((vehicle == name) & (of == which) for which in (algorithm, REFERENCE))
             axes.fill_between(time_s[mine], 0.0, bound[mine], color=d.FILL, linewidth=0, label="2σ_r")
             d.line(axes, time_s[reckoned], bound[reckoned], d.FAINT, 0.8, label="2σ_r without ranges")
@@ -138,9 +139,9 @@ def errors(results: FlightResults) -> Drawing | None:
                 d.line(axes, time_s[mine], error[mine], d.INS, 1.0, label="error")
             axes.set_ylim(0.0, _ceiling(bound[mine], error[mine]))
             axes.set_ylabel(f"{d.label(name, 12)}, m")
-            d.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number >= len(shown) - 2, most=6)
+            layout.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number >= len(shown) - 2, most=6)
             if not number:
-                d.legend_above(axes, 3)
+                layout.legend_above(axes, 3)
 
     more = len(answer.vehicle_names) - len(shown)
     caption = (
@@ -188,7 +189,7 @@ def geometry(results: FlightResults) -> Drawing | None:
     def paint(figure: Any) -> None:
         for number, (column, title) in enumerate(columns):
             top = height - 8 - 42 * number
-            axes = d.place(figure, 18, top - 34, 174, top)
+            axes = layout.place(figure, 18, top - 34, 174, top)
             for name, (colour, told) in styles.items():
                 mine = vehicle == name
                 when, values = d.broken_at_gaps(time_s[mine], numbers(data, column)[mine])
@@ -198,9 +199,9 @@ def geometry(results: FlightResults) -> Drawing | None:
             if column == "hdop" and known.size and known.max() > 20.0 * np.median(known):
                 axes.set_yscale("log")
                 plain_log(axes.yaxis, (1.0,))
-            d.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number == len(columns) - 1)
+            layout.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number == len(columns) - 1)
             if not number:
-                d.legend_above(axes, 10)
+                layout.legend_above(axes, 10)
 
     caption = (
         "Geometry of the sources that each aircraft hears in a frame: dilution, and determinant and least eigenvalue "
@@ -223,7 +224,7 @@ def links(results: FlightResults) -> Drawing | None:
     ceiling = float(np.clip(1.1 * far.max(initial=3.0), 4.0, 12.0))
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 18, 12, 174, 56)
+        axes = layout.place(figure, 18, 12, 174, 56)
         if _is_crowd(answer):
             d.dots(axes, time_s[mark > 0], np.clip(normal[mark > 0], -ceiling, ceiling), d.INS, label="used")
         for name, colour in () if _is_crowd(answer) else zip(answer.vehicle_names, _colours(answer), strict=True):
@@ -232,12 +233,12 @@ def links(results: FlightResults) -> Drawing | None:
         gated = mark <= 0
         if gated.any():
             d.dots(axes, time_s[gated], np.clip(normal[gated], -ceiling, ceiling), d.LIMIT, 3.0, label="gated")
-        d.limit_line(axes, NORMAL_95, "95 %")
-        d.limit_line(axes, -NORMAL_95, "")
+        layout.limit_line(axes, NORMAL_95, "95 %")
+        layout.limit_line(axes, -NORMAL_95, "")
         axes.set_ylim(-1.05 * ceiling, 1.05 * ceiling)
         axes.set_ylabel("residual over its sigma")
-        d.time_axis(axes, float(time_s.min()), float(time_s.max()))
-        d.legend_above(axes, 10)
+        layout.time_axis(axes, float(time_s.min()), float(time_s.max()))
+        layout.legend_above(axes, 10)
 
     caption = (
         f"Residuals of the ranges over their computed sigma, {title_of(answer.default_algorithm)}"

@@ -8,6 +8,7 @@ import numpy as np
 from groundstation.base.geodesy import north_east_m
 from groundstation.chapters.wording import number, words
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.flight import FlightResults
@@ -43,9 +44,9 @@ def track_map(results: FlightResults) -> Drawing | None:
 
     def paint(figure: Any) -> None:
         right = 86.0 if zoom else 174.0
-        _map(d.place(figure, 16, 12, right, 84), north, east, used, "Whole flight" if zoom else "")
+        _map(layout.place(figure, 16, 12, right, 84), north, east, used, "Whole flight" if zoom else "")
         if zoom:
-            _map(d.place(figure, 104, 12, 174, 84), north[taxi], east[taxi], used[taxi], "Taxi")
+            _map(layout.place(figure, 104, 12, 174, 84), north[taxi], east[taxi], used[taxi], "Taxi")
 
     start = f"{number(origin[0], 5, '°')}, {number(origin[1], 5, '°')}"
     caption = f"Ring: start ({start})." + (
@@ -124,7 +125,7 @@ def profile(results: FlightResults) -> Drawing | None:
 
     def paint(figure: Any) -> None:
         base = 12.0 + lane_mm
-        places = [d.place(figure, 30, base + 35 * row, 174, base + 35 * row + 31) for row in range(len(panels))]
+        places = [layout.place(figure, 30, base + 35 * row, 174, base + 35 * row + 31) for row in range(len(panels))]
         for axes, (column, text, colour) in zip(reversed(places), panels, strict=True):
             if phases is not None:
                 d.spans(
@@ -133,12 +134,12 @@ def profile(results: FlightResults) -> Drawing | None:
             values = numbers(data, column)
             d.line(axes, time, values, colour, 1.0)
             axes.set_ylabel(text)
-            d.time_axis(axes, low, high, title=axes is places[0] and not states)
-        d.legend_above(places[-1])
+            layout.time_axis(axes, low, high, title=axes is places[0] and not states)
+        layout.legend_above(places[-1])
         if states and gnss is not None:
-            strip = d.place(figure, 30, 12, 174, 9 + lane_mm)
+            strip = layout.place(figure, 30, 12, 174, 9 + lane_mm)
             d.lanes(strip, numbers(gnss, "start_s"), numbers(gnss, "end_s"), texts(gnss, "state"), states, GNSS_COLOURS)
-            d.time_axis(strip, low, high)
+            layout.time_axis(strip, low, high)
 
     names = tuple(name for name in ("overview", "phases", "gnss_lanes") if results.figure_with_rows(name) is not None)
     caption = "Ground: phase of flight." + (" Lanes: usability of GNSS." if states else "")
@@ -171,7 +172,7 @@ def attitude(results: FlightResults) -> Drawing | None:
 
     def paint(figure: Any) -> None:
         for place, (names, unit) in enumerate(reversed(panels)):
-            axes = d.place(figure, 30, 12 + 36 * place, 174, 42 + 36 * place)
+            axes = layout.place(figure, 30, 12 + 36 * place, 174, 42 + 36 * place)
             for name, colour in zip(names, (d.INS, d.GNSS), strict=True):
                 values = numbers(data, name)
                 if np.isfinite(values).any():
@@ -179,8 +180,8 @@ def attitude(results: FlightResults) -> Drawing | None:
                     text = words(name.removesuffix("_deg"))
                     d.line(axes, numbers(data, "time_s"), shown, colour, 0.9, label=text)
             axes.set_ylabel(unit)
-            d.time_axis(axes, float(times.min()), float(times.max()), title=place == 0)
-            d.legend_above(axes)
+            layout.time_axis(axes, float(times.min()), float(times.max()), title=place == 0)
+            layout.legend_above(axes)
 
     alt = "Roll, pitch and heading over flight time."
     return Drawing("Attitude", "", alt, d.draw("attitude", height, paint), ("overview",))
@@ -204,9 +205,9 @@ def states(results: FlightResults) -> Drawing | None:
     colours = dict.fromkeys(rows, d.INS) | STATE_COLOURS
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 44, 12, 174, height - 2)
+        axes = layout.place(figure, 44, 12, 174, height - 2)
         d.lanes(axes, start[shown], end[shown], named[shown], rows, colours)
-        d.time_axis(axes, min(float(times.min()), 0.0), float(times.max()))
+        layout.time_axis(axes, min(float(times.min()), 0.0), float(times.max()))
 
     flags = [name for name in dict.fromkeys(lane.tolist()) if name not in ("mode", "arming")]
     caption = "What the log itself says of flight mode and arming"
