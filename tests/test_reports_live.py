@@ -9,6 +9,7 @@ import numpy as np
 
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
+from groundstation.reports.frames import TIME
 from groundstation.reports.live import Panel, page_data
 
 TIME_S = np.arange(0.0, 100.0)
@@ -81,6 +82,32 @@ def test_a_map_and_an_axis_of_names_stay_pictures() -> None:
         d.line(layout.place(figure, 16, 12, 174, 50), [0.0, 2.0, 1.0], [0.0, 1.0, 2.0], d.INS)
 
     assert panels(a_map) == panels(names) == panels(backwards) == ()
+
+
+def test_the_frame_of_a_picture_is_where_its_axes_stand() -> None:
+    def a_map(figure: Any) -> None:
+        axes, bar = layout.place(figure, 16, 12, 150, 50), layout.place(figure, 156, 12, 160, 50)
+        axes.set_aspect("equal", adjustable="datalim")
+        filled = axes.contourf([0.0, 100.0], [0.0, 100.0], [[1.0, 2.0], [3.0, 4.0]])
+        figure.colorbar(filled, cax=bar)
+        d.tell(axes, TIME_S, np.where(TIME_S < 90.0, TIME_S, np.nan), TIME_S + 7.0, TIME)
+        axes.set_xlabel("east, m")
+
+    def names(figure: Any) -> None:
+        axes = layout.place(figure, 60, 12, 174, 50)
+        axes.plot([1.0], [0.0], "o")
+        axes.set_yticks([0.0], ["whole run"])
+
+    (frame,) = d.draw("test", 60, a_map).frames
+    assert np.allclose((frame.left_mm, frame.bottom_mm, frame.width_mm, frame.height_mm), (16, 12, 134, 38))
+    assert (frame.x_title, frame.names) == ("east, m", ())
+    wide, high = (np.ptp(limits) for limits in (frame.x_range, frame.y_range))
+    assert np.isclose(wide / high, 134 / 38)  # equal scales
+    assert frame.samples is not None and frame.samples.value.tolist() == (TIME_S[:90] + 7.0).tolist()
+    assert d.draw("test", 60, names).frames[0].names == ((0.0, "whole run"),)
+    page = json.loads(page_data([], [(frame,)]))
+    x, y, value = (page["arrays"][place] for place in page["pictures"][0][0]["samples"])
+    assert (x == y, x == value) == (True, False) and page["pictures"][0][0]["of"] == TIME
 
 
 def test_a_broken_time_axis_has_a_panel_for_each_run() -> None:

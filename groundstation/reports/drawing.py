@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from groundstation.chapters.parts import Part
 from groundstation.chapters.wording import clean
+from groundstation.reports.frames import MM_PER_INCH, Samples, frames_of
 from groundstation.reports.live import Svg, panels_of
 
 WIDTH_MM = 178.0  # the printable width of A4
 MAX_POINTS = 5000
-MM_PER_INCH = 25.4
 DOT_LENGTH = 1e-9  # of the span of all; a PNG shows no strokes of no length
 
 # Okabe and Ito (2008), colour-blind safe. One meaning, one colour, in every figure.
@@ -181,7 +181,8 @@ def draw(key: str, height_mm: float, paint: Callable[[Any], None], width_mm: flo
         paint(figure)
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-        return Svg(_for_page(buffer.getvalue(), key), panels_of(figure))
+        panels = panels_of(figure)
+        return Svg(_for_page(buffer.getvalue(), key), panels, () if panels else frames_of(figure))
 
 
 def _for_page(svg: str, key: str) -> str:
@@ -239,6 +240,14 @@ def dots(axes: Any, x: Any, y: Any, colour: str, size: float = 1.8, most: int = 
     _strokes(axes, x, x + length, y, color=colour, linewidth=size, capstyle="round", **options)
     if name:
         axes.plot([], [], "o", color=colour, markersize=2.6, label=name)
+
+
+def tell(axes: Any, x: Any, y: Any, value: Any, title: str) -> None:
+    """Have a page say the value of the sample that is nearest to the cursor; ``title`` says of what."""
+    columns = [np.asarray(values, dtype=np.float64).ravel() for values in (x, y, value)]
+    known = np.flatnonzero(np.isfinite(columns).all(axis=0))
+    shown = known[thin(len(known))]
+    axes.samples_told = Samples(title, *(column[shown] for column in columns))
 
 
 def bars(axes: Any, start: Any, end: Any, place: float, colour: str, width_pt: float) -> None:

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from groundstation.chapters.wording import clock
-from groundstation.reports.drawing import FAINT, LIMIT, MM_PER_INCH, finite
-from groundstation.reports.live import TIME
+from groundstation.reports.drawing import FAINT, LIMIT, finite
+from groundstation.reports.frames import MM_PER_INCH, TIME
 
 LEAST_PAUSE_S, MOST_WINDOWS = 60.0, 6  # a longer pause breaks a time axis
 PANEL_GAP_MM, LEAST_PANEL_MM = 9.0, 20.0

@@ -11,6 +11,7 @@ from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
+from groundstation.reports.frames import TIME
 from groundstation.results.control import UNCONTROLLED, ControlPlan
 from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.flight import FlightResults
@@ -60,6 +61,8 @@ def paths(results: FlightResults) -> Drawing | None:
             marks = mine[np.linspace(0, len(mine) - 1, TICKS_ON_A_WAY).astype(np.int64)]
             d.dots(axes, east[marks], north[marks], colour, 3.0)
             axes.plot(east[mine[-1:]], north[mine[-1:]], "o", color=colour, markersize=5.0)
+        mine = law == answer.recommended
+        d.tell(axes, east[mine], north[mine], numbers(data, "time_s")[mine], TIME)
         if points is not None:
             places = [numbers(points, f"{axis}_m") / M_PER_KM for axis in ("east", "north")]
             axes.plot(*places, "^", color=d.INK, markersize=4.5, linestyle="none")

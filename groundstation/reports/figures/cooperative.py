@@ -12,6 +12,7 @@ from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
+from groundstation.reports.frames import TIME
 from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.flight import FlightResults
@@ -70,6 +71,7 @@ def session_map(results: FlightResults) -> Drawing | None:
             for point, name in zip(points, texts(stations, "name"), strict=True):
                 text = d.label(str(name), 16)
                 layout.beside(axes, point[1] / M_PER_KM, point[0] / M_PER_KM, text, d.INK, axes.transData, "center")
+        d.tell(axes, plane[:, 1] / M_PER_KM, plane[:, 0] / M_PER_KM, numbers(data, "time_s")[rows], TIME)
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_xlabel("east, km")
         axes.set_ylabel("north, km")

@@ -141,6 +141,7 @@ def hindcast_map(results: FlightResults) -> Drawing | None:
             axes = layout.place(figure, 16 + 72 * place, 12, 80 + 72 * place, 66)
             axes.grid(visible=False)
             drawn = axes.contourf(hours, minutes, np.ma.masked_invalid(cells), levels, cmap="viridis", extend="max")
+            d.tell(axes, *np.meshgrid(hours, minutes), cells, "radial error, m")
             axes.set_title(METHODS.get(name, name))
             axes.set_xlabel("start, h of flight time")
             axes.set_ylabel("horizon, min without GNSS" if place == 0 else "")

@@ -10,6 +10,7 @@ from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
+from groundstation.reports.frames import TIME
 from groundstation.results.figures import flags, numbers, texts
 from groundstation.results.flight import FlightResults
 from groundstation.results.magnetic import METHOD_TITLES, MagneticResult
@@ -111,6 +112,7 @@ def track(results: FlightResults) -> Drawing | None:
         axes = layout.place(figure, 16, 12, 174, 84)
         axes.set_aspect("equal", adjustable="datalim")
         d.line(axes, east / 1e3, north / 1e3, d.UNUSED, 0.9)
+        d.tell(axes, east / 1e3, north / 1e3, time, TIME)
         named: set[str] = set()
         for turn in turns:
             mine = (time >= turn.start_s) & (time <= turn.end_s)

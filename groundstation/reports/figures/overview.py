@@ -10,6 +10,7 @@ from groundstation.chapters.wording import number, words
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
+from groundstation.reports.frames import TIME
 from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult, TaxiSegment
@@ -37,16 +38,17 @@ def track_map(results: FlightResults) -> Drawing | None:
     north, east = north_east_m(latitude, longitude, *origin)
     answer = results.answer(HeadingResult)
     segments = () if answer is None else answer.segments
-    used = _used_rows(numbers(data, "time_s"), segments)
-    taxi = _taxi_rows(numbers(data, "time_s"), segments, results.figure_with_rows("phases"))
+    time = numbers(data, "time_s")
+    used = _used_rows(time, segments)
+    taxi = _taxi_rows(time, segments, results.figure_with_rows("phases"))
     on_ground = _extent(north[taxi], east[taxi])
     zoom = on_ground > SMALLEST_TAXI_M and _extent(north, east) > 2.0 * on_ground
 
     def paint(figure: Any) -> None:
         right = 86.0 if zoom else 174.0
-        _map(layout.place(figure, 16, 12, right, 84), north, east, used, "Whole flight" if zoom else "")
+        _map(layout.place(figure, 16, 12, right, 84), time, north, east, used, "Whole flight" if zoom else "")
         if zoom:
-            _map(layout.place(figure, 104, 12, 174, 84), north[taxi], east[taxi], used[taxi], "Taxi")
+            _map(layout.place(figure, 104, 12, 174, 84), time[taxi], north[taxi], east[taxi], used[taxi], "Taxi")
 
     start = f"{number(origin[0], 5, '°')}, {number(origin[1], 5, '°')}"
     caption = f"Ring: start ({start})." + (
@@ -77,13 +79,14 @@ def _extent(north: Any, east: Any) -> float:
     return float(max(spans, default=0.0))
 
 
-def _map(axes: Any, north: Any, east: Any, used: Any, title: str) -> None:
+def _map(axes: Any, time: Any, north: Any, east: Any, used: Any, title: str) -> None:
     kilometres = _extent(north, east) > 3000.0
     scale, unit = (1e-3, "km") if kilometres else (1.0, "m")
     north, east = north * scale, east * scale
     axes.set_aspect("equal", adjustable="datalim")
     d.line(axes, east, north, d.GNSS, 0.9)
     d.line(axes, np.where(used, east, np.nan), np.where(used, north, np.nan), d.USED, 2.4, solid_capstyle="round")
+    d.tell(axes, east, north, time, TIME)
     first = int(np.flatnonzero(np.isfinite(north) & np.isfinite(east))[0])
     axes.plot(
         [east[first]], [north[first]], "o", color=d.INK, markersize=5, markerfacecolor="white", markeredgewidth=1.2

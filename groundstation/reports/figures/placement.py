@@ -40,6 +40,7 @@ def accuracy_map(results: FlightResults) -> Drawing | None:
         filled = axes.contourf(east, north, sigma, levels=levels, cmap="viridis_r", extend="max")
         figure.colorbar(filled, cax=bar, ticks=levels[::2], format="%.3g")
         bar.set_ylabel("weighted sigma, m")
+        d.tell(axes, *np.meshgrid(east, north), sigma, "weighted sigma, m")
         if rings is not None:
             _keep_out(axes, rings)
         if way is not None:
