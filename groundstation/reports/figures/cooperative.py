@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.ellipse import magnified, outlines
 from groundstation.base.local_frame import plane_through
 from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.cooperative import REFERENCE, title_of, trusted
@@ -18,11 +19,9 @@ from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.flight import FlightResults
 
 ELLIPSES = 8  # of each track
-SEEN_SHARE, MAGNIFIED = 0.03, (1, 2, 5, 10, 20, 50, 100)
 MOST_PANELS = 8
 PANEL_MM = 38.0
 M_PER_KM = 1000.0
-ROUND = np.linspace(0.0, 2.0 * np.pi, 49)
 FloatArray = NDArray[np.float64]
 
 
@@ -89,19 +88,13 @@ def session_map(results: FlightResults) -> Drawing | None:
 def _ellipses(data: FigureData, rows: NDArray[np.bool_]) -> FloatArray:
     """2 sigma ellipses about the origin, north and east, shape (n, 49, 2); upright where no correlation is saved."""
     north, east = (numbers(data, f"sigma_{axis}_m")[rows] for axis in ("north", "east"))
-    correlation = np.nan_to_num(numbers(data, "correlation_north_east")[rows])
-    across = np.sqrt(np.clip(1.0 - correlation**2, 0.0, None))
-    drawn_north = north[:, None] * np.cos(ROUND)
-    drawn_east = east[:, None] * (correlation[:, None] * np.cos(ROUND) + across[:, None] * np.sin(ROUND))
-    return 2.0 * np.stack([drawn_north, drawn_east], axis=2)
+    return outlines(north, east, np.nan_to_num(numbers(data, "correlation_north_east")[rows]), 2.0)
 
 
 def _magnified(plane: FloatArray, ellipses: FloatArray) -> int:
-    """How many times larger ellipses are drawn so that they can be seen: 1, or 2, 5, 10 ... times."""
-    half = float(np.nanmedian(np.hypot(*np.moveaxis(ellipses, 2, 0))))
+    """How many times larger ellipses are drawn so that they can be seen."""
     side = float(np.nanmax(np.nanmax(plane[:, :2], axis=0) - np.nanmin(plane[:, :2], axis=0)))
-    wanted = SEEN_SHARE * side / half if half > 0.0 else 1.0
-    return max((step for step in MAGNIFIED if step <= wanted), default=1)
+    return magnified(side, float(np.nanmedian(np.hypot(*np.moveaxis(ellipses, 2, 0)))))
 
 
 def _numbers(results: FlightResults) -> tuple[str, ...]:

@@ -5,12 +5,14 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.base.ellipse import ELLIPSE_95, outlines
 from groundstation.base.geodesy import north_east_m
 from groundstation.chapters.wording import number, words
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.frames import TIME
+from groundstation.results.corrected_position import CorrectedPosition, corrected_position
 from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult, TaxiSegment
@@ -44,16 +46,25 @@ def track_map(results: FlightResults) -> Drawing | None:
     on_ground = _extent(north[taxi], east[taxi])
     zoom = on_ground > SMALLEST_TAXI_M and _extent(north, east) > 2.0 * on_ground
 
+    corrected = corrected_position(results)
+    larger = 1 if corrected is None else corrected.larger(_extent(north, east))
+
     def paint(figure: Any) -> None:
         right = 86.0 if zoom else 174.0
-        _map(layout.place(figure, 16, 12, right, 84), time, north, east, used, "Whole flight" if zoom else "")
+        axes = layout.place(figure, 16, 12, right, 84)
+        if corrected is not None:
+            _ellipses(axes, corrected, origin, larger, _scale(north, east)[0])
+        _map(axes, time, north, east, used, "Whole flight" if zoom else "")
         if zoom:
             _map(layout.place(figure, 104, 12, 174, 84), time[taxi], north[taxi], east[taxi], used[taxi], "Taxi")
 
     start = f"{number(origin[0], 5, '°')}, {number(origin[1], 5, '°')}"
-    caption = f"Ring: start ({start})." + (
-        " Green: straight taxi the heading error was taken from." if used.any() else ""
-    )
+    caption = f"Ring: start ({start})."
+    if used.any():
+        caption += " Green: straight taxi the heading error was taken from."
+    if corrected is not None:
+        size = f", drawn {number(larger, 0)} times their size" if larger > 1 else ""
+        caption += f" Ellipses: 95 % of the corrected position{size}."
     alt = "Map of the track in metres north and east of the start."
     return Drawing("Track", caption, alt, d.draw("map", 92, paint), ("overview",))
 
@@ -79,9 +90,25 @@ def _extent(north: Any, east: Any) -> float:
     return float(max(spans, default=0.0))
 
 
+def _scale(north: Any, east: Any) -> tuple[float, str]:
+    """Factor and unit of a map."""
+    return (1e-3, "km") if _extent(north, east) > 3000.0 else (1.0, "m")
+
+
+def _ellipses(axes: Any, corrected: CorrectedPosition, origin: tuple[float, float], larger: int, scale: float) -> None:
+    """95 % ellipses of the corrected position along the track."""
+    rows = corrected.along()
+    north, east = north_east_m(corrected.latitude_deg[rows], corrected.longitude_deg[rows], *origin)
+    sigmas = corrected.sigma_north_m[rows], corrected.sigma_east_m[rows]
+    for middle, outline in zip(
+        np.column_stack([north, east]), outlines(*sigmas, np.zeros(len(rows)), ELLIPSE_95), strict=True
+    ):
+        drawn = scale * (middle + larger * outline)
+        d.line(axes, drawn[:, 1], drawn[:, 0], d.INS, 0.8)
+
+
 def _map(axes: Any, time: Any, north: Any, east: Any, used: Any, title: str) -> None:
-    kilometres = _extent(north, east) > 3000.0
-    scale, unit = (1e-3, "km") if kilometres else (1.0, "m")
+    scale, unit = _scale(north, east)
     north, east = north * scale, east * scale
     axes.set_aspect("equal", adjustable="datalim")
     d.line(axes, east, north, d.GNSS, 0.9)
@@ -91,7 +118,7 @@ def _map(axes: Any, time: Any, north: Any, east: Any, used: Any, title: str) -> 
     axes.plot(
         [east[first]], [north[first]], "o", color=d.INK, markersize=5, markerfacecolor="white", markeredgewidth=1.2
     )
-    if _extent(north, east) * (1000.0 if kilometres else 1.0) < SMALLEST_MAP_M:  # scatter of a receiver at rest
+    if _extent(north, east) / scale < SMALLEST_MAP_M:  # scatter of a receiver at rest
         half = 0.5 * SMALLEST_MAP_M
         axes.update_datalim([(east[first] - half, north[first] - half), (east[first] + half, north[first] + half)])
         axes.autoscale_view()
