@@ -8,7 +8,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.records import frozen
-from groundstation.estimators.inertial.start_covariance import WITH_COVARIANCE
+from groundstation.estimators.inertial.skill import WITH_SIGMA
 from groundstation.results.figures import FigureData
 from groundstation.studies.forecast_cases import Case
 from groundstation.studies.forecast_runs import LEVELS, METHOD_NAMES, SETS_OF_STARTS, STUDY_HORIZONS_MIN, Outcome
@@ -164,7 +164,7 @@ def honesty_table(outcomes: dict[str, tuple[Outcome, ...]], flights_at_least: in
             float(chi_square_quantile(part, freedom)) / freedom for part in (CHI_SQUARE_TAIL, 1.0 - CHI_SQUARE_TAIL)
         ]
         spread = inside[..., LEVELS.index(95)].std(axis=0, ddof=1) / np.sqrt(len(known))
-        for index, method in enumerate(WITH_COVARIANCE):
+        for index, method in enumerate(WITH_SIGMA):
             for at, horizon in enumerate(STUDY_HORIZONS_MIN):
                 shares = (*inside.mean(axis=0)[index, at], spread[index, at], inside_model.mean(axis=0)[index, at, 2])
                 ratios = (nees[index, at], model[index, at], first[index, at], bare[index, at], *limits)
