@@ -319,8 +319,9 @@ def study(
     from groundstation.pipeline.verbs.synthesis import study_to
 
     with listener("none" if quiet else progress) as listen:
-        options = {"recorded": recorded, "minutes": minutes}
-        text = study_to(name, output, runs=runs, seed=seed, force=force, listen=listen, **options)
+        text = study_to(
+            name, output, runs=runs, seed=seed, force=force, listen=listen, recorded=recorded, minutes=minutes
+        )
     if not quiet:
         typer.echo(text)
     return DONE
