@@ -305,6 +305,10 @@ def study(
         Path | None,
         typer.Option("--recorded", help="Folder of recorded robots (cooperative only): run on them.", metavar="FOLDER"),
     ] = None,
+    minutes: Annotated[
+        float | None,
+        typer.Option("--minutes", help="End after so long (heading only); the same command goes on.", min=0.1),
+    ] = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -315,7 +319,9 @@ def study(
     from groundstation.pipeline.verbs.synthesis import study_to
 
     with listener("none" if quiet else progress) as listen:
-        text = study_to(name, output, runs=runs, seed=seed, force=force, listen=listen, recorded=recorded)
+        text = study_to(
+            name, output, runs=runs, seed=seed, force=force, listen=listen, recorded=recorded, minutes=minutes
+        )
     if not quiet:
         typer.echo(text)
     return DONE

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.normal import NORMAL_95
 from groundstation.estimators.heading.checks import Disagreement, VarianceRatio
 from groundstation.estimators.heading.gating import NOT_TAXI, is_straight_and_fast
 from groundstation.estimators.heading.normality import Normality, normality_limits
@@ -25,6 +26,7 @@ class Figures:
     quality_deg: float
     half_width_deg: float
     whole_half_width_deg: float
+    steady_sigma_deg: float
     taxi_seconds: float
     normality: Normality | None
     variance: VarianceRatio | None
@@ -191,17 +193,19 @@ def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings) -
         _gate("quality", "spread of the running mean", figures.quality_deg, high=settings.quality_max_deg, unit="deg"),
         _gate(
             "half_width",
-            "half width of the honest 95 % interval",
+            "half width of the 95 % interval by this taxi alone",
             figures.half_width_deg,
             high=settings.half_width_max_deg,
             unit="deg",
         ),
         _gate(
             "whole_half_width",
-            "half width with steady sideslip and mounting",
+            "half width of the 95 % interval, steady sideslip and mounting in it",
             figures.whole_half_width_deg,
             high=settings.whole_half_width_max_deg,
             unit="deg",
+            reason=f"{NORMAL_95 * figures.steady_sigma_deg:.2f} deg of it steady: taxi the other way too, log the "
+            "wind, or state the sigmas in the aircraft file",
             required=settings.whole_decides,
         ),
     )
