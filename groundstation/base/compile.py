@@ -28,6 +28,7 @@ from groundstation.base.machine_code import (
     forms_of,
     linked,
     object_file,
+    plain_forms,
 )
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -80,8 +81,8 @@ class Loop:
 
     @cached_property
     def _part(self) -> Any:
-        """The function as numba has it inside others; with their code it is kept."""
-        return self._dispatcher(is_cached=False)
+        """The function as numba has it inside others, with whose code it is kept."""
+        return self._dispatcher(is_cached=False) if self._is_kept else self._called
 
     def _dispatcher(self, is_cached: bool) -> Any:
         import numba
@@ -127,9 +128,10 @@ class Loop:
         if getattr(config, "DISABLE_JIT", False):
             return None
         names: dict[str, Any] = {"kernel": self._part, "array": get_cfarray_intrinsic("C", None)}
-        exec(entry_source(self.py_func, forms), names)
+        source, kinds = entry_source(self.py_func, forms)
+        exec(source, names | kinds, names)
         types: list[Any] = [numba.types.CPointer(numba.int64 if answers_with_integer(self.py_func) else numba.float64)]
-        for form in forms:
+        for form in plain_forms(forms):
             if isinstance(form, str):
                 types.append(numba.int64 if form == INTEGER else numba.float64)
             else:

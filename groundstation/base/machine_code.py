@@ -8,8 +8,9 @@ pointer and a shape for each array. llvmlite, which numba brings, links it in so
 import ctypes
 import hashlib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cache
 from itertools import count
 from pathlib import Path
@@ -19,16 +20,29 @@ from typing import Any
 import numpy as np
 
 INTEGER, NUMBER = "integer", "number"
-Form = str | tuple[str, int]  # of an argument: INTEGER, NUMBER, or the dtype and dimensions of an array
-ARRAY_DTYPES = frozenset(("uint8", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64", "bool"))
+ARRAY_DTYPES = frozenset(
+    ("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64", "bool")
+)
 ENTRY = "groundstation_entry"
 _RESULTS: dict[Any, type] = {int: ctypes.c_int64, bool: ctypes.c_int64, float: ctypes.c_double, None: ctypes.c_int64}
 _NUMBERS = count()  # every library has a name of its own
 _HARMLESS = frozenset(("memset", "memcpy", "memmove", "memcmp", "sqrt", "sin", "cos", "exp", "log", "pow", "atan2"))
 
 
+@dataclass(frozen=True)
+class Group:
+    """Form of a tuple: its class, the names of its parts where it has any, and their forms."""
+
+    kind: type
+    names: tuple[str, ...]
+    parts: "tuple[Form, ...]"
+
+
+Form = str | tuple[str, int] | Group  # of an argument: INTEGER, NUMBER, dtype and dimensions of an array, a tuple
+
+
 def forms_of(arguments: Sequence[Any]) -> tuple[Form, ...] | None:
-    """Forms of what a loop is handed; None where it is more than numbers and arrays without gaps.
+    """Forms of what a loop is handed; None where it is more than numbers, arrays without gaps, and tuples of those.
 
     Examples
     --------
@@ -38,13 +52,19 @@ def forms_of(arguments: Sequence[Any]) -> tuple[Form, ...] | None:
     forms: list[Form] = []
     for one in arguments:
         if isinstance(one, np.ndarray):
-            if not one.flags.c_contiguous or not one.flags.aligned or one.dtype.name not in ARRAY_DTYPES:
+            is_plain = one.ndim > 0 and one.flags.c_contiguous and one.flags.aligned
+            if not is_plain or one.dtype.name not in ARRAY_DTYPES:
                 return None
             forms.append((one.dtype.name, one.ndim))
         elif isinstance(one, int | np.integer | np.bool_):
             forms.append(INTEGER)
         elif isinstance(one, float | np.floating):
             forms.append(NUMBER)
+        elif isinstance(one, tuple):
+            parts = forms_of(one)
+            if parts is None:
+                return None
+            forms.append(Group(type(one), getattr(one, "_fields", ()), parts))
         else:
             return None
     return tuple(forms)
@@ -64,24 +84,41 @@ def _annotation(function: Callable[..., Any]) -> Any:
     return function.__annotations__.get("return", ...)
 
 
-def entry_source(function: Callable[..., Any], forms: Sequence[Form]) -> str:
-    """Source of the entry of a loop for arguments of these forms, to be compiled beside ``kernel``.
+def entry_source(function: Callable[..., Any], forms: Sequence[Form]) -> tuple[str, dict[str, type]]:
+    """Source of the entry of a loop, to be compiled beside ``kernel`` and ``array``, and the tuples that it names.
 
     Examples
     --------
     >>> def total(table, first) -> int: ...
-    >>> print(entry_source(total, (("int64", 2), "integer")))
+    >>> print(entry_source(total, (("int64", 2), "integer"))[0])
     def entry(result, a0, a0_0, a0_1, a1):
         result[0] = kernel(array(a0, (a0_0, a0_1,)), a1)
     """
-    taken, handed = ["result"], []
-    for at, form in enumerate(forms):
-        name = f"a{at}"
+    taken, kinds = ["result"], dict[str, type]()
+
+    def handed(form: Form, name: str) -> str:
+        if isinstance(form, Group):
+            parts = ", ".join(handed(part, f"{name}_{at}") for at, part in enumerate(form.parts))
+            if not form.names:
+                return f"({parts},)" if parts else "()"
+            kinds[f"Of_{name}"] = form.kind
+            return f"Of_{name}({parts})"
         lengths = [] if isinstance(form, str) else [f"{name}_{axis}" for axis in range(form[1])]
-        taken += [name, *lengths]
-        handed.append(f"array({name}, ({', '.join(lengths)},))" if lengths else name)
+        taken.extend((name, *lengths))
+        return f"array({name}, ({', '.join(lengths)},))" if lengths else name
+
+    call = f"kernel({', '.join(handed(form, f'a{at}') for at, form in enumerate(forms))})"
     answer = "" if _annotation(function) is None else "result[0] = "
-    return f"def entry({', '.join(taken)}):\n    {answer}kernel({', '.join(handed)})"
+    return f"def entry({', '.join(taken)}):\n    {answer}{call}", kinds
+
+
+def plain_forms(forms: Sequence[Form]) -> Iterator[str | tuple[str, int]]:
+    """Forms of numbers and arrays, those in tuples in their place."""
+    for form in forms:
+        if isinstance(form, Group):
+            yield from plain_forms(form.parts)
+        else:
+            yield form
 
 
 def digest_of(function: Callable[..., Any], forms: Sequence[Form]) -> bytes:
@@ -200,7 +237,7 @@ class Linked:
     def __init__(self, library: Any, function: Callable[..., Any], forms: Sequence[Form]) -> None:
         self._library = library  # the code lives as long as this
         kinds: list[Any] = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]
-        for form in forms:
+        for form in plain_forms(forms):
             if isinstance(form, str):
                 kinds.append(ctypes.c_int64 if form == INTEGER else ctypes.c_double)
             else:
@@ -212,8 +249,18 @@ class Linked:
         """Run the loop."""
         result, nothing, error = self._result_type(), ctypes.c_void_p(), ctypes.c_void_p()
         values: list[Any] = [ctypes.byref(nothing), ctypes.byref(error), ctypes.byref(result)]
-        for one in arguments:
-            values += (one.ctypes.data, *one.shape) if isinstance(one, np.ndarray) else (one,)
+        _put(arguments, values)
         if self._entry(*values):
             raise RuntimeError("a compiled loop has failed")
         return None if self._annotation is None else self._annotation(result.value)
+
+
+def _put(arguments: Sequence[Any], values: list[Any]) -> None:
+    """Append the C values of arguments."""
+    for one in arguments:
+        if isinstance(one, np.ndarray):
+            values += (one.ctypes.data, *one.shape)
+        elif isinstance(one, tuple):
+            _put(one, values)
+        else:
+            values.append(one)
