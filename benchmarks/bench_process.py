@@ -20,11 +20,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bench_memory import LOGS, ROOT, repeated_csv, repeated_dataflash, repeated_ulog
+from bench_memory import ROOT, repeated_csv, repeated_dataflash, repeated_ulog
+from recorded import LOGS, are_here
 
 from groundstation.base.units import NS_PER_S
 
-SIZES_KB = (20, 2_000, 15_000, 60_000)
+SIZES_KB = (20, 2_000, 15_000)  # and 60_000 by --sizes-kb
 VERBS = ("info", "check", "convert")
 WHOLE_VERBS = ("run", "report")  # minutes for a long log: asked for by name
 SOURCES: dict[str, tuple[Path, Callable[[Path, Path, int], None]]] = {
@@ -72,8 +73,7 @@ class Timed:
 def make_log(suffix: str, size_kb: int, folder: Path) -> Path | None:
     """A log of about a size; None where the recorded one is absent."""
     source, repeat = SOURCES[suffix]
-    if not source.exists():
-        print(f"no {source}: {suffix} is left out (GROUNDSTATION_REAL_LOGS)")
+    if not are_here(source):
         return None
     target = folder / f"log_{size_kb}.{suffix}"
     if size_kb * 1_000 >= 0.9 * source.stat().st_size:
@@ -152,7 +152,7 @@ def main() -> None:
     parser.add_argument("--formats", nargs="+", default=[*SOURCES, "mcap"], metavar="SUFFIX")
     parser.add_argument("--sizes-kb", nargs="+", type=int, default=SIZES_KB, metavar="KB")
     parser.add_argument("--verbs", nargs="+", default=list(VERBS), help=f"of {', '.join((*VERBS, *WHOLE_VERBS))}")
-    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--cold", action="store_true", help="also with nothing compiled")
     parser.add_argument(
         "--against", type=lambda text: Path(text).resolve(), help="another checkout, measured beside this one"
