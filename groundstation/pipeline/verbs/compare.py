@@ -90,6 +90,7 @@ def compare(a: Path, b: Path, event: Event | None = None) -> tuple[Comparison, S
         _only(findings[1], findings[0]),
         tuple(entry for name, entry in reasons[0].items() if name not in reasons[1]),
         tuple(entry for name, entry in reasons[1].items() if name not in reasons[0]),
+        is_session(a),
     )
     return comparison, saved_a, saved_b
 
