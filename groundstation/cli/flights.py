@@ -110,7 +110,7 @@ def compare(
 
 def comparison_text(found: "Comparison", *, everything: bool = False) -> str:
     """Text of ``compare``: who is who, how the clocks are aligned, the answers, settings and findings that differ."""
-    from groundstation.chapters.terminal import columns
+    from groundstation.base.text_columns import columns
 
     alignment = found.alignment
     when = "" if alignment.event == "utc" else f" (A at {alignment.a_s:.1f} s, B at {alignment.b_s:.1f} s)"
