@@ -30,7 +30,7 @@ from groundstation.chapters.wording import (
     unit_sign,
 )
 from groundstation.results.flight import FlightResults
-from groundstation.results.landing import Approach, LandingResult, PositionError, StabilisedAt
+from groundstation.results.landing import Approach, HeightError, LandingResult, PositionError, StabilisedAt
 
 LEAD = "How each approach was flown against its runway, and where it touched down."
 TITLE = "Approaches"
@@ -167,6 +167,7 @@ def _approach(one: Approach) -> list[Part | None]:
         _gates(one),
         _touchdown(one),
         *(_error(one, error) for error in one.position_errors),
+        *(_height(one, error) for error in one.height_errors),
         Figure("landing.protection", of) if one.protection else None,
         _protection(one),
     ]
@@ -259,6 +260,16 @@ def _error(one: Approach, error: PositionError) -> Grid | Facts | None:
         "what a straight line leaves open",
     )
     return Facts(f"Approach {one.number}: {error.topic} across the course", (pair,))
+
+
+def _height(one: Approach, error: HeightError) -> Facts | None:
+    if error.state != "measured":
+        return None
+    pairs = [
+        ("On the roll-out", _with_sigma(error.error_m, error.sigma_m), interval(error.confidence95_m, 0, "m")),
+        *((f"σ by {part.name}", number(part.sigma_m, 1, "m"), "") for part in error.parts),
+    ]
+    return Facts(f"Approach {one.number}: altitude of {error.topic}, by the elevation of the runway", tuple(pairs))
 
 
 def _with_sigma(value: float | None, sigma: float | None) -> str:
