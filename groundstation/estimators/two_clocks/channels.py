@@ -26,6 +26,7 @@ UNITS: Mapping[str, str] = {
     "altitude": "m",
 }
 LEAST_ROWS = 10
+LEAST_WEIGHT = 1  # altitudes alone
 
 
 @dataclass(frozen=True)
@@ -60,14 +61,17 @@ class Pair:
     other: Side
 
 
-def pair_of(first: Flight, other: Flight, longest_s: float) -> Pair | None:
+def pair_of(
+    first: Flight, other: Flight, longest_s: float, *, is_late: tuple[bool, bool] = (False, False)
+) -> Pair | None:
     """The pair of topics that shows most of the motion, with the signals that both have; None where there is none.
 
     Velocities say more than speed, an INS more than GNSS (it is stamped when it is measured), fast topics more than
-    slow ones. A topic slower than one sample in ``longest_s`` says nothing.
+    slow ones. A topic slower than one sample in ``longest_s`` says nothing. ``is_late``: GNSS messages of a log came to
+    its recorder late; they are used where nothing else shows the motion.
     """
     sides = [[_channels(flight, topic) for topic in _topics(flight)] for flight in (first, other)]
-    best, rank = None, (0, 0, 0.0)
+    best, rank = None, (False, -2, 0, 0, 0.0)
     for a in sides[0]:
         for b in sides[1]:
             names = _common(a, b)
@@ -80,10 +84,21 @@ def pair_of(first: Flight, other: Flight, longest_s: float) -> Pair | None:
             if not 0.0 < slower <= longest_s:
                 continue
             inertial = sum(topic.startswith("ins") for topic in (a.topic, b.topic))
-            of_pair = (sum(WEIGHT[name] for name in names), inertial, -slower)
+            late = sum(side.topic.startswith("gnss") and stamps for side, stamps in zip((a, b), is_late, strict=True))
+            weight = sum(WEIGHT[name] for name in names)
+            of_pair = (weight > LEAST_WEIGHT, -late, weight, inertial, -slower)
             if of_pair > rank:
                 best, rank = pair, of_pair
     return best
+
+
+def side_of(flight: Flight, topic: str, names: tuple[str, ...]) -> Side | None:
+    """Some signals of a topic; None where it lacks one or has hardly any sample."""
+    found = _channels(flight, topic)
+    if any(name not in found.values for name in names):
+        return None
+    side = found.side(names)
+    return side if len(side.time_s) >= LEAST_ROWS else None
 
 
 def _topics(flight: Flight) -> list[str]:

@@ -48,7 +48,8 @@ def relate(first: TimedLog, other: TimedLog, *, settings: TwoClocksSettings | No
     files_lag_s = (other.flight.start_ns - first.flight.start_ns) / NS_PER_S if _both_utc(first, other) else None
     if by_gnss:
         _require_overlap(first, other, by_gnss)
-    pair = pair_of(first.flight, other.flight, settings.interval_max_s)
+    is_late = _stamps_late(first), _stamps_late(other)
+    pair = pair_of(first.flight, other.flight, settings.interval_max_s, is_late=is_late)
     place, why = _placed(pair, by_gnss, settings)
     base = LogRelation(first.flight.start_ns, other.flight.start_ns, ())
     if pair is not None:
@@ -99,7 +100,7 @@ def _by_gnss_time(first: TimedLog, other: TimedLog, settings: TwoClocksSettings)
         settings.arrival_sigma_s * float(sum(not told.is_own for told in (first.gnss_time, other.gnss_time))) ** 0.5
     )
     start_ns, end_ns = other.flight.start_ns, other.end_ns
-    inside = [one.begin_ns for one in (*other.gnss_time.stretches, *first.gnss_time.stretches)]
+    inside = [one.begin_ns for one in (*other.gnss_time.stretches[1:], *first.gnss_time.stretches[1:])]
     begins_ns = sorted({start_ns, *(begin for begin in inside if start_ns < begin < end_ns)})
     stretches = []
     for begin_ns, until_ns in zip(begins_ns, [*begins_ns[1:], end_ns], strict=True):
@@ -158,7 +159,7 @@ def _by_motion(
 ) -> LogRelation:
     """The relation with the motion fitted in each stretch, weighed with GNSS time where that tells."""
     first, other = logs
-    hidden_s = settings.aided_sigma_s if _is_aided(first, pair.first) or _is_aided(other, pair.other) else 0.0
+    hidden_s = _hidden_s((first, pair.first), (other, pair.other), settings=settings)
     begins = [(one.begin_s, one.lag_s) for one in by_gnss]
     if len(begins) < 2:
         begins = steps_of(grids_of(pair, settings), place, settings)
@@ -200,6 +201,22 @@ def _settled(
     sigma_s = float(np.hypot(prior.sigma_at(fit.middle_s), fit.lag_sigma_s))
     is_wrong = abs(gap_s) > settings.contradiction_sigmas * sigma_s
     return moving if is_wrong else _weighed(moving, prior), (gap_s, sigma_s)
+
+
+def _stamps_late(log: TimedLog) -> bool:
+    """Whether a log has GNSS messages that came to a recorder of something else, too, by whose clock they are stamped.
+
+    Of a log of GNSS alone no other clock matters than that of its own stamps.
+    """
+    is_own = log.gnss_time is not None and log.gnss_time.is_own
+    return not is_own and any(topic.startswith("ins") for topic in log.flight.topics())
+
+
+def _hidden_s(*sides: tuple[TimedLog, Side], settings: TwoClocksSettings) -> float:
+    """One sigma of what the motion does not show: filters of INS that GNSS corrects, GNSS messages that came late."""
+    hidden = [settings.aided_sigma_s for log, side in sides if _is_aided(log, side)]
+    hidden += [settings.arrival_sigma_s for log, side in sides if side.topic.startswith("gnss") and _stamps_late(log)]
+    return float(np.linalg.norm(hidden)) if hidden else 0.0
 
 
 def _is_aided(log: TimedLog, side: Side) -> bool:
