@@ -150,7 +150,7 @@ def _channels(flight: Flight, topic: str) -> _Channels:
         found["heading"] = unwrap(found["heading"])
     found["turn"] = _turn(table, time_s, found["heading"])
     most = max(int(np.count_nonzero(np.isfinite(values))) for values in found.values())
-    known = {name: values for name, values in found.items() if np.count_nonzero(np.isfinite(values)) > most // 2}
+    known = {name: values for name, values in found.items() if _tells(values, most // 2)}
     if ("north" in known) != ("east" in known):
         known = {name: values for name, values in known.items() if name not in ("north", "east")}
     attitude_deg = None
@@ -158,6 +158,12 @@ def _channels(flight: Flight, topic: str) -> _Channels:
         tilt = [np.nan_to_num(table.values(name)) for name in ("roll_deg", "pitch_deg")]
         attitude_deg = np.column_stack([*tilt, known["heading"]])
     return _Channels(topic, time_s, known, attitude_deg)
+
+
+def _tells(values: FloatArray, more_than: int) -> bool:
+    """Whether there are enough values, and not all are the same."""
+    finite = values[np.isfinite(values)]
+    return len(finite) > more_than and float(np.ptp(finite)) > 0.0
 
 
 def _usable(table: Table) -> Table:
@@ -199,3 +205,19 @@ def averaged(side: Side, step_s: float) -> Side:
         np.add.reduceat(side.values, starts, axis=0) / count[:, None],
         None if attitude is None else np.add.reduceat(attitude, starts, axis=0) / count[:, None],
     )
+
+
+def running_mean(side: Side, nodes: int) -> Side:
+    """Means over an odd number of samples, two in that length; those at the ends are left out."""
+    if len(side.time_s) <= nodes:
+        return side
+    half = nodes // 2
+    step = max(nodes // 2, 1)
+    rows = slice(half, len(side.time_s) - half, step)
+
+    def means(values: FloatArray) -> FloatArray:
+        sums = np.cumsum(np.concatenate([np.zeros((1, *values.shape[1:])), values]), axis=0)
+        return np.asarray((sums[nodes:] - sums[:-nodes])[::step] / nodes)
+
+    attitude = None if side.attitude_deg is None else means(side.attitude_deg)
+    return Side(side.topic, side.time_s[rows], means(side.values), attitude)

@@ -110,7 +110,7 @@ def run_together(
 
     if any(is_remote(str(place)) for place in (out, *paths)):
         raise UsageError("--together", "logs or results elsewhere", "local ones")
-    named = " + ".join(map(str, paths))
+    named = " + ".join(PurePath(path).name for path in paths)
     refuse_foreign(Path(out), force)
     listen(Event("begin", total=1))
     with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:

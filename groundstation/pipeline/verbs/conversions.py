@@ -79,7 +79,7 @@ def convert_together(
     from groundstation.pipeline.one_flight.join import join_logs, opened
 
     settings = (configuration or Configuration()).settings
-    named = " + ".join(map(str, logs))
+    named = " + ".join(log.name for log in logs)
     if output.exists() and (not force or output.is_dir()):
         raise UsageError(str(output), "a file that exists", "a new name", "-f overwrites it")
     listen(Event("begin", total=1))
