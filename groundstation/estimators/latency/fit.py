@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.quantiles import student_quantile
 from groundstation.estimators.latency.settings import LatencySettings
 from groundstation.estimators.latency.windows import Noise, Series, Whitened, Windows, noise_of, reweighted, spread_of
 
@@ -55,14 +56,7 @@ class DelayFit:
     @property
     def half_width_s(self) -> float:
         """Half of the 95 % interval, by Student's quantile."""
-        return student95(self.freedom) * self.sigma_s
-
-
-def student95(freedom: float) -> float:
-    """Half of the 95 % interval in standard errors, by Student's quantile."""
-    from scipy.stats import t
-
-    return float(t.ppf(0.975, freedom))
+        return student_quantile(0.975, self.freedom) * self.sigma_s
 
 
 @dataclass(frozen=True)

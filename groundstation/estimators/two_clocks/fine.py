@@ -6,7 +6,8 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, unwrap
 from groundstation.base.normal import NORMAL_95
-from groundstation.estimators.latency.fit import DelayFit, fit_delay, student95
+from groundstation.base.quantiles import student_quantile
+from groundstation.estimators.latency.fit import DelayFit, fit_delay
 from groundstation.estimators.latency.settings import LatencySettings
 from groundstation.estimators.latency.signals import SLOW_MPS, rotation_n_from_b
 from groundstation.estimators.latency.windows import Series, Windows, cut_windows
@@ -85,7 +86,7 @@ def fit_motion(
         drift += -sense * 1e-6 * fit.nuisance
     assert fit is not None
     hidden_s = float(np.hypot(hidden_s, _hidden_by_arm_s(pair, other, settings)))
-    half_s = student95(fit.freedom) * float(np.hypot(fit.sigma_s, hidden_s))
+    half_s = student_quantile(0.975, fit.freedom) * float(np.hypot(fit.sigma_s, hidden_s))
     slow_s = settings.slow_reference_share * _slow(min(pair.first.interval_s, pair.other.interval_s))
     half_s = float(np.hypot(half_s, NORMAL_95 * slow_s))
     if not max(half_s, NORMAL_95 * fit.modelled_sigma_s) <= settings.half_width_max_s:
@@ -94,7 +95,7 @@ def fit_motion(
         return f"the one explains {fit.explained:.0%} of the motion of the other"
     if not fit.is_converged:
         return "no minimum near the place of the first search"
-    drift_sigma = 1e-6 * fit.nuisance_sigma * student95(fit.nuisance_freedom) / NORMAL_95
+    drift_sigma = 1e-6 * fit.nuisance_sigma * student_quantile(0.975, fit.nuisance_freedom) / NORMAL_95
     share = settings.drift_sigma_ppm**2 / (settings.drift_sigma_ppm**2 + (1e6 * drift_sigma) ** 2)
     drift, drift_sigma = share * drift, share**0.5 * drift_sigma  # with what is known of crystals
     return MotionFit(middle_s, lag_s, half_s / NORMAL_95, drift, drift_sigma, fit.explained, fit.windows)

@@ -17,7 +17,6 @@ from groundstation.base.records import Int64Array, RecordBatch
 from groundstation.base.serial import to_json_exactly
 from groundstation.base.source_units import PREFIX as UNITS
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.together.analysis import TOGETHER_ANALYSIS
 from groundstation.estimators.two_clocks.gnss_time import gnss_time_of
 from groundstation.estimators.two_clocks.relate import relate
 from groundstation.estimators.two_clocks.relation import LogRelation, TimedLog
@@ -67,35 +66,25 @@ def joined_name(logs: Sequence[Log]) -> str:
     return " + ".join(log.source.name for log in logs)
 
 
-def joined_file(paths: Sequence[Path], folder: Path, configuration: Configuration, listen: Listener = silent) -> Path:
-    """Join logs by their paths into an MCAP in a folder, as ``--together`` does; returns its path.
+def join_files(
+    paths: Sequence[Path], target: Path, configuration: Configuration, listen: Listener = silent
+) -> Converted:
+    """Write one MCAP of several logs of one flight, by their paths; see :func:`join_logs`.
 
     Raises
     ------
     UsageError
         When a path is missing or a folder, and as :func:`join_logs`, as is all else.
     """
-    logs = opened(paths, configuration)
-    name = joined_name(logs)
-    listen(Event("stage", name, "joining"))
-    target = folder / "joined.mcap"
-    join_logs(
-        logs,
-        target,
-        configuration.settings.thresholds,
-        settings=configuration.settings.analyses[TOGETHER_ANALYSIS.name],
-    )
-    return target
-
-
-def opened(paths: Sequence[Path], configuration: Configuration) -> list[Log]:
-    """The logs of some paths."""
     for path in paths:
         if not path.exists():
             raise UsageError(str(path), "no such file")
         if as_log(path).is_dir():
             raise UsageError(str(path), "a folder", "the logs of one flight by name", "--together takes files")
-    return [open_log(path, configuration.profile_path, configuration.icds) for path in paths]
+    logs = [open_log(path, configuration.profile_path, configuration.icds) for path in paths]
+    listen(Event("stage", joined_name(logs), "joining"))
+    target.parent.mkdir(parents=True, exist_ok=True)
+    return join_logs(logs, target, configuration.thresholds, settings=configuration.settings.of(TwoClocksSettings))
 
 
 def join_logs(

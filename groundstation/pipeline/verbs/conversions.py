@@ -10,7 +10,6 @@ from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
-from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.log import Log, as_log, log_name, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
@@ -75,19 +74,16 @@ def convert_together(
     UsageError
         When a log is missing or given twice, there is but one, or the target exists and ``force`` is not given.
     """
-    from groundstation.estimators.together.analysis import TOGETHER_ANALYSIS
-    from groundstation.pipeline.one_flight.join import join_logs, opened
+    from groundstation.pipeline.one_flight.join import join_files
 
-    settings = (configuration or Configuration()).settings
     named = " + ".join(log.name for log in logs)
-    if output.exists() and (not force or output.is_dir()):
+    if output.suffix == ".ch10" or output.is_dir():
+        raise UsageError(str(output), "Chapter 10 or a folder", "an MCAP for logs that are joined")
+    if output.exists() and (not force or output.resolve() in {log.resolve() for log in logs}):
         raise UsageError(str(output), "a file that exists", "a new name", "-f overwrites it")
     listen(Event("begin", total=1))
     try:
-        found = opened(logs, configuration or Configuration())
-        output.parent.mkdir(parents=True, exist_ok=True)
-        listen(Event("stage", output.name, "joining"))
-        converted = join_logs(found, output, settings.thresholds, settings=settings.analyses[TOGETHER_ANALYSIS.name])
+        converted = join_files(logs, output, configuration or Configuration(), listen)
     except UsageError:
         raise
     except GroundstationError as error:
@@ -99,7 +95,7 @@ def convert_together(
 
 
 def _convert_one(path: Path, target: Path, configuration: Configuration) -> Outcome:
-    told, thresholds = "", configuration.settings.thresholds
+    told, thresholds = "", configuration.thresholds
     try:
         log = open_log(path, configuration.profile_path, configuration.icds)
         if target.suffix == ".ch10":
@@ -119,6 +115,7 @@ def _converted(source: str, converted: Converted, target: Path, told: str = "") 
 
 def _to_chapter10(log: Log, target: Path, thresholds: Thresholds) -> tuple[Converted, str]:
     """Write the flight of a log as Chapter 10; what became of the log, and which topics are on no bus."""
+    from groundstation.pipeline.one_flight.flight import read_flight
     from groundstation.simulation.chapter10_writer import write_chapter10
 
     with TemporaryDirectory(prefix="groundstation-") as folder:

@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.chapters.generic import quantity
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.results.figures import numbers
 from groundstation.results.flight import FlightResults
@@ -26,10 +27,10 @@ def motion(results: FlightResults, label: str) -> Drawing | None:
     time = numbers(both, "time_s")
     reference, other = (column for column in both.columns if column != "time_s")
     (difference,) = (column for column in left.columns if column != "time_s")
-    ends = d.padded(float(np.nanmin(time)), float(np.nanmax(time)))
+    ends = layout.padded(float(np.nanmin(time)), float(np.nanmax(time)))
 
     def paint(figure: Any) -> None:
-        above = d.place(figure, 18, BOTTOM_MM + PANEL_MM + GAP_MM, 174, BOTTOM_MM + 2 * PANEL_MM + GAP_MM)
+        above = layout.place(figure, 18, BOTTOM_MM + PANEL_MM + GAP_MM, 174, BOTTOM_MM + 2 * PANEL_MM + GAP_MM)
         for column, topic, colour, width in (
             (reference, log.reference_topic, d.SERIES[0], 2.2),
             (other, log.topic, d.SERIES[1], 0.9),
@@ -37,14 +38,14 @@ def motion(results: FlightResults, label: str) -> Drawing | None:
             x, y = d.broken_at_gaps(time, numbers(both, column))
             d.line(above, x, y, colour, width, label=d.label(topic))
         above.set_ylabel(d.label(f"{shown.signal}, {shown.unit}"))
-        d.time_axis(above, *ends, title=False)
-        d.legend_above(above, 2)
-        below = d.place(figure, 18, BOTTOM_MM, 174, BOTTOM_MM + PANEL_MM)
+        layout.time_axis(above, *ends, title=False)
+        layout.legend_above(above, 2)
+        below = layout.place(figure, 18, BOTTOM_MM, 174, BOTTOM_MM + PANEL_MM)
         x, y = d.broken_at_gaps(time, numbers(left, difference))
         d.line(below, x, y, d.SERIES[2], 0.8)
         below.axhline(0.0, color="0.6", linewidth=0.6)
         below.set_ylabel(d.label(f"difference, {shown.unit}"))
-        d.time_axis(below, *ends)
+        layout.time_axis(below, *ends)
 
     caption = (
         f"Above: {quantity(shown.signal)[0]} of {log.reference_topic} and {log.topic} on the clock of the flight. "
