@@ -6,7 +6,7 @@ from groundstation.chapters.plan import is_plan
 from groundstation.chapters.wording import ABSENT, clean, number
 from groundstation.results.flight import FlightResults, Source
 
-LONG_LISTS = ("parameter.", "units.")  # of autopilot logs, hundreds of them
+LONG_LISTS = ("parameter.", "units.", "together")  # of autopilot logs, hundreds of them; a chapter tells the last
 MOST_METADATA = 8
 REST = "More metadata in summary.json."
 CHECKS = "Every number stands in summary.json or tables/*.csv; versions and configuration in manifest.json."
