@@ -79,8 +79,8 @@ def test_table_is_level_flight_plus_the_forecast_bias() -> None:
     figure = next(item for item in result.figures if item.name == "magnetic_table")
     at_level = np.array(result.card[0].deviation_deg)
     steer = result.card[0].steer_deg
-    average = np.interp(steer, figure["magnetic_heading_deg"], -figure["deviation_deg"], period=360.0)
-    bias = np.interp(steer, figure["magnetic_heading_deg"], figure["bank_bias_deg"], period=360.0)
+    average = np.interp(steer, figure["uncorrected_magnetic_heading_deg"], -figure["deviation_deg"], period=360.0)
+    bias = np.interp(steer, figure["uncorrected_magnetic_heading_deg"], figure["bank_bias_deg"], period=360.0)
     assert average - bias == pytest.approx(-at_level, abs=0.02)  # means over bins of 1 deg
     assert result.table_fit_rms_deg == pytest.approx(0.0, abs=0.1)
 

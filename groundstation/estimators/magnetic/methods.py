@@ -30,7 +30,7 @@ NO_CIRCULAR = (
 )
 WANDER_IN_A_TO_E = np.array([0.3, 1.0, 1.0, 0.3, 0.3])  # what wanders with the turn rate goes into A, D, E
 WANDER_FREEDOM = 4.0  # what the settings say of the wander counts as so many stretches
-WANDER_S = 350.0  # twice a correlation time: in a figure that lasts longer the wander averages out as its inverse
+WANDER_S = 500.0  # twice a correlation time: in a figure that lasts longer the wander averages out as its inverse
 TELLING_SIGMAS = 2.0  # held-out errors that differ by less may do so by chance
 FORECAST_BANKS_DEG = (10.0, 20.0, 30.0)
 
