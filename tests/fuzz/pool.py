@@ -4,6 +4,7 @@ import multiprocessing
 import resource
 import tempfile
 import time
+import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ def _peak_mb() -> float:
 
 
 def _child(pipe: Any, warm_up: list[Case]) -> None:
+    warnings.simplefilter("error", RuntimeWarning)  # what numpy warns of would be told to users
     watch = Watch()
     with tempfile.TemporaryDirectory() as name:
         tempfile.tempdir = name
