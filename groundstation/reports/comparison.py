@@ -25,8 +25,8 @@ A, B = d.INS, d.GNSS
 MOST = 3000  # points of a line
 NEAR_M = 200_000.0  # flights that begin no further apart share one map
 SHARED = (
-    "Both come from one log: they share its noise, and what differs follows from {} alone. A difference within the "
-    "stated sigmas is no proof that they do not matter."
+    "Both come from {}: their noise is shared, and what differs follows from {} alone. A difference within the stated "
+    "sigmas is no proof that they do not matter."
 )
 LINES = (  # figure, column, column of the half width and what it is multiplied by, axis, title
     ("overview", "altitude_m", None, "altitude, m", "Altitude"),
@@ -66,7 +66,11 @@ def _opening(comparison: Comparison) -> list[Part]:
     told = f"Clocks aligned on {alignment.event}{when}: clock of B {number(alignment.offset_s, 3, 's', signed=True)}."
     heads = (Head(""), Head(f"A: {comparison.a.flight_id}"), Head(f"B: {comparison.b.flight_id}"))
     opening: list[Part] = [Grid("", heads, rows), Note(f"{told} Times in the figures are flight times of A.")]
-    return [*opening, Note(SHARED.format(comparison.cause), "warn")] if comparison.is_same_log else opening
+    return (
+        [*opening, Note(SHARED.format(comparison.origin, comparison.cause), "warn")]
+        if comparison.is_same_log
+        else opening
+    )
 
 
 def _answers(comparison: Comparison) -> Section:

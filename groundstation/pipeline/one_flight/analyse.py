@@ -73,7 +73,7 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
         flight = replace(flight, metadata=MappingProxyType({**flight.metadata, ALWAYS_ON_GROUND: "true"}))
     known = known_of(flight, configuration)
     found = run_analyses(FLIGHT_ANALYSES, flight, known)
-    thresholds = configuration.settings.thresholds
+    thresholds = configuration.thresholds
     gaps = {name: gaps_of(name, flight[name].time_ns, thresholds=thresholds) for name in flight.topics()}
     findings = list(given.findings)
     for analysis in FLIGHT_ANALYSES:
