@@ -53,7 +53,7 @@ def _numbered(sections: Sequence[Section | None], saved: SavedFlight, numbers: I
 
 
 def _workings(section: Section, configuration: Mapping[str, Any]) -> Section:
-    """What a chapter leaves to the appendix; of the settings those that are unlike the shipped."""
+    """What a chapter leaves to the appendix; of the settings those that were set."""
     every = (*section.parts, *section.appendix) if section.is_open else section.appendix
     parts = kept(_as_set(part, configuration) for part in every)
     return Section(f"{section.key}-workings", f"{section.title}: workings", "", parts)
@@ -63,8 +63,8 @@ def _as_set(part: Part, configuration: Mapping[str, Any]) -> Part | None:
     """Settings cut down to those that the user set, None where there is none; any other part as it is."""
     if not isinstance(part, Facts) or not part.settings_of:
         return part
-    given = configuration.get(part.settings_of, {})
-    pairs = [pair for pair in part.pairs if pair[0].partition(".")[0] in given]
+    given = configuration.get(part.settings_of)
+    pairs = [pair for pair in part.pairs if isinstance(given, Mapping) and pair[0].partition(".")[0] in given]
     return replace(part, pairs=pairs) if pairs else None
 
 
