@@ -16,6 +16,7 @@ SUBJECTS = {
     "magnetic_ground": "Heading sensor on the ground",
     "landing": "Approaches",
     "landing_beacons": "Landing by locators",
+    "reference": "Comparison with the reference",
     "cooperative": "Navigation between aircraft",
 }
 

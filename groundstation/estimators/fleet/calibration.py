@@ -12,8 +12,8 @@ FloatArray = NDArray[np.float64]
 PIT_BINS = 10
 
 
-def share_interval(inside: int, checks: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Exact interval of a share.
+def share_interval(inside: float, checks: float, confidence: float = 0.95) -> tuple[float, float]:
+    """Exact interval of a share; of correlated checks both numbers are effective ones.
 
     Source: Clopper, Pearson, Biometrika 26 (1934), 404-413.
 
@@ -27,7 +27,7 @@ def share_interval(inside: int, checks: int, confidence: float = 0.95) -> tuple[
     from scipy.stats import beta
 
     tail = 0.5 * (1.0 - confidence)
-    low = float(beta.ppf(tail, inside, checks - inside + 1)) if inside else 0.0
+    low = float(beta.ppf(tail, inside, checks - inside + 1)) if inside > 0.0 else 0.0
     high = float(beta.ppf(1.0 - tail, inside + 1, checks - inside)) if inside < checks else 1.0
     return low, high
 
