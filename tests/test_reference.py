@@ -185,6 +185,14 @@ def test_claims_are_told_apart() -> None:
     assert share_of(np.zeros(3_000, dtype=bool), np.full(3_000, 10.0)).state == "too_sure"
 
 
+def test_a_reference_that_is_the_logs_own_solution_judges_nothing() -> None:
+    for sigmas, away in (({}, 0.0), ({"horizontal_sigma_m": 0.014}, 0.001)):
+        answer = judged(ride(np.array([away, 0.0]), **sigmas))
+        assert not answer.is_judge
+        assert "the solution of gnss itself" in answer.reason
+        assert all(row.state != "too_sure" for row in answer.claims)
+
+
 def test_arm_and_clock_are_found_and_the_arm_is_taken_out() -> None:
     time_s, _place, velocity, heading = motion()
     rng = np.random.default_rng(13)
@@ -234,7 +242,7 @@ def test_a_turned_path_is_turned_back() -> None:
 
 
 def test_a_clock_off_by_leap_seconds_judges_nothing_until_it_is_shifted() -> None:
-    flight = ride()
+    flight = ride(np.array([2.0, 0.0]))
     truth = flight["truth"]
     late = replace(flight, tables={**flight.tables, "truth": replace(truth, time_ns=truth.time_ns + 18 * NS_PER_S)})
     answer = judged(late)
@@ -245,7 +253,7 @@ def test_a_clock_off_by_leap_seconds_judges_nothing_until_it_is_shifted() -> Non
     assert "clock_offset_s = -18.00" in told
     mended = judged(late, clock_offset_s=-18.0)
     assert mended.is_judge
-    assert error_of(mended, "horizontal") < ROUNDING_M
+    assert error_of(mended, "horizontal") == pytest.approx(2.0, abs=ROUNDING_M)
 
 
 def test_another_place_datum_and_a_coarse_reference_are_told() -> None:

@@ -24,6 +24,7 @@ from groundstation.cli.application import (
     Profile,
     Progress,
     Quiet,
+    ReferenceFiles,
     SiteFile,
     ThresholdsFile,
     Verbose,
@@ -121,6 +122,7 @@ def convert(
     config: ConfigFile = None,
     profile: Profile = None,
     icd: IcdFiles = None,
+    reference: ReferenceFiles = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -130,10 +132,12 @@ def convert(
     """Convert recorded logs to MCAP (protobuf channels, zstd, indexed); the clock is repaired, both times are kept."""
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
+    from groundstation.pipeline.many_flights.references import judged_by
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.conversions import convert_many
 
-    configuration = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
+    settings = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
+    configuration = judged_by(settings, reference or (), is_one_log=len(logs) == 1)
     with listener("none" if quiet else progress) as listen:
         outcomes = convert_many(logs, output, configuration=configuration, force=force, listen=listen)
     printing.outcomes(outcomes, as_json_text=json, quiet=quiet)
@@ -152,6 +156,7 @@ def run(
     thresholds: ThresholdsFile = None,
     profile: Profile = None,
     icd: IcdFiles = None,
+    reference: ReferenceFiles = None,
     jobs: Annotated[int, typer.Option("-j", "--jobs", help="Processes; 0: one per core.", min=0)] = 0,
     scheduler: Annotated[
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
@@ -193,10 +198,12 @@ def run(
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
     from groundstation.pipeline.many_flights.batch import plan_many, run_many
+    from groundstation.pipeline.many_flights.references import judged_by
     from groundstation.pipeline.one_flight.configuration import applying, load_configuration
 
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd)
-    configuration = applying(settings, apply)
+    is_one_log = len(paths) == 1 and not Path(paths[0]).is_dir()
+    configuration = judged_by(applying(settings, apply), reference or (), is_one_log=is_one_log)
     if dry_run:
         planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)

@@ -120,7 +120,7 @@ def checked(errors: Errors, axis: Axis) -> Checked | None:
     below = np.clip(chdtr(axis.components, squares), 1e-12, 1.0 - 1e-12)
     z = ndtri(below) if axis.components == 2 else axis.values[known] / total[known]
     is_inside = below <= SHARE
-    share = share_of(is_inside, np.asarray(z))
+    share = share_of(is_inside, np.asarray(z), squares, axis.components)
     reference = _rms_of(errors.reference, axis.sigma, known)
     claimed_rms = float(np.sqrt(np.mean(np.square(claimed[known]))))
     is_coarse = reference is not None and reference > claimed_rms

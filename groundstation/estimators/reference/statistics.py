@@ -99,24 +99,33 @@ class Share:
     state: ClaimState
 
 
-def share_of(is_inside: BoolArray, z: FloatArray) -> Share:
-    """Judge a claim by its samples in order of time, shape (n,); ``z`` are standard normal if the claim is true.
+def share_of(is_inside: BoolArray, z: FloatArray, squares: FloatArray | None = None, components: int = 1) -> Share:
+    """Judge a claim by its samples in order of time, shape (n,).
+
+    Parameters
+    ----------
+    is_inside : ndarray of bool
+        Whether an error is within its 95 % region.
+    z : ndarray
+        The error, standard normal if the claim is true.
+    squares : ndarray, optional
+        Error over sigma, squared and summed over the ``components``; of one component it is the square of z.
 
     Notes
     -----
     A true claim has errors about zero, so that a lasting error is one sample however long it is watched. The share has
-    the exact binomial interval of the effective number; the mean square of z is held against chi-square of as many
-    degrees of freedom: one error of ten sigma is enough.
+    the exact binomial interval of the effective number; the mean of the squares is held against chi-square of as
+    many degrees of freedom: one error of ten sigma is enough.
     """
     from scipy.stats import chi2
 
     share, count = float(np.mean(is_inside)), effective_samples(z, about=0.0)
     low, high = share_interval(share * count, count)
-    squares = count * float(np.mean(np.square(z)))
-    least, most = (float(chi2.ppf(tail, count)) for tail in (0.025, 0.975))
+    total = count * float(np.mean(np.square(z) if squares is None else squares))
+    least, most = (float(chi2.ppf(tail, count * components)) for tail in (0.025, 0.975))
     state: ClaimState = "too_few" if count < FEWEST_FOR_A_CLAIM else "consistent"
-    if high < 0.95 or squares > most:
+    if high < 0.95 or total > most:
         state = "too_sure"
-    elif low > 0.95 or (squares < least and count >= FEWEST_FOR_A_CLAIM):
+    elif low > 0.95 or (total < least and count >= FEWEST_FOR_A_CLAIM):
         state = "too_careful"
     return Share(share, count, (low, high), state)

@@ -12,7 +12,8 @@ from groundstation.estimators.reference.settings import ReferenceSettings
 from groundstation.results.reference import ErrorRow, ReferenceResult, title_of
 
 CONSTANT = 0.1  # spread over length of an offset that passes for another datum
-DATUM_M = 30.0  # a shorter constant offset is an arm, or ionosphere
+DATUM_M = {"horizontal": 30.0, "vertical": 5.0}  # a shorter constant offset is an arm, or ionosphere
+SAME_M, SAME_SHARE = 0.005, 0.2  # of its sigma: a reference so near to the receiver is its own solution
 INS_FARTHER = 50.0  # an INS that drifts may be so many times farther off than GNSS
 LEAP_SECONDS = range(13, 20)
 
@@ -36,9 +37,20 @@ def standing_of(
             return Standing(False, f"it is {np.median(distance) / 1000.0:.1f} km away: another vehicle or place")
     if gross_s:
         return Standing(False, f"its clock is {abs(gross_s):.1f} s {'slow' if gross_s < 0 else 'fast'} by motion")
+    twin = next((row for row in rows if _is_own_solution(row)), None)
+    if twin is not None:
+        away = f"{1000.0 * twin.spread.rmse:.1f} mm RMS from it"
+        return Standing(False, f"it is the solution of {twin.subject} itself ({away}), no independent one")
     if rows and all(row.is_coarse for row in rows):
         return Standing(False, "its own sigmas are as large as what is seen: the log is no worse than it")
     return Standing(True)
+
+
+def _is_own_solution(row: ErrorRow) -> bool:
+    """Whether the reference repeats what a receiver logged: nearer to it than its own sigma allows."""
+    if (kind_of(row.subject), row.quantity, row.axis) != ("gnss", "position", "horizontal"):
+        return False
+    return row.spread.rmse < max(SAME_M, SAME_SHARE * (row.reference_sigma or 0.0))
 
 
 def findings_of(answer: ReferenceResult, gross_s: float, interval_s: float) -> tuple[Finding, ...]:
@@ -77,7 +89,7 @@ def _datum(answer: ReferenceResult) -> Iterator[Finding]:
     gnss = [row for row in answer.errors if row.quantity == "position" and kind_of(row.subject) == "gnss"]
     for row in gnss:
         size = abs(row.spread.mean)
-        if size > DATUM_M and row.spread.std < CONSTANT * size and row.axis in ("horizontal", "vertical"):
+        if size > DATUM_M.get(row.axis, np.inf) and row.spread.std < CONSTANT * size:
             hint = (
                 "another datum? SK-42 lies some 100 m from WGS-84"
                 if row.axis == "horizontal"

@@ -13,6 +13,7 @@ from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
 from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.integrity.limits import Thresholds, thresholds_from
 from groundstation.pipeline.one_flight.deviation_to_apply import Apply, asked_for
+from groundstation.pipeline.one_flight.reference import NO_REFERENCES, References
 from groundstation.readers.icd import named_icd
 from groundstation.tables.session_settings import SessionSettings
 
@@ -68,6 +69,8 @@ class Configuration:
         The file that a table was read from, for messages.
     apply : Apply, optional
         The deviation to add to the magnetic heading.
+    references : References
+        Files of which the one of the log's time judges the answers.
 
     Raises
     ------
@@ -82,6 +85,7 @@ class Configuration:
     icds: tuple[str, ...] = ()
     files: Mapping[str, str] = field(default_factory=dict)
     apply: Apply | None = None
+    references: References = NO_REFERENCES
     settings: UserSettings = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -124,6 +128,8 @@ class Configuration:
             document["icds"] = [Path(one).name for one in self.icds]
         if self.apply:
             document["apply"] = self.apply.to_dict()
+        if self.references.paths:
+            document["references"] = [path.name for path in self.references.paths]
         return document
 
 
