@@ -24,7 +24,8 @@ from groundstation.estimators.inertial.filter import (  # noqa: E402
     run_filter,
     smooth,
 )
-from groundstation.estimators.inertial.hindcast import hindcast, leads_of, start_epochs  # noqa: E402
+from groundstation.estimators.inertial.hindcast import hindcast  # noqa: E402
+from groundstation.estimators.inertial.leads import leads_of, start_epochs  # noqa: E402
 from groundstation.estimators.inertial.settings import InertialSettings  # noqa: E402
 from groundstation.results.forecast import METHODS  # noqa: E402
 from groundstation.studies.forecast import study_forecast  # noqa: E402

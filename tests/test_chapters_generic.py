@@ -7,7 +7,13 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from groundstation.chapters import FLIGHT_CHAPTERS, PLAN_CHAPTERS, SESSION_CHAPTERS, chapters_of, without_chapter
+from groundstation.chapters.by_answer import (
+    FLIGHT_CHAPTERS,
+    PLAN_CHAPTERS,
+    SESSION_CHAPTERS,
+    chapters_of,
+    without_chapter,
+)
 from groundstation.chapters.generic import MOST_ROWS, figures_over_time, generic
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Facts, Section

@@ -12,6 +12,7 @@ from groundstation.estimators.cooperative import plain
 from groundstation.estimators.cooperative.aircraft import Aircraft, aircraft_of, fleet_of
 from groundstation.estimators.cooperative.algorithms import run_algorithm
 from groundstation.estimators.cooperative.arrays import KINDS, PEER, Events, rows_for
+from groundstation.estimators.cooperative.centralised import is_about_reckoning
 from groundstation.estimators.cooperative.estimate import estimate_session
 from groundstation.estimators.cooperative.events import Prepared, prepare
 from groundstation.estimators.cooperative.messages import Broadcast, decode, pairwise_bytes, report_bytes
@@ -279,6 +280,14 @@ def test_two_aircraft_pairwise_is_the_centralised_filter() -> None:
     for a, b in zip(one.tracks, other.tracks, strict=True):
         assert a.state == pytest.approx(b.state, rel=1e-6, abs=1e-6)
         assert a.covariance == pytest.approx(b.covariance, rel=1e-6, abs=1e-6)
+
+
+def test_ranges_are_linearised_at_the_estimate_where_something_fixed_is_heard() -> None:
+    for scenario, is_about in ((replace(LOCAL, points=()), True), (LOCAL, False), (GLOBAL, False)):
+        settings = believed(scenario)
+        prepared = prepare(simulate_session(scenario, 1).session, settings)
+        assert is_about_reckoning(prepared, settings) is is_about
+        assert is_about_reckoning(prepared, replace(settings, derivatives="reckoning"))
 
 
 def test_three_aircraft_pairwise_stays_close_to_the_centralised_filter() -> None:

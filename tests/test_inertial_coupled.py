@@ -20,7 +20,8 @@ from groundstation.estimators.inertial.coupled import (
 )
 from groundstation.estimators.inertial.differences import Differences, drag_per_s
 from groundstation.estimators.inertial.filter import PATIENCE_S, Epochs, run_filter
-from groundstation.estimators.inertial.hindcast import built_up, hindcast, start_epochs
+from groundstation.estimators.inertial.hindcast import hindcast
+from groundstation.estimators.inertial.leads import built_up, start_epochs
 from groundstation.estimators.inertial.model import (
     DRIFT,
     POSITION,

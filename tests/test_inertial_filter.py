@@ -19,7 +19,7 @@ from groundstation.estimators.inertial.filter import (
     run_filter,
     smooth,
 )
-from groundstation.estimators.inertial.hindcast import start_epochs
+from groundstation.estimators.inertial.leads import start_epochs
 from groundstation.estimators.inertial.model import (
     POSITION,
     SIZE,

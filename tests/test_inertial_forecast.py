@@ -9,7 +9,8 @@ import pytest
 from groundstation.estimators.inertial.estimate import Estimation, estimate_ins_errors
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, initial_of, run_filter
 from groundstation.estimators.inertial.forecast import assess_forecast
-from groundstation.estimators.inertial.hindcast import hindcast, leads_of, start_epochs
+from groundstation.estimators.inertial.hindcast import hindcast
+from groundstation.estimators.inertial.leads import leads_of, start_epochs
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import claimed_sigma
 from groundstation.estimators.inertial.starts import start_states
@@ -56,7 +57,7 @@ def cut(run: FilterRun, epoch: int) -> FilterRun:
     return run_filter(past, run.model, run.noise, gate=SETTINGS.gate_sigmas**2, initial=first)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", [method for method in METHODS if method != "noise_bank"])
 def test_a_start_uses_nothing_later_than_itself(found: Estimation, method: str) -> None:
     epoch = 9000
     whole = start_states(method, found.run, np.array([epoch]), SETTINGS)
@@ -135,12 +136,13 @@ def test_an_outage_of_the_log_is_crossed_by_the_method_and_model_chosen() -> Non
     for name, settings in (
         ("filter", InertialSettings()),
         ("windows", InertialSettings(default_method="windows")),
+        ("bank", InertialSettings(default_method="noise_bank")),
         ("coupled", InertialSettings(model="coupled")),
     ):
         tracks[name] = estimate_ins_errors(lost, settings=settings).corrected_error_m
     inside = slice(5000, 5700)
     assert np.array_equal(tracks["filter"][:4000], tracks["windows"][:4000])
-    for other in ("windows", "coupled"):
+    for other in ("windows", "bank", "coupled"):
         apart = np.abs(tracks[other][inside] - tracks["filter"][inside]).max()
         assert 1.0 < apart < 5000.0  # m: another forecast, of the same INS
 

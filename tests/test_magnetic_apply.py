@@ -44,7 +44,8 @@ from groundstation.results.deviation import (
     deviation_from_csv,
     deviation_of,
 )
-from groundstation.results.files import SUMMARY, save
+from groundstation.results.file_names import SUMMARY
+from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import ADVISORY, CardRow, MagneticResult

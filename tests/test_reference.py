@@ -8,7 +8,7 @@ import pytest
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
-from groundstation.chapters import chapter_of
+from groundstation.chapters.by_answer import chapter_of
 from groundstation.chapters.markdown import markdown
 from groundstation.estimators.known import Known
 from groundstation.estimators.reference.analysis import REFERENCE

@@ -12,11 +12,10 @@ from groundstation.base.timescales import GPS_EPOCH_NS, leap_seconds_at
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.references import judged_by
 from groundstation.pipeline.one_flight.analyse import analyse
-from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.configuration import NO_REFERENCES, Configuration, References
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
 from groundstation.pipeline.one_flight.flight import given_of, read_flight
 from groundstation.pipeline.one_flight.log import open_log
-from groundstation.pipeline.one_flight.reference import NO_REFERENCES, References
 from groundstation.pipeline.verbs.conversions import convert_many
 from groundstation.readers.sbet import RECORD
 from groundstation.results.flight import FlightResults

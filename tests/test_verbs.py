@@ -156,7 +156,11 @@ def test_a_report_that_cannot_be_written_stops_no_other(tmp_path: Path) -> None:
 
 
 def test_results_go_to_stdout_and_nothing_else_does(tmp_path: Path) -> None:
-    arguments = ["run", str(SAMPLES), "-o", str(tmp_path / "out"), "--json", "-j", "1"]
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    for name in ("taxi-short.csv", "taxi-damaged.csv", "README.md"):
+        shutil.copy(SAMPLES / name, logs)
+    arguments = ["run", str(logs), "-o", str(tmp_path / "out"), "--json", "-j", "1", "--no-pdf"]
     code, out, err = groundstation(*arguments)
     assert code == 3
     assert {entry["state"] for entry in json.loads(out)} == {"done", "data_lost", "skipped"}

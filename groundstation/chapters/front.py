@@ -1,8 +1,8 @@
 """The top of the report: which flight this is, its best answer, the others as tiles, what could not be assessed."""
 
 from groundstation.base.timescales import utc_ns_to_iso
-from groundstation.chapters import answer_chapters
 from groundstation.chapters.assessed import not_assessed
+from groundstation.chapters.by_answer import answer_chapters
 from groundstation.chapters.cooperative import is_session, session_front
 from groundstation.chapters.parts import Cell, Front, Mark, Tile
 from groundstation.chapters.plan import is_plan, plan_front

@@ -89,6 +89,8 @@ def _advice(results: FlightResults) -> Iterator[tuple[str, str, str]]:
                 yield line, text, purpose
     if inertial is not None and inertial.kind == "gnss_aided":
         yield "Record", FREE_INERTIAL, "INS errors"
+    if inertial is not None and inertial.kind == "unknown":
+        yield "Check", "whether GNSS corrects this INS (ins_kind of the aircraft file)", "INS errors"
     if results.status != "ok":
         yield "Check", LOST, ""
 

@@ -6,7 +6,7 @@ from itertools import count
 from pathlib import Path
 from string import ascii_uppercase
 
-from groundstation.chapters import answer_chapters, chapters_of
+from groundstation.chapters.by_answer import answer_chapters, chapters_of
 from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.findings import findings
 from groundstation.chapters.next_steps import next_steps

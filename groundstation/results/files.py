@@ -17,14 +17,13 @@ from groundstation.results.answer import Answer
 from groundstation.results.chosen import chosen_intervals
 from groundstation.results.document import SummaryDocument
 from groundstation.results.figures import FigureData, FigureSet
+from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import Manifest
 from groundstation.results.restore import restored
 from groundstation.results.summary import digits_of, summary_of
 
 Document = TypeVar("Document")
-SUMMARY, MANIFEST, ARRAYS, TABLES = "summary.json", "manifest.json", "arrays", "tables"
-OLD_ARRAYS = "results.parquet"  # an earlier name of that folder, still read
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 PARQUET_MAGIC = b"PAR1"  # at both ends of a whole file
 PARQUET_LEAST_BYTES = 12  # both, and the length of what describes the file

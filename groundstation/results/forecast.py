@@ -18,6 +18,7 @@ METHODS: dict[str, str] = {
     "drift_windows": "windows of the drift alone",
     "consistent_windows": "consistent windows",
     "smoothed_start": "smoothed start",
+    "noise_bank": "bank of noise sets",
 }
 HORIZONS_MIN = (1, 5, 10, 30, 60, 90, 120)
 

@@ -16,7 +16,7 @@ from groundstation.base.records import frozen
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.base.units import MPS2_PER_G
 from groundstation.simulation.channel_truth import POSITION, RADIUS_M, TILT, VELOCITY, channel_truth
-from groundstation.simulation.ins_class import InsClass, load_ins_class
+from groundstation.simulation.ins_class import InsClass, draw_instrument, load_ins_class
 from groundstation.simulation.ins_draw import Streams, draw_heading_wander, draw_sensor_errors
 from groundstation.simulation.ins_errors import InsErrors, propagate
 from groundstation.simulation.processes import gauss_markov
@@ -46,7 +46,7 @@ class FamilySettings:
     ----------
     ins : str or InsClass
         Name of a shipped class, or a class.
-    route : {"straight", "norilsk_moscow", "manoeuvring"}
+    route : {"straight", "norilsk_moscow", "manoeuvring", "out_and_back", "dogleg", "racetrack", "late_survey"}
     duration_s, step_s : float
     gnss : GnssNoise
     truth : {"full", "channel"}
@@ -56,6 +56,8 @@ class FamilySettings:
         Switches of the full truth.
     body_fixed : bool, optional
         Whether sensor errors turn with the body; None: as the class says.
+    each_its_own : bool
+        Every flight has an instrument of its own, better or worse than the class (:func:`ins_class.draw_instrument`).
     """
 
     ins: str | InsClass = "navigation"
@@ -67,6 +69,7 @@ class FamilySettings:
     earth_rate: bool = True
     body_fixed: bool | None = None
     deflection: bool = True
+    each_its_own: bool = False
     channel_gravity_mps2: float = number(MPS2_PER_G, 9.0, 10.0)
     channel_radius_m: float = number(RADIUS_M, 6.3e6, 6.5e6)
 
@@ -175,6 +178,8 @@ def _one_run(family: FamilySettings, time_s: FloatArray, seed: int, run: int) ->
 
     route = draw_route(family.route, time_s, streams("route"))
     motion, ins = route.motion, family.ins_class
+    if family.each_its_own:
+        ins = draw_instrument(ins, streams("instrument"))
     errors = _channel_errors(family, ins, time_s, streams) if family.truth == "channel" else None
     wander = np.zeros(len(time_s))
     if errors is None:

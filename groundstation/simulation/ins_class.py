@@ -1,7 +1,10 @@
 """INS classes: the error budget of an inertial navigator, shipped as TOML beside this module, one file a class."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
+from typing import Any
+
+import numpy as np
 
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.toml_settings import number, required_number, settings_from
@@ -57,6 +60,28 @@ class InsClass:
     initial_tilt_rad: float = number(1e-5, 0.0, 0.1)
     initial_azimuth_deg: float = number(0.0, 0.0, 45.0)
     heading: HeadingWander = field(default_factory=HeadingWander)
+
+
+# Factors between which the error budget of one instrument of a class lies; log-uniform, drawn each by itself.
+INSTRUMENT_SPREAD = {
+    "gyro_constant_dph": (0.15, 1.5),  # low: an alignment that has learnt most of it
+    "gyro_trend_dph_per_h": (0.15, 1.5),
+    "gyro_random_dph": (0.3, 1.5),
+    "gyro_correlation_s": (0.5, 4.0),
+    "angle_random_walk_deg_per_sqrt_h": (0.5, 1.5),
+    "accelerometer_constant_ug": (0.3, 1.5),
+    "accelerometer_random_ug": (0.3, 1.5),
+    "deflection_arcsec": (0.3, 1.5),
+}
+
+
+def draw_instrument(ins: InsClass, rng: np.random.Generator) -> InsClass:
+    """One instrument of a class: its error budget is the class's times factors of :data:`INSTRUMENT_SPREAD`."""
+    drawn: dict[str, Any] = {
+        name: float(getattr(ins, name)) * float(np.exp(rng.uniform(*np.log(ends))))
+        for name, ends in INSTRUMENT_SPREAD.items()
+    }
+    return replace(ins, **drawn)
 
 
 def ins_class_names() -> tuple[str, ...]:

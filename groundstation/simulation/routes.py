@@ -17,7 +17,7 @@ from groundstation.base.records import frozen
 from groundstation.base.units import MPS2_PER_G
 from groundstation.simulation.ins_errors import TrueMotion
 
-RouteKind = Literal["straight", "norilsk_moscow", "manoeuvring"]
+RouteKind = Literal["straight", "norilsk_moscow", "manoeuvring", "out_and_back", "dogleg", "racetrack", "late_survey"]
 NORILSK_DEG = (69.31, 87.33)
 MOSCOW_DEG = (55.60, 37.30)
 ROLL_S = 40.0  # take-off run
@@ -61,7 +61,15 @@ class Plan:
 
 def draw_route(kind: RouteKind, time_s: FloatArray, rng: np.random.Generator) -> Route:
     """Draw a route of a kind over all of ``time_s``, shape (n,), evenly spaced."""
-    planners = {"straight": _straight, "norilsk_moscow": _norilsk_moscow, "manoeuvring": _manoeuvring}
+    planners = {
+        "straight": _straight,
+        "norilsk_moscow": _norilsk_moscow,
+        "manoeuvring": _manoeuvring,
+        "out_and_back": _out_and_back,
+        "dogleg": _dogleg,
+        "racetrack": _racetrack,
+        "late_survey": _late_survey,
+    }
     return fly_plan(planners[kind](time_s, rng), time_s)
 
 
@@ -190,6 +198,41 @@ def _manoeuvring(time_s: FloatArray, rng: np.random.Generator) -> Plan:
         at += rng.uniform(300.0, 1200.0)
     start = (rng.uniform(-65.0, 65.0), rng.uniform(-180.0, 180.0), rng.uniform(0.0, 360.0))
     return Plan(*start, speed, altitude, turn, np.zeros(len(time_s)))
+
+
+def _out_and_back(time_s: FloatArray, rng: np.random.Generator) -> Plan:
+    """One long leg, one turn of 180 deg near the middle of the flight, the same leg back."""
+    return _legs(time_s, rng, [(rng.uniform(0.35, 0.6) * float(time_s[-1]), 180.0 * rng.choice([-1.0, 1.0]))])
+
+
+def _dogleg(time_s: FloatArray, rng: np.random.Generator) -> Plan:
+    """An airway: legs of 15 to 45 min with a change of course of 20 to 80 deg between them, either way."""
+    at = np.cumsum(rng.uniform(900.0, 2700.0, 20))
+    return _legs(time_s, rng, [(start, rng.choice([-1.0, 1.0]) * rng.uniform(20.0, 80.0)) for start in at])
+
+
+def _racetrack(time_s: FloatArray, rng: np.random.Generator) -> Plan:
+    """A patrol: legs of one length, 3 to 25 min, every turn 180 deg to the same side."""
+    angle, leg_s = 180.0 * rng.choice([-1.0, 1.0]), rng.uniform(180.0, 1500.0)
+    return _legs(time_s, rng, [(start, angle) for start in np.arange(600.0 + leg_s, time_s[-1], leg_s + 120.0)])
+
+
+def _late_survey(time_s: FloatArray, rng: np.random.Generator) -> Plan:
+    """A straight transit over 0.4 to 0.6 of the time, then a turn every 5 to 15 min: the past does not tell it."""
+    begin_s = rng.uniform(0.4, 0.6) * float(time_s[-1])
+    at = begin_s + np.cumsum(rng.uniform(300.0, 900.0, 60))
+    return _legs(time_s, rng, [(start, float(rng.choice([-180.0, -90.0, 60.0, 90.0, 180.0]))) for start in at])
+
+
+def _legs(time_s: FloatArray, rng: np.random.Generator, turns: list[tuple[float, float]]) -> Plan:
+    """Climb out, cruise, and turns (start, angle) at 20 deg of bank."""
+    cruise = rng.uniform(120.0, 230.0)
+    speed, altitude = _climb_out(time_s, rng.uniform(0.0, 600.0), rng.uniform(5e3, 11e3), 70.0, cruise, 8.0)
+    turn = np.zeros(len(time_s))
+    for start_s, angle_deg in turns:
+        turn += turn_of(time_s, start_s, angle_deg, _rate_dps(20.0, cruise))[0]
+    latitude = rng.uniform(-50.0, 50.0)  # 16 000 s at 230 m/s end below 84 deg at worst
+    return Plan(latitude, rng.uniform(-180.0, 180.0), rng.uniform(0.0, 360.0), speed, altitude, turn, 0.0 * turn)
 
 
 @compiled

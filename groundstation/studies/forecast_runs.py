@@ -10,11 +10,11 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import frozen
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, run_filter
-from groundstation.estimators.inertial.hindcast import Hindcast, built_up, hindcast
+from groundstation.estimators.inertial.hindcast import Hindcast, hindcast
+from groundstation.estimators.inertial.leads import built_up
 from groundstation.estimators.inertial.replay import plan_replay
 from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.estimators.inertial.skill import QUANTILES, Claimed, claimed_sigma
-from groundstation.estimators.inertial.start_covariance import WITH_COVARIANCE
+from groundstation.estimators.inertial.skill import QUANTILES, WITH_SIGMA, Claimed, claimed_sigma
 from groundstation.results.forecast import METHODS
 from groundstation.simulation.inertial_family import ErrorBatch, simulate_family
 from groundstation.studies.forecast_cases import Case, epochs_of, model_of
@@ -158,7 +158,7 @@ def _honesty(run: FilterRun, replay: Hindcast, since: slice, settings: InertialS
     """Errors over sigmas against what GNSS shows: its error at both ends belongs to the claim."""
     leads = leads_at(replay)
     parts: list[list[FloatArray]] = []
-    for method in WITH_COVARIANCE:
+    for method in WITH_SIGMA:
         claimed = claimed_sigma(method, run, replay, settings)
         assert isinstance(claimed, Claimed)
         error = replay.error_m(method)[since][:, leads]

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.records import frozen
-from groundstation.estimators.inertial.start_covariance import WITH_COVARIANCE
+from groundstation.estimators.inertial.skill import WITH_SIGMA
 from groundstation.results.figures import FigureData
 from groundstation.studies.forecast_cases import Case
 from groundstation.studies.forecast_runs import LEVELS, METHOD_NAMES, SETS_OF_STARTS, STUDY_HORIZONS_MIN, Outcome
@@ -150,8 +151,6 @@ def honesty_table(outcomes: dict[str, tuple[Outcome, ...]], flights_at_least: in
     99 % limits come from chi-square with two degrees of freedom a flight. Columns ``_model`` are before the sigma is
     scaled by the class and the flight's past. ``coverage95_sigma`` is the spread of the mean over flights.
     """
-    from scipy.stats import chi2
-
     rows = []
     for case, several in outcomes.items():
         known = [outcome.honesty for outcome in several if outcome.honesty is not None]
@@ -161,9 +160,11 @@ def honesty_table(outcomes: dict[str, tuple[Outcome, ...]], flights_at_least: in
         nees, model = (np.mean([getattr(h, name) for h in known], axis=0) for name in ("nees", "nees_model"))
         first, bare = (np.mean([getattr(h, n) for h in known], axis=0) / 2.0 for n in ("first", "first_model"))
         freedom = 2 * len(known)
-        limits = [float(chi2.ppf(part, freedom) / freedom) for part in (CHI_SQUARE_TAIL, 1.0 - CHI_SQUARE_TAIL)]
+        limits = [
+            float(chi_square_quantile(part, freedom)) / freedom for part in (CHI_SQUARE_TAIL, 1.0 - CHI_SQUARE_TAIL)
+        ]
         spread = inside[..., LEVELS.index(95)].std(axis=0, ddof=1) / np.sqrt(len(known))
-        for index, method in enumerate(WITH_COVARIANCE):
+        for index, method in enumerate(WITH_SIGMA):
             for at, horizon in enumerate(STUDY_HORIZONS_MIN):
                 shares = (*inside.mean(axis=0)[index, at], spread[index, at], inside_model.mean(axis=0)[index, at, 2])
                 ratios = (nees[index, at], model[index, at], first[index, at], bare[index, at], *limits)

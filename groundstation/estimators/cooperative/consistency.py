@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.quantiles import chi_square_quantile
 from groundstation.estimators.cooperative.tracks import Track
 from groundstation.tables.session import DeadReckoning, Odometry
 
@@ -75,8 +76,8 @@ def nees_limits(freedom: int, independent: int, share: float = 0.95) -> tuple[fl
     >>> round(low, 2), round(high, 2)
     (1.63, 2.41)
     """
-    from scipy.stats import chi2
-
     total = freedom * independent
-    low, high = (float(chi2.ppf(part, total)) / independent for part in (0.5 - 0.5 * share, 0.5 + 0.5 * share))
+    low, high = (
+        float(chi_square_quantile(part, total)) / independent for part in (0.5 - 0.5 * share, 0.5 + 0.5 * share)
+    )
     return low, high

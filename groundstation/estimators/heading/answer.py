@@ -6,8 +6,9 @@ import numpy as np
 
 from groundstation.base.angles import wrap_180
 from groundstation.estimators.heading import figures as drawn
-from groundstation.estimators.heading.checks import disagreement, normality, variance_ratio
+from groundstation.estimators.heading.checks import disagreement, variance_ratio
 from groundstation.estimators.heading.interval import ErrorPosterior
+from groundstation.estimators.heading.normality import normality
 from groundstation.estimators.heading.references import (
     drift_prior,
     mode_changes,

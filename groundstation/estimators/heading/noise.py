@@ -150,7 +150,8 @@ def taxi_filter(
         P[0, 0] = P[1, 1] = kept * kept * (start[2] - q[0]) + q[0]
         x[0, 0], x[0, 1] = kept * start[0], kept * start[1]
     total, innovation = np.zeros((width, width)), np.zeros(width)
-    keep, F = np.ones(STATES), np.eye(2)
+    keep, F = np.zeros(STATES), np.zeros((2, 2))
+    keep[2] = keep[3] = 1.0
     log_determinant, last_step, written = 0.0, -1.0, 0
     for i in range(count):
         step = time_s[i] - time_s[i - 1] if i > 0 else 0.0
@@ -195,7 +196,8 @@ def taxi_filter(
             K[a] *= inverse
         if len(history) > 0:
             history[i, 0] = s
-            history[i, 1:] = K
+            for a in range(STATES):  # a slice assigned would take 3 s to compile
+                history[i, 1 + a] = K[a]
         for j in range(width):
             v = columns[i, j] - H[0] * x[j, 0] - H[1] * x[j, 1] - x[j, 2] - x[j, 4] - x[j, 5]
             for a in range(STATES):
@@ -228,7 +230,8 @@ def generalised_weights(
     gradient with respect to the state.
     """
     count, motion = len(time_s), math.exp(theta[MOTION])
-    H, x, r, keep, F = np.zeros(STATES), np.zeros(STATES), np.zeros(STATES), np.ones(STATES), np.eye(2)
+    H, x, r, keep, F = np.zeros(STATES), np.zeros(STATES), np.zeros(STATES), np.zeros(STATES), np.zeros((2, 2))
+    keep[2] = keep[3] = 1.0
     H[2] = H[4] = H[5] = 1.0
     innovation, weights = np.zeros(count), np.zeros(count)
     for turn in range(2 * count):
@@ -255,7 +258,9 @@ def generalised_weights(
             for a in range(STATES):
                 r[a] = (r[a] - H[a] * weights[i]) * keep[a]
             r[2], r[3] = F[0, 0] * r[2] + F[1, 0] * r[3], F[0, 1] * r[2] + F[1, 1] * r[3]
-    total = weights.sum()
+    total = 0.0
+    for i in range(count):
+        total += weights[i]
     for i in range(count):
         weights[i] /= total
     return weights

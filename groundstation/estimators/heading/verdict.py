@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from groundstation.estimators.heading.checks import Disagreement, Normality, VarianceRatio, normality_limits
+from groundstation.estimators.heading.checks import Disagreement, VarianceRatio
 from groundstation.estimators.heading.gating import NOT_TAXI, is_straight_and_fast
+from groundstation.estimators.heading.normality import Normality, normality_limits
 from groundstation.estimators.heading.samples import Samples
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.wording import told

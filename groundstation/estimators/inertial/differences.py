@@ -250,13 +250,14 @@ def _binned(
     # half an interval of offset: samples on whole intervals, with jitter either way, fall into one bin each
     bins = [np.floor(part / interval + 0.5).astype(np.int64) for part in (ins_s, gnss_s)]
     which = np.unique(np.concatenate(bins))
-    ins_mean = _mean_in(np.searchsorted(which, bins[0]), ins_s[:, None], len(which))[:, 0]
-    gnss_mean = _mean_in(np.searchsorted(which, bins[1]), np.column_stack([gnss_s, position, velocity]), len(which))
+    ins_mean = mean_in(np.searchsorted(which, bins[0]), ins_s[:, None], len(which))[:, 0]
+    gnss_mean = mean_in(np.searchsorted(which, bins[1]), np.column_stack([gnss_s, position, velocity]), len(which))
     time_s = np.where(np.isfinite(gnss_mean[:, 0]), gnss_mean[:, 0], ins_mean)
     return time_s, gnss_mean[:, 1:]
 
 
-def _mean_in(bin_of: Int64Array, values: FloatArray, bins: int) -> FloatArray:
+def mean_in(bin_of: Int64Array, values: FloatArray, bins: int) -> FloatArray:
+    """Means of the columns of values (n, k) over the samples of each bin, shape (bins, k); NaN where none is known."""
     known = np.isfinite(values)
     out = np.full((bins, values.shape[1]), np.nan)
     for column in range(values.shape[1]):

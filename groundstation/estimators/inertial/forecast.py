@@ -8,12 +8,14 @@ from numpy.typing import NDArray
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.inertial import figures
+from groundstation.estimators.inertial.bank import NoiseBank, run_bank
 from groundstation.estimators.inertial.coupled import CoupledRun, coupled_rows, hindcast_coupled, run_coupled
 from groundstation.estimators.inertial.estimate import Estimation
 from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.gaps import gap_rows
-from groundstation.estimators.inertial.hindcast import Hindcast, hindcast, leads_of, start_epochs
+from groundstation.estimators.inertial.hindcast import Hindcast, hindcast
 from groundstation.estimators.inertial.kind import UNKNOWN
+from groundstation.estimators.inertial.leads import leads_of, start_epochs
 from groundstation.estimators.inertial.model import POSITION, FloatArray
 from groundstation.estimators.inertial.replay import LEAST_STARTS, Plan, map_grid, plan_replay
 from groundstation.estimators.inertial.settings import InertialSettings
@@ -62,7 +64,8 @@ def assess_forecast(
         minutes = float(np.ptp(run.epochs.time_s)) / 60.0
         raise NotAssessableError("forecast", f"{minutes:.0f} min of flight are too short for a replayed outage")
     coupled = run_coupled(estimation.compared, estimation.noise, settings)
-    separate = hindcast(run, plan.at, plan.lead_s, tuple(METHODS), settings)
+    bank = run_bank(run, settings)
+    separate = hindcast(run, plan.at, plan.lead_s, tuple(METHODS), settings, bank)
     since = slice(int(np.searchsorted(separate.start_s, plan.first_start_s - 1e-6)), None)
     replay = _of_model(separate, coupled, settings)
     claimed = {method: claimed_sigma(method, run, replay, settings) for method in METHODS}
@@ -71,7 +74,7 @@ def assess_forecast(
         f"{horizon:g}": min((row for row in skill if row.horizon_min == horizon), key=lambda row: row.rms_m).method
         for horizon in sorted({row.horizon_min for row in skill})  # GNSS may be absent at every end of a horizon
     }
-    classic, classic_figures = _classic(run, coupled, settings, take_off_s)
+    classic, classic_figures = _classic(run, coupled, bank, settings, take_off_s)
     judged, default = replay.of(since), claimed[settings.default_method]
     default = None if default is None else default.of(since)
     grid_at, grid_lead_s = map_grid(run, settings)
@@ -83,14 +86,14 @@ def assess_forecast(
         calibration_reason=plan.reason,
         skill=skill,
         gaps=gap_rows(run, judged.at, _lengths_that_fit(plan), settings=settings),
-        phases=_phases(run, coupled, settings, phase_of),
+        phases=_phases(run, coupled, bank, settings, phase_of),
         classic_starts=classic,
         calibration=calibration_rows(replay, claimed, plan.horizons_min, plan.first_start_s),
         coupled=coupled_rows(coupled, separate.of(since), settings, horizons_min=plan.horizons_min),
         best_method=best,
         figures=(
             figures.map_figure(
-                _of_model(hindcast(run, grid_at, grid_lead_s, tuple(METHODS), settings), coupled, settings)
+                _of_model(hindcast(run, grid_at, grid_lead_s, tuple(METHODS), settings, bank), coupled, settings)
             ),
             figures.growth_figure(judged, default),
             figures.fan_figure(judged, settings.default_method, default),
@@ -112,7 +115,7 @@ def _lengths_that_fit(plan: Plan) -> tuple[float, ...]:
 
 
 def _phases(
-    run: FilterRun, coupled: CoupledRun, settings: InertialSettings, phase_of: PhaseOf | None
+    run: FilterRun, coupled: CoupledRun, bank: NoiseBank, settings: InertialSettings, phase_of: PhaseOf | None
 ) -> tuple[PhaseRow, ...]:
     """Outages of 10 s to 1 h that begin in each phase, default method beside raw INS."""
     if phase_of is None:
@@ -123,7 +126,7 @@ def _phases(
     rows = []
     for lengths, step in ((SHORT_S, SHORT_S[0]), (LONG_S, LONG_S[0])):
         lead_s = leads_of(step, lengths[-1])
-        replay = _of_model(hindcast(run, at, lead_s, methods, settings), coupled, settings)
+        replay = _of_model(hindcast(run, at, lead_s, methods, settings, bank), coupled, settings)
         for length in lengths:
             lead = round(length / step) - 1
             errors = {method: replay.radial_m(method)[:, lead] for method in methods}
@@ -136,7 +139,7 @@ def _phases(
 
 
 def _classic(
-    run: FilterRun, coupled: CoupledRun, settings: InertialSettings, take_off_s: float
+    run: FilterRun, coupled: CoupledRun, bank: NoiseBank, settings: InertialSettings, take_off_s: float
 ) -> tuple[tuple[ClassicStart, ...], tuple[FigureData, ...]]:
     """The paper's four starts: at equal horizons as rows, to the end of the flight as its figure 2."""
     time_s = run.epochs.time_s
@@ -147,7 +150,7 @@ def _classic(
     rest = float(time_s[-1] - time_s[at[0]])
     lead_s = leads_of(60.0, rest)
     methods = tuple(dict.fromkeys((*CLASSIC_METHODS, settings.default_method)))
-    replay = _of_model(hindcast(run, at, lead_s, methods, settings), coupled, settings)
+    replay = _of_model(hindcast(run, at, lead_s, methods, settings, bank), coupled, settings)
     rows = []
     for start, hours in enumerate(CLASSIC_H):
         for method in methods:

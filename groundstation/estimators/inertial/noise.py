@@ -1,7 +1,9 @@
 """Noise parameters per INS class: what the filter believes of the gyros, of GNSS and of the start. TOML in classes/."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import product
+from typing import Literal
 
 import numpy as np
 
@@ -15,6 +17,7 @@ RADPS_PER_DPH = math.pi / 180.0 / 3600.0
 RADPS2_PER_DPHPH = RADPS_PER_DPH / 3600.0
 S_PER_H = 3600.0
 DEFAULT_CLASS = "navigation"
+ScaleName = Literal["separate", "bank"]
 _CLASSES = ShippedToml("groundstation.estimators.inertial", "classes", "ins_class")
 
 
@@ -34,6 +37,15 @@ class GnssNoise:
     velocity_correlated_mps: float = number(0.03, 0.0, 100.0)
     velocity_correlation_s: float = number(60.0, 0.0, 100_000.0)
     is_inflated: bool = True
+
+    def averaged(self, samples: float) -> "GnssNoise":
+        """Noise of means of so many samples: the white part falls, the correlated part stays."""
+        root = math.sqrt(samples)
+        return replace(
+            self,
+            position_white_m=self.position_white_m / root,
+            velocity_white_mps=self.velocity_white_mps / root,
+        )
 
     def variances(self, interval_s: float) -> tuple[float, float]:
         """Variances of position and velocity, m^2 and m^2/s^2, for epochs ``interval_s`` apart."""
@@ -61,28 +73,62 @@ def _variance(white: float, correlated: float, correlation_s: float, interval_s:
 class Calibration:
     """What the filter's forecast sigma must be multiplied by at each horizon, and how sure that is.
 
-    ``scale`` belongs to ``horizon_min``; found on simulated flights of the class. ``weight`` is what it counts against
-    the outages replayed in the past of the flight at hand: so many independent ones.
+    ``scale`` belongs to ``horizon_min``; found on simulated flights of the class; ``bank_scale`` is that of the bank's
+    mixture. ``weight`` is what it counts against the outages replayed in the past of the flight at hand: so many
+    independent ones.
     """
 
     horizon_min: tuple[float, ...] = (1.0, 5.0, 10.0, 30.0, 60.0, 90.0, 120.0)
     scale: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+    bank_scale: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
     weight: float = number(5.0, 0.1, 1000.0)
 
     def __post_init__(self) -> None:
-        if len(self.scale) != len(self.horizon_min) or not self.scale:
-            raise SettingsError(
-                "scale", f"{len(self.scale)} numbers", f"one for each of {len(self.horizon_min)} horizons"
-            )
+        for name, scale in (("scale", self.scale), ("bank_scale", self.bank_scale)):
+            if len(scale) != len(self.horizon_min) or not scale:
+                expected = f"one for each of {len(self.horizon_min)} horizons"
+                raise SettingsError(name, f"{len(scale)} numbers", expected)
+            if min(scale) <= 0.0:
+                raise SettingsError(name, f"{min(scale):g}", "positive numbers")
         if any(low >= high for low, high in zip(self.horizon_min, self.horizon_min[1:], strict=False)):
             raise SettingsError("horizon_min", str(list(self.horizon_min)), "growing numbers")
-        if min(self.scale) <= 0.0:
-            raise SettingsError("scale", f"{min(self.scale):g}", "positive numbers")
 
-    def at(self, lead_s: FloatArray) -> FloatArray:
+    def at(self, lead_s: FloatArray, of: ScaleName = "separate") -> FloatArray:
         """Scale at other lead times (linear in the logarithm of the lead, held beyond the ends)."""
+        scale = {"separate": self.scale, "bank": self.bank_scale}[of]
         lead_min = np.maximum(np.asarray(lead_s, dtype=np.float64) / 60.0, 1e-3)
-        return np.asarray(np.interp(np.log(lead_min), np.log(self.horizon_min), self.scale))
+        return np.asarray(np.interp(np.log(lead_min), np.log(self.horizon_min), scale))
+
+
+@dataclass(frozen=True)
+class BankFactors:
+    """Factors of the sets of a bank on the noise of their class; every combination is a set.
+
+    ``random_drift`` and ``random_drift_correlation`` go together, one to one.
+    """
+
+    drift: tuple[float, ...] = (0.35, 1.2)
+    tilt_walk: tuple[float, ...] = (0.5, 1.4)
+    velocity_walk: tuple[float, ...] = (0.6, 1.5)
+    random_drift: tuple[float, ...] = (0.5, 1.2)
+    random_drift_correlation: tuple[float, ...] = (0.5, 1.0)
+
+    def sets(self, noise: "InsNoise") -> tuple["InsNoise", ...]:
+        """The noise sets of a class."""
+        random_drifts = zip(self.random_drift, self.random_drift_correlation, strict=True)
+        return tuple(
+            replace(
+                noise,
+                drift_dph=drift * noise.drift_dph,
+                tilt_walk_deg_per_sqrt_h=tilt * noise.tilt_walk_deg_per_sqrt_h,
+                velocity_walk_mps_per_sqrt_s=velocity * noise.velocity_walk_mps_per_sqrt_s,
+                random_drift_dph=size * noise.random_drift_dph,
+                random_drift_correlation_s=correlation * noise.random_drift_correlation_s,
+            )
+            for drift, tilt, velocity, (size, correlation) in product(
+                self.drift, self.tilt_walk, self.velocity_walk, tuple(random_drifts)
+            )
+        )
 
 
 @dataclass(frozen=True)
@@ -109,6 +155,7 @@ class InsNoise:
     drift_rate_walk_dphph_per_sqrt_h: float = number(0.0, 0.0, 1e5)
     gnss: GnssNoise = field(default_factory=GnssNoise)
     calibration: Calibration = field(default_factory=Calibration)
+    bank: BankFactors = field(default_factory=BankFactors)
 
     @property
     def beta_per_s(self) -> float:

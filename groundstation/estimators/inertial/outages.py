@@ -9,10 +9,12 @@ from groundstation.base.units import NS_PER_S
 from groundstation.estimators.inertial.coupled import CoupledRun, hindcast_coupled, run_coupled
 from groundstation.estimators.inertial.differences import Differences
 from groundstation.estimators.inertial.filter import FilterRun
-from groundstation.estimators.inertial.hindcast import hindcast, leads_of
+from groundstation.estimators.inertial.hindcast import hindcast
+from groundstation.estimators.inertial.leads import leads_of
 from groundstation.estimators.inertial.model import POSITION, FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.estimators.inertial.start_covariance import WITH_COVARIANCE, lead_growth, start_covariance
+from groundstation.estimators.inertial.skill import WITH_SIGMA, scale_of
+from groundstation.estimators.inertial.start_covariance import lead_growth, start_covariance
 from groundstation.results.inertial import RealOutage
 from groundstation.tables.gaps import largest_step_s
 from groundstation.tables.table import Flight
@@ -47,43 +49,63 @@ def bridge_outages(flight: Flight, compared: Differences, run: FilterRun, settin
     coupled = run_coupled(compared, run.noise, settings) if is_coupled and long else None
     for last, back in long:
         outage = _empty(flight, compared, float(epochs.time_s[last]), float(epochs.time_s[back]))
-        grown = _grown(run, last, back, coupled, settings)
+        grown, own_m2 = _grown(run, last, back, coupled, settings)
         error_m[last + 1 : back] = run.x[last, POSITION] + grown[:-1]
         measured = epochs.position_m[back]
         if np.isfinite(measured).all() and not epochs.is_reset[last + 1 : back + 1].any():
             away = float(np.hypot(*(measured - run.x[last, POSITION] - grown[-1])))
-            outage = replace(outage, jump_m=away, sigma_m=_sigma(run, last, outage.length_s, settings))
+            outage = replace(outage, jump_m=away, sigma_m=_sigma(run, last, outage.length_s, own_m2, settings))
         found.append(outage)
     if epochs.time_s[-1] - epochs.time_s[seen[-1]] > limit_s:
         found.append(_empty(flight, compared, float(epochs.time_s[seen[-1]]), float(epochs.time_s[-1])))
     return Bridged(tuple(found), error_m)
 
 
-def _grown(run: FilterRun, last: int, back: int, coupled: CoupledRun | None, settings: InertialSettings) -> FloatArray:
-    """Position error forecast to build up since epoch ``last``, at the epochs behind it up to ``back``, (k, c)."""
+def _grown(
+    run: FilterRun, last: int, back: int, coupled: CoupledRun | None, settings: InertialSettings
+) -> tuple[FloatArray, FloatArray | None]:
+    """Position error forecast to build up since epoch ``last``, at the epochs behind it up to ``back``, (k, c).
+
+    And its variance at the last of them, (c,), where the method tells one of its own.
+    """
     elapsed = run.epochs.time_s[last + 1 : back + 1] - run.epochs.time_s[last]
     step_s = min(settings.forecast_step_s, float(elapsed[-1]))
     lead_s = leads_of(step_s, float(elapsed[-1]) + step_s)
-    at = np.array([last])
+    at, method = np.array([last]), settings.default_method
+    own_m2 = None
     if coupled is not None:
         built = hindcast_coupled(coupled, at, lead_s, settings)[0]
     else:
-        built = hindcast(run, at, lead_s, (settings.default_method,), settings).forecast_m[settings.default_method][0]
+        replay = hindcast(run, at, lead_s, (method,), settings)
+        built = replay.forecast_m[method][0]
+        if method in replay.variance_m2:
+            own_m2 = _at(elapsed[-1:], lead_s, replay.variance_m2[method][0])[0]
+    return _at(elapsed, lead_s, built), own_m2
+
+
+def _at(elapsed_s: FloatArray, lead_s: FloatArray, values: FloatArray) -> FloatArray:
+    """What grows from nothing over the leads, (l, c), at other times."""
     times = np.concatenate([[0.0], lead_s])
-    columns = [np.interp(elapsed, times, np.concatenate([[0.0], column])) for column in built.T]
+    columns = [np.interp(elapsed_s, times, np.concatenate([[0.0], column])) for column in values.T]
     return np.stack(columns, axis=1)
 
 
-def _sigma(run: FilterRun, last: int, length_s: float, settings: InertialSettings) -> float | None:
+def _sigma(
+    run: FilterRun, last: int, length_s: float, own_m2: FloatArray | None, settings: InertialSettings
+) -> float | None:
     """Radial sigma of the forecast at the end of an outage, what the first GNSS position errs included."""
-    if settings.default_method not in WITH_COVARIANCE:
+    method = settings.default_method
+    if method not in WITH_SIGMA:
         return None
     lead_s = np.array([length_s])
-    growth, scale = lead_growth(run, lead_s), float(run.noise.calibration.at(lead_s)[0])
+    growth, scale = lead_growth(run, lead_s), float(run.noise.calibration.at(lead_s, scale_of(method))[0])
     total = 0.0
     for channel in range(run.x.shape[2]):
-        start = start_covariance(settings.default_method, run, np.array([last]), channel, settings)
-        total += scale**2 * float(growth.variance(start)[0, 0])
+        if own_m2 is None:
+            start = start_covariance(method, run, np.array([last]), channel, settings)
+            total += scale**2 * float(growth.variance(start)[0, 0])
+        else:
+            total += scale**2 * float(own_m2[channel])
         total += float(run.covariance(channel)[last, POSITION, POSITION]) + float(growth.judge_m2[0])
     return float(np.sqrt(total))
 

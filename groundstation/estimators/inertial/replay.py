@@ -7,7 +7,7 @@ import numpy as np
 from groundstation.base.records import Int64Array
 from groundstation.estimators.inertial.differences import seconds_covered
 from groundstation.estimators.inertial.filter import FilterRun
-from groundstation.estimators.inertial.hindcast import built_up, leads_of, start_epochs
+from groundstation.estimators.inertial.leads import PAST_FROM_S, built_up, leads_of, start_epochs
 from groundstation.estimators.inertial.model import FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.results.forecast import HORIZONS_MIN
@@ -16,7 +16,6 @@ LEAD_STEP_S = 60.0
 LEAST_STARTS = 3  # a horizon with fewer is not shown
 LEAST_PAST_S = 300.0
 HALF_HOUR_MIN = 30.0
-PAST_FROM_S = 1800.0  # outages replayed from here on tell how honest the sigma of later ones is
 SHORT_SHARE = 0.4  # of a flight too short for the settings' first start
 MOST_STEPS_OF_MAP = 100
 

@@ -5,19 +5,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.records import BoolArray
 from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.hindcast import Hindcast
+from groundstation.estimators.inertial.leads import MEMORY_S, past_mean
 from groundstation.estimators.inertial.model import FloatArray
+from groundstation.estimators.inertial.noise import ScaleName
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.start_covariance import WITH_COVARIANCE, lead_growth, start_covariance
 from groundstation.results.forecast import CalibrationRow, SkillRow
 
 QUANTILES = {50: 0.6744897501960817, 68: 0.9944578832097532, 95: 1.959963984540054}  # of the normal, two-sided
 # Chosen by the logarithmic score on simulated flights, straight, manoeuvring and Norilsk to Moscow
-MEMORY_S = 1200.0  # errors of outages that start nearer than this to each other are not independent
 INHERITED = 0.7  # share of what is seen at one horizon that is expected at the next longer one
 BOUND = 0.95
+WITH_SIGMA = (*WITH_COVARIANCE, "noise_bank")
 
 
 @dataclass(frozen=True)
@@ -48,18 +51,27 @@ def claimed_sigma(method: str, run: FilterRun, replay: Hindcast, settings: Inert
     The scale of a start comes from the class (so many flights' worth) and from those replayed outages that were over
     before the start: nothing later is used.
     """
-    if method not in WITH_COVARIANCE:
+    if method not in WITH_SIGMA:
         return None
     channels = replay.actual_m.shape[2]
-    growth, of_class = lead_growth(run, replay.lead_s), run.noise.calibration.at(replay.lead_s)
-    parts = [
-        growth.variance(start_covariance(method, run, replay.at, channel, settings)) for channel in range(len(run.P))
-    ]
-    ins = np.stack([parts[min(channel, len(parts) - 1)] for channel in range(channels)], axis=2)
+    growth, of_class = lead_growth(run, replay.lead_s), run.noise.calibration.at(replay.lead_s, scale_of(method))
+    if method in replay.variance_m2:
+        ins = replay.variance_m2[method]
+    else:
+        parts = [
+            growth.variance(start_covariance(method, run, replay.at, channel, settings))
+            for channel in range(len(run.P))
+        ]
+        ins = np.stack([parts[min(channel, len(parts) - 1)] for channel in range(channels)], axis=2)
     judge = growth.judge_m2[None, :, None]
     expected = np.sqrt(ins * np.square(of_class)[None, :, None] + judge)
     own = _own_scale(np.square(replay.error_m(method) / expected), replay, run)
     return Claimed(np.sqrt(ins + judge), expected * own[:, :, None], own * of_class[None, :])
+
+
+def scale_of(method: str) -> ScaleName:
+    """Which scale of its class a method's sigma is multiplied by."""
+    return "bank" if method == "noise_bank" else "separate"
 
 
 def _own_scale(ratio: FloatArray, replay: Hindcast, run: FilterRun) -> FloatArray:
@@ -74,24 +86,13 @@ def _own_scale(ratio: FloatArray, replay: Hindcast, run: FilterRun) -> FloatArra
         return np.ones(ratio.shape[:2])
     factor, squares = np.ones(len(ratio)), []
     for lead, seconds in nodes:
-        mean, weight = _past_mean(ratio[:, lead], replay.start_s, seconds)
+        past, weight = past_mean(ratio[:, lead].mean(axis=1)[:, None], replay.start_s, seconds, replay.start_s)
         expected = 1.0 + INHERITED * (factor - 1.0)
-        factor = (calibration.weight * expected + weight * mean) / (calibration.weight + weight)
+        factor = (calibration.weight * expected + weight * past[:, 0]) / (calibration.weight + weight)
         squares.append(factor)
     at = np.log([seconds for _, seconds in nodes])
     scales, leads = np.sqrt(np.stack(squares, axis=1)), np.log(replay.lead_s)
     return np.stack([np.interp(leads, at, row) for row in scales])
-
-
-def _past_mean(ratio: FloatArray, start_s: FloatArray, lead_s: float) -> tuple[FloatArray, FloatArray]:
-    """For every start the mean squared ratio over outages that were over by then, and how many independent ones."""
-    known = np.isfinite(ratio).all(axis=1)
-    square = np.where(known, np.nan_to_num(ratio).mean(axis=1), 0.0)
-    over = np.searchsorted(start_s, start_s - lead_s + 1e-6, side="right")
-    number = np.concatenate([[0], np.cumsum(known)])[over]
-    mean = np.concatenate([[0.0], np.cumsum(square)])[over] / np.maximum(number, 1)
-    span = np.where(number > 0, start_s[np.maximum(over - 1, 0)] - start_s[:1], 0.0)
-    return mean, np.where(number > 0, 1.0 + span / max(lead_s, MEMORY_S), 0.0)
 
 
 def skill_rows(
@@ -126,8 +127,6 @@ def calibration_rows(
     replay: Hindcast, claimed: dict[str, Claimed | None], horizons_min: Sequence[float], first_start_s: float = 0.0
 ) -> tuple[CalibrationRow, ...]:
     """Coverage of the bands and NEES with chi-square limits from the number of independent starts."""
-    from scipy.stats import chi2
-
     rows = []
     for method, sigma in claimed.items():
         if sigma is None:
@@ -152,8 +151,8 @@ def calibration_rows(
                     inside68=inside[68],
                     inside95=inside[95],
                     nees=float(np.mean(np.square(error[known, lead] / sigma.scaled_m[known, lead]))),
-                    nees_low=float(chi2.ppf(0.5 - 0.5 * BOUND, freedom) / freedom),
-                    nees_high=float(chi2.ppf(0.5 + 0.5 * BOUND, freedom) / freedom),
+                    nees_low=float(chi_square_quantile(0.5 - 0.5 * BOUND, freedom)) / freedom,
+                    nees_high=float(chi_square_quantile(0.5 + 0.5 * BOUND, freedom)) / freedom,
                     scale=float(np.mean(sigma.scale[known, lead])),
                 )
             )

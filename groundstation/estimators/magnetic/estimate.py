@@ -195,7 +195,7 @@ def _residual(row: Method) -> Residual | None:
 
 def _parameters(fit: IronFit, azimuth_sigma_deg: float) -> PoissonParameters | None:
     """The iron of a fit, None where it is refused."""
-    return None if fit.reason else parameters_of(fit.iron, fit.covariance_with(azimuth_sigma_deg))
+    return None if fit.reason else parameters_of(fit.iron, fit.stated_covariance(azimuth_sigma_deg))
 
 
 def _aligned(readings: Readings, alignment: Alignment, mounting_deg: float) -> Readings:

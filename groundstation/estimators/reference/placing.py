@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.quantiles import student_quantile
 from groundstation.estimators.reference.errors import Errors
 from groundstation.estimators.reference.settings import ReferenceSettings
 from groundstation.estimators.reference.statistics import independent
@@ -74,12 +75,11 @@ def fit_place(errors: Errors) -> PlaceFit | None:
 
 def _uncertainty(products: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Half widths and degrees of freedom of sums of correlated products, shape (n, k)."""
-    from scipy.stats import t
-
     count = np.array([independent(column) for column in products.T])
     variance = len(products) ** 2 * np.mean(np.square(products), axis=0) / (count - 1.0)
     freedom = count - 1.0
-    return np.asarray(t.ppf(0.975, freedom) * np.sqrt(variance)), freedom
+    quantiles = np.array([student_quantile(0.975, one) for one in freedom.tolist()])
+    return quantiles * np.sqrt(variance), freedom
 
 
 def _design(errors: Errors, known: np.ndarray) -> FloatArray:

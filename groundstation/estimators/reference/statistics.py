@@ -7,6 +7,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import chi_square_quantile, student_quantile
 from groundstation.base.records import BoolArray
 from groundstation.estimators.fleet.calibration import share_interval
 from groundstation.estimators.heading.standstill import effective_samples
@@ -46,7 +47,7 @@ def spread_of(values: FloatArray) -> Spread:
     mean, centred = float(np.mean(values)), values - np.mean(values)
     squares, variance = np.square(values), float(np.mean(np.square(centred)))
     known = len(values) >= 2 and variance > 0.0
-    half = _student(count) * math.sqrt(variance / (1.0 - 1.0 / count) / count) if known else 0.0
+    half = student_quantile(0.975, count - 1.0) * math.sqrt(variance / (1.0 - 1.0 / count) / count) if known else 0.0
     return Spread(
         samples=len(values),
         effective_samples=count,
@@ -72,7 +73,7 @@ def root_mean_interval(squares: FloatArray, count: float) -> tuple[float, float]
     if len(squares) < 2 or mean <= 0.0:
         return None
     relative = float(np.std(squares)) / mean / math.sqrt(count - 1.0)
-    factor = math.exp(min(_student(count) * relative, 50.0))
+    factor = math.exp(min(student_quantile(0.975, count - 1.0) * relative, 50.0))
     return math.sqrt(mean / factor), math.sqrt(mean * factor)
 
 
@@ -80,13 +81,6 @@ def _median_interval(values: FloatArray, count: float) -> tuple[float, float]:
     half = 0.5 * NORMAL_95 / math.sqrt(count)
     low, high = np.quantile(values, [max(0.5 - half, 0.0), min(0.5 + half, 1.0)]).tolist()
     return low, high
-
-
-def _student(count: float) -> float:
-    """Student's 97.5 % quantile with one degree of freedom less than the effective number."""
-    from scipy.stats import t
-
-    return float(t.ppf(0.975, count - 1.0))
 
 
 @dataclass(frozen=True)
@@ -117,12 +111,10 @@ def share_of(is_inside: BoolArray, z: FloatArray, squares: FloatArray | None = N
     the exact binomial interval of the effective number; the mean of the squares is held against chi-square of as
     many degrees of freedom: one error of ten sigma is enough.
     """
-    from scipy.stats import chi2
-
     share, count = float(np.mean(is_inside)), effective_samples(z, about=0.0)
     low, high = share_interval(share * count, count)
     total = count * float(np.mean(np.square(z) if squares is None else squares))
-    least, most = (float(chi2.ppf(tail, count * components)) for tail in (0.025, 0.975))
+    least, most = (float(chi_square_quantile(tail, count * components)) for tail in (0.025, 0.975))
     state: ClaimState = "too_few" if count < FEWEST_FOR_A_CLAIM else "consistent"
     if high < 0.95 or total > most:
         state = "too_sure"

@@ -8,7 +8,13 @@ from functools import partial
 from pathlib import Path, PurePath
 
 from groundstation.base.errors import UnclaimedLogError, UsageError
-from groundstation.pipeline.many_flights.found_sessions import Asked, FoundSessions, find_sessions, run_sessions
+from groundstation.pipeline.many_flights.found_sessions import (
+    STATIONS_TOML,
+    Asked,
+    FoundSessions,
+    find_sessions,
+    run_sessions,
+)
 from groundstation.pipeline.many_flights.inputs import collect, flight_folders, is_ours, session_folders
 from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
 from groundstation.pipeline.many_flights.output import LocalOutput, RemoteOutput
@@ -252,10 +258,15 @@ def _planned(job: Job) -> Outcome:
 
 
 def _planned_sessions(asked: Asked, planned: Sequence[Outcome]) -> list[Outcome]:
-    """Sessions among the flights that are finished; those of the other logs are found when they have been read."""
+    """Sessions among the finished flights; that those of unread logs are looked for, where stations are given."""
     flight_ids = {one.flight_id for one in planned if one.flight_id}
     found = find_sessions(asked, flight_ids) if flight_ids else FoundSessions()
-    return [*map(planned_session, found.jobs), *(one for one in found.told if one.state == "failed")]
+    sessions = [*map(planned_session, found.jobs), *(one for one in found.told if one.state == "failed")]
+    unread = [one.source for one in planned if one.state == "done" and one.text == PLANS["everything"]]
+    if unread and (asked.stations is not None or any(Path(log).with_name(STATIONS_TOML).is_file() for log in unread)):
+        text = "looked for among the flights once the logs are read"
+        sessions.append(Outcome("sessions", "done", text, is_session=True))
+    return sessions
 
 
 def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configuration) -> tuple[tuple[str, bool], ...]:

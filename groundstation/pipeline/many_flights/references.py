@@ -6,9 +6,8 @@ from pathlib import Path
 
 from groundstation.base.errors import UnclaimedLogError, UsageError
 from groundstation.pipeline.many_flights.inputs import collect
-from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.configuration import Configuration, References
 from groundstation.pipeline.one_flight.log import open_log
-from groundstation.pipeline.one_flight.reference import References
 
 
 def judged_by(configuration: Configuration, references: Sequence[Path], *, is_one_log: bool) -> Configuration:

@@ -86,7 +86,7 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
         flight = replace(flight, metadata=MappingProxyType({**flight.metadata, ALWAYS_ON_GROUND: "true"}))
     found, known = answers_of(flight, configuration)
     flight = flight.without(TRUTH)
-    thresholds = configuration.settings.thresholds
+    thresholds = configuration.thresholds
     gaps = {name: gaps_of(name, flight[name].time_ns, thresholds=thresholds) for name in flight.topics()}
     findings = list(given.findings)
     for analysis in FLIGHT_ANALYSES:

@@ -17,8 +17,9 @@ from groundstation.integrity.ledger import damage_entry
 from groundstation.integrity.ledger_findings import TOPIC_CODES, topic_findings
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.integrity.survey import Census
+from groundstation.pipeline.one_flight.configuration import NO_REFERENCES, References
 from groundstation.pipeline.one_flight.log import Log
-from groundstation.pipeline.one_flight.reference import FACTS, NO_REFERENCES, TRUTH, Laid, References, laid_beside
+from groundstation.pipeline.one_flight.reference import FACTS, TRUTH, Laid, laid_beside
 from groundstation.store.info import StoreInfo
 
 OWN_TRUTH = ("a truth of its own", "a log without one", "leave --reference out")

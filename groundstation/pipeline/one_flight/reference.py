@@ -13,6 +13,7 @@ from groundstation.base.records import MAX_BATCH_ROWS, Damage, Int64Array, Recor
 from groundstation.base.signals import TOPICS, kind_of, topics_of_kind
 from groundstation.base.timescales import GPS_EPOCH_NS, gps_week_to_utc_ns, leap_seconds_at, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.pipeline.one_flight.configuration import References
 from groundstation.pipeline.one_flight.log import Log, open_log
 from groundstation.tables.assemble import batches_from_flight
 from groundstation.tables.table import Flight, Table
@@ -24,17 +25,6 @@ NS_PER_MS = 1_000_000
 POSITION = ("latitude_deg", "longitude_deg")
 ANGLES = ("true_heading_deg", "roll_deg")
 _FIELDS = frozenset(one.name for one in TOPICS[TRUTH])
-
-
-@dataclass(frozen=True)
-class References:
-    """Files that may judge flights; ``is_expected``: it is an error when none is of the time of the one log named."""
-
-    paths: tuple[Path, ...] = ()
-    is_expected: bool = False
-
-
-NO_REFERENCES = References()
 
 
 @dataclass(frozen=True)

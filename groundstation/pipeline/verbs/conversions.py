@@ -10,7 +10,6 @@ from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
-from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.log import Log, as_log, log_name, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
@@ -61,7 +60,7 @@ def convert_many(
 
 
 def _convert_one(path: Path, target: Path, configuration: Configuration) -> Outcome:
-    told, thresholds, references = "", configuration.settings.thresholds, configuration.references
+    told, thresholds, references = "", configuration.thresholds, configuration.references
     try:
         log = open_log(path, configuration.profile_path, configuration.icds)
         if target.suffix == ".ch10":
@@ -77,6 +76,7 @@ def _convert_one(path: Path, target: Path, configuration: Configuration) -> Outc
 
 def _to_chapter10(log: Log, target: Path, thresholds: Thresholds) -> tuple[Converted, str]:
     """Write the flight of a log as Chapter 10; what became of the log, and which topics are on no bus."""
+    from groundstation.pipeline.one_flight.flight import read_flight
     from groundstation.simulation.chapter10_writer import write_chapter10
 
     with TemporaryDirectory(prefix="groundstation-") as folder:

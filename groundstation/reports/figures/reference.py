@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.wording import MINUS
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.results.figures import numbers, texts
 from groundstation.results.flight import FlightResults
@@ -52,12 +53,12 @@ def errors(results: FlightResults, of: str) -> Drawing | None:
     def paint(figure: Any) -> None:
         for place, (column, title, _sigma, _components) in enumerate(panels):
             bottom = 12.0 + (len(panels) - 1 - place) * (PANEL_MM + GAP_MM)
-            axes = d.place(figure, 18, bottom, 174, bottom + PANEL_MM)
+            axes = layout.place(figure, 18, bottom, 174, bottom + PANEL_MM)
             _paint(axes, time, columns[column], bands[column], COLOURS.get(subject.partition(".")[0], d.USED))
             axes.set_ylabel(title)
-            d.time_axis(axes, float(time.min()), float(time.max()), title=place == len(panels) - 1)
+            layout.time_axis(axes, float(time.min()), float(time.max()), title=place == len(panels) - 1)
             if place == 0:
-                d.legend_above(axes)
+                layout.legend_above(axes)
 
     has_band = any(np.isfinite(half).any() for half in bands.values())
     claimed = "Shaded: the 95 % that it and the reference claim together." if has_band else "It claims no σ."
@@ -84,8 +85,8 @@ def _paint(axes: Any, time: FloatArray, values: FloatArray, half: FloatArray, co
     reach = float(np.abs(shown).max()) if shown.size else 1.0
     claimed = d.finite(half)
     most = min(float(claimed.max()), BAND_SEEN * reach) if claimed.size else 0.0
-    ends = d.padded(min(float(shown.min()), -most), max(float(shown.max()), most), 0.08) if shown.size else (-1.0, 1.0)
-    axes.set_ylim(*ends)
+    if shown.size:
+        axes.set_ylim(*layout.padded(min(float(shown.min()), -most), max(float(shown.max()), most), 0.08))
 
 
 def track(results: FlightResults) -> Drawing | None:
@@ -101,7 +102,7 @@ def track(results: FlightResults) -> Drawing | None:
     scale, unit = (1e-3, "km") if float(np.ptp(known)) > 3_000.0 else (1.0, "m")
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 18, 12, 174, 92)
+        axes = layout.place(figure, 18, 12, 174, 92)
         axes.set_aspect("equal", adjustable="datalim")
         for name in names:
             mine = of == name
@@ -112,7 +113,7 @@ def track(results: FlightResults) -> Drawing | None:
             d.line(axes, scale * east[mine], scale * north[mine], shade, width, zorder=order, label=label)
         axes.set_xlabel(f"east, {unit}")
         axes.set_ylabel(f"north, {unit}")
-        d.legend_above(axes)
+        layout.legend_above(axes)
 
     caption = (
         "From where the reference begins. Every error of position, the constant ones as well, is in its place here."
@@ -130,12 +131,12 @@ def claims(results: FlightResults) -> Drawing | None:
     height = 16.0 + 6.0 * len(rows)
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 66, 12, 174, height - 2.0)
+        axes = layout.place(figure, 66, 12, 174, height - 2.0)
         for place, row in enumerate(rows):
             colour = "#b3261e" if row.state == "too_sure" else d.USED if row.state == "consistent" else d.FAINT
             axes.plot([100.0 * bound for bound in row.confidence95], [place, place], color=colour, linewidth=2.4)
             axes.plot([100.0 * row.share_inside95], [place], "o", color=colour, markersize=4.5)
-        d.limit_line(axes, 95.0, "", vertical=True)
+        layout.limit_line(axes, 95.0, "", vertical=True)
         axes.set_yticks(range(len(rows)), [_name(row.subject, row.quantity, row.axis) for row in rows])
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.grid(axis="y", visible=False)

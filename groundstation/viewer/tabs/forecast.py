@@ -161,7 +161,7 @@ def method_colours(default: str) -> dict[str, colours.Colour]:
     --------
     >>> shades = method_colours("windows")
     >>> shades["windows"] == colours.ANSWER, shades["raw_ins"] == colours.INS, len(set(shades.values()))
-    (True, True, 8)
+    (True, True, 9)
     """
     fixed = {"raw_ins": colours.INS, **({default: colours.ANSWER} if default in METHODS else {})}
     spare = (

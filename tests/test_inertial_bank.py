@@ -1,0 +1,146 @@
+"""The bank of noise sets: coarse epochs, weights from finished outages alone, a mixture that says how far it is off."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from groundstation.base.errors import SettingsError
+from groundstation.estimators.inertial.bank import COARSE_S, NoiseBank, coarse_epochs, run_bank
+from groundstation.estimators.inertial.estimate import estimate_ins_errors
+from groundstation.estimators.inertial.filter import Epochs, FilterRun, initial_of, run_filter
+from groundstation.estimators.inertial.hindcast import hindcast
+from groundstation.estimators.inertial.leads import leads_of, past_mean, start_epochs
+from groundstation.estimators.inertial.noise import BankFactors, Calibration, GnssNoise, load_class
+from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.estimators.inertial.skill import claimed_sigma
+from tests.inertial_flights import batch_of, flight_of
+
+SETTINGS = InertialSettings()
+ALONE = BankFactors((1.0,), (1.0,), (1.0,), (1.0,), (1.0,))
+LEADS_S = leads_of(600.0, 3600.0)
+ROUNDING = 1e-9
+
+
+@pytest.fixture(scope="module")
+def run() -> FilterRun:
+    return estimate_ins_errors(flight_of(batch_of(duration_s=12_000.0, route="manoeuvring"))).run
+
+
+@pytest.fixture(scope="module")
+def bank(run: FilterRun) -> NoiseBank:
+    return run_bank(run, SETTINGS)
+
+
+def test_sets_are_every_combination_and_random_drifts_go_with_their_times() -> None:
+    noise = load_class("navigation")
+    sets = noise.bank.sets(noise)
+    assert len(sets) == len(set(sets)) == 16
+    pairs = {(one.random_drift_dph, one.random_drift_correlation_s) for one in sets}
+    assert len(pairs) == 2
+    with pytest.raises(ValueError, match="zip"):
+        BankFactors(random_drift=(1.0,), random_drift_correlation=(1.0, 2.0)).sets(noise)
+    with pytest.raises(SettingsError, match="bank_scale"):
+        Calibration(bank_scale=(1.0,))
+
+
+def test_coarse_epochs_are_means_of_what_was_used(run: FilterRun) -> None:
+    coarse, end_s, count = coarse_epochs(run)
+    epochs = run.epochs
+    assert count == COARSE_S
+    third = slice(20, 30)
+    assert coarse.time_s[2] == pytest.approx(epochs.time_s[third].mean())
+    assert coarse.position_m[2] == pytest.approx(epochs.position_m[third].mean(axis=0))
+    assert coarse.velocity_mps[2] == pytest.approx(epochs.velocity_mps[third].mean(axis=0))
+    assert end_s[2] == epochs.time_s[29]
+    used = np.array(run.used)
+    used[22, 0] = -1
+    without, _, _ = coarse_epochs(replace(run, used=used))
+    kept = np.delete(np.arange(20, 30), 2)
+    assert without.position_m[2] == pytest.approx(epochs.position_m[kept].mean(axis=0))
+    assert without.time_s[2] == pytest.approx(epochs.time_s[kept].mean())
+
+
+def test_slow_gnss_and_a_reset_have_epochs_of_their_own() -> None:
+    time_s = np.arange(0.0, 600.0)
+    position = np.where((np.arange(600) % 15 == 4)[:, None], time_s[:, None] * [1.0, -2.0], np.nan)
+    is_reset = time_s == 87.0
+    epochs = replace(Epochs.plain(time_s, position, np.full_like(position, np.nan)), is_reset=is_reset)
+    noise = load_class("navigation")
+    model = estimate_ins_errors(flight_of(batch_of(duration_s=600.0))).run.model
+    run = run_filter(epochs, model, noise, initial=initial_of(epochs, noise), gate=1e12)
+    coarse, _, count = coarse_epochs(run)
+    assert count == 1.0
+    seen = np.isfinite(coarse.position_m[:, 0])
+    assert coarse.position_m[seen, 0] == pytest.approx(coarse.time_s[seen])
+    assert seen.sum() == 40
+    assert np.flatnonzero(coarse.is_reset).tolist() == [9]
+    assert coarse.time_s[9] == pytest.approx(np.mean([87.0, 88.0, 89.0]))
+    assert np.all(np.diff(coarse.time_s) > 0.0)
+
+
+def test_a_bank_of_the_class_alone_forecasts_as_the_last_estimate(run: FilterRun) -> None:
+    """Ten-second means lose nothing: within 2 % of the claimed sigma, and that within 1 %."""
+    one = replace(run, noise=replace(run.noise, bank=ALONE))
+    at = start_epochs(run.epochs, 5400.0, 600.0)
+    replay = hindcast(one, at, LEADS_S, ("noise_bank", "last_estimate"), SETTINGS)
+    claimed = {method: claimed_sigma(method, one, replay, SETTINGS) for method in replay.forecast_m}
+    assert claimed["noise_bank"] is not None and claimed["last_estimate"] is not None
+    sigma = claimed["last_estimate"].model_m
+    apart = (replay.forecast_m["noise_bank"] - replay.forecast_m["last_estimate"]) / sigma
+    assert np.sqrt(np.mean(np.square(apart))) < 0.05
+    assert claimed["noise_bank"].model_m / sigma == pytest.approx(1.0, abs=0.02)
+
+
+def test_weights_sum_to_one_and_are_equal_before_any_outage_was_over(bank: NoiseBank) -> None:
+    weight = bank.weights(np.array([600.0, 2399.0, 2401.0, 9000.0]))
+    assert weight.sum(axis=0) == pytest.approx(1.0)
+    assert weight[:, :2] == pytest.approx(1.0 / len(bank.runs))
+    assert weight[:, 2].std() > 0.0
+    assert weight[:, 3].max() > 2.0 / len(bank.runs)
+
+
+def test_the_variance_is_that_of_a_mixture(run: FilterRun, bank: NoiseBank) -> None:
+    at = start_epochs(run.epochs, 5400.0, 600.0)
+    replay = hindcast(run, at, LEADS_S, ("noise_bank",), SETTINGS, bank)
+    singles = [
+        hindcast(run, at, LEADS_S, ("noise_bank",), SETTINGS, replace(bank, flown=run, runs=(member,))).forecast_m[
+            "noise_bank"
+        ]
+        for member in bank.runs
+    ]
+    weight = bank.weights(replay.start_s)
+    mean = np.einsum("ks,kslc->slc", weight, np.stack(singles))
+    assert np.abs(replay.forecast_m["noise_bank"] - mean).max() < 1e-6
+    spread = np.einsum("ks,kslc->slc", weight, np.square(np.stack(singles) - mean))
+    assert np.all(replay.variance_m2["noise_bank"] > spread)
+
+
+def test_nothing_later_than_a_start_is_used(run: FilterRun, bank: NoiseBank) -> None:
+    begin = float(run.epochs.time_s[9000])
+    position = np.array(run.epochs.position_m)
+    later = run.epochs.time_s > begin
+    position[later] += 3000.0 * np.sin(run.epochs.time_s[later] / 200.0)[:, None]
+    other = replace(run, epochs=replace(run.epochs, position_m=position))
+    at = np.array([6000, 9000])
+    whole, changed = (hindcast(each, at, LEADS_S, ("noise_bank",), SETTINGS, None) for each in (run, other))
+    assert np.abs(whole.forecast_m["noise_bank"] - changed.forecast_m["noise_bank"]).max() < ROUNDING
+    ratio = whole.variance_m2["noise_bank"] / changed.variance_m2["noise_bank"]
+    assert ratio == pytest.approx(1.0, rel=ROUNDING)
+    assert not np.allclose(bank.weights(np.array([11_900.0])), run_bank(other, SETTINGS).weights(np.array([11_900.0])))
+
+
+def test_past_mean_counts_what_was_over_and_how_far_it_reached_back() -> None:
+    start_s = np.array([0.0, 300.0, 600.0, 900.0, 3000.0])
+    values = np.array([[1.0], [3.0], [np.nan], [8.0], [100.0]])
+    mean, independent = past_mean(values, start_s, 600.0, np.array([0.0, 599.0, 600.0, 1200.0, 1500.0]))
+    assert mean[:, 0].tolist() == [0.0, 0.0, 1.0, 2.0, 4.0]
+    assert independent == pytest.approx([0.0, 0.0, 1.0, 1.5, 1.75])
+    nothing, none = past_mean(np.zeros((0, 2)), np.zeros(0), 600.0, np.array([5.0]))
+    assert nothing.tolist() == [[0.0, 0.0]] and none.tolist() == [0.0]
+
+
+def test_the_white_part_of_gnss_falls_with_the_samples_averaged() -> None:
+    noise = GnssNoise(4.0, 3.0, 300.0, 0.2, 0.1, 60.0).averaged(16.0)
+    assert (noise.position_white_m, noise.position_correlated_m) == (1.0, 3.0)
+    assert (noise.velocity_white_mps, noise.velocity_correlated_mps) == (0.05, 0.1)
