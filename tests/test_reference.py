@@ -1,6 +1,7 @@
 """Against the reference: errors with known truth, intervals of correlated errors, arms, clocks, what judges nothing."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,14 +18,18 @@ from groundstation.estimators.reference.paths import path_rows
 from groundstation.estimators.reference.placing import fit_place
 from groundstation.estimators.reference.settings import ReferenceSettings
 from groundstation.estimators.reference.statistics import share_of, spread_of
+from groundstation.pipeline.many_flights.fleet_rows import checks_of
 from groundstation.pipeline.one_flight.analyse import Answered, answers_of
 from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.results.files import save
 from groundstation.results.flight import FlightResults, Source
+from groundstation.results.manifest import Manifest
 from groundstation.results.reference import ReferenceResult
 from groundstation.simulation.flight import simulate
 from groundstation.simulation.processes import gauss_markov
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight, Table
+from tests.saved import load
 from tests.simulated_flights import FLIGHT_LEGS, quiet
 
 START_NS = 1_777_874_400_000_000_000
@@ -169,7 +174,7 @@ def test_intervals_hold_for_correlated_errors() -> None:
         for place, (bounds, true) in enumerate(((found.mean95, 0.0), (found.rmse95, 1.0), (found.std95, 1.0))):
             held[place] += bounds[0] <= true <= bounds[1]
     assert (held / 100 >= 0.90).all()
-    states = [share_of(np.abs(values) <= 1.96, values).state for values in series]
+    states = [share_of(np.abs(values) <= 1.96, values[:, None]).state for values in series]
     assert sum(state in ("too_sure", "too_careful") for state in states) <= 10
 
 
@@ -178,11 +183,11 @@ def test_claims_are_told_apart() -> None:
     values = gauss_markov(rng, (1, 3_000), 1.0, 1.0, 5.0)[0]
     expected = {1.0: "consistent", 0.5: "too_sure", 4.0: "too_careful"}
     for sigma, state in expected.items():
-        assert share_of(np.abs(values) <= 1.96 * sigma, values / sigma).state == state
-    lasting = np.full(3_000, 1.5)
-    assert share_of(np.abs(lasting) <= 1.96, lasting).effective_samples == pytest.approx(1.0, abs=0.1)
-    assert share_of(np.abs(lasting) <= 1.96, lasting).state == "too_few"
-    assert share_of(np.zeros(3_000, dtype=bool), np.full(3_000, 10.0)).state == "too_sure"
+        assert share_of(np.abs(values) <= 1.96 * sigma, values[:, None] / sigma).state == state
+    lasting = np.full((3_000, 1), 1.5)
+    assert share_of(np.abs(lasting[:, 0]) <= 1.96, lasting).effective_samples == pytest.approx(1.0, abs=0.1)
+    assert share_of(np.abs(lasting[:, 0]) <= 1.96, lasting).state == "too_few"
+    assert share_of(np.zeros(3_000, dtype=bool), np.full((3_000, 1), 10.0)).state == "too_sure"
 
 
 def test_a_reference_that_is_the_logs_own_solution_judges_nothing() -> None:
@@ -302,7 +307,7 @@ def test_no_answer_but_the_judgement_depends_on_the_truth(flown: Flight, answere
     assert without.not_assessable == answered.not_assessable
 
 
-def test_the_chapter_tells_claimed_against_seen() -> None:
+def test_the_chapter_tells_claimed_against_seen_and_a_fleet_counts_it(tmp_path: Path) -> None:
     rng = np.random.default_rng(15)
     flight = ride(rng.normal(0.0, 2.0, (3_000, 2)), horizontal_sigma_m=1.4)
     found = answers_of(flight, Configuration())[0]
@@ -312,3 +317,12 @@ def test_the_chapter_tells_claimed_against_seen() -> None:
     text = markdown(chapter_of(results, found.answers["reference"]))
     assert "too sure" in text
     assert "Claimed against seen" in text
+    figures = found.answers["reference"].figures
+    save(tmp_path, replace(results, figures=figures), Manifest())
+    checks = checks_of(load(tmp_path))
+    claim = judged(flight).claim("gnss", "position", "horizontal")
+    assert claim is not None
+    assert {check.quantity for check in checks} == {"truth_gnss"}
+    assert len(checks) == int(claim.effective_samples)
+    share = sum(check.is_inside for check in checks) / len(checks)
+    assert share == pytest.approx(claim.share_inside95, abs=0.05)

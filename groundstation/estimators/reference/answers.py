@@ -84,7 +84,7 @@ def _forecast_row(fan: FigureData, method: str, horizon_min: float, errors: Erro
     share = None
     if np.isfinite(sigma[known]).all():
         z = error / sigma[known]
-        share = share_of(np.abs(z).ravel() <= NORMAL_95, z.ravel())
+        share = share_of(np.abs(z).ravel() <= NORMAL_95, z.reshape(-1, 1))
     return ForecastCheck(
         *(method, horizon_min, int(known.sum())),
         rmse_m=float(np.sqrt(np.mean(np.square(radial)))),

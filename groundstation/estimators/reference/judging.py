@@ -21,7 +21,7 @@ SHARE = 0.95
 class Axis:
     """One axis of an error: ``sigma`` names the claim on it; ``values`` (n,), NaN where unknown.
 
-    ``components`` are 2 where the values are lengths of north and east, which the sigma counts together.
+    ``parts`` (n, c) are its components: north and east of a length, which the sigma counts together; else itself.
     """
 
     quantity: Quantity
@@ -29,10 +29,16 @@ class Axis:
     unit: str
     values: FloatArray
     sigma: str
-    components: int = 1
+    parts: FloatArray
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", frozen(self.values))
+        object.__setattr__(self, "parts", frozen(self.parts))
+
+    @property
+    def components(self) -> int:
+        """How many components its sigma counts together."""
+        return int(self.parts.shape[1])
 
 
 @dataclass(frozen=True)
@@ -54,17 +60,18 @@ def axes_of(errors: Errors, settings: ReferenceSettings) -> Iterator[Axis]:
         along, cross = errors.along_cross(vectors[:, :2], settings.moving_mps)
         vertical_sigma = "vertical_sigma_m" if quantity == "position" else ""
         listed = (
-            ("along", along, "", 1),
-            ("cross", cross, "", 1),
-            ("horizontal", np.hypot(vectors[:, 0], vectors[:, 1]), sigma, 2),
-            ("vertical", vectors[:, 2], vertical_sigma, 1),
+            ("along", along, "", along[:, None]),
+            ("cross", cross, "", cross[:, None]),
+            ("horizontal", np.hypot(vectors[:, 0], vectors[:, 1]), sigma, vectors[:, :2]),
+            ("vertical", vectors[:, 2], vertical_sigma, vectors[:, 2:]),
         )
-        for name, values, claim, components in listed:
+        for name, values, claim, parts in listed:
             if np.isfinite(values).any():
-                yield Axis(quantity, name, unit, values, claim, components)  # type: ignore[arg-type]
+                yield Axis(quantity, name, unit, values, claim, parts)  # type: ignore[arg-type]
     for name, sigma, values in zip(ANGLE_AXES, ANGLE_SIGMAS, errors.angles_deg.T, strict=True):
         if np.isfinite(values).any():
-            yield Axis("attitude", name, "deg", _about_its_mean(values), sigma)
+            whole = _about_its_mean(values)
+            yield Axis("attitude", name, "deg", whole, sigma, whole[:, None])
 
 
 def _about_its_mean(angle_deg: FloatArray) -> FloatArray:
@@ -120,7 +127,7 @@ def checked(errors: Errors, axis: Axis) -> Checked | None:
     below = np.clip(chdtr(axis.components, squares), 1e-12, 1.0 - 1e-12)
     z = ndtri(below) if axis.components == 2 else axis.values[known] / total[known]
     is_inside = below <= SHARE
-    share = share_of(is_inside, np.asarray(z), squares, axis.components)
+    share = share_of(is_inside, axis.parts[known] / (total[known, None] / np.sqrt(axis.components)))
     reference = _rms_of(errors.reference, axis.sigma, known)
     claimed_rms = float(np.sqrt(np.mean(np.square(claimed[known]))))
     is_coarse = reference is not None and reference > claimed_rms

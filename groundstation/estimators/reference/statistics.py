@@ -93,27 +93,27 @@ class Share:
     state: ClaimState
 
 
-def share_of(is_inside: BoolArray, z: FloatArray, squares: FloatArray | None = None, components: int = 1) -> Share:
-    """Judge a claim by its samples in order of time, shape (n,).
+def share_of(is_inside: BoolArray, errors: FloatArray) -> Share:
+    """Judge a claim by its samples in order of time.
 
     Parameters
     ----------
-    is_inside : ndarray of bool
+    is_inside : ndarray of bool, shape (n,)
         Whether an error is within its 95 % region.
-    z : ndarray
-        The error, standard normal if the claim is true.
-    squares : ndarray, optional
-        Error over sigma, squared and summed over the ``components``; of one component it is the square of z.
+    errors : ndarray, shape (n, c)
+        Its components over the sigma claimed for each.
 
     Notes
     -----
     A true claim has errors about zero, so that a lasting error is one sample however long it is watched. The share has
-    the exact binomial interval of the effective number; the mean of the squares is held against chi-square of as
-    many degrees of freedom: one error of ten sigma is enough.
+    the exact binomial interval of the effective number; the mean of the squares is held against chi-square of as many
+    degrees of freedom: one error of ten sigma is enough.
     """
-    share, count = float(np.mean(is_inside)), effective_samples(z, about=0.0)
+    components = errors.shape[1]
+    share = float(np.mean(is_inside))
+    count = min(effective_samples(column, about=0.0) for column in errors.T)
     low, high = share_interval(share * count, count)
-    total = count * float(np.mean(np.square(z) if squares is None else squares))
+    total = count * float(np.mean(np.sum(np.square(errors), axis=1)))
     least, most = (float(chi_square_quantile(tail, count * components)) for tail in (0.025, 0.975))
     state: ClaimState = "too_few" if count < FEWEST_FOR_A_CLAIM else "consistent"
     if high < 0.95 or total > most:
