@@ -10,7 +10,7 @@ from groundstation.results.heading import Gate, HeadingResult
 from groundstation.results.inertial import InertialResult
 
 TITLE = "What to do next"
-LEAD = "For a better answer next time."
+LEAD = ""
 LINES = ("Fly", "Record", "Check")
 MOST_OF_A_LINE = 4
 TAXI = "taxi straight above 6 m/s for 20 s before take-off"

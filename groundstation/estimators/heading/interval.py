@@ -261,7 +261,10 @@ class _Target:
         log_likelihood, estimate = np.empty(count), np.empty((count, width))
         variance = np.empty((count, len(checkpoints), width))
         bounded = np.clip(thetas, PRIOR_MEAN - 6.0 * PRIOR_SIGMA, PRIOR_MEAN + 6.0 * PRIOR_SIGMA)
-        noise.evaluate(bounded, self.still, self.taxi, self.prior, checkpoints, log_likelihood, estimate, variance)
+        room = noise.room_for(width + 1, len(checkpoints))
+        noise.evaluate(
+            bounded, self.still, self.taxi, self.prior, checkpoints, log_likelihood, estimate, variance, room
+        )
         scaled = ((thetas - PRIOR_MEAN) / PRIOR_SIGMA)[:, self.free]
         return log_likelihood - 0.5 * np.sum(scaled**2, axis=1), estimate, variance
 
@@ -377,12 +380,10 @@ def misfit(differences: Differences, parameters: FloatArray) -> float:
     """Mean square of the whitened residuals: 1 where the differences are as noisy as the parameters say, shape ()."""
     target = _Target(NO_STANDSTILL, differences)
     width = int(target.taxi[1].shape[1])
-    information = np.zeros((1, width, width))
-    noise.taxi_filter(
-        *target.taxi, -1.0, parameters, np.zeros(3), target.last, information, np.zeros((0, 1 + noise.STATES))
-    )
-    mean, inverse = np.zeros(width - 1), np.zeros((width - 1, width - 1))
-    noise.solve_normal_equations(information[0], target.prior[0], target.prior[1], mean, inverse)
+    room = noise.room_for(width)
+    noise.taxi_filter(*target.taxi, -1.0, parameters, room.start, target.last, room.information, room.history, room)
+    information, mean = room.information, room.mean
+    noise.solve_normal_equations(information[0], target.prior[0], target.prior[1], mean, room.inverse, room)
     full = np.concatenate([[1.0], -mean])
     squares = float(np.sum(np.outer(full, full) * information[0]))
     return squares / max(len(differences.time_s) - width + 1, 1)
@@ -393,6 +394,9 @@ def sample_weights(differences: Differences, parameters: FloatArray) -> FloatArr
     target = _Target(NO_STANDSTILL, differences)
     time_s, columns, from_north, from_east, is_start = target.taxi
     history = np.zeros((len(time_s), 1 + noise.STATES))
-    information = np.zeros((1, columns.shape[1], columns.shape[1]))
-    noise.taxi_filter(*target.taxi, -1.0, parameters, np.zeros(3), target.last, information, history)
-    return np.asarray(noise.generalised_weights(time_s, from_north, from_east, is_start, parameters, history))
+    room, weights = noise.room_for(columns.shape[1]), np.zeros(len(time_s))
+    noise.taxi_filter(*target.taxi, -1.0, parameters, room.start, target.last, room.information, history, room)
+    noise.generalised_weights(
+        time_s, from_north, from_east, is_start, parameters, history, room, np.zeros(len(time_s)), weights
+    )
+    return weights

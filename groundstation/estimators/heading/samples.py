@@ -14,6 +14,7 @@ from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.heading.lines import fitted_lines, window_bounds
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.tables.sources import sources_of_kind
 from groundstation.tables.table import Flight, Table
 
 FloatArray = NDArray[np.float64]
@@ -144,14 +145,14 @@ def choose_topics(flight: Flight, request: HeadingRequest) -> tuple[str, str]:
         (
             topic
             for field in ("true_heading_deg", "magnetic_heading_deg")
-            for topic in topics_of_kind("ins", flight.topics())
+            for topic in sources_of_kind(flight, "ins")
             if flight[topic].has(field)
         ),
         "",
     )
     velocities = ("velocity_north_mps", "velocity_east_mps")
     gnss = request.gnss_topic or next(
-        (topic for topic in topics_of_kind("gnss", flight.topics()) if flight[topic].has(*velocities)), ""
+        (topic for topic in sources_of_kind(flight, "gnss") if flight[topic].has(*velocities)), ""
     )
     if ins not in flight:
         raise NotAssessableError("heading", f"no topic {ins}" if ins else "no INS heading in the log")
