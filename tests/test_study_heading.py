@@ -13,7 +13,7 @@ from groundstation.studies.heading_family import RunOutcome, run_families
 from groundstation.studies.heading_paper import arm_table, precision_table, quality_table, standstill_tables
 
 FEW_RUNS, FEW_SEED = 24, 5
-MANY_RUNS = 400  # some 2 min of a free core each family
+MANY_RUNS = 400  # some 2 min of processor time each family
 JUDGING_SEEDS = {"grid": 71, "continuous": 72}
 
 
