@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 
 # Priors: each parameter is log-normal. (median, sigma of the natural logarithm): two sigma either side reach over
 # 0.007-0.37 m/s, 0.007-0.12 m/s, 0.4-45 s, 0.05-3 deg, 0.1-1.3 Hz, 0.012-0.99, 0.003-0.2 deg, 0.2-5 times,
-# 0.1-11 arcmin (twice), 8-440 s.
+# 0.1-11 arcmin, 0.1-40 arcmin, 8-440 s.
 PRIOR: dict[str, tuple[float, float]] = {
     "white_mps": (0.05, 1.0),
     "correlated_mps": (0.03, 0.7),
@@ -32,7 +32,7 @@ PRIOR: dict[str, tuple[float, float]] = {
     "heading_white_deg": (0.025, 1.05),
     "motion_factor": (1.0, 0.8),
     "segment_deg": (1.0 / ARCMIN_PER_DEG, 1.2),
-    "wander_deg": (1.0 / ARCMIN_PER_DEG, 1.2),
+    "wander_deg": (2.0 / ARCMIN_PER_DEG, 1.5),
     "wander_s": (60.0, 1.0),
 }
 PRIOR_MEAN = np.log([PRIOR[name][0] for name in noise.PARAMETER_NAMES])
@@ -176,11 +176,12 @@ class ErrorPosterior:
             mixture_quantile(1.0 - tail, self.mean_deg, sigma, self.weight),
         )
 
-    def growth_half_width_deg(self, probability: float = 0.95) -> FloatArray:
-        """Half width of the interval after ``growth_samples``, noise as known at the end, shape (m,)."""
+    def growth_half_width_deg(self, probability: float = 0.95, extra_sigma_deg: float = 0.0) -> FloatArray:
+        """Half width of the interval after ``growth_samples``, shape (m,), noise and terms told apart as at the end."""
+        extra_deg = np.hypot(self.apart_sigma_deg, extra_sigma_deg)
         upper = 0.5 * (1.0 + probability)
         zeros = np.zeros(len(self.weight))
-        columns = self.growth_sigma_deg.T
+        columns = np.hypot(self.growth_sigma_deg, extra_deg).T
         return np.array([mixture_quantile(upper, zeros, sigma, self.weight) for sigma in columns])
 
     def even_draws(self, count: int = 40) -> FloatArray:
@@ -322,11 +323,10 @@ def error_posterior(
     _log_density, coefficients, variance = target.evaluate(points, checkpoints)
     coefficients[:, 0] += target.reference_deg
     measured = np.sqrt(np.maximum(variance, 1e-18))
-    # The terms told apart widen the interval and do not move the number: from a few directions they would extrapolate.
-    whole = _Target(standstill, differences).evaluate(points, target.last)[2][:, -1, 0]
+    apart_deg = _left_in_error(differences, np.asarray(weight @ points))
     return ErrorPosterior(
         mean_deg=coefficients[:, 0],
-        sigma_deg=np.maximum(np.sqrt(np.maximum(whole, 1e-18)), measured[:, -1, 0]),
+        sigma_deg=np.hypot(measured[:, -1, 0], apart_deg),
         measured_sigma_deg=measured[:, -1, 0],
         weight=weight,
         coefficients=coefficients,
@@ -337,6 +337,22 @@ def error_posterior(
         effective_draws=float(1.0 / np.sum(weight**2)),
         has_converged=has_converged,
     )
+
+
+def _left_in_error(differences: Differences, parameters: FloatArray) -> float:
+    """Standard deviation of what the terms told apart leave in the error, degrees.
+
+    They do not move the number, for from a few directions they would extrapolate: so all of them that the weights of
+    the samples let through is in it, and as the number is linear in the differences, that is what it would be were
+    each term the differences.
+    """
+    variance, measured = 0.0, without_apart(differences)
+    known = tuple(replace(one, prior_mean=0.0) for one in measured.regressors)
+    for term in (one for one in differences.regressors if one.is_apart):
+        alone = replace(measured, difference_deg=term.values, regressors=known, error_prior_deg=None)
+        through = float(fixed_noise_estimate(alone, parameters[None, :])[0][0])
+        variance += (term.prior_sigma * through) ** 2
+    return float(np.sqrt(variance))
 
 
 def without_apart(differences: Differences) -> Differences:
