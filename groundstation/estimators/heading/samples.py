@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import direction_of, interpolate_heading, unwrap, wrap_180
 from groundstation.base.errors import NotAssessableError
-from groundstation.base.records import BoolArray, Int64Array
+from groundstation.base.records import HEADING_IS_TRACK, BoolArray, Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.heading.lines import fitted_lines, window_bounds
@@ -158,6 +158,9 @@ def choose_topics(flight: Flight, request: HeadingRequest) -> tuple[str, str]:
         raise NotAssessableError("heading", f"no topic {ins}" if ins else "no INS heading in the log")
     if gnss not in flight:
         raise NotAssessableError("heading", f"no topic {gnss}" if gnss else "no GNSS velocity in the log")
+    if f"{HEADING_IS_TRACK}.{ins}.true_heading_deg" in flight.metadata:
+        text = f"the heading of {ins} is the receiver's own track: their difference is zero whatever the nose does"
+        raise NotAssessableError("heading", text)
     return ins, gnss
 
 
