@@ -83,6 +83,16 @@ def test_damage_of_one_log_is_told_with_its_name_and_keeps_the_other(logs: Path,
     assert found.info.ledger.topics["gnss.b"].rows > 3_000
 
 
+def test_a_log_that_cannot_be_read_is_left_out_and_told(logs: Path, tmp_path: Path) -> None:
+    empty = tmp_path / "d.ulg"
+    empty.write_bytes((logs / "a.ulg").read_bytes()[:16])
+    found = join_logs([open_log(logs / "b.ubx"), open_log(empty)], tmp_path / "joined.mcap")
+    assert found.has_lost_data
+    assert found.findings[0].code == "together.unreadable"
+    assert found.findings[0].text.startswith("d.ulg: log that is left out")
+    assert found.info.ledger.loses_data
+
+
 def test_the_same_log_twice_is_refused(logs: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"a\.ulg: found the same content as a\.ulg"):
         join_logs([open_log(logs / "a.ulg")] * 2, tmp_path / "x.mcap")

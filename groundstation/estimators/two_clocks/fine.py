@@ -52,7 +52,7 @@ def fit_motion(
     span_s : (float, float)
         Seconds of the other log.
     hidden_s : float
-        One sigma of what no motion shows: the filter of an INS.
+        One sigma of what no motion shows: the filter of an INS, messages that came late.
 
     Returns
     -------
@@ -61,9 +61,9 @@ def fit_motion(
 
     Notes
     -----
-    The faster of the two is the reference of :func:`fit_delay`. Drift is a nuisance of it: what a delay that grows with
-    time adds to the signal, time times its rate. Both are fitted again about the drift found. What may be wrong between
-    two sensors (scale, azimuth) is a nuisance each.
+    An INS, else the faster of the two, is the reference of :func:`fit_delay`. Drift is a nuisance of it: what a delay
+    that grows with time adds to the signal, time times its rate. Both are fitted again about the drift found. What may
+    be wrong between two sensors (scale, azimuth, arm) is a nuisance each.
     """
     inside = (pair.other.time_s >= span_s[0]) & (pair.other.time_s <= span_s[1])
     if np.count_nonzero(inside) < settings.overlap_min_s / pair.other.interval_s * 0.5:
@@ -85,20 +85,25 @@ def fit_motion(
         lag_s, middle_s = lag_s - drift * (own - middle_s) + sense * fit.delay_s, own
         drift += -sense * 1e-6 * fit.nuisance
     assert fit is not None
+    why = _why_not(fit, settings)
     hidden_s = float(np.hypot(hidden_s, _hidden_by_arm_s(pair, other, settings)))
     half_s = student_quantile(0.975, fit.freedom) * float(np.hypot(fit.sigma_s, hidden_s))
     slow_s = settings.slow_reference_share * _slow(min(pair.first.interval_s, pair.other.interval_s))
     half_s = float(np.hypot(half_s, NORMAL_95 * slow_s))
     if not max(half_s, NORMAL_95 * fit.modelled_sigma_s) <= settings.half_width_max_s:
-        return f"too little motion: 95 % interval of +- {half_s:.2g} s, limit {settings.half_width_max_s:g} s"
-    if fit.explained < settings.explained_min:
-        return f"the one explains {fit.explained:.0%} of the motion of the other"
-    if not fit.is_converged:
-        return "no minimum near the place of the first search"
+        why = f"too little motion: 95 % interval of +- {half_s:.2g} s, limit {settings.half_width_max_s:g} s"
+    if why:
+        return why
     drift_sigma = 1e-6 * fit.nuisance_sigma * student_quantile(0.975, fit.nuisance_freedom) / NORMAL_95
     share = settings.drift_sigma_ppm**2 / (settings.drift_sigma_ppm**2 + (1e6 * drift_sigma) ** 2)
     drift, drift_sigma = share * drift, share**0.5 * drift_sigma  # with what is known of crystals
     return MotionFit(middle_s, lag_s, half_s / NORMAL_95, drift, drift_sigma, fit.explained, fit.windows)
+
+
+def _why_not(fit: DelayFit, settings: TwoClocksSettings) -> str:
+    if fit.explained < settings.explained_min:
+        return f"the one explains {fit.explained:.0%} of the motion of the other"
+    return "" if fit.is_converged else "no minimum near the place of the first search"
 
 
 def _hidden_by_arm_s(pair: Pair, other: Side, settings: TwoClocksSettings) -> float:

@@ -51,7 +51,7 @@ def relate(first: TimedLog, other: TimedLog, *, settings: TwoClocksSettings | No
         _require_overlap(first, other, by_gnss)
     is_late = _stamps_late(first), _stamps_late(other)
     pair = pair_of(first.flight, other.flight, settings.interval_max_s, is_late=is_late)
-    place, why = _placed(pair, by_gnss, settings)
+    place, why = _placed(pair, by_gnss, files_lag_s, settings)
     base = LogRelation(first.flight.start_ns, other.flight.start_ns, ())
     if pair is not None:
         base = replace(base, first_topic=pair.first.topic, other_topic=pair.other.topic, signals=pair.names)
@@ -118,8 +118,13 @@ def _by_gnss_time(first: TimedLog, other: TimedLog, settings: TwoClocksSettings)
     return tuple(stretches)
 
 
-def _placed(pair: Pair | None, by_gnss: tuple[Stretch, ...], settings: TwoClocksSettings) -> tuple[Place | None, str]:
-    """Where the motions fit; or None, and why the motion does not tell."""
+def _placed(
+    pair: Pair | None, by_gnss: tuple[Stretch, ...], files_lag_s: float | None, settings: TwoClocksSettings
+) -> tuple[Place | None, str]:
+    """Where the motions fit; or None, and why the motion does not tell.
+
+    Of several places that fit alike that near to the times of the files is taken, where both are in UTC.
+    """
     if pair is None:
         return None, "no motion that both show"
     still = [side.topic for side in (pair.first, pair.other) if not _moves(pair.names, side, settings)]
@@ -129,7 +134,11 @@ def _placed(pair: Pair | None, by_gnss: tuple[Stretch, ...], settings: TwoClocks
     if by_gnss:
         lags = [one.lag_s for one in by_gnss]
         near_s = min(lags) - settings.near_gnss_time_s, max(lags) + settings.near_gnss_time_s
-    place = place_of(grids_of(pair, settings), settings, near_s)
+    grids = grids_of(pair, settings)
+    place = place_of(grids, settings, near_s)
+    if place is not None and near_s is None and files_lag_s is not None and place.rival > settings.rival_share_max:
+        reach_s = settings.near_gnss_time_s
+        place = place_of(grids, settings, (files_lag_s - reach_s, files_lag_s + reach_s))
     if place is None:
         return None, "too little of the motion in common"
     if place.correlation < settings.correlation_min:

@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -13,7 +13,7 @@ from groundstation.base.errors import GroundstationError, UnreadableLogError, Us
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import DamagedSpan, Ledger
 from groundstation.base.normal import NORMAL_95
-from groundstation.base.records import Int64Array, RecordBatch
+from groundstation.base.records import Damage, Int64Array, RecordBatch
 from groundstation.base.serial import to_json_exactly
 from groundstation.base.source_units import PREFIX as UNITS
 from groundstation.base.units import NS_PER_S
@@ -22,6 +22,7 @@ from groundstation.estimators.two_clocks.relate import relate
 from groundstation.estimators.two_clocks.relation import LogRelation, TimedLog
 from groundstation.estimators.two_clocks.settings import TwoClocksSettings
 from groundstation.integrity.clock import ClockModel
+from groundstation.integrity.ledger import damage_entry
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, census_of, convert_log, recounted
@@ -139,10 +140,10 @@ def _require_different(logs: Sequence[Log]) -> None:
         first[log.source.sha256] = log.path.name
 
 
-def _converted(logs: Sequence[Log], folder: Path, limits: Thresholds) -> tuple[list[_Part], list[Finding]]:
-    """The logs that can be read, and a finding for each of the others; the first keeps its place without a label."""
+def _converted(logs: Sequence[Log], folder: Path, limits: Thresholds) -> tuple[list[_Part], list[Damage]]:
+    """The logs that can be read, and a damage for each of the others; the first keeps its place without a label."""
     parts: list[_Part] = []
-    left_out: list[Finding] = []
+    left_out: list[Damage] = []
     error: GroundstationError | None = None
     for label, log in zip(("", *LABELS), logs, strict=False):
         mcap = folder / f"{label or 'a'}.mcap"
@@ -151,7 +152,7 @@ def _converted(logs: Sequence[Log], folder: Path, limits: Thresholds) -> tuple[l
             flight = read_flight(mcap, converted)
         except GroundstationError as reason:
             error = reason
-            left_out.append(Finding("fail", "together.unreadable", f"{log.source.name} is left out: {reason}"))
+            left_out.append(Damage("unreadable_log", log.source.name, 1, f"log that is left out ({reason})"))
             continue
         timed = TimedLog(flight, gnss_time_of(converted.info.clock, converted.info.reader))
         parts.append(_Part(label, log, mcap, converted, timed))
@@ -161,7 +162,7 @@ def _converted(logs: Sequence[Log], folder: Path, limits: Thresholds) -> tuple[l
 
 
 def _written(
-    parts: Sequence[_Part], clock_of: _Part, target: Path, limits: Thresholds, left_out: Sequence[Finding]
+    parts: Sequence[_Part], clock_of: _Part, target: Path, limits: Thresholds, left_out: Sequence[Damage]
 ) -> StoreInfo:
     from groundstation.store.writer import StoreWriter
 
@@ -180,7 +181,7 @@ def _written(
                 info = recounted(info, [], census)
             infos.append(info)
             joined.append(_told(part, census.rows, mover.reordered, start_ns))
-        writer.info = _merged(parts, infos, Joining(tuple(joined)), of_clock, [*left_out, *_findings(joined)])
+        writer.info = _merged(parts, infos, Joining(tuple(joined)), of_clock, left_out)
     return replace(writer.info, start_ns=start_ns)
 
 
@@ -245,7 +246,11 @@ def _renamed(part: _Part, of_clock: StoreInfo, start_ns: int) -> StoreInfo:
 
 
 def _merged(
-    parts: Sequence[_Part], infos: Sequence[StoreInfo], joining: Joining, of_clock: StoreInfo, more: Sequence[Finding]
+    parts: Sequence[_Part],
+    infos: Sequence[StoreInfo],
+    joining: Joining,
+    of_clock: StoreInfo,
+    left_out: Sequence[Damage],
 ) -> StoreInfo:
     ledgers = [one.ledger for one in infos]
     spans = sorted((span for one in ledgers for span in one.spans), key=lambda span: span.start_s)
@@ -254,7 +259,7 @@ def _merged(
         topics=dict(sorted(item for one in ledgers for item in one.topics.items())),
         spans=tuple(spans),
         spans_more=sum(one.spans_more for one in ledgers),
-        damages=tuple(damage for one in ledgers for damage in one.damages),
+        damages=(*map(damage_entry, left_out), *(damage for one in ledgers for damage in one.damages)),
         remarks=tuple(remark for one in ledgers for remark in one.remarks),
         bytes_skipped=sum(one.bytes_skipped for one in ledgers),
         skipped_spans=ledgers[0].skipped_spans,
@@ -274,9 +279,13 @@ def _merged(
         metadata=_metadata(parts, joining),
         start_ns=min(part.start_ns for part in parts),
         ledger=ledger,
-        findings=(*more, *(finding for info in infos for finding in info.findings)),
+        findings=(
+            *(Finding("fail", "together.unreadable", f"{one.place}: {one.what}") for one in left_out),
+            *_findings(joining.logs),
+            *(finding for info in infos for finding in info.findings),
+        ),
         remarks=tuple(remark for info in infos for remark in info.remarks),
-        damages=tuple(damage for info in infos for damage in info.damages),
+        damages=(*map(asdict, left_out), *(damage for info in infos for damage in info.damages)),
     )
 
 
