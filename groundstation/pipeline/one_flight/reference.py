@@ -72,12 +72,15 @@ def laid_beside(log_name: str, span_ns: tuple[int, int], has_utc: bool, referenc
     Raises
     ------
     GroundstationError
-        When the log has no UTC, a file cannot be read, none overlaps though one is expected, or several do.
+        When a file cannot be read, several overlap, or one is expected and none overlaps or the log has no UTC.
     """
     if not references.paths:
         return Laid()
-    if not has_utc:
+    if not has_utc and references.is_expected:
         raise GroundstationError(log_name, "a log without UTC", "UTC, by which a reference is put on its clock")
+    if not has_utc:
+        text = "no reference: the log has no UTC, by which one is put on its clock"
+        return Laid(findings=(Finding("info", "reference.none", text),))
     found = []
     for path in references.paths:
         reference = load_reference(path)
