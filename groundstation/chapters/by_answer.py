@@ -13,6 +13,7 @@ from groundstation.chapters.magnetic import magnetic
 from groundstation.chapters.parts import Rank, Section
 from groundstation.chapters.plan import PLAN_CHAPTERS, is_plan
 from groundstation.chapters.reference import reference
+from groundstation.chapters.together import together
 from groundstation.results.answer import Answer
 from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.flight import FlightResults
@@ -25,6 +26,7 @@ from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
 from groundstation.results.magnetic_ground import GroundDeviation
 from groundstation.results.reference import ReferenceResult
+from groundstation.results.together import Together
 
 # In the order of the report. An answer that none of them tells has the generic chapter.
 FLIGHT_CHAPTERS: tuple[Chapter, ...] = (
@@ -35,6 +37,7 @@ FLIGHT_CHAPTERS: tuple[Chapter, ...] = (
     Chapter((MagneticResult, GroundDeviation), magnetic),
     Chapter((LandingResult,), landing),
     Chapter((BeaconLanding,), landing_beacons),
+    Chapter((Together,), together),
     Chapter((ReferenceResult,), reference),
 )
 SESSION_CHAPTERS: tuple[Chapter, ...] = (Chapter((CooperativeResult,), cooperative),)

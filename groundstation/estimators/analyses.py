@@ -16,11 +16,13 @@ from groundstation.estimators.latency.analysis import LATENCY
 from groundstation.estimators.magnetic.analysis import MAGNETIC, MAGNETIC_GROUND
 from groundstation.estimators.plan import Plan
 from groundstation.estimators.reference.analysis import REFERENCE
+from groundstation.estimators.together.analysis import TOGETHER_ANALYSIS
 from groundstation.results.answer import Answer
 
 FLIGHT_ANALYSES: tuple[Analysis, ...] = (
     *(HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND),
     *(LANDING, LANDING_BEACONS),
+    TOGETHER_ANALYSIS,
     REFERENCE,
 )
 SESSION_ANALYSES: tuple[Analysis, ...] = (COOPERATIVE,)

@@ -93,6 +93,47 @@ def run_many(
     return _run_here(near, asked, crew, force, listen)
 
 
+def run_together(
+    paths: Sequence[Path | str],
+    out: Path | str,
+    configuration: Configuration,
+    *,
+    force: bool = False,
+    fail_on: str = "none",
+    with_pdf: bool = True,
+    listen: Listener = silent,
+) -> tuple[Outcome, ...]:
+    """Run several logs of one flight as that flight; see :func:`groundstation.pipeline.one_flight.join.join_logs`.
+
+    The logs are read and joined each time; parameters as of :func:`run_many`.
+
+    Raises
+    ------
+    UsageError
+        As :func:`run_many`; when fewer than two logs are named, one of them twice, or one is a folder or elsewhere.
+    """
+    from groundstation.pipeline.one_flight.join import join_files
+
+    if any(is_remote(str(place)) for place in (out, *paths)):
+        raise UsageError("--together", "logs or results elsewhere", "local ones")
+    named = " + ".join(PurePath(path).name for path in paths)
+    refuse_foreign(Path(out), force)
+    listen(Event("begin", total=1))
+    with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
+        try:
+            mcap = Path(folder) / "joined.mcap"
+            join_files([Path(path) for path in paths], mcap, configuration, listen)
+        except UsageError:
+            raise
+        except Exception as error:
+            reason, trace = reason_of(named, error)
+            listen(Event("end", named, reason))
+            return (Outcome(named, "failed", reason, trace=trace),)
+        job = Job(mcap, Path(out), configuration, fail_on, with_pdf=with_pdf, url=named)
+        asked = Asked(Path(out), configuration, None, fail_on, with_pdf, redo=True)
+        return _run_here([job], asked, partial(in_turn, listen=listen), force, listen)
+
+
 def _run_here(work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen: Listener) -> tuple[Outcome, ...]:
     out = asked.out
     refuse_foreign(out, force)

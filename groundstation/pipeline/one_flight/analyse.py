@@ -53,8 +53,8 @@ class Given:
 class Answered:
     """What the analyses of a flight gave: answers and findings by analysis, and why some gave nothing.
 
-    ``reasons`` has an entry for every analysis without an answer; ``not_assessable`` leaves out those that only lack
-    the answer of another.
+    ``reasons`` has an entry for every analysis that applies and has no answer; ``not_assessable`` leaves out those that
+    only lack the answer of another.
     """
 
     answers: Answers
@@ -157,6 +157,8 @@ def run_analyses(analyses: tuple[Analysis, ...], data: Any, known: Any) -> Answe
     findings: dict[str, tuple[Finding, ...]] = {}
     reasons: dict[str, NotAssessable] = {}
     for analysis in in_order_of_need(analyses):
+        if not analysis.applies(data, known):
+            continue
         missing = next((name for name in analysis.requires if name not in answers), None)
         if missing is not None:
             reasons[analysis.name] = reasons.get(missing) or NotAssessable(missing, f"{missing} did not run")

@@ -9,7 +9,7 @@ from pathlib import Path
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.ledger import Ledger, TopicEntry
-from groundstation.base.records import Damage, Item, RecordBatch, Remark
+from groundstation.base.records import HEADING_IS_TRACK, Damage, Item, RecordBatch, Remark
 from groundstation.base.signals import kind_of
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.version import __version__
@@ -86,7 +86,7 @@ def _convert_recorded(log: Log, target: Path, limits: Thresholds, references: Re
         source_sha256=log.source.sha256,
         reader=found.header.reader,
         versions={"groundstation": __version__, "mcap": installed.version("mcap")},
-        metadata={**found.header.metadata, **_derivations(found.remarks), **laid.facts},
+        metadata={**found.header.metadata, **_told_of_fields(found.remarks), **laid.facts},
         has_utc=found.clock.is_absolute,
         start_ns=span_ns[0],
         clock=found.clock.document(),
@@ -112,13 +112,16 @@ def _with_truth(ledger: Ledger, laid: Laid, limits: Thresholds) -> Ledger:
     return replace(ledger, topics=dict(sorted({**ledger.topics, **counted}.items())))
 
 
-def _derivations(remarks: tuple[Remark, ...]) -> dict[str, str]:
-    """What each derived field was derived from, ``derived.<topic>.<field>``: it stays with the flight."""
-    derived = (remark for remark in remarks if remark.code == "derived")
+def _told_of_fields(remarks: tuple[Remark, ...]) -> dict[str, str]:
+    """What the analyses must know of a field: it stays with the flight.
+
+    ``derived.<topic>.<field>``: what it was derived from; ``heading_is_track.<topic>.<field>``: in words.
+    """
     origin = " derived from "
     return {
-        f"derived.{remark.topic}.{field}": remark.text.rpartition(origin)[2]
-        for remark in derived
+        f"{remark.code}.{remark.topic}.{field}": remark.text.rpartition(origin)[2]
+        for remark in remarks
+        if remark.code in ("derived", HEADING_IS_TRACK)
         for field in remark.fields
     }
 

@@ -76,6 +76,7 @@ def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
     return [
         {**entry, "would_run": entry["name"] in found.answers, "reason": found.reasons.get(entry["name"], "")}
         for entry in _analyses()
+        if entry["name"] in {*found.answers, *found.reasons}  # what does not apply to such a log is left out
     ]
 
 
