@@ -150,9 +150,10 @@ def test_what_cannot_judge_is_refused_in_one_line(folder: Path, flown: Flight, t
         with pytest.raises(GroundstationError, match=told) as raised:
             converted(used, tmp_path / "x.mcap", *references)
         assert "\n" not in str(raised.value)
-    made, flight = converted(log, tmp_path / "x.mcap", other_day, is_expected=False)
-    assert "truth" not in flight
-    assert "reference.none" in {finding.code for finding in made.findings}
+    for used in (log, no_time):
+        made, flight = converted(used, tmp_path / "x.mcap", other_day, is_expected=False)
+        assert "truth" not in flight
+        assert "reference.none" in {finding.code for finding in made.findings}
 
 
 def test_a_damaged_reference_keeps_its_intact_part(folder: Path, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,8 +16,9 @@ from groundstation.base.timescales import GPS_EPOCH_NS, gps_week_to_utc_ns, leap
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.one_flight.configuration import References
 from groundstation.pipeline.one_flight.log import Log, open_log
-from groundstation.tables.assemble import batches_from_flight
-from groundstation.tables.table import Flight, Table
+
+if TYPE_CHECKING:
+    from groundstation.tables.table import Flight, Table
 
 TRUTH = "truth"
 FACTS = "truth."  # how the facts about a reference begin in the metadata of a flight
@@ -37,7 +39,7 @@ class Reference:
     name: str
     sha256: str
     reader: str
-    table: Table
+    table: "Table"
     is_weekly: bool
     damages: tuple[Damage, ...] = ()
 
@@ -72,12 +74,18 @@ def laid_beside(log_name: str, span_ns: tuple[int, int], has_utc: bool, referenc
     Raises
     ------
     GroundstationError
-        When the log has no UTC, a file cannot be read, none overlaps though one is expected, or several do.
+        When a file cannot be read, several overlap, or one is expected and none overlaps or the log has no UTC.
     """
     if not references.paths:
         return Laid()
-    if not has_utc:
+    from groundstation.tables.assemble import batches_from_flight
+    from groundstation.tables.table import Flight
+
+    if not has_utc and references.is_expected:
         raise GroundstationError(log_name, "a log without UTC", "UTC, by which a reference is put on its clock")
+    if not has_utc:
+        text = "no reference: the log has no UTC, by which one is put on its clock"
+        return Laid(findings=(Finding("info", "reference.none", text),))
     found = []
     for path in references.paths:
         reference = load_reference(path)
@@ -117,7 +125,7 @@ def _span_text(path: Path) -> str:
     return " to ".join(utc_ns_to_iso(int(one), 0) for one in (reference.table.time_ns[0], reference.table.time_ns[-1]))
 
 
-def _findings(reference: Reference, table: Table) -> list[Finding]:
+def _findings(reference: Reference, table: "Table") -> list[Finding]:
     name = reference.name
     text = f"{name} ({reference.reader}, {reference.table.topic}) judges this flight: {len(table)} samples as truth"
     found = [Finding("info", "reference.laid", text, TRUTH)]
@@ -164,14 +172,14 @@ def _load(path: Path, _time_ns: int, _size: int) -> Reference:
     return Reference(log.source.name, log.source.sha256, log.source.reader, table, is_weekly, damages)
 
 
-def _read(log: Log) -> tuple[Flight, tuple[Damage, ...], bool]:
+def _read(log: Log) -> "tuple[Flight, tuple[Damage, ...], bool]":
     """Tables of the canonical topics of a log, what of it is damaged, whether its times are UTC."""
     from groundstation.integrity.ordering import corrected
     from groundstation.integrity.survey import survey
     from groundstation.store.reader import read_info
     from groundstation.tables.assemble import flight_from_batches
 
-    def tables(batches: Sequence[RecordBatch], metadata: Mapping[str, str], has_utc: bool) -> Flight:
+    def tables(batches: Sequence[RecordBatch], metadata: Mapping[str, str], has_utc: bool) -> "Flight":
         return flight_from_batches(batches, metadata=metadata, has_utc=has_utc, source_name=log.source.name)
 
     kinds = (TRUTH, "ins", "gnss")
@@ -186,7 +194,7 @@ def _read(log: Log) -> tuple[Flight, tuple[Damage, ...], bool]:
     return tables(kept, found.header.metadata, found.clock.is_absolute), found.damages, found.clock.is_absolute
 
 
-def best_topic(flight: Flight) -> str:
+def best_topic(flight: "Flight") -> str:
     """The topic of a log that judges best: its truth, an INS that GNSS corrects, GNSS, then what there is.
 
     An INS left alone drifts; with GNSS in the same file GNSS is the reference.
@@ -204,12 +212,12 @@ def best_topic(flight: Flight) -> str:
     return next(iter(listed), "")
 
 
-def _is_aided(flight: Flight, topic: str) -> bool:
+def _is_aided(flight: "Flight", topic: str) -> bool:
     modes = flight[topic].text("mode")
     return flight.metadata.get("ins_kind") == "gnss_aided" or bool(np.mean(modes == "gnss_aided") > 0.5)
 
 
-def _on_utc(reference: Reference, span_ns: tuple[int, int]) -> Table:
+def _on_utc(reference: Reference, span_ns: tuple[int, int]) -> "Table":
     """The table on UTC; of seconds of a week, in the week in which it overlaps the log most."""
     if not reference.is_weekly:
         return reference.table
@@ -227,6 +235,6 @@ def _utc_of_week(week: int, week_ns: Int64Array) -> Int64Array:
     return np.asarray(gps_week_to_utc_ns(int(week), whole_ms) + rest_ns)
 
 
-def _cropped(table: Table, span_ns: tuple[int, int]) -> Table:
+def _cropped(table: "Table", span_ns: tuple[int, int]) -> "Table":
     """What of a reference is of the time of the log: the flight begins and ends with what was recorded."""
     return table.take((table.time_ns >= span_ns[0]) & (table.time_ns <= span_ns[1]))

@@ -31,7 +31,7 @@ PAGES = {
         ("heading_deg", "heading, deg", "true_heading_sigma_deg", 1),
     ),
 }
-SHADES = {"gnss": colours.GNSS, "ins": colours.INS, "corrected": colours.ANSWER, "smoothed": colours.PINK}
+SHADES = {"gnss": colours.GNSS, "ins": colours.INS, "corrected": colours.ANSWER, "smoothed": colours.YELLOW}
 BOLD, THIN = 1.5, 1.0
 
 
@@ -68,9 +68,10 @@ def _views(
             continue
         path = f"reference/{subject.replace('.', '_')}/{column}"
         half = NORMAL_95 * column_of(data, sigma)[mine] / np.sqrt(components)
-        if np.isfinite(half).any():
+        has_band = bool(np.isfinite(half).any())
+        if has_band:
             band = Line("95 % claimed", colours.HONEST, THIN)
             recorder.band(f"{path}/a_band", time_ns, np.zeros(len(half)), half, band, gaps)
         recorder.lines(f"{path}/b_error", time_ns, values[:, None], [Line("error", shade, BOLD)], gaps)
-        views.append(plot(f"{title_of(subject)} − reference, {title}", path))
+        views.append(plot(f"{title_of(subject)}: {title}", path, legend=has_band))
     return views
