@@ -142,6 +142,9 @@ def _coefficients(answer: MagneticResult) -> Grid:
         "Of the error in level flight, declination removed, ± standard deviation. The deviation to add has the "
         f"opposite signs. σ of A by the table is the quadrature of: {parts}."
     )
+    if is_number(answer.attitude_wander_deg):
+        wander = number(answer.attitude_wander_deg, 3, "°")
+        caption += f" Roll and pitch of the INS are taken to be wrong by {wander} in the mean of the figure."
     return Grid("Coefficients", heads, rows, caption)
 
 
