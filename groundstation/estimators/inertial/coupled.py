@@ -98,8 +98,7 @@ class CraftMotion:
         """
         n = len(time_s)
         latitude, altitude, north, east = (
-            _interpolated(differences.epochs.time_s, column, time_s)
-            for column in (differences.latitude_deg, differences.altitude_m, *differences.velocity_mps.T)
+            np.interp(time_s, differences.epochs.time_s, column) for column in differences.motion_known
         )
         velocity = np.stack([north, east], axis=1)
         seconds = np.diff(time_s)[:, None]
@@ -436,8 +435,3 @@ def _rates_radps(motion: CraftMotion) -> tuple[FloatArray, FloatArray, FloatArra
     north, east = motion.velocity_mps.T
     earth = (EARTH_RATE_RADPS * np.cos(latitude_rad), -EARTH_RATE_RADPS * np.sin(latitude_rad))
     return *earth, east / normal, -north / meridian, -east * np.tan(latitude_rad) / normal
-
-
-def _interpolated(time_s: FloatArray, values: FloatArray, at_s: FloatArray) -> FloatArray:
-    known = np.isfinite(values)
-    return np.interp(at_s, time_s[known], values[known]) if known.any() else np.zeros(len(at_s))
