@@ -38,6 +38,7 @@ class Case:
     soft: tuple[tuple[float, float, float], ...] = SOFT
     ins_error_deg: float = 0.0
     declination_error_deg: float = 0.0
+    field_error_nt: tuple[float, float] = (0.0, 0.0)
     heading_noise_deg: float = 0.0
     attitude_noise_deg: float = 0.0
     field_noise_nt: float = 0.0
@@ -62,7 +63,10 @@ class Made:
 
 
 def make(**changes: Any) -> Made:
-    """Make a flight; the INS heading is wrong by ``ins_error_deg``, the model by ``declination_error_deg``."""
+    """Make a flight; the INS heading is wrong by ``ins_error_deg``.
+
+    The model's declination lacks ``declination_error_deg``, its H and Z lack ``field_error_nt``.
+    """
     case = replace(Case(), **changes)
     rng = np.random.default_rng(case.seed)
     roll, heading = motion(case, rng)
@@ -70,7 +74,8 @@ def make(**changes: Any) -> Made:
     pitch = 2.0 + 0.5 * np.sin(2.0 * np.pi * time_s / 40.0) * (case.bank_sway_deg > 0.0)
     place = np.full(1, LATITUDE_DEG), np.full(1, LONGITUDE_DEG), np.full(1, case.altitude_m)
     earth = declination_along(*place, START_NS)
-    horizontal, down = float(earth.horizontal_nt[0]), float(earth.down_nt[0])
+    horizontal = float(earth.horizontal_nt[0]) + case.field_error_nt[0]
+    down = float(earth.down_nt[0]) + case.field_error_nt[1]
     magnetic = heading - float(earth.values_deg[0]) - case.declination_error_deg
     field = field_in_body(horizontal, down, magnetic, roll, pitch)
     reading = field @ np.array(case.soft).T + np.array(case.hard_nt)

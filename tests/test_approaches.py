@@ -240,3 +240,31 @@ def test_an_approach_written_as_a_table_gives_the_same_answer(tmp_path: Path) ->
     told, direct = found(written).answer.approaches[0], found(simulate_approach(scenario).flight).answer.approaches[0]
     assert told.end_s == direct.end_s and told.established is not None and direct.established is not None
     assert told.established.line_course_deg == pytest.approx(direct.established.line_course_deg, abs=1e-3)
+
+
+def with_altitude(error_m: float, name: str = "altitude_msl_m") -> Flight:
+    """A landing 100 m above the sea whose INS has an altitude, of a place 3 m above its wheels."""
+    flight = simulate_approach(replace(PLAIN, recorded=EXACT)).flight
+    height_m = flight["baro"].values("height_above_airfield_m")
+    return changed(flight, "ins", name, height_m + 100.0 + 3.0 + error_m)
+
+
+def test_the_runway_shows_the_error_of_an_altitude_without_gnss() -> None:
+    for error_m in (-25.0, 0.0, 40.0):
+        (one,) = found(with_altitude(error_m), site(PLAIN, elevation_m=100.0)).answer.approaches
+        (height,) = one.height_errors
+        assert height.state == "measured" and height.error_m == pytest.approx(error_m, abs=0.2)
+        assert height.sigma_m is not None and 2.0 < height.sigma_m < 8.0
+        assert height.confidence95_m is not None and height.confidence95_m[0] < error_m < height.confidence95_m[1]
+
+
+@pytest.mark.parametrize(
+    ("name", "elevation_m", "said"),
+    [("altitude_msl_m", None, "no elevation"), ("altitude_ellipsoid_m", 100.0, "above the ellipsoid")],
+)
+def test_an_altitude_that_the_runway_cannot_judge_is_not_measured(
+    name: str, elevation_m: float | None, said: str
+) -> None:
+    (one,) = found(with_altitude(5.0, name), site(PLAIN, elevation_m=elevation_m)).answer.approaches
+    (height,) = one.height_errors
+    assert height.state == "not measured" and said in height.reason and height.error_m is None

@@ -18,9 +18,9 @@ SKILL = "Skill by method and horizon"
 HONEST = "Is the claimed σ honest? Drift windows"
 
 
-def chapter(kind: str = "unaided", **changes: Any) -> Section:
-    """The chapter of the example beside an INS of that kind, with some fields of its answer changed."""
-    section = forecast(example(inertial_result(kind=kind), forecast_result(**changes)))
+def chapter(**changes: Any) -> Section:
+    """The chapter of the example, with some fields of its answer changed."""
+    section = forecast(example(inertial_result(), forecast_result(**changes)))
     assert section is not None
     return section
 
@@ -174,14 +174,6 @@ def test_rows_of_the_smaller_tables() -> None:
     assert row(section, "Gaps with GNSS on both sides", "30 min") == ("30", "419", "34", "95%", "95%")
     assert rows(section, "Outages by phase of flight")[-1] == ("taxi", "1:00", "4", "12.0", "30.0")
     assert row(section, "Coupled model", "60 min") == ("537", "+2%")
-
-
-def test_the_forecast_of_an_ins_of_unknown_kind_says_so() -> None:
-    section = chapter("unknown")
-    assert notes(section)[0] == (
-        "Whether GNSS corrects this INS already cannot be told: if it does, what follows says nothing of a forecast."
-    )
-    assert tones(section)[0] == "unknown"
 
 
 def test_a_reason_stands_in_place_of_the_answer() -> None:

@@ -70,10 +70,10 @@ def test_a_missing_file_is_told() -> None:
 
 def test_thresholds_are_a_section_and_a_file(tmp_path: Path) -> None:
     config = written(tmp_path, "c.toml", "[thresholds]\nversion = 1\ngaps.min_s = 0.5\n")
-    assert load_configuration(config).settings.thresholds.gaps.min_s == 0.5
+    assert load_configuration(config).thresholds.gaps.min_s == 0.5
     own = written(tmp_path, "t.toml", "version = 1\n[gaps]\nperiods = 4\n")
     found = load_configuration(config, thresholds=own)
-    assert found.settings.thresholds.gaps == type(found.settings.thresholds.gaps)(4.0, 0.2)
+    assert found.thresholds.gaps == type(found.thresholds.gaps)(4.0, 0.2)
     assert found.to_dict() == {"thresholds": {"version": 1, "gaps": {"periods": 4}}}
     with pytest.raises(SettingsError, match=r"c.toml, key thresholds.version"):
         load_configuration(written(tmp_path, "c.toml", "[thresholds]\ngaps.min_s = 0.5\n"))

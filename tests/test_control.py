@@ -100,6 +100,33 @@ def test_the_gradient_of_every_measure_is_exact(criterion: LocalCriterion, axes:
     assert_slopes_agree(slope, differences(one_step, at[:, 7]))
 
 
+def test_the_gradient_with_the_separation_is_exact() -> None:
+    session = Session(mixed(separation_m=9000.0))
+    at = wandering(session)
+    assert session.crowding(session.motion.paths(at).position_m)[0] > 1.0
+
+    def crowded(controls: FloatArray) -> tuple[float, FloatArray]:
+        return session.variance(controls, 100.0)
+
+    assert_slopes_agree(crowded(at)[1], differences(crowded, at))
+    one_step = StepMeasure(session, "dop", at, 7)
+    assert_slopes_agree(one_step(at[:, 7])[1], differences(one_step, at[:, 7]))
+
+
+def test_laws_keep_the_separation_that_they_would_break_without_it() -> None:
+    """A single source ahead: the nearer one passes it, the faster its direction turns."""
+    ahead = PlannedAircraft("A", 3000.0, 400.0, 8000.0, 200.0, 0.0, is_exact=True)
+    user, far = replace(USER, track_deg=0.0), PlannedPoint("P", 60_000.0, 2000.0, 100.0)
+    free = SessionPlan(
+        *("close", (user, ahead), (far,)), duration_s=40.0, step_s=5.0, separation_m=0.0, control=Control(starts=0)
+    )
+    apart = answer_of(replace(free, separation_m=2900.0)).law("covariance")
+    near = answer_of(free).law("covariance")
+    assert near.least_separation_m is not None and near.least_separation_m < 2700.0
+    assert apart.least_separation_m == pytest.approx(2900.0, rel=1e-3)
+    assert near.two_sigma_r_m < apart.two_sigma_r_m < answer_of(free).law(UNCONTROLLED).two_sigma_r_m
+
+
 def test_the_covariance_is_that_of_the_textbook() -> None:
     session = Session(mixed())
     positions = session.motion.paths(wandering(session)).position_m

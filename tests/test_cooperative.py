@@ -12,11 +12,13 @@ from groundstation.estimators.cooperative import plain
 from groundstation.estimators.cooperative.aircraft import Aircraft, aircraft_of, fleet_of
 from groundstation.estimators.cooperative.algorithms import run_algorithm
 from groundstation.estimators.cooperative.arrays import KINDS, PEER, Events, rows_for
+from groundstation.estimators.cooperative.centralised import is_about_reckoning
 from groundstation.estimators.cooperative.estimate import estimate_session
 from groundstation.estimators.cooperative.events import Prepared, prepare
 from groundstation.estimators.cooperative.messages import Broadcast, decode, pairwise_bytes, report_bytes
 from groundstation.estimators.cooperative.motion import place
 from groundstation.estimators.cooperative.observation import observe
+from groundstation.estimators.cooperative.plain.decentralised import Decentralised
 from groundstation.estimators.cooperative.plain.observation import rows_of
 from groundstation.estimators.cooperative.plain.steps import Event
 from groundstation.estimators.cooperative.settings import (
@@ -279,6 +281,14 @@ def test_two_aircraft_pairwise_is_the_centralised_filter() -> None:
     for a, b in zip(one.tracks, other.tracks, strict=True):
         assert a.state == pytest.approx(b.state, rel=1e-6, abs=1e-6)
         assert a.covariance == pytest.approx(b.covariance, rel=1e-6, abs=1e-6)
+
+
+def test_ranges_are_linearised_at_the_estimate_where_something_fixed_is_heard() -> None:
+    for scenario, is_about in ((replace(LOCAL, points=()), True), (LOCAL, False), (GLOBAL, False)):
+        settings = believed(scenario)
+        prepared = prepare(simulate_session(scenario, 1).session, settings)
+        assert is_about_reckoning(prepared, settings) is is_about
+        assert is_about_reckoning(prepared, replace(settings, derivatives="reckoning"))
 
 
 def test_three_aircraft_pairwise_stays_close_to_the_centralised_filter() -> None:
@@ -585,3 +595,18 @@ def test_aircraft_in_line_keep_their_estimates_near_their_reckoning() -> None:
         found = run_algorithm(prepare(simulated.session, settings), settings, "centralised")
         for track, truth in zip(found.tracks, simulated.truth, strict=True):
             assert np.abs(track.state[:, :2] - truth.states[:, :2]).max() < 4.5 * scenario.errors.position_m
+
+
+@pytest.mark.parametrize(("frame_s", "latency_slots"), [(1.0, 1), (10.0, 3)])
+def test_no_vehicle_claims_less_than_the_error_of_a_point_that_it_shares(frame_s: float, latency_slots: int) -> None:
+    """The joint covariance of a vehicle's states and the points keeps its positive eigenvalues."""
+    scenario = replace(load_session("ranked-known-clocks"), duration_s=120.0)
+    settings = believed(scenario, frame_s=frame_s, latency_slots=latency_slots, gate_sigma=0.0)
+    filters = Decentralised(prepare(simulate_session(scenario, 3).session, settings), settings, "modified")
+    filters.run()
+    variance_m2 = np.repeat([point.position_sigma_m**2 for point in scenario.points if point.position_sigma_m > 0.0], 2)
+    assert len(variance_m2) == 2
+    for own in filters._own:
+        joint = np.block([[own.P, own.shared], [own.shared.T, np.diag(variance_m2)]])
+        scale = np.sqrt(np.diag(joint))
+        assert np.linalg.eigvalsh(joint / np.outer(scale, scale)).min() > 0.0

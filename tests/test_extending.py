@@ -45,7 +45,7 @@ def groundstation(folder: Path, *arguments: str) -> subprocess.CompletedProcess[
     return subprocess.run(
         [sys.executable, "-m", "groundstation", *arguments],
         cwd=folder,
-        env=os.environ | {"PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "numba")},
+        env=os.environ | {"PYTHONPATH": str(folder)},
         capture_output=True,
         text=True,
         encoding="utf-8",
@@ -83,8 +83,9 @@ def patched(module: str, difference: str) -> str:
 
 
 def copy_of_the_package(folder: Path) -> None:
+    """With the loops that are compiled already, but nothing that another process may be writing just now."""
     for part in ("groundstation", "schemas"):
-        shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("*.pyc*", "*.tmp.*"))
 
 
 def rotor(folder: Path) -> None:

@@ -6,14 +6,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.records import Column
 from groundstation.base.toml_settings import settings_from
 from groundstation.estimators.heading.arms import know_arm
-from groundstation.estimators.heading.checks import about_running_line, normality
+from groundstation.estimators.heading.checks import about_running_line
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.gating import gate_samples, intervals_without_epoch, unused_intervals
+from groundstation.estimators.heading.normality import kurtosis_z, normality, skewness_z
 from groundstation.estimators.heading.recursion import run_recursion
 from groundstation.estimators.heading.references import (
     logged_reference,
@@ -349,6 +351,21 @@ def test_normality_sizes() -> None:
     assert two_humps.excess_kurtosis < -1.2
     assert two_humps.distance > 0.08
     assert normality(np.full(100, 1.0)) is None
+
+
+@pytest.mark.parametrize("count", [20, 400])
+def test_normality_p_values_are_those_of_scipy(count: int) -> None:
+    values = np.random.default_rng(count).standard_t(6, count)
+    found = normality(values)
+    assert found is not None
+    standard = (values - values.mean()) / values.std()
+    distance = stats.kstest(standard, "norm")
+    assert found.distance == pytest.approx(distance.statistic, rel=1e-12)
+    assert found.distance_p == pytest.approx(distance.pvalue, rel=0.05)  # that one is exact, ours an approximation
+    assert skewness_z(found.skewness, count) == pytest.approx(stats.skewtest(standard).statistic, rel=1e-10)
+    assert kurtosis_z(found.excess_kurtosis + 3.0, count) == pytest.approx(
+        stats.kurtosistest(standard).statistic, rel=1e-10
+    )
 
 
 def test_running_line_follows_a_turn_and_leaves_the_sway() -> None:

@@ -206,6 +206,17 @@ def test_of_an_ins_that_follows_gnss_the_differences_alone_are_told(flight: Flig
     assert result.to_frame("differences").axis.tolist() == ["north", "east", "horizontal"] * 2
 
 
+def test_of_an_ins_at_rest_the_differences_alone_are_told(flight: Flight) -> None:
+    still = {name: np.zeros(len(flight["gnss"])) for name in ("velocity_north_mps", "velocity_east_mps")}
+    still |= {name: np.full(len(flight["gnss"]), 50.0) for name in ("latitude_deg", "longitude_deg")}
+    found = answered(changed(changed(flight, "gnss", **still), "ins", **still))
+    result = found.answers["inertial"]
+    assert isinstance(result, InertialResult) and result.kind == "unknown" and "below 5 m/s" in result.kind_reason
+    assert result.channels == () and result.differences and set(found.answers) == {"inertial"}
+    assert [finding.code for finding in found.findings["inertial"]] == ["inertial.unknown_kind"]
+    assert "whether GNSS corrects this INS cannot be told (95 %" in found.reasons["forecast"]
+
+
 def test_what_is_stated_of_the_ins_decides(flight: Flight) -> None:
     by_head = answered(replace(flight, metadata={"ins_kind": "gnss_aided"}))
     by_aircraft = answered(following(flight), aircraft=AircraftData(ins_kind="unaided"))

@@ -9,7 +9,7 @@ import pytest
 from groundstation.base.angles import wrap_180
 from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.estimators.analysis import Found
-from groundstation.estimators.known import Beacon, Runway, SiteData
+from groundstation.estimators.known import Beacon, Ground, Runway, SiteData
 from groundstation.estimators.landing_beacons.analysis import LANDING_BEACONS
 from groundstation.estimators.landing_beacons.geometry import (
     distance_from_bearing_m,
@@ -23,9 +23,13 @@ from groundstation.estimators.landing_beacons.settings import LandingBeaconsSett
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.one_flight.configuration import load_configuration
 from groundstation.pipeline.verbs.synthesis import simulate_to
+from groundstation.results.answer import by_analysis
+from groundstation.results.flight import FlightResults, Source
 from groundstation.results.landing_beacons import BeaconLanding
 from groundstation.simulation.scenario import Scenario
+from groundstation.viewer.recording import write_recording
 from tests.landing_example import BEACONS, approach_scenario, flown, known_of
+from tests.recording_contents import Contents
 from tests.saved import load
 
 PLACES = np.array([(-one.before_threshold_m, one.right_m) for one in BEACONS])
@@ -134,6 +138,20 @@ def test_the_answer_tells_distance_side_and_category(found: Found[BeaconLanding]
     assert LANDING_BEACONS.sentence({"landing_beacons": found.answer}).startswith("1 approach by bearings")
 
 
+def test_the_tab_has_the_time_of_the_approach_alone(found: Found[BeaconLanding], tmp_path: Path) -> None:
+    simulated, _ = flown(approach_scenario())
+    flight, answer = simulated.flight, found.answer
+    source = Source("a.csv", "00" * 32, 0, "flat-csv")
+    bare = FlightResults("20260504T060000Z_a", source, {}, flight.start_ns, flight.duration_s, "ok")
+    results = FlightResults(**{**vars(bare), "answers": by_analysis(answer), "figures": answer.figures})
+    write_recording(tmp_path / "flight.rrd", flight, results)
+    contents = Contents(tmp_path / "flight.rrd")
+    cursor_s = np.sort(contents.times("/landing_beacons/1/lateral/cursor")) / 1e9
+    assert cursor_s[0] == pytest.approx(answer.approaches[0].start_s)
+    assert cursor_s[-2] == pytest.approx(answer.approaches[0].end_s)
+    assert "/landing_beacons/1/glide_path/b_deviation" in contents.fixed
+
+
 def test_bearings_that_run_the_wrong_way_give_no_numbers() -> None:
     with pytest.raises(NotAssessableError, match="wrong sign or quadrant"):
         analysed(approach_scenario(is_reversed=True))
@@ -151,10 +169,49 @@ def test_beacons_at_wrong_distances_are_told() -> None:
     assert "landing_beacons.speed" in {one.code for one in moved.findings}
 
 
-def test_rising_ground_is_told() -> None:
+def test_over_rising_ground_there_is_no_deviation_from_the_glide_path(found: Found[BeaconLanding]) -> None:
     rising = analysed(approach_scenario(rise_m_per_km=10.0))
     (told,) = [one for one in rising.findings if one.code == "landing_beacons.terrain"]
-    assert "hold the terrain" in told.text
+    assert "no deviation from the glide path" in told.text and "[[runways.ground]]" in told.text
+    rows = {one.before_threshold_m: one for one in rising.answer.rows}
+    assert rows[2000.0].glide_path_m is None and rows[2000.0].vertical_category == ""
+    level = next(one.glide_path_m for one in found.answer.rows if one.before_threshold_m == 100.0)
+    assert level is not None and rows[100.0].glide_path_m == pytest.approx(level - 1.0, abs=0.5)
+    data = rising.answer.figures[0]
+    far = data["straight_before_threshold_m"] > 1000.0
+    assert not np.isfinite(data["glide_path_m"][far]).any()
+
+
+def test_a_profile_of_the_ground_gives_the_glide_path_back() -> None:
+    scenario = approach_scenario(rise_m_per_km=10.0)
+    simulated, places = flown(scenario)
+    known = known_of(simulated, places)
+    ground = (Ground(-3000.0, 0.0), Ground(0.0, 0.0), Ground(12_000.0, 120.0))
+    runway = replace(known.site.runways[0], ground=ground)
+    found = LANDING_BEACONS.run(simulated.flight, replace(known, site=replace(known.site, runways=(runway,))), SETTINGS)
+    assert found.findings == () and found.answer.approaches[0].terrain_m < 4.0
+    data = found.answer.figures[0]
+    near = np.isfinite(data["glide_path_m"]) & (data["before_threshold_m"] < 2500.0)
+    rows = np.searchsorted(simulated.trajectory.time_ns / 1e9, data["time_s"])
+    true = (places.up_m - (15.0 - places.along_m * np.tan(np.deg2rad(3.0))))[rows]
+    normal = np.abs((data["glide_path_m"] - true) / data["glide_path_sigma_m"])[near]
+    assert np.mean(normal < 1.959964) > 0.9
+
+
+def test_a_profile_out_of_order_is_refused() -> None:
+    with pytest.raises(SettingsError, match="growing distance"):
+        Runway("06", 60.0, ground=(Ground(100.0, 0.0), Ground(0.0, 0.0)))
+
+
+def test_without_any_altitude_the_ground_is_told_to_be_taken_for_level() -> None:
+    simulated, places = flown(approach_scenario())
+    ins = simulated.flight["ins"]
+    kept = {name: column for name, column in ins.columns.items() if not name.startswith("altitude")}
+    tables = {name: table for name, table in simulated.flight.tables.items() if not name.startswith("baro")}
+    flight = replace(simulated.flight, tables=tables | {"ins": replace(ins, columns=kept)})
+    found = LANDING_BEACONS.run(flight, known_of(simulated, places), SETTINGS)
+    (told,) = [one for one in found.findings if one.code == "landing_beacons.terrain"]
+    assert told.severity == "warn" and "for level" in told.text
 
 
 @pytest.mark.parametrize(

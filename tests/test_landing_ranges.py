@@ -16,6 +16,7 @@ from groundstation.estimators.landing_ranges.filter import (
 )
 from groundstation.estimators.landing_ranges.model import CLOCK, PLACE, error_model
 from groundstation.estimators.landing_ranges.moving_point import fly_moving_point, measure
+from groundstation.estimators.landing_ranges.plan import _of_places
 from groundstation.estimators.landing_ranges.scenario import (
     GroundPoint,
     MovingPoint,
@@ -85,6 +86,18 @@ def test_information_a_second_counts_and_not_the_interval() -> None:
     fine = covariance_along(replace(FOUR, noise=RangeNoise(interval_s=0.01, white_m=3.0)))
     coarse = covariance_along(FOUR)
     assert coarse.sigma_m[-1] == pytest.approx(fine.sigma_m[-1], rel=0.1)
+
+
+def test_points_on_one_line_and_under_the_path_are_told() -> None:
+    def codes(*places: tuple[float, float]) -> list[str]:
+        points = tuple(GroundPoint(f"P{n}", before_m, right_m) for n, (before_m, right_m) in enumerate(places))
+        return [one.code for one in _of_places(RangeApproach("places", points=points))]
+
+    assert codes((0.0, -1000.0), (0.0, 1000.0)) == []
+    assert codes((0.0, -1000.0), (0.0, 1000.0), (3000.0, 0.0)) == []
+    assert codes((0.0, -1000.0), (0.0, 1000.0), (500.0, 10.0)) == ["landing_ranges.under_path"]
+    assert codes((-500.0, -1000.0), (0.0, 0.0), (500.0, 1010.0))[0] == "landing_ranges.on_one_line"
+    assert codes((3000.0, 0.0), (-2600.0, 0.0)) == ["landing_ranges.on_course"]
 
 
 def test_left_and_right_are_alike() -> None:

@@ -44,7 +44,8 @@ from groundstation.results.deviation import (
     deviation_from_csv,
     deviation_of,
 )
-from groundstation.results.files import SUMMARY, save
+from groundstation.results.file_names import SUMMARY
+from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import ADVISORY, CardRow, MagneticResult
@@ -292,7 +293,7 @@ def test_the_next_flights_of_forty_aircraft_get_better() -> None:
         by_iron = deviation_of(magnetic, results.flight_id, "SIM-3")
         curve = results.figure("magnetic_curves")
         assert curve is not None
-        by_curve = replace(by_iron, iron=None, table_deg=tuple(curve["deviation_recommended_deg"].tolist()))
+        by_curve = replace(by_iron, iron=None, table_deg=tuple(curve["deviation_to_add_deg"].tolist()))
         latencies = analysed(flown.flight).answer(Latencies)
         found.append(
             [

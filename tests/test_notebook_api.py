@@ -1,5 +1,6 @@
 """The Python API: lazy, the same for a log and a flight folder, one line for every error."""
 
+import io
 import json
 import re
 import shutil
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib.figure
+import matplotlib.image
 import numpy as np
 import pandas as pd
 import pytest
@@ -21,6 +23,8 @@ from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.api import OpenLog, SavedRun
 from groundstation.pipeline.verbs.clip import Wanted, clip
 from groundstation.reports import drawing
+from groundstation.reports.drawing import Sketch
+from groundstation.reports.notebook_figure import figure_from
 from groundstation.results.files import SavedFlight, save
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import Manifest
@@ -188,6 +192,18 @@ def test_every_figure_of_the_report_can_be_had(flight: OpenLog) -> None:
     assert shown.axes[0].get_xlabel() == flight.figure("density").axes[0].get_xlabel()
     with pytest.raises(UsageError, match="one of map, profile, attitude"):
         flight.figure("nonsense")
+
+
+def test_every_dot_is_seen_in_a_png() -> None:
+    def paint(figure: Any) -> None:
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.axis("off")
+        axes.set(xlim=(0.0, 6.0), ylim=(0.0, 4.0))
+        drawing.dots(axes, [1.0, 3.0, 5.0], [2.0, 2.0, 2.0], drawing.INS, size=4.0)
+
+    shown = figure_from(Sketch(40.0, paint, 60.0))._repr_png_()
+    inked = matplotlib.image.imread(io.BytesIO(shown))[:, :, 0].min(axis=0) < 0.5
+    assert np.count_nonzero(np.diff(inked.astype(int)) == 1) == 3
 
 
 def test_sketching_leaves_the_report_as_it_is(flight: OpenLog) -> None:

@@ -14,7 +14,9 @@ from groundstation.chapters.inertial import inertial
 from groundstation.chapters.parts import Front
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures import with_drawings
+from groundstation.reports.figures.overview import track_map
 from groundstation.reports.flight_report import flight_document
+from groundstation.results.corrected_position import corrected_position
 from groundstation.results.figures import FigureData
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
@@ -90,6 +92,16 @@ def test_of_an_aided_ins_differences_and_its_own_filter_are_drawn() -> None:
         *("INS − GNSS, position", "INS − GNSS, velocity", "Innovations of the INS's own filter"),
     ]
     assert "Shaded" in found[2].caption
+
+
+def test_the_track_has_ellipses_of_the_corrected_position() -> None:
+    drawn = track_map(flight())
+    assert drawn is not None and "Ellipses: 95 % of the corrected position" in drawn.caption
+    corrected = corrected_position(flight())
+    assert corrected is not None and len(corrected.along()) == 8
+    assert corrected.larger(1e3) <= corrected.larger(1e6) / 100
+    without = track_map(example(inertial_result(**AIDED, figures=aided_figures(600.0))))
+    assert without is not None and "Ellipses" not in without.caption
 
 
 @pytest.mark.parametrize("kind", ["unknown", "gnss_aided"])

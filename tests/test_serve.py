@@ -22,7 +22,7 @@ from typer.testing import CliRunner
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.cli.main import app
 from groundstation.pipeline.verbs.serve import recordings_in, serve
-from groundstation.results.files import SUMMARY
+from groundstation.results.file_names import SUMMARY
 from groundstation.viewer.catalog_table import COLUMNS
 from groundstation.viewer.fleet import FLIGHTS_TEXT
 from groundstation.viewer.fleet_catalog import FLEET, FLIGHTS, Catalog, catalog_server, reachable

@@ -173,6 +173,8 @@ def test_a_second_run_does_nothing_and_the_lines_are_the_same(
     assert planned.endswith(f"  {IDENTITY}  session finished, nothing to do")
     (copy / IDENTITY / "report.html").unlink()
     assert called(*call, "--dry-run") == 0 and "session to report again" in capsys.readouterr().out
+    assert called("run", logs, "-o", tmp_path / "new", "--dry-run") == 0
+    assert "sessions  looked for among the flights once the logs are read" in capsys.readouterr().out.splitlines()
     assert called(*call) == 0
     assert (copy / IDENTITY / "report.html").read_bytes() == (out / IDENTITY / "report.html").read_bytes()
     assert "; 1 session: 1 done" in capsys.readouterr().err

@@ -79,7 +79,8 @@ def test_a_session_is_run_again_with_other_settings(session: Path, tmp_path: Pat
     assert "cooperative.links.A.B.ranges" in deltas
     assert {"cooperative.ins.position_m"} <= {pair.name for pair in found.settings}
     assert called("compare", session, again, "-o", tmp_path / "c") == 0
-    assert (tmp_path / "c" / "compare.html").read_text(encoding="utf-8").count("<svg") == 2
+    html = (tmp_path / "c" / "compare.html").read_text(encoding="utf-8")
+    assert "Both come from the same logs" in html and html.count("<svg") == 2
     entities = Contents(tmp_path / "c" / "compare.rrd").batches
     assert {f"/{side}/session_errors/{name}" for side in "AB" for name in ("two_sigma_r_m", "rms_error_m")} <= set(
         entities

@@ -8,6 +8,7 @@ import pytest
 
 from groundstation.base.angles import FloatArray, unwrap, wrap_180
 from groundstation.base.errors import SettingsError
+from groundstation.base.geodesy import SEMI_MAJOR_M
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.simulation.deviation import (
     BIN_MIDDLES_DEG,
@@ -22,7 +23,8 @@ from groundstation.simulation.magnetic_family import (
     draw_magnetic_scenario,
     simulate_magnetic_family,
 )
-from groundstation.simulation.scenario import MagnetometerSettings, load_scenario
+from groundstation.simulation.magnetometer import world_field_nt
+from groundstation.simulation.scenario import Anomaly, MagnetometerSettings, load_scenario
 from groundstation.tables.declination import declination_along
 from groundstation.tables.table import Flight
 from tests.simulated_flights import FLIGHT_LEGS, TAXI_LEGS, quiet, scenario
@@ -148,6 +150,22 @@ def test_half_a_degree_of_roll_is_one_and_a_half_degrees_of_heading() -> None:
     assert np.max(np.abs(error)) == pytest.approx(1.5, abs=0.02)
     assert np.allclose(np.abs(error), np.abs(1.5 * np.cos(np.deg2rad(heading))), atol=0.03)
     assert np.max(np.abs(wrap_180(shown_deg(flight, "truth") - heading))) < 1e-3
+
+
+def test_the_worlds_field_has_its_error_and_a_wave_of_the_crust() -> None:
+    """Phase 90 deg at the stand: all along the wave; a quarter of a wave further all down, and sideways no change."""
+    made = scenario(legs=ROUND_TURN)
+    still = simulate(made).trajectory.at(np.array([0, 0, 0]))
+    quarter_deg = float(np.rad2deg(2_500.0 / SEMI_MAJOR_M))
+    moved = replace(still, latitude_deg=still.latitude_deg + np.array([0.0, 0.0, quarter_deg]))
+    moved = replace(moved, longitude_deg=moved.longitude_deg + np.array([0.0, 0.1, 0.0]))
+    settings = MagnetometerSettings(
+        world_field_nt=(16e3, 3e3, 50e3),
+        field_error_nt=(1.0, 2.0, 3.0),
+        anomaly=Anomaly(amplitude_nt=100.0, wavelength_m=10_000.0, direction_deg=0.0, phase_deg=90.0),
+    )
+    more = world_field_nt(moved, made, settings) - np.array([16_001.0, 3_002.0, 50_003.0])
+    assert more == pytest.approx(np.array([[100.0, 0.0, 0.0], [100.0, 0.0, 0.0], [0.0, 0.0, 100.0]]), abs=1e-6)
 
 
 @pytest.mark.parametrize("name", ["magnetic-eight", "magnetic-hard"])

@@ -7,7 +7,6 @@ import pytest
 
 from groundstation.estimators.magnetic.estimate import estimate_deviation
 from groundstation.results.figures import FigureData
-from groundstation.simulation.flight import simulate
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
 from groundstation.simulation.scenario import MagnetometerSettings
 from groundstation.studies import magnetic_runs, magnetic_tables
@@ -22,10 +21,12 @@ from groundstation.studies.magnetic_cases import (
     INCOMPLETE,
     REFERENCE,
     SWEPT,
+    WIDE,
     Setup,
     seed_of,
 )
-from groundstation.studies.magnetic_flights import Hangar, declination_error_deg, judged_outcome, turned
+from groundstation.studies.magnetic_coverage import coverage_table
+from groundstation.studies.magnetic_flights import Hangar, judged_outcome
 from groundstation.studies.magnetic_judge import METHODS, NOT_ASSESSABLE, Judged, Outcome, errors_deg, level_circle
 from groundstation.studies.magnetic_page import claim_text, coefficient_claim, limit_text, refusal_text, residual_claim
 from groundstation.studies.magnetic_runs import Job, RunOutcome, fly_job, run_jobs
@@ -44,7 +45,6 @@ from groundstation.studies.magnetic_tables import (
 )
 from groundstation.studies.page import StudyResult
 from groundstation.tables.phases import Interval, Phases
-from groundstation.tables.table import Flight
 
 SEED, FEW = 5, 4
 MANY, MANY_SEED = 200, 71
@@ -80,34 +80,16 @@ def test_iron_is_exact_without_noise_and_one_branch_is_worst(claimed: tuple[RunO
 
 def test_what_the_models_declination_lacks_stands_in_what_is_left() -> None:
     """True = magnetic + declination: a world that has more makes the corrected magnetic heading too large."""
-    hangar = Hangar(seed_of(SEED, 0))
-    scenario, left = draw_magnetic_scenario(EXACT, hangar.seed), []
-    for is_exact in (True, False):
-        flown = hangar.flown(scenario, Setup(EXACT, is_aligned=False, is_exact=is_exact))
+    hangar, left, declination = Hangar(seed_of(SEED, 0)), [], []
+    for family in (EXACT, replace(EXACT, field_error_sigmas=1.0)):
+        flown = hangar.flown(draw_magnetic_scenario(family, hangar.seed), Setup(family, is_aligned=False))
         result = estimate_deviation(flown.flight, phases=AIRBORNE)
-        circle = level_circle(flown, flown.field_ned_nt[len(flown.field_ned_nt) // 2])
-        left.append(errors_deg(circle, result)[TABLE][0])
-    lacking = declination_error_deg(hangar.seed, flown.field_ned_nt)
-    assert abs(lacking) > 0.2
+        middle = flown.field_ned_nt[len(flown.field_ned_nt) // 2]
+        left.append(errors_deg(level_circle(flown, middle), result)[TABLE][0])
+        declination.append(float(np.rad2deg(np.arctan2(middle[1], middle[0]))))
+    lacking = declination[1] - declination[0]
+    assert abs(lacking) > 0.1
     assert np.mean(left[1] - left[0]) == pytest.approx(lacking, abs=SHIFTED_BINS_DEG)
-
-
-def test_turned_flight_turns_every_true_direction_alike() -> None:
-    flight = judged_flight()
-    other = turned(flight, 10.0)
-    before, after = (np.deg2rad(one["ins"].values("true_heading_deg")) for one in (flight, other))
-    assert np.allclose(np.cos(after - before), np.cos(np.deg2rad(10.0)))
-    fast = np.hypot(flight["gnss"].values("velocity_north_mps"), flight["gnss"].values("velocity_east_mps")) > 5.0
-    tracks = [
-        np.arctan2(one["gnss"].values("velocity_east_mps"), one["gnss"].values("velocity_north_mps"))[fast]
-        for one in (flight, other)
-    ]
-    assert np.allclose(np.exp(1j * (tracks[1] - tracks[0])), np.exp(1j * np.deg2rad(10.0)))
-
-
-def judged_flight() -> Flight:
-    family = replace(SWEPT, figures=1, straights=0, straight_s=5.0, turn_deg=30.0)
-    return simulate(draw_magnetic_scenario(family, 3)).flight
 
 
 def test_taxi_aligns_the_ins_and_an_hour_of_drift_comes_back() -> None:
@@ -197,10 +179,11 @@ def test_power_is_found_above_a_floor_of_noise(exponent: float, floor: float) ->
 
 def known(rms_deg: float, ratio: float, verdict: str = "accept", reason: str = "") -> Outcome:
     """A flight on which every method errs by a figure and both judged ones by so many sigmas."""
-    judged = Judged(np.full(5, ratio), np.array([abs(ratio) <= k for k in (1, 2, 3)], dtype=float), abs(ratio), ratio,
-                    ratio, rms_deg, rms_deg)  # fmt: skip
+    judged = Judged(np.full(5, ratio), np.array([abs(ratio) <= k for k in (1, 2, 3)], dtype=float),
+                    float(abs(ratio) <= 1.96), abs(ratio), ratio, ratio, rms_deg, rms_deg)  # fmt: skip
     errors = np.full(len(METHODS), rms_deg)
-    return Outcome(verdict, reason, errors, errors, True, 70.0, 17e3, {TABLE: judged, IRON: judged}, 2.0 * rms_deg)
+    return Outcome(verdict, reason, errors, errors, True, 70.0, 17e3, {TABLE: judged, IRON: judged}, 2.0 * rms_deg,
+                   IRON)  # fmt: skip
 
 
 def sample(outcomes: list[Outcome]) -> Sample:
@@ -230,6 +213,16 @@ def test_coverage_is_counted_and_told() -> None:
     assert "in 250 of 500 cases (50.0 %)" in coefficient_claim(none, IRON)
     assert coefficient_claim(table, IRON).endswith("None is shown to be worse than stated.")
     assert "worse than stated: A (50.0 % within 2 sigma), B" in coefficient_claim(none, IRON)
+
+
+def test_coverage_of_a_cell_is_that_of_its_accepted_flights() -> None:
+    flights = [known(0.2, 0.5), known(0.4, 2.5), known(9.0, 9.0, "reject")]
+    table = coverage_table([("wide", "cell", flights), ("wide", "none", flights[2:])])
+    assert (table["flights"].tolist(), table["accepted"].tolist()) == ([3, 1], [2, 0])
+    assert (table["iron_a_to_e"][0], table["recommended_level"][0]) == (0.5, 0.5)
+    assert table["iron_d_ratio"][0] == pytest.approx(np.sqrt((0.5**2 + 2.5**2) / 2.0))
+    assert (table["recommended_rms_deg"][0], table["recommended_worst_deg"][0]) == (pytest.approx(np.sqrt(0.1)), 0.4)
+    assert np.isnan(table["iron_level"][1])
 
 
 def test_reasons_are_counted_without_their_numbers() -> None:
@@ -286,6 +279,8 @@ def test_study_has_its_tables_and_page() -> None:
         assert len(table) == len(sweep.points) * len(METHODS)
         assert set(table["flights"]) == {2}
     assert set(tables["magnetic_incomplete"]["figure"]) == set(INCOMPLETE)
+    cells = tables["magnetic_coverage"]
+    assert cells["cell"][cells["family"] == "wide"].tolist() == list(WIDE)[:2]
     assert (tables["magnetic_verdicts"]["accepted"] <= tables["magnetic_verdicts"]["flights"]).all()
     for text in ("## Is what is left within the stated sigma?", "The claim is ", "grows as bank to the power"):
         assert text in study.markdown

@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError, UsageError
+from groundstation.estimators.cooperative.consistency import judge
+from groundstation.estimators.cooperative.tracks import Track
+from groundstation.estimators.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.pipeline.verbs.recorded import recorded_sets
 from groundstation.readers import registry, utias
 from groundstation.readers.source import Source
@@ -155,6 +158,38 @@ def test_a_set_becomes_a_session(tmp_path: Path) -> None:
     (table,) = result.tables
     assert (table["rms_m"] < 10.0 * EXACT_M).all(), table.to_frame()
     assert not table["diverges"].any()
+
+
+def test_a_gap_of_the_odometry_is_told_and_widens_the_sigma(tmp_path: Path) -> None:
+    """Ten seconds without a reading: the motion itself may be wrong, all the gap long, and the filters know it."""
+
+    def change(name: str, text: str) -> str:
+        if name != "Robot1_Odometry":
+            return text
+        lines = text.splitlines()
+        kept = [one for one in lines if one.startswith("#") or not 20.0 < float(one.split()[0]) - ZERO_S < 30.0]
+        return "\n".join(kept) + "\n"
+
+    (found,) = recorded_sets(write_set(tmp_path / "set", change))
+    (told,) = found.findings
+    assert told.code == "session.odometry_gap" and "10.0 s at a time" in told.text
+    gapped, whole = found.sessions[0].vehicles
+    assert isinstance(gapped, Odometry) and isinstance(whole, Odometry) and not whole.gap_s.any()
+    assert np.count_nonzero(gapped.gap_s) == pytest.approx(50, abs=1)
+    noise = [WheeledVehicle(one, SETTINGS["utias"]).step(np.zeros(10), 20.0, 30.0)[2] for one in (gapped, whole)]
+    added = np.diag(noise[0] - noise[1])
+    assert np.sqrt(added[2]) == pytest.approx(0.2 * 10.0, rel=0.05), "radians: the whole turn of the gap"
+    assert np.sqrt(0.5 * (added[0] + added[1])) >= 0.15 * 10.0
+
+
+def test_epochs_inside_a_gap_of_the_truth_are_not_judged() -> None:
+    time_s = np.arange(0.0, 10.0, 0.5)
+    track = Track("R1", time_s, np.zeros((20, 3)), np.zeros((20, 2)), np.tile(np.eye(2), (20, 1, 1)))
+    true_s = np.concatenate([np.arange(0.0, 3.1, 0.1), np.arange(7.0, 12.0, 0.1)])
+    vehicle = Odometry("R1", time_s, np.zeros(20), np.zeros(20), (0.0, 0.0), 0.0)
+    judged = judge(track, vehicle, true_s, np.zeros((len(true_s), 3)))
+    known = np.isfinite(judged.nees)
+    assert not known[(time_s > 3.0) & (time_s < 7.0)].any() and known[(time_s <= 3.0) | (time_s >= 7.0)].all()
 
 
 def test_robots_that_lack_a_file_are_left_out(tmp_path: Path) -> None:

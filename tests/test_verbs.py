@@ -123,7 +123,10 @@ def test_study_writes_page_and_tables(tmp_path: Path) -> None:
     assert code == 0
     assert text.strip() == (tmp_path / "heading.md").read_text(encoding="utf-8").strip()
     assert (tmp_path / "tables/heading_published.csv").is_file()
-    assert groundstation("study", "heading", "-o", str(tmp_path), "--runs", "10")[0] == 2
+    kept = (tmp_path / "runs/heading-wide-73.jsonl").stat().st_mtime_ns
+    assert groundstation("study", "heading", "-o", str(tmp_path), "--runs", "10")[:2] == (0, text), "none made again"
+    assert (tmp_path / "runs/heading-wide-73.jsonl").stat().st_mtime_ns == kept
+    assert groundstation("study", "magnetic", "-o", str(tmp_path), "--minutes", "1")[0] == 2
 
 
 def test_progress_as_json_lines_goes_to_stderr(tmp_path: Path) -> None:
@@ -155,7 +158,11 @@ def test_a_report_that_cannot_be_written_stops_no_other(tmp_path: Path) -> None:
 
 
 def test_results_go_to_stdout_and_nothing_else_does(tmp_path: Path) -> None:
-    arguments = ["run", str(SAMPLES), "-o", str(tmp_path / "out"), "--json", "-j", "1"]
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    for name in ("taxi-short.csv", "taxi-damaged.csv", "README.md"):
+        shutil.copy(SAMPLES / name, logs)
+    arguments = ["run", str(logs), "-o", str(tmp_path / "out"), "--json", "-j", "1", "--no-pdf"]
     code, out, err = groundstation(*arguments)
     assert code == 3
     assert {entry["state"] for entry in json.loads(out)} == {"done", "data_lost", "skipped"}

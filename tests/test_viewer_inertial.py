@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 import rerun as rr
 
+from groundstation.base.ellipse import ELLIPSE_95
 from groundstation.results.answer import by_analysis
+from groundstation.results.corrected_position import corrected_position
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable
 from groundstation.results.forecast import ForecastResult
@@ -94,6 +96,20 @@ def test_figures_asked_first_stand_in_the_panels(contents: Contents) -> None:
     skill = plain(contents.text("/forecast/answer"))
     assert skill.startswith("# Shipped method: windows of the drift alone\n")
     assert "| windows of the drift alone (shipped) | **✓ 24** |" in skill and "| Starts | 43 |" in skill
+
+
+def test_the_plan_has_an_ellipse_of_the_corrected_position_at_every_row(
+    contents: Contents, results: FlightResults
+) -> None:
+    states = results.figure("inertial_states")
+    corrected = corrected_position(results)
+    assert states is not None and corrected is not None
+    (batch,) = contents.batches["/plan/ellipse_now"]
+    half = np.array(batch.column("Ellipses2D:half_sizes").to_pylist(), dtype=np.float64).reshape(-1, 2)
+    sigmas = np.column_stack([states[f"{axis}_position_sigma_m"] for axis in ("east", "north")])
+    larger = round(float(half[0, 0] / (ELLIPSE_95 * sigmas[0, 0])))
+    np.testing.assert_allclose(half, larger * ELLIPSE_95 * sigmas, rtol=1e-5)
+    assert "/plan/ellipses" in contents.fixed
 
 
 def test_of_an_aided_ins_differences_and_its_filter_are_shown(

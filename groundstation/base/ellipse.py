@@ -4,6 +4,10 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 
+ELLIPSE_95 = float(np.sqrt(-2.0 * np.log(0.05)))  # sigmas of the ellipse that holds 95 % of a normal pair
+ROUND = np.linspace(0.0, 2.0 * np.pi, 49)
+SEEN_SHARE = 0.03  # of a map's side that an ellipse has to be across to be seen
+
 
 def principal_axes(
     sigma_north: FloatArray, sigma_east: FloatArray, correlation: FloatArray
@@ -33,3 +37,33 @@ def principal_axes(
     middle, half = 0.5 * (north + east), np.hypot(0.5 * (north - east), both)
     azimuth_deg = np.rad2deg(0.5 * np.arctan2(2.0 * both, north - east))
     return np.sqrt(middle + half), np.sqrt(np.clip(middle - half, 0.0, None)), azimuth_deg
+
+
+def outlines(sigma_north: FloatArray, sigma_east: FloatArray, correlation: FloatArray, sigmas: float) -> FloatArray:
+    """Outlines of error ellipses of so many sigmas about the origin, north and east, shape (n, 49, 2).
+
+    Examples
+    --------
+    >>> one = outlines(np.array([2.0]), np.array([1.0]), np.array([0.0]), 2.0)[0]
+    >>> one[0].tolist(), np.round(one[12], 9).tolist()
+    ([4.0, 0.0], [0.0, 2.0])
+    """
+    across = np.sqrt(np.clip(1.0 - correlation**2, 0.0, None))
+    north = sigma_north[:, None] * np.cos(ROUND)
+    east = sigma_east[:, None] * (correlation[:, None] * np.cos(ROUND) + across[:, None] * np.sin(ROUND))
+    return sigmas * np.stack([north, east], axis=2)
+
+
+def magnified(side_m: float, half_m: float) -> int:
+    """How many times larger an ellipse is drawn on a map to be seen: 1, 2, 5, 10, 20 ... times.
+
+    Examples
+    --------
+    >>> magnified(100.0, 5.0), magnified(10_000.0, 2.0), magnified(0.0, 0.0)
+    (1, 100, 1)
+    """
+    wanted = SEEN_SHARE * side_m / half_m if half_m > 0.0 else 1.0
+    if not 1.0 <= wanted < np.inf:
+        return 1
+    decade: int = 10 ** int(np.floor(np.log10(wanted)))
+    return decade * max(step for step in (1, 2, 5) if step * decade <= wanted)

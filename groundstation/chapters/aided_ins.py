@@ -1,19 +1,20 @@
-"""Chapter: an INS that GNSS corrects already: INS - GNSS, and the innovations that its own filter logged."""
+"""Chapter: an INS that GNSS corrects, or may correct: INS - GNSS, and the innovations that its own filter logged."""
 
 from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
 from groundstation.chapters.wording import ABSENT, any_value, clock, number, percent, typeset, unit_sign
 from groundstation.results.inertial import Difference, InertialResult, OwnInnovation
 
 TITLE = "INS against GNSS"
-HEADLINE = "GNSS corrects this INS"
+HEADLINES = {"gnss_aided": "GNSS corrects this INS", "unknown": "Whether GNSS corrects this INS cannot be told"}
 LEAD = "INS − GNSS shows how closely this INS follows its receiver, not how good either of them is."
 PLACES = {"m": 2, "mps": 3}
 
 
 def aided(answer: InertialResult) -> Section:
-    """The chapter of an INS that GNSS corrects."""
+    """The chapter of an INS that GNSS corrects, or of which that cannot be told."""
     position = answer.difference("position")
-    within = "" if position is None else f": within {number(position.p95, 1, 'm')} of it (95 %)"
+    is_known = answer.kind == "gnss_aided"
+    within = f": within {number(position.p95, 1, 'm')} of it (95 %)" if position is not None and is_known else ""
     parts: tuple[Part | None, ...] = (
         _why(answer),
         _differences(answer.differences),
@@ -22,7 +23,7 @@ def aided(answer: InertialResult) -> Section:
         _innovations(answer),
         Figure("inertial.own_innovations"),
     )
-    headline = f"{HEADLINE}{within}"
+    headline = f"{HEADLINES[answer.kind]}{within}"
     return Section(
         "inertial", TITLE, LEAD, kept(parts), headline, claim=_claim(answer, headline), appendix=(_pair(answer),)
     )
@@ -38,16 +39,17 @@ def _claim(answer: InertialResult, headline: str) -> Claim:
     sentences = (f"{reason[:1].upper()}{reason[1:]}.",) if reason else ()
     value = figures[0][1] if figures else ""
     remark = "INS − GNSS, 95 %; its own drift cannot be seen" if figures else "its own drift cannot be seen"
-    return Claim(Rank.INERTIAL_OPEN, Mark("unknown", "Aided"), headline, value, remark, sentences, figures)
+    word = "Aided" if answer.kind == "gnss_aided" else "Open"
+    return Claim(Rank.INERTIAL_OPEN, Mark("unknown", word), headline, value, remark, sentences, figures)
 
 
 def _why(answer: InertialResult) -> Note:
     reason = typeset(answer.kind_reason).strip().rstrip(".")
-    text = (
-        f"GNSS corrects this INS already: {reason}. What GNSS takes out cannot be seen against GNSS, so nothing is "
-        "estimated, corrected or forecast."
-    )
-    return Note(text)
+    unseen = "What GNSS takes out cannot be seen against GNSS, so nothing is estimated, corrected or forecast."
+    if answer.kind == "gnss_aided":
+        return Note(f"GNSS corrects this INS already: {reason}. {unseen}")
+    text = f"{HEADLINES[answer.kind]}: {reason}. {unseen} An aircraft file that states ins_kind decides it."
+    return Note(text, "unknown")
 
 
 def _differences(rows: tuple[Difference, ...]) -> Grid | None:

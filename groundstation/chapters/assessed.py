@@ -16,6 +16,7 @@ SUBJECTS = {
     "magnetic_ground": "Heading sensor on the ground",
     "landing": "Approaches",
     "landing_beacons": "Landing by locators",
+    "together": "Joining of logs",
     "cooperative": "Navigation between aircraft",
 }
 

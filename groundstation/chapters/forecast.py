@@ -32,8 +32,7 @@ def forecast(results: FlightResults) -> Section | None:
     answer, ins = results.answer(ForecastResult), results.answer(InertialResult)
     if answer is None:
         return without_answer(results, "forecast", TITLE, LEAD)
-    kind = "" if ins is None else ins.kind
-    notes = conclusions(answer, kind)
+    notes = conclusions(answer)
     parts: tuple[Part | None, ...] = (
         *notes,
         Figure("forecast.growth"),
@@ -48,7 +47,7 @@ def forecast(results: FlightResults) -> Section | None:
     headline = f"Shipped method: {title_of(answer.default_method)}"
     tone: Tone = "warn" if any(note.tone == "warn" for note in notes) else "good"
     told = None
-    if kind == "unaided":
+    if ins is not None and ins.kind == "unaided":
         told = forecast_claim(answer, tuple(note.text for note in notes[:2]), tone)
     return Section("forecast", TITLE, LEAD, kept(parts), headline, claim=told, appendix=kept(workings))
 

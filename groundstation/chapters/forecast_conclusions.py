@@ -11,16 +11,9 @@ SAME = 0.03  # two RMS values closer than this are not told apart
 HEADLINE_MIN = 60.0  # the horizon the conclusion quotes, or the longest there is
 
 
-def conclusions(answer: ForecastResult, kind: str) -> list[Note]:
-    """A sentence or two for skill, honesty and windows; ``kind`` is that of the INS."""
-    text = "Whether GNSS corrects this INS already cannot be told: if it does, what follows says nothing of a forecast."
-    notes = [
-        Note(text, "unknown") if kind == "unknown" else None,
-        _gain(answer),
-        _honesty(answer),
-        _windows(answer),
-    ]
-    return [note for note in notes if note is not None]
+def conclusions(answer: ForecastResult) -> list[Note]:
+    """A sentence or two for skill, honesty and windows."""
+    return [note for note in (_gain(answer), _honesty(answer), _windows(answer)) if note is not None]
 
 
 def rows_of(answer: ForecastResult, method: str) -> dict[float, SkillRow]:

@@ -41,7 +41,7 @@ def inertial(results: FlightResults) -> Section | None:
     answer = results.answer(InertialResult)
     if answer is None:
         return without_answer(results, "inertial", TITLE, LEAD)
-    if answer.kind == "gnss_aided":
+    if answer.kind != "unaided":
         return aided(answer)
     parts: tuple[Part | None, ...] = (
         *_conclusions(answer),
@@ -66,20 +66,13 @@ def inertial(results: FlightResults) -> Section | None:
 
 
 def _headline(answer: InertialResult) -> str:
-    if answer.kind == "unknown":
-        return "Whether GNSS corrects this INS cannot be told"
     rate = number(answer.radial_error_rate_50_nmiph, 2, "nmi/h")
     return "Unaided INS" if rate == ABSENT else f"Unaided INS, {rate} (median)"
 
 
 def _conclusions(answer: InertialResult) -> list[Note]:
     """The chapter in a few sentences: what the INS is like, and whether the filter can be trusted."""
-    notes = []
-    if answer.kind == "unknown":
-        reason = typeset(answer.kind_reason).strip().rstrip(".")
-        text = f"Whether GNSS corrects this INS already cannot be told: {reason or 'the log does not show it'}."
-        notes.append(Note(f"{text} If it does, its errors and any forecast mean nothing.", "unknown"))
-    notes.append(_quality(answer))
+    notes = [_quality(answer)]
     if answer.reopened > 0:
         times = "once" if answer.reopened == 1 else f"{number(answer.reopened, 0)} times"
         text = (
@@ -101,9 +94,8 @@ def _quality(answer: InertialResult) -> Note:
     rate = "" if ABSENT in rates else f" of {rates[0]} (median; 95 % of the time below {rates[1]})"
     velocity = number(answer.velocity_error_rms_mps, 2, "m/s")
     largest = number(answer.largest_radial_error_m, 0, "m")
-    name = f"An INS{rate}, taken as unaided" if answer.kind == "unknown" else f"An unaided INS{rate}"
     in_words = _in_words(answer.channels)
-    text = f"{name}: velocity error {velocity} RMS, position error up to {largest}. {in_words}"
+    text = f"An unaided INS{rate}: velocity error {velocity} RMS, position error up to {largest}. {in_words}"
     tone: Tone = "plain" if _is_inflated(answer.channels) else "good"  # raised noise proves nothing
     return Note(text.strip(), tone if _is_consistent(answer.channels) else "warn")
 

@@ -1,7 +1,7 @@
 """What the INS errors and the forecast answer at a glance: how fast the INS drifts, and how far a forecast can go."""
 
 from groundstation.chapters.parts import Claim, Mark, Rank, Tone
-from groundstation.chapters.wording import is_number, number, typeset
+from groundstation.chapters.wording import is_number, number
 from groundstation.results.forecast import ForecastResult, SkillRow
 from groundstation.results.inertial import InertialResult
 
@@ -10,11 +10,10 @@ HOUR_MIN = 60.0  # the horizon a forecast is judged by at a glance, or the longe
 
 
 def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -> Claim:
-    """Drift of an INS that GNSS does not correct, or of which that cannot be told.
+    """Drift of an INS that GNSS does not correct.
 
     ``quality`` says in a sentence whether the filter can be trusted; ``is_doubtful`` that its sigmas are too small.
     """
-    reason = typeset(answer.kind_reason).strip().rstrip(".")
     rate, most = answer.radial_error_rate_50_nmiph, number(answer.radial_error_rate_95_nmiph, 2, "nmi/h")
     drift = number(rate, 2, "nmi/h")
     headline = (
@@ -25,17 +24,15 @@ def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -
         ("Velocity error", number(answer.velocity_error_rms_mps, 2, "m/s"), "RMS"),
         ("Largest position error", number(answer.largest_radial_error_m, 0, "m"), "against GNSS"),
     )
-    is_open = answer.kind == "unknown"
-    tone: Tone = "unknown" if is_open else "warn" if is_doubtful else "good"
-    doubt = f"Whether GNSS corrects this INS cannot be told: {reason}." if is_open else ""
+    tone: Tone = "warn" if is_doubtful else "good"
     return Claim(
-        Rank.INERTIAL_OPEN if is_open else Rank.INERTIAL,
+        Rank.INERTIAL,
         Mark(tone, WORDS[tone]),
         headline,
         value=drift if is_number(rate) else "",
         remark=f"median; 95 % below {most}" if is_number(rate) else "",
-        sentences=tuple(filter(None, (doubt, quality))),
-        figures=() if is_open else tuple(figure for figure in found if figure[1] != "—"),
+        sentences=(quality,) if quality else (),
+        figures=tuple(figure for figure in found if figure[1] != "—"),
     )
 
 

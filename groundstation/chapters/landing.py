@@ -30,18 +30,17 @@ from groundstation.chapters.wording import (
     unit_sign,
 )
 from groundstation.results.flight import FlightResults
-from groundstation.results.landing import Approach, LandingResult, PositionError, StabilisedAt
+from groundstation.results.landing import Approach, HeightError, LandingResult, PositionError, StabilisedAt
 
 LEAD = "How each approach was flown against its runway, and where it touched down."
 TITLE = "Approaches"
 TONES: dict[str, Tone] = {"stabilised": "good", "not stabilised": "warn", "not measured": "unknown"}
 MOST_TOLD = 6
 HOW = (
-    "How computed: a final is what leads straight to a touchdown, or on the guidance down to a height from which the "
-    "aircraft climbs again. Guidance deviations become metres by the width of the course sector, two dots being its "
-    "edge, and by 0.12 of the glide angle a dot. Where runway and localizer are known, position minus localizer is the "
-    "error of the positions across the course, without GNSS; generalised least squares with the tolerance of the "
-    "course line, its bends, its width, steps of the positions and bearing of the runway in the covariance."
+    "How computed: a final leads straight to a touchdown, or on the guidance to a height from which a climb follows. "
+    "Deviations become metres by the course sector, two dots to its edge, and 0.12 of the glide angle a dot. With "
+    "runway and localizer known, position minus localizer is the error across the course, without GNSS: generalised "
+    "least squares, with tolerances of course line, bends, width, steps and runway bearing in the covariance."
 )
 
 
@@ -167,6 +166,7 @@ def _approach(one: Approach) -> list[Part | None]:
         _gates(one),
         _touchdown(one),
         *(_error(one, error) for error in one.position_errors),
+        *(_height(one, error) for error in one.height_errors),
         Figure("landing.protection", of) if one.protection else None,
         _protection(one),
     ]
@@ -259,6 +259,16 @@ def _error(one: Approach, error: PositionError) -> Grid | Facts | None:
         "what a straight line leaves open",
     )
     return Facts(f"Approach {one.number}: {error.topic} across the course", (pair,))
+
+
+def _height(one: Approach, error: HeightError) -> Facts | None:
+    if error.state != "measured":
+        return None
+    pairs = [
+        ("On the roll-out", _with_sigma(error.error_m, error.sigma_m), interval(error.confidence95_m, 0, "m")),
+        *((f"σ by {part.name}", number(part.sigma_m, 1, "m"), "") for part in error.parts),
+    ]
+    return Facts(f"Approach {one.number}: altitude of {error.topic}, by the elevation of the runway", tuple(pairs))
 
 
 def _with_sigma(value: float | None, sigma: float | None) -> str:

@@ -24,7 +24,7 @@ APPROACH_HEADS = (
 )
 APPROACH_CAPTION = (
     "From and to: distance before the threshold. Ground speed and heading of the INS show whether bearings and beacons "
-    "belong together; terrain is rise and fall of the ground under the approach."
+    "belong together; terrain is rise and fall of the ground under the approach that the site file does not tell."
 )
 ROW_HEADS = (
     *(Head("Approach"), Head("Before the threshold, m", True), Head("Right of course, m", True)),
@@ -62,10 +62,13 @@ def _headline(answer: BeaconLanding) -> str:
     row = answer.rows[-1]
     lateral, glide = _with(row.lateral_m, row.lateral_95_m), _with(row.glide_path_m, row.glide_path_95_m)
     where = f"{number(row.before_threshold_m, 0, 'm')} before the threshold"
-    return f"{told}; {where} {lateral} m right of course, {glide} m above glide path"
+    above = "" if row.glide_path_m is None else f", {glide} m above glide path"
+    return f"{told}; {where} {lateral} m right of course{above}"
 
 
-def _with(value: float, half: float) -> str:
+def _with(value: float | None, half: float | None) -> str:
+    if value is None or half is None:
+        return ABSENT
     return f"{number(value, 1, signed=True)} ± {number(half, 1)}"
 
 

@@ -10,7 +10,7 @@ from groundstation.results.heading import Gate, HeadingResult
 from groundstation.results.inertial import InertialResult
 
 TITLE = "What to do next"
-LEAD = "For a better answer next time."
+LEAD = ""
 LINES = ("Fly", "Record", "Check")
 MOST_OF_A_LINE = 4
 TAXI = "taxi straight above 6 m/s for 20 s before take-off"
@@ -21,6 +21,7 @@ BY_GATE = {
     "before_take_off": ("Fly", "taxi straight before take-off: that after landing does not count"),
     "half_width": ("Fly", "taxi straight for longer"),
     "precision": ("Fly", "taxi straight for longer"),
+    "whole_half_width": ("Fly", "taxi the other way too, or state the sigmas of sideslip and mounting"),
     "standstill_duration": ("Fly", "stand still for 30 s before taxi"),
     "standstill_speed_of_mean": ("Fly", "stand still for 30 s before taxi, with an open sky"),
     "geometry": ("Record", "GDOP, PDOP or HDOP"),
@@ -89,6 +90,8 @@ def _advice(results: FlightResults) -> Iterator[tuple[str, str, str]]:
                 yield line, text, purpose
     if inertial is not None and inertial.kind == "gnss_aided":
         yield "Record", FREE_INERTIAL, "INS errors"
+    if inertial is not None and inertial.kind == "unknown":
+        yield "Check", "whether GNSS corrects this INS (ins_kind of the aircraft file)", "INS errors"
     if results.status != "ok":
         yield "Check", LOST, ""
 

@@ -71,13 +71,17 @@ class Grid(Part):
 
 @dataclass(frozen=True)
 class Facts(Part):
-    """Pairs of a label and a value, each with an optional remark; ``compact`` sets many short ones in columns."""
+    """Pairs of a label and a value, each with an optional remark; ``compact`` sets many short ones in columns.
+
+    ``settings_of`` names the table of a settings file that the pairs are keys and values of.
+    """
 
     kind: ClassVar[str] = "facts"
     title: str
     pairs: Sequence[tuple[str, str, str]]
     caption: str = ""
     compact: bool = False
+    settings_of: str = ""
 
 
 @dataclass(frozen=True)

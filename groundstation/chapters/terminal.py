@@ -1,52 +1,29 @@
 """Sections as plain text for a terminal: aligned columns, nothing that a terminal takes for a command."""
 
-from collections.abc import Collection, Sequence
-
+from groundstation.base.text_columns import columns
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Mark, Note, Part, Section
 from groundstation.chapters.wording import clean
-
-GAP = "  "
-
-
-def columns(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
-    """Lay rows out in aligned columns; those numbered in ``right`` are aligned to the right.
-
-    Examples
-    --------
-    >>> print(columns([["topic", "rows"], ["ins", "3020"], ["baro", "302"]], right=(1,)))
-    topic  rows
-    ins    3020
-    baro    302
-    """
-    widths = [max(len(row[place]) for row in rows) for place in range(len(rows[0]))]
-    lines = []
-    for row in rows:
-        cells = [
-            cell.rjust(width) if place in right else cell.ljust(width)
-            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ]
-        lines.append(GAP.join(cells).rstrip())
-    return "\n".join(lines)
 
 
 def terminal(section: Section) -> str:
     """A section as plain text, headed by its headline or its title.
 
-    The parts set small are left out, and figures, but for what stands in their place.
+        The parts set small are left out, and figures, but for what stands in their place.
 
-    Examples
-    --------
-    >>> from groundstation.chapters.parts import Head
-    >>> heads, rows = (Head("Gate"), Head("Figure", True)), [("Precision e", "0.022°"), ("Quality", "0.1°")]
-    >>> print(terminal(Section("heading", "Heading", "", (Note("Enter it.", "good"), Grid("Gates", heads, rows)))))
-    Heading
-    <BLANKLINE>
-    ✓ Enter it.
-    <BLANKLINE>
-    Gates
-    Gate         Figure
-    Precision e  0.022°
-    Quality        0.1°
+        Examples
+        --------
+        >>> from groundstation.base.text_columns import columns
+    from groundstation.chapters.parts import Head
+        >>> heads, rows = (Head("Gate"), Head("Figure", True)), [("Precision e", "0.022°"), ("Quality", "0.1°")]
+        >>> print(terminal(Section("heading", "Heading", "", (Note("Enter it.", "good"), Grid("Gates", heads, rows)))))
+        Heading
+        <BLANKLINE>
+        ✓ Enter it.
+        <BLANKLINE>
+        Gates
+        Gate         Figure
+        Precision e  0.022°
+        Quality        0.1°
     """
     told = (part_text(part) for part in (*section.above, *section.parts))
     return "\n\n".join(filter(None, (clean(section.headline or section.title), *told)))

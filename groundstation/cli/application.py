@@ -81,6 +81,10 @@ Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more; show w
 Json = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
 FailOn = Annotated[FailOnMode, typer.Option("--fail-on", help="Exit 4 at a finding this severe or worse.")]
 Force = Annotated[bool, typer.Option("-f", "--force", help="Overwrite what is there.")]
+Together = Annotated[
+    bool,
+    typer.Option("--together", help="The logs are of one flight: put them on one clock, by GNSS time or by motion."),
+]
 NoPdf = Annotated[bool, typer.Option("--no-pdf", help="Leave report.pdf and steer_card.pdf out.")]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
 Profile = Annotated[

@@ -8,8 +8,9 @@ from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import FieldEntry, Ledger, TopicEntry
 from groundstation.base.signals import is_canonical
+from groundstation.base.text_columns import columns
 from groundstation.chapters.parts import Grid, Head
-from groundstation.chapters.terminal import columns, grid_text
+from groundstation.chapters.terminal import grid_text
 from groundstation.cli.printing import totals
 from groundstation.cli.text import as_json, printable
 from groundstation.pipeline.verbs.check import Checked

@@ -110,11 +110,11 @@ def compare(
 
 def comparison_text(found: "Comparison", *, everything: bool = False) -> str:
     """Text of ``compare``: who is who, how the clocks are aligned, the answers, settings and findings that differ."""
-    from groundstation.chapters.terminal import columns
+    from groundstation.base.text_columns import columns
 
     alignment = found.alignment
     when = "" if alignment.event == "utc" else f" (A at {alignment.a_s:.1f} s, B at {alignment.b_s:.1f} s)"
-    shared = f"; one log: differences come from {found.cause}, the noise is shared" if found.is_same_log else ""
+    shared = f"; {found.origin}: differences come from {found.cause}, the noise is shared" if found.is_same_log else ""
     sides = [
         [f"{letter}:", printable(f"{side.flight_id}  {side.source_name}")]
         for letter, side in zip("AB", (found.a, found.b), strict=True)

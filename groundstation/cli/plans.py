@@ -85,7 +85,7 @@ def _plan(
     progress: Progress,
 ) -> int:
     """What every kind of plan does with the options they share."""
-    from groundstation.chapters.terminal import columns
+    from groundstation.base.text_columns import columns
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
     from groundstation.pipeline.verbs.plan import run_plan, shipped_scenarios

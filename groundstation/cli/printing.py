@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from groundstation.chapters.terminal import columns
+from groundstation.base.text_columns import columns
 from groundstation.cli.text import as_json, printable
 from groundstation.pipeline.one_flight.log import log_name
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code

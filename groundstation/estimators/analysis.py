@@ -79,6 +79,8 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
         Analyses whose answers it uses where there are any; they run first.
     requires : tuple of str
         Those of them without which it cannot run; that it then did not run is their reason, told once.
+    applies : callable
+        Whether data of that kind can have it at all: of other data nothing is said of it, not even why not.
     is_expected : callable
         Whether such data let one expect an answer: then a finding says why there is none.
     rests_on : callable
@@ -101,6 +103,7 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     table: str = ""
     builds_on: tuple[str, ...] = ()
     requires: tuple[str, ...] = ()
+    applies: Callable[[Any, Any], bool] = _always
     is_expected: Callable[[Any, Any], bool] = _always
     rests_on: Callable[[Any, Any], RestsOn | None] = _no_samples
     sentence: Callable[[Answers], str] = _nothing

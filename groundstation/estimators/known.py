@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, Literal, TypeVar
 
 from groundstation.base.errors import SettingsError
@@ -71,11 +72,23 @@ class Stand:
 
 
 @dataclass(frozen=True)
+class Ground:
+    """Height of the ground at a place on the extended centre line, above that of the threshold."""
+
+    before_threshold_m: float = required_number(-10_000.0, 100_000.0)
+    height_m: float = required_number(-5_000.0, 5_000.0)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+@dataclass(frozen=True)
 class Runway:
     """Runway with its true bearing (in the direction of take-off), the position of its threshold and its approach aids.
 
     ``localizer_width_m`` is the full width of the course sector
     at the threshold, ``localizer_distance_m`` from the threshold to its antenna behind the far end.
+    ``ground`` is the profile under the approach, straight between its places; none: level.
     """
 
     name: str
@@ -90,9 +103,15 @@ class Runway:
     width_m: float | None = number(None, 1.0, 200.0)
     localizer_width_m: float | None = number(None, 10.0, 1_000.0)
     localizer_distance_m: float | None = number(None, 500.0, 10_000.0)
+    ground: tuple[Ground, ...] = ()
 
     def __post_init__(self) -> None:
         check_ranges(self)
+        places = [one.before_threshold_m for one in self.ground]
+        if len(places) == 1 or any(one >= other for one, other in pairwise(places)):
+            raise SettingsError(
+                "ground", f"{len(places)} places", "two or more, by growing distance before_threshold_m"
+            )
         if (self.latitude_deg is None) != (self.longitude_deg is None):
             missing, other = "latitude_deg", "longitude_deg"
             if self.longitude_deg is None:

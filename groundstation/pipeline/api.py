@@ -10,24 +10,21 @@ from typing import TYPE_CHECKING, Any
 from groundstation.base.clock import Clock
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
 from groundstation.base.ledger import Ledger
-from groundstation.estimators.analyses import ANSWER_TYPES
-from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, file_in
 from groundstation.pipeline.notebook import AnyPath, OpenFlight
-from groundstation.pipeline.one_flight.analyse import analyse
-from groundstation.pipeline.one_flight.configuration import SECTIONS, Configuration, load_configuration
-from groundstation.pipeline.one_flight.convert import Converted, convert_log
-from groundstation.pipeline.one_flight.flight import given_of, read_flight
+from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration, sections
 from groundstation.pipeline.one_flight.identity import flight_id
 from groundstation.pipeline.one_flight.log import Log, open_log
 from groundstation.pipeline.verbs.describe import facts_of
-from groundstation.results.files import SavedFlight, load
-from groundstation.results.flight import FlightResults, Source
-from groundstation.results.manifest import Manifest
-from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from groundstation.integrity.limits import Thresholds
+    from groundstation.pipeline.one_flight.convert import Converted
+    from groundstation.results.files import SavedFlight
+    from groundstation.results.flight import FlightResults, Source
+    from groundstation.tables.table import Flight
 
 Settings = AnyPath | Mapping[str, Any]
 
@@ -125,8 +122,11 @@ class Conversion:
         self.log = log
         self._done: dict[str, tuple[Converted, Flight]] = {}  # by the thresholds of the ledger
 
-    def read(self, thresholds: Thresholds) -> tuple[Converted, Flight]:
+    def read(self, thresholds: "Thresholds") -> "tuple[Converted, Flight]":
         """Convert the log to an MCAP and read its tables back, as a run does."""
+        from groundstation.pipeline.one_flight.convert import convert_log
+        from groundstation.pipeline.one_flight.flight import read_flight
+
         if thresholds.sha256 not in self._done:
             with told_in_a_line(self.log.path.name), TemporaryDirectory(prefix="groundstation-") as folder:
                 mcap = Path(folder) / "flight.mcap"
@@ -141,14 +141,14 @@ class OpenLog(OpenFlight):
     def __init__(self, conversion: Conversion, configuration: Configuration) -> None:
         self.configuration = configuration
         self._conversion = conversion
-        self._thresholds = configuration.settings.thresholds
+        self._thresholds = configuration.thresholds
 
     @property
-    def _converted(self) -> Converted:
+    def _converted(self) -> "Converted":
         return self._conversion.read(self._thresholds)[0]
 
     @property
-    def source(self) -> Source:
+    def source(self) -> "Source":
         return self._conversion.log.source
 
     @property
@@ -164,11 +164,14 @@ class OpenLog(OpenFlight):
         return facts_of(self._conversion.log, self.flight.metadata, self.ledger)
 
     @cached_property
-    def flight(self) -> Flight:
+    def flight(self) -> "Flight":
         return self._conversion.read(self._thresholds)[1]
 
     @cached_property
-    def results(self) -> FlightResults:
+    def results(self) -> "FlightResults":
+        from groundstation.pipeline.one_flight.analyse import analyse
+        from groundstation.pipeline.one_flight.flight import given_of
+
         flight = self.flight
         start_utc_ns = flight.start_ns if flight.has_utc else None
         identity = flight_id(start_utc_ns, flight.metadata, self.source.sha256)
@@ -196,7 +199,10 @@ class OpenLog(OpenFlight):
                 raise GroundstationError(str(out), outcome.text)
             return SavedRun(Path(outcome.folder))
 
-    def _saved(self) -> SavedFlight:
+    def _saved(self) -> "SavedFlight":
+        from groundstation.estimators.analyses import ANSWER_TYPES
+        from groundstation.results.files import SavedFlight
+        from groundstation.results.manifest import Manifest
         from groundstation.results.summary import summary_of
 
         manifest = Manifest(configuration=self.configuration.to_dict())
@@ -208,15 +214,18 @@ class SavedRun(OpenFlight):
     """A flight folder that a run made: its answers as they were saved, its tables from the MCAP in it."""
 
     def __init__(self, folder: Path) -> None:
+        from groundstation.estimators.analyses import ANSWER_TYPES
+        from groundstation.results.files import load
+
         self.folder = folder
         self.saved = load(folder, ANSWER_TYPES)
 
     @cached_property
-    def results(self) -> FlightResults:
+    def results(self) -> "FlightResults":
         return self.saved.results
 
     @property
-    def source(self) -> Source:
+    def source(self) -> "Source":
         return self.results.source
 
     @property
@@ -232,7 +241,7 @@ class SavedRun(OpenFlight):
         return facts_of(Log(self.folder, self.source, is_store=True), self.results.metadata, self.ledger)
 
     @cached_property
-    def flight(self) -> Flight:
+    def flight(self) -> "Flight":
         return self._log.flight
 
     @cached_property
@@ -240,14 +249,14 @@ class SavedRun(OpenFlight):
         """The flight anew, from the MCAP, with the settings of the run."""
         mcap = file_in(self.folder, ".mcap")
         told = self.saved.manifest.configuration
-        known = {name: value for name, value in told.items() if name in SECTIONS}
+        known = {name: value for name, value in told.items() if name in sections()}
         with told_in_a_line(mcap.name):
             return OpenLog(Conversion(open_log(mcap)), load_configuration(known))
 
     def with_settings(self, **sections: Any) -> OpenLog:
         return self._log.with_settings(**sections)
 
-    def _saved(self) -> SavedFlight:
+    def _saved(self) -> "SavedFlight":
         return self.saved
 
 

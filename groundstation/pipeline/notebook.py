@@ -11,9 +11,7 @@ from typing import TYPE_CHECKING, Any
 from groundstation.base.clock import Clock
 from groundstation.base.errors import GroundstationError, NotAssessableError, UnknownNameError, told_in_a_line
 from groundstation.base.ledger import Ledger
-from groundstation.pipeline.one_flight.flight import sentence
 from groundstation.results.answer import A
-from groundstation.results.files import SavedFlight
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.heading import HeadingResult
@@ -25,6 +23,7 @@ from groundstation.tables.table import Flight, Tables
 
 if TYPE_CHECKING:
     from groundstation.reports.drawing import Drawing, Sketch
+    from groundstation.results.files import SavedFlight
 
 AnyPath = str | PathLike[str]
 MOST_TOPICS = 12  # named in the card of a flight
@@ -81,7 +80,7 @@ class OpenFlight(ABC):
         """
 
     @abstractmethod
-    def _saved(self) -> SavedFlight:
+    def _saved(self) -> "SavedFlight":
         """The flight as the report reads it."""
 
     @cached_property
@@ -214,6 +213,8 @@ class OpenFlight(ABC):
         return None
 
     def __repr__(self) -> str:
+        from groundstation.pipeline.one_flight.flight import sentence
+
         done = self.__dict__.get("results")
         told = f": {sentence(done)}" if done is not None else ""
         return f"<{type(self).__name__} {self.source.name} ({self.source.reader}){told}>"

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import MAX_TEXT_CHARACTERS, BoolArray, Column, Int64Array
 from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.readers import arrow_values as arrow
 
 MAX_TIME_NS = 2**62  # UTC until 2116; sums and differences of two such times fit 64 bits
 _NUMBER = r"^[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?|(?i:nan|inf|infinity))$"
@@ -40,16 +40,7 @@ class Cells:
 def trimmed(text: Any) -> Any:
     """Cells without padding; cells of nothing but padding become empty (null)."""
     stripped = pc.utf8_trim_whitespace(text)
-    return pc.if_else(pc.equal(stripped, ""), pa.scalar(None, pa.string()), stripped)
-
-
-def _mask(array: Any) -> BoolArray:
-    return np.asarray(array.to_numpy(zero_copy_only=False), dtype=bool)
-
-
-def _values(array: Any, filler: float | int) -> NDArray[Any]:
-    """Values of an array as numpy, the filler where null."""
-    return np.asarray((pc.fill_null(array, filler) if array.null_count else array).to_numpy(zero_copy_only=False))
+    return pc.if_else(pc.equal(stripped, arrow.EMPTY_TEXT), arrow.NO_TEXT, stripped)
 
 
 def _cast(text: Any, target: Any, pattern: str) -> tuple[Any, BoolArray]:
@@ -59,13 +50,13 @@ def _cast(text: Any, target: Any, pattern: str) -> tuple[Any, BoolArray]:
     try:
         return pc.cast(text, options=options), none
     except pa.ArrowException:
-        fits = pc.fill_null(pc.match_substring_regex(text, pattern), False)
-        kept = pc.if_else(fits, text, pa.scalar(None, pa.string()))
-        return pc.cast(kept, options=options), _mask(text.is_valid()) & ~_mask(fits)
+        fits = pc.fill_null(pc.match_substring_regex(text, pattern), arrow.FALSE)
+        kept = pc.if_else(fits, text, arrow.NO_TEXT)
+        return pc.cast(kept, options=options), arrow.is_valid(text) & ~arrow.mask(fits)
 
 
 def _column(array: Any, filler: float | int) -> Column:
-    return Column(_values(array, filler), _mask(array.is_valid()) if array.null_count else None)
+    return Column(arrow.values(array, filler), arrow.is_valid(array) if array.null_count else None)
 
 
 def numbers(text: Any) -> Cells:
@@ -101,8 +92,10 @@ def flags(text: Any) -> Cells:
     ([True, False, False, False], [True, True, False, False], [False, False, False, True])
     """
     lower = pc.utf8_lower(text)
-    true, false = (_mask(pc.is_in(lower, value_set=pa.array(words))) for words in (["1", "true"], ["0", "false"]))
-    return Cells(Column(true, true | false), _mask(text.is_valid()) & ~true & ~false)
+    true, false = (
+        arrow.mask(pc.is_in(lower, value_set=arrow.texts(words))) for words in (["1", "true"], ["0", "false"])
+    )
+    return Cells(Column(true, true | false), arrow.is_valid(text) & ~true & ~false)
 
 
 def words(text: Any, restore: Callable[[str], str] = str) -> Cells:
@@ -114,11 +107,13 @@ def words(text: Any, restore: Callable[[str], str] = str) -> Cells:
     >>> read.column.values.tolist(), read.unreadable.tolist()
     (['nav', '', ''], [False, False, True])
     """
-    strange = _mask(pc.fill_null(pc.match_substring_regex(text, _NOT_TEXT), False))
-    present = _mask(text.is_valid()) & ~strange
-    coded = pc.dictionary_encode(pc.fill_null(pc.if_else(pa.array(present), text, ""), ""))
+    strange = arrow.mask(pc.fill_null(pc.match_substring_regex(text, _NOT_TEXT), arrow.FALSE))
+    present = arrow.is_valid(text) & ~strange
+    coded = pc.dictionary_encode(
+        pc.fill_null(pc.if_else(arrow.flags(present), text, arrow.EMPTY_TEXT), arrow.EMPTY_TEXT)
+    )
     distinct = [restore(word) for word in coded.dictionary.to_pylist()] or [""]
-    index = coded.indices.to_numpy()
+    index = arrow.values(coded.indices, 0)
     long = np.array([len(word) > MAX_TEXT_CHARACTERS for word in distinct])
     values = np.array([word[:MAX_TEXT_CHARACTERS] for word in distinct], dtype=np.str_)
     return Cells(Column(values[index], present), strange, long[index] if long.any() else None)
@@ -140,15 +135,15 @@ def decimal_ns(text: Any, digits: int = 9, multiple: int = 1) -> Cells:
     >>> decimal_ns(pa.array(["1700000000123.4567899"]), 6).column.values.tolist()
     [1700000000123456789]
     """
-    filled, fits = _mask(text.is_valid()), pc.fill_null(pc.match_substring_regex(text, _DECIMAL), False)
-    kept = pc.if_else(fits, text, pa.scalar(None, pa.string()))
+    filled, fits = arrow.is_valid(text), pc.fill_null(pc.match_substring_regex(text, _DECIMAL), arrow.FALSE)
+    kept = pc.if_else(fits, text, arrow.NO_TEXT)
     target = pa.decimal128(_DECIMAL_DIGITS + digits, digits)
     decimals = pc.cast(kept, options=pc.CastOptions(target_type=target, allow_decimal_truncate=True))
     # A decimal128 is a 128-bit integer, here of nanoseconds: its low half is the int64 wanted.
     halves = np.frombuffer(decimals.buffers()[1], dtype=np.int64, count=2 * (len(decimals) + decimals.offset))
     low, high = halves[2 * decimals.offset :: 2], halves[2 * decimals.offset + 1 :: 2]
-    values, readable = low.copy(), _mask(fits) & (high == low >> 63)
-    for at in np.flatnonzero(filled & ~_mask(fits)):  # 1.5e3: rare, so one by one
+    values, readable = low.copy(), arrow.mask(fits) & (high == low >> 63)
+    for at in np.flatnonzero(filled & ~arrow.mask(fits)):  # 1.5e3: rare, so one by one
         exact = _exact(text[int(at)].as_py(), digits)
         values[at], readable[at] = exact or 0, exact is not None
     readable &= (values > -MAX_TIME_NS // multiple) & (values < MAX_TIME_NS // multiple)
@@ -166,8 +161,8 @@ def _exact(text: str, digits: int) -> int | None:
 def integers_ns(text: Any) -> Cells:
     """Whole numbers of nanoseconds."""
     array, unreadable = _cast(text, pa.int64(), _INTEGER)
-    filled = _mask(text.is_valid())
-    return _times(_values(array, 0), filled, filled & ~unreadable)
+    filled = arrow.is_valid(text)
+    return _times(arrow.values(array, 0), filled, filled & ~unreadable)
 
 
 def _times(values: Int64Array, filled: BoolArray, readable: BoolArray) -> Cells:
@@ -190,8 +185,8 @@ def iso_ns(text: Any) -> tuple[Cells, BoolArray]:
             whole = pc.cast(pc.cast(text, target), pa.int64())
         except pa.ArrowException:
             continue
-        filled = _mask(text.is_valid())
-        read = _times(_values(whole, 0), filled, filled)
+        filled = arrow.is_valid(text)
+        read = _times(arrow.values(whole, 0), filled, filled)
         return read, read.column.mask & zoneless
     return _iso_one_by_one(text)
 
@@ -208,4 +203,4 @@ def _iso_one_by_one(text: Any) -> tuple[Cells, BoolArray]:
             continue
         if abs(utc_ns) < MAX_TIME_NS:
             values[at], readable[at], zoneless[at] = utc_ns, True, not named_zone
-    return _times(values, _mask(text.is_valid()), readable), zoneless
+    return _times(values, arrow.is_valid(text), readable), zoneless

@@ -8,6 +8,7 @@ import pyarrow.compute as pc
 
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
+from groundstation.readers import arrow_values as arrow
 from groundstation.readers.cells import MAX_TIME_NS, Cells
 
 _NS_PER_DAY = 86_400 * NS_PER_S
@@ -51,8 +52,8 @@ def _each_distinct(text: Any, parse: Any, formats: tuple[str, ...]) -> tuple[Int
     parsed = [None if word is None else parse(word, formats) for word in coded.dictionary.to_pylist()]
     values = np.array([0 if value is None else value for value in parsed] or [0], dtype=np.int64)
     known = np.array([value is not None for value in parsed] or [False], dtype=bool)
-    index = coded.indices.to_numpy(zero_copy_only=False)
-    filled = np.asarray(text.is_valid().to_numpy(zero_copy_only=False), dtype=bool)
+    index = arrow.values(coded.indices, 0)
+    filled = arrow.is_valid(text)
     return values[index], known[index], filled & ~known[index]
 
 

@@ -12,6 +12,7 @@ from groundstation.chapters.findings import MARKS
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Part, Section
 from groundstation.chapters.wording import ABSENT, any_value, number, significant
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.reports.page import TEMPLATES, render
@@ -24,8 +25,8 @@ A, B = d.INS, d.GNSS
 MOST = 3000  # points of a line
 NEAR_M = 200_000.0  # flights that begin no further apart share one map
 SHARED = (
-    "Both come from one log: they share its noise, and what differs follows from {} alone. A difference within the "
-    "stated sigmas is no proof that they do not matter."
+    "Both come from {}: their noise is shared, and what differs follows from {} alone. A difference within the stated "
+    "sigmas is no proof that they do not matter."
 )
 LINES = (  # figure, column, column of the half width and what it is multiplied by, axis, title
     ("overview", "altitude_m", None, "altitude, m", "Altitude"),
@@ -65,7 +66,11 @@ def _opening(comparison: Comparison) -> list[Part]:
     told = f"Clocks aligned on {alignment.event}{when}: clock of B {number(alignment.offset_s, 3, 's', signed=True)}."
     heads = (Head(""), Head(f"A: {comparison.a.flight_id}"), Head(f"B: {comparison.b.flight_id}"))
     opening: list[Part] = [Grid("", heads, rows), Note(f"{told} Times in the figures are flight times of A.")]
-    return [*opening, Note(SHARED.format(comparison.cause), "warn")] if comparison.is_same_log else opening
+    return (
+        [*opening, Note(SHARED.format(comparison.origin, comparison.cause), "warn")]
+        if comparison.is_same_log
+        else opening
+    )
 
 
 def _answers(comparison: Comparison) -> Section:
@@ -169,7 +174,7 @@ def _overlay(
         return None
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 20, 12, 174, 54)
+        axes = layout.place(figure, 20, 12, 174, 54)
         times, shown = [], []
         for side, data in drawn:
             values = d.broken_at_wrap(numbers(data, column)) if column == "heading_deg" else numbers(data, column)
@@ -183,11 +188,11 @@ def _overlay(
             shown.append(values)
         # The bands of the first samples may leave the picture.
         low, high = np.percentile(d.finite(*shown), (0.0, 100.0) if width is None else (0.5, 99.5))
-        axes.set_ylim(*d.padded(float(low), float(high)))
+        axes.set_ylim(*layout.padded(float(low), float(high)))
         axes.set_ylabel(axis)
         every = d.finite(*times)
-        d.time_axis(axes, float(every.min()), float(every.max()))
-        d.legend_above(axes)
+        layout.time_axis(axes, float(every.min()), float(every.max()))
+        layout.legend_above(axes)
 
     caption = f"{title} of both flights." if len(drawn) == len(sides) else f"{title}: only {drawn[0][0].letter} has it."
     return Drawing(title, caption, f"{title} of A and B over flight time.", d.draw(f"{name}-{column}", 60, paint))
@@ -211,13 +216,13 @@ def _tracks(sides: Sequence[_Side]) -> Drawing | None:
     ]
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 20, 12, 174, 96)
+        axes = layout.place(figure, 20, 12, 174, 96)
         axes.set_aspect("equal", adjustable="datalim")
         for side, north, east in tracks:
             d.line(axes, east / 1000.0, north / 1000.0, side.colour, side.width, MOST, label=side.letter)
         axes.set_xlabel("east, km")
         axes.set_ylabel("north, km")
-        d.legend_above(axes)
+        layout.legend_above(axes)
 
     origin = "the first position of A" if is_shared else "the first position of each"
     caption = f"Distances north and east of {origin}, equal scales."
@@ -241,7 +246,7 @@ def _growth(sides: Sequence[_Side]) -> Drawing | None:
         return None
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 20, 12, 174, 64)
+        axes = layout.place(figure, 20, 12, 174, 64)
         for horizon, rms, name, colour, style in curves:
             d.line(axes, horizon, np.where(rms > 0.0, rms, np.nan), colour, 1.2, label=name, linestyle=style)
         axes.set_xscale("log")
@@ -250,7 +255,7 @@ def _growth(sides: Sequence[_Side]) -> Drawing | None:
         plain_log(axes.yaxis)
         axes.set_xlabel("horizon, min")
         axes.set_ylabel("RMS radial error, m")
-        d.legend_above(axes, 4)
+        layout.legend_above(axes, 4)
 
     caption = "Root mean square of the radial error over all replayed starts; dotted: the INS without a forecast."
     return Drawing("Forecast", caption, "RMS of the forecast error of A and B by horizon.", d.draw("growth", 70, paint))

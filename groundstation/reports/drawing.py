@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.chapters.parts import Part
-from groundstation.chapters.wording import clean, clock
-from groundstation.reports.live import TIME, Svg, panels_of
+from groundstation.chapters.wording import clean
+from groundstation.reports.frames import MM_PER_INCH, Samples, frames_of
+from groundstation.reports.live import Svg, panels_of
 
 WIDTH_MM = 178.0  # the printable width of A4
 MAX_POINTS = 5000
-MM_PER_INCH = 25.4
-LEAST_PAUSE_S, MOST_WINDOWS = 60.0, 6  # a longer pause breaks a time axis
-PANEL_GAP_MM, LEAST_PANEL_MM = 9.0, 20.0
+DOT_LENGTH = 1e-9  # of the span of all; a PNG shows no strokes of no length
 
 # Okabe and Ito (2008), colour-blind safe. One meaning, one colour, in every figure.
 INS = "#0072b2"
@@ -182,7 +181,8 @@ def draw(key: str, height_mm: float, paint: Callable[[Any], None], width_mm: flo
         paint(figure)
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-        return Svg(_for_page(buffer.getvalue(), key), panels_of(figure))
+        panels = panels_of(figure)
+        return Svg(_for_page(buffer.getvalue(), key), panels, () if panels else frames_of(figure))
 
 
 def _for_page(svg: str, key: str) -> str:
@@ -217,130 +217,6 @@ def _font_characters() -> frozenset[int]:
     return _characters
 
 
-# ---------------------------------------------------------------------------------------------------- axes
-
-
-def place(figure: Any, left: float, bottom: float, right: float, top: float, **options: Any) -> Any:
-    """Add axes whose edges lie so many millimetres from the lower left corner of the figure."""
-    width, height = figure.get_size_inches() * MM_PER_INCH
-    return figure.add_axes((left / width, bottom / height, (right - left) / width, (top - bottom) / height), **options)
-
-
-def time_axis(axes: Any, low: float, high: float, title: bool = True, most: int = 9) -> None:
-    """Scale the horizontal axis as flight time, written as minutes and seconds at ``most`` round steps."""
-    from matplotlib.ticker import FixedLocator, FuncFormatter
-
-    low, high = (low, high) if high > low else (low - 1.0, low + 1.0)
-    steps = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 28800, 86400)
-    step = next((step for step in steps if (high - low) / step <= most), 604800)
-    first = int(np.ceil(low / step))
-    ticks = [step * count for count in range(first, first + 12) if step * count <= high]
-    axes.set_label(TIME)
-    axes.set_xlim(low, high)
-    axes.xaxis.set_major_locator(FixedLocator(ticks))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: clock(float(value))))
-    if title:
-        axes.set_xlabel("flight time, h:min:s" if high >= 3600 else "flight time, min:s")
-    else:
-        axes.tick_params(labelbottom=False)
-
-
-def windows(time: Any, least_gap_s: float = LEAST_PAUSE_S) -> list[tuple[float, float]]:
-    """Spans of flight time that the samples fill, a little around each; a longer pause ends one, at most six of them.
-
-    Examples
-    --------
-    >>> windows([0.0, 1.0, 2.0, 500.0, 540.0])
-    [(-2.0, 4.0), (498.0, 542.0)]
-    """
-    known = np.sort(finite(time))
-    if not known.size:
-        return [(0.0, 1.0)]
-    pauses = np.diff(known)
-    longest = np.argsort(-pauses, kind="stable")[: MOST_WINDOWS - 1]
-    cuts = np.sort(longest[pauses[longest] > least_gap_s]).tolist()
-    ends = [*cuts, len(known) - 1]
-    starts = [0, *(cut + 1 for cut in cuts)]
-    spans = [(float(known[first]), float(known[last])) for first, last in zip(starts, ends, strict=True)]
-    return [padded(low, high, 0.05, 2.0) for low, high in spans]
-
-
-def time_panels(
-    figure: Any,
-    edges_mm: tuple[float, float, float, float],
-    spans: Sequence[tuple[float, float]],
-    *,
-    title: bool = True,
-    shared: bool = True,
-) -> list[Any]:
-    """Axes beside each other, one for each span of flight time: a time axis broken where nothing is to be seen.
-
-    Parameters
-    ----------
-    edges_mm : (float, float, float, float)
-        Left, bottom, right and top, from the lower left corner of the figure.
-    title : bool
-        Whether the time axis is written.
-    shared : bool
-        Whether all have the vertical scale of the first; else each has its own, written beside it.
-    """
-    left, bottom, right, top = edges_mm
-    room = right - left - PANEL_GAP_MM * (len(spans) - 1)
-    lengths = np.array([high - low for low, high in spans])
-    widths = np.maximum(lengths / lengths.sum() * room, LEAST_PANEL_MM)
-    widths *= room / widths.sum()
-    panels: list[Any] = []
-    for (low, high), width in zip(spans, widths.tolist(), strict=True):
-        options = {"sharey": panels[0]} if panels and shared else {}
-        axes = place(figure, left, bottom, left + width, top, **options)
-        time_axis(axes, low, high, title=title and width == widths.max(), most=max(int(width / 16.0), 1))
-        axes.tick_params(labelbottom=title, labelleft=not (panels and shared))
-        panels.append(axes)
-        left += width + PANEL_GAP_MM
-    return panels
-
-
-def legend_above(axes: Any, columns: int = 6) -> None:
-    """Put the legend on one line above the axes, where it hides nothing."""
-    handles, _ = axes.get_legend_handles_labels()
-    if handles:
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, columnspacing=1.2, borderpad=0.1)
-
-
-def limit_line(axes: Any, value: float, text: str, vertical: bool = False, colour: str = LIMIT) -> None:
-    """Draw a limit as a dashed line; its text goes to the legend, where it hides no curve. Empty: no text."""
-    style = {"color": colour, "linewidth": 0.9, "linestyle": (0, (4, 2)), "zorder": 3, "label": text or None}
-    (axes.axvline if vertical else axes.axhline)(value, **style)
-
-
-def beside(axes: Any, x: float, y: float, text: str, colour: str, transform: Any, ha: str) -> None:
-    """Write a short label just above a place, its letters edged in white to be legible over lines."""
-    from matplotlib.patheffects import withStroke
-
-    axes.annotate(
-        text,
-        (x, y),
-        (0, 2),
-        xycoords=transform,
-        textcoords="offset points",
-        color=colour,
-        fontsize=8,
-        va="bottom",
-        ha=ha,
-        path_effects=[withStroke(linewidth=1.6, foreground="white")],
-        zorder=6,
-    )
-
-
-def nothing(axes: Any, text: str) -> None:
-    """Say in the middle of empty axes why they are empty."""
-    axes.set_yticks([])
-    axes.text(0.5, 0.5, text, color=FAINT, ha="center", va="center", transform=axes.transAxes)
-
-
-# ---------------------------------------------------------------------------------------------------- marks
-
-
 def thin(count: int, most: int = MAX_POINTS) -> NDArray[np.int64]:
     """Positions of at most ``most`` of ``count`` samples, evenly spread, the same every time.
 
@@ -355,14 +231,23 @@ def thin(count: int, most: int = MAX_POINTS) -> NDArray[np.int64]:
 
 
 def dots(axes: Any, x: Any, y: Any, colour: str, size: float = 1.8, most: int = MAX_POINTS, **options: Any) -> None:
-    """Draw samples as dots: strokes of no length with round ends in a single path, a tenth of the bytes of markers."""
+    """Draw samples as dots: strokes of hardly any length with round ends, in one path; a tenth of markers' bytes."""
     known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
     shown = known[thin(len(known), most)]
     x, y = np.asarray(x, dtype=np.float64)[shown], np.asarray(y, dtype=np.float64)[shown]
     name = options.pop("label", None)
-    _strokes(axes, x, x, y, color=colour, linewidth=size, capstyle="round", **options)
+    length = DOT_LENGTH * ((np.ptp(x) if len(x) else 0.0) or 1.0)
+    _strokes(axes, x, x + length, y, color=colour, linewidth=size, capstyle="round", **options)
     if name:
         axes.plot([], [], "o", color=colour, markersize=2.6, label=name)
+
+
+def tell(axes: Any, x: Any, y: Any, value: Any, title: str) -> None:
+    """Have a page say the value of the sample that is nearest to the cursor; ``title`` says of what."""
+    columns = [np.asarray(values, dtype=np.float64).ravel() for values in (x, y, value)]
+    known = np.flatnonzero(np.isfinite(columns).all(axis=0))
+    shown = known[thin(len(known))]
+    axes.samples_told = Samples(title, *(column[shown] for column in columns))
 
 
 def bars(axes: Any, start: Any, end: Any, place: float, colour: str, width_pt: float) -> None:
@@ -381,8 +266,8 @@ def _strokes(axes: Any, start: Any, end: Any, height: Any, **options: Any) -> No
     corners = np.column_stack([np.column_stack([start, end]).ravel(), np.repeat(height, 2)])
     codes = np.tile([Path.MOVETO, Path.LINETO], len(start)).astype(np.uint8)
     path = Path(corners, codes)
-    path.should_simplify = False  # simplifying drops strokes of no length
-    axes.add_patch(PathPatch(path, fill=False, **options))
+    path.should_simplify = False  # simplifying drops short strokes
+    axes.add_patch(PathPatch(path, fill=False, snap=False, **options))  # snapped ends of a dot are one: no dot
     axes.autoscale_view()
 
 
@@ -452,9 +337,3 @@ def finite(*arrays: Any) -> NDArray[np.float64]:
     """All finite values of some arrays, joined."""
     joined = np.concatenate([np.asarray(values, dtype=np.float64).ravel() for values in arrays] or [np.zeros(0)])
     return np.asarray(joined[np.isfinite(joined)])
-
-
-def padded(low: float, high: float, share: float = 0.06, least: float = 1e-6) -> tuple[float, float]:
-    """Axis limits around a range."""
-    margin = max(share * (high - low), least)
-    return low - margin, high + margin

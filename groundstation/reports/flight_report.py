@@ -81,7 +81,8 @@ def flight_document(saved: SavedFlight) -> Document:
 def flight_report_html(document: Document) -> str:
     """Render the report of a flight as a complete HTML document; its figures are drawn live where scripts may run."""
     parts = (part for section in document.sections for part in section.parts)
-    live = [part.svg.panels for part in parts if isinstance(part, Drawing) and part.svg.panels]
+    drawn = [part.svg for part in parts if isinstance(part, Drawing)]
+    live, pictures = [svg.panels for svg in drawn if svg.panels], [svg.frames for svg in drawn if svg.frames]
     return render(
         "flight.html.j2",
         kind=document.kind,
@@ -90,6 +91,6 @@ def flight_report_html(document: Document) -> str:
         sections=document.sections,
         verdict_of=VERDICT_OF.get(document.kind, "the heading correction"),
         page_label=_NOT_IN_AN_ID.sub("-", document.label),  # stands inside a CSS string
-        **live_figures(live),
+        **live_figures(live, pictures),
         style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
     )

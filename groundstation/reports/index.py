@@ -9,11 +9,11 @@ from groundstation.base.digits import digits_of
 from groundstation.base.serial import to_json_exactly
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.wording import is_number
+from groundstation.results.file_names import INDEX_CSV, INDEX_JSON
 from groundstation.results.files import SavedFlight, json_text, text_cell, write_text
 from groundstation.results.flight import FlightResults
 from groundstation.results.summary import SCHEMA_VERSION
 
-INDEX_JSON, INDEX_CSV = "index.json", "index.csv"
 Kind = Literal["flight", "session", "failed", "skipped"]
 KINDS: tuple[Kind, ...] = ("flight", "session", "failed", "skipped")
 

@@ -1,7 +1,8 @@
 """Figures that a reader can zoom into: the axes of a painted figure as data for uPlot, beside the picture of them.
 
 Only axes of curves, dots, bands and lanes over a number are taken; a figure with a map, an image or names along an axis
-stays a picture. The numbers are those that the picture shows, as float32.
+stays a picture, of which the frames of its axes are kept (reports/frames.py). The numbers are those that the picture
+shows, as float32.
 """
 
 import base64
@@ -11,10 +12,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-TIME = "flight time"  # the label of axes over flight time
-FloatArray = NDArray[np.float64]
+from groundstation.reports.frames import FloatArray, Frame, frame_of
 
 
 @dataclass(frozen=True)
@@ -35,40 +34,30 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Panel:
-    """One pair of axes: its place in the figure, in millimetres, its scales, and what stands on it.
+class Panel(Frame):
+    """One pair of axes with what stands on it.
 
-    ``names`` are those of the lanes with their places, ``grounds`` start, end, colour and name of shaded spans,
-    ``marks`` place and colour of upright lines. A range whose first number is the greater runs backwards.
+    ``grounds`` are start, end, colour and name of shaded spans, ``marks`` place and colour of upright lines.
     """
 
-    left_mm: float
-    bottom_mm: float
-    width_mm: float
-    height_mm: float
-    title: str
-    x_title: str
-    y_title: str
-    is_time: bool
-    has_log_x: bool
-    has_log_y: bool
-    x_range: tuple[float, float]
-    y_range: tuple[float, float]
-    names: tuple[tuple[float, str], ...]
     grounds: tuple[tuple[float, float, str, str], ...]
     marks: tuple[tuple[float, str], ...]
     curves: tuple[Curve, ...]
 
 
 class Svg(str):
-    """A picture as an SVG element, and the panels by which a page draws the same figure live; none: a picture alone."""
+    """A picture as an SVG element, and the panels by which a page draws the same figure live; none: a picture alone.
+
+    ``frames`` are those of its axes.
+    """
 
     panels: tuple[Panel, ...]
+    frames: tuple[Frame, ...]
 
-    def __new__(cls, text: str, panels: tuple[Panel, ...] = ()) -> "Svg":
-        """The text of the element, with its panels."""
+    def __new__(cls, text: str, panels: tuple[Panel, ...] = (), frames: tuple[Frame, ...] = ()) -> "Svg":
+        """The text of the element, with its panels and frames."""
         made = super().__new__(cls, text)
-        made.panels = panels
+        made.panels, made.frames = panels, frames
         return made
 
 
@@ -81,10 +70,10 @@ def panels_of(figure: Any) -> tuple[Panel, ...]:
     return tuple(sorted(found, key=lambda panel: (-round(panel.bottom_mm), panel.left_mm)))
 
 
-def page_data(figures: Iterable[tuple[Panel, ...]]) -> str:
-    """The panels of every figure of a page as JSON for a script element; equal arrays stand once.
+def page_data(figures: Iterable[tuple[Panel, ...]], pictures: Iterable[tuple[Frame, ...]] = ()) -> str:
+    """The panels of every live figure of a page, and the frames of every picture, as JSON for a script element.
 
-    Arrays are base64 of little-endian float32, NaN where a line breaks.
+    Arrays are base64 of little-endian float32, NaN where a line breaks; equal arrays stand once.
     """
     pool: dict[str, int] = {}
 
@@ -92,12 +81,15 @@ def page_data(figures: Iterable[tuple[Panel, ...]]) -> str:
         text = base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
         return pool.setdefault(text, len(pool))
 
-    told = [[_plain(panel, kept) for panel in panels] for panels in figures]
-    whole = {"figures": told, "arrays": list(pool)}
+    whole = {
+        "figures": [[_plain_panel(panel, kept) for panel in panels] for panels in figures],
+        "pictures": [[_plain(frame, kept) for frame in frames] for frames in pictures],
+        "arrays": list(pool),
+    }
     return json.dumps(whole, ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
 
 
-def _plain(panel: Panel, kept: Any) -> dict[str, Any]:
+def _plain_panel(panel: Panel, kept: Any) -> dict[str, Any]:
     curves = [
         {
             "kind": one.kind,
@@ -111,40 +103,31 @@ def _plain(panel: Panel, kept: Any) -> dict[str, Any]:
         }
         for one in panel.curves
     ]
+    return {**_plain(panel, kept), "grounds": panel.grounds, "marks": panel.marks, "curves": curves}
+
+
+def _plain(frame: Frame, kept: Any) -> dict[str, Any]:
+    told = frame.samples
     return {
-        "place": [round(value, 1) for value in (panel.left_mm, panel.bottom_mm, panel.width_mm, panel.height_mm)],
-        "titles": [panel.title, panel.x_title, panel.y_title],
-        "time": panel.is_time,
-        "log": [panel.has_log_x, panel.has_log_y],
-        "x": list(panel.x_range),
-        "y": list(panel.y_range),
-        "names": panel.names,
-        "grounds": panel.grounds,
-        "marks": panel.marks,
-        "curves": curves,
+        "place": [round(value, 1) for value in (frame.left_mm, frame.bottom_mm, frame.width_mm, frame.height_mm)],
+        "titles": [frame.title, frame.x_title, frame.y_title],
+        "time": frame.is_time,
+        "log": [frame.has_log_x, frame.has_log_y],
+        "x": list(frame.x_range),
+        "y": list(frame.y_range),
+        "names": frame.names,
+        **({} if told is None else {"samples": [kept(told.x), kept(told.y), kept(told.value)], "of": told.title}),
     }
 
 
 def _panel(figure: Any, axes: Any) -> Panel | None:
-    curves = _curves(axes)
-    if curves is None or axes.get_aspect() != "auto" or {axes.get_xscale(), axes.get_yscale()} - {"linear", "log"}:
+    curves, frame = _curves(axes), frame_of(figure, axes)
+    if curves is None or frame is None or axes.get_aspect() != "auto":
         return None
-    names = tuple(_names(axes))
-    has_names = any(text and not _is_number(text) for _, text in names)
-    if has_names and not any(curve.kind == "lanes" for curve in curves):
+    if frame.names and not any(curve.kind == "lanes" for curve in curves):
         return None  # a place for each name, and no number to zoom into
-    width, height = figure.get_size_inches() * 25.4
-    box = axes.get_position()
-    return Panel(
-        *(box.x0 * width, box.y0 * height, box.width * width, box.height * height),
-        *(axes.get_title(loc="left") or axes.get_title(), axes.get_xlabel(), axes.get_ylabel()),
-        *(axes.get_label() == TIME, axes.get_xscale() == "log", axes.get_yscale() == "log"),
-        *(_limits(axes.get_xlim()), _limits(axes.get_ylim())),
-        names if has_names else (),
-        tuple(_grounds(axes)),
-        tuple((float(one.get_xdata()[0]), _colour(one)) for one in axes.lines if _is_upright(axes, one)),
-        tuple(curves),
-    )
+    marks = tuple((float(one.get_xdata()[0]), _colour(one)) for one in axes.lines if _is_upright(axes, one))
+    return Panel(**vars(frame), grounds=tuple(_grounds(axes)), marks=marks, curves=tuple(curves))
 
 
 def _curves(axes: Any) -> list[Curve] | None:
@@ -269,22 +252,3 @@ def _grounds(axes: Any) -> Iterable[tuple[float, float, str, str]]:
             low = float(patch.get_x())
             colour = str(to_hex(patch.get_facecolor(), keep_alpha=True))
             yield low, low + float(patch.get_width()), colour, _name(patch)
-
-
-def _names(axes: Any) -> list[tuple[float, str]]:
-    """Where the vertical scale has a tick, and what stands there."""
-    places = axes.get_yticks()
-    labels = axes.yaxis.get_major_formatter().format_ticks(places)
-    return [(float(place), str(label)) for place, label in zip(places, labels, strict=True)]
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text.replace("\u2212", "-"))
-    except ValueError:
-        return False
-    return True
-
-
-def _limits(limits: tuple[float, float]) -> tuple[float, float]:
-    return float(np.float32(limits[0])), float(np.float32(limits[1]))

@@ -5,8 +5,9 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from groundstation.reports.drawing import MM_PER_INCH, Drawing, Sketch, report_style, sketching
+from groundstation.reports.drawing import Drawing, Sketch, report_style, sketching
 from groundstation.reports.flight_report import flight_document
+from groundstation.reports.frames import MM_PER_INCH
 from groundstation.results.files import SavedFlight
 
 SHOWN_DPI = 144  # sharp on screens of two pixels a point

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.chapters.wording import clean
+from groundstation.reports.frames import Frame
 from groundstation.reports.live import Panel, page_data
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -21,9 +22,12 @@ def render(template: str, **context: Any) -> str:
     return str(_environment().get_template(template).render(csp=CONTENT_SECURITY_POLICY, **context))
 
 
-def live_figures(figures: Sequence[tuple[Panel, ...]]) -> dict[str, str]:
-    """What flight.html.j2 needs to draw figures live: data, script with its digest, style; empty texts without any."""
-    if not figures:
+def live_figures(figures: Sequence[tuple[Panel, ...]], pictures: Sequence[tuple[Frame, ...]]) -> dict[str, str]:
+    """What flight.html.j2 needs to draw figures live and to zoom into pictures; empty texts without any.
+
+    Those are data, script with its digest, style.
+    """
+    if not (figures or pictures):
         return dict.fromkeys(("live_data", "script", "script_digest", "live_style"), "")
     uplot, licence, ours = (
         (TEMPLATES / name).read_text(encoding="utf-8").strip()
@@ -32,7 +36,7 @@ def live_figures(figures: Sequence[tuple[Panel, ...]]) -> dict[str, str]:
     script = f"/*\n{licence}\n*/\n{uplot.partition('*/')[2].strip()}\n{ours}"
     style = (TEMPLATES / "uplot/uPlot.min.css").read_text(encoding="utf-8").strip()
     return {
-        "live_data": page_data(figures),
+        "live_data": page_data(figures, pictures),
         "script": script,
         "script_digest": digest_of(script),
         "live_style": style,

@@ -117,6 +117,8 @@ class Comparison:
         What only one of them has, by severity, code and topic.
     not_assessable_a, not_assessable_b : tuple of NotAssessable
         Analyses that only the other one has.
+    are_sessions : bool
+        Both are sessions of several aircraft, each with a log.
     """
 
     a: Side
@@ -129,6 +131,12 @@ class Comparison:
     findings_b: tuple[Finding, ...] = ()
     not_assessable_a: tuple[NotAssessable, ...] = ()
     not_assessable_b: tuple[NotAssessable, ...] = ()
+    are_sessions: bool = False
+
+    @property
+    def origin(self) -> str:
+        """What both come from, where they share it."""
+        return "the same logs" if self.are_sessions else "one log"
 
     @property
     def cause(self) -> str:

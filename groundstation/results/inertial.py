@@ -138,9 +138,9 @@ class InertialResult(Answer):
     ins_topic, gnss_topic : str
         The pair used.
     kind : str
-        ``"unaided"``; ``"gnss_aided"`` for an INS that GNSS corrects: then ``differences`` are all that is told, and
-        there are no channels, rates, outages or class; ``"unknown"`` where the log is too short or at rest for too
-        long to tell. ``kind_reason`` says why.
+        ``"unaided"``; ``"gnss_aided"`` for an INS that GNSS corrects; ``"unknown"`` where the log is too short or at
+        rest for too long to tell. Of the last two ``differences`` are all that is told: there are no channels, rates,
+        outages or class. ``kind_reason`` says why.
     ins_class : str
         Noise parameters used, by name; ``ins_class_origin`` says who chose them.
     transition : str

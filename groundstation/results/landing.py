@@ -153,6 +153,35 @@ class PositionError:
 
 
 @dataclass(frozen=True)
+class HeightError:
+    """Error of a recorded altitude on the roll-out, with the elevation of the runway for reference: it needs no GNSS.
+
+    Parameters
+    ----------
+    topic : str
+        Whose altitude.
+    state : {'measured', 'not measured'}
+        ``reason`` says why not.
+    samples : int
+        On the roll-out.
+    error_m, sigma_m : float or None
+        Altitude less what elevation and height above the wheels say, upwards positive.
+    confidence95_m : (float, float) or None
+    parts : tuple of ErrorPart
+        Of sigma.
+    """
+
+    topic: str
+    state: Measured
+    reason: str
+    samples: int
+    error_m: float | None = None
+    sigma_m: float | None = None
+    confidence95_m: tuple[float, float] | None = None
+    parts: tuple[ErrorPart, ...] = ()
+
+
+@dataclass(frozen=True)
 class Sensitivity:
     """How far positions move across the course over how far the localizer shows it: 1 where its sense and width fit.
 
@@ -212,6 +241,7 @@ class Approach:
     protection: Protection | None
     claim: str
     position_step_m: tuple[float, float] | None = None
+    height_errors: tuple[HeightError, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,8 @@ class BeaconApproachRow:
     ground_speed_mps, heading_difference_deg : float or None
         Of the INS, and heading by the bearings minus its heading: both show whether bearings and beacons belong.
     terrain_m : float or None
-        How much the ground under the approach rises and falls, by radio altitude against altitude.
+        How much the ground under the approach rises and falls, by radio altitude against altitude, less the profile of
+        the site file.
     """
 
     approach: int
@@ -59,7 +60,7 @@ class DeviationRow:
     Parameters
     ----------
     lateral_m, glide_path_m : float
-        Right of the course, above the glide path.
+        Right of the course, above the glide path; the latter None over ground that is not known.
     lateral_95_m, glide_path_95_m, distance_95_m : float
         1.96 sigma of one axis, from the errors of bearings and radio altitude.
     lateral_category, vertical_category : str
@@ -71,8 +72,8 @@ class DeviationRow:
     distance_95_m: float
     lateral_m: float
     lateral_95_m: float
-    glide_path_m: float
-    glide_path_95_m: float
+    glide_path_m: float | None
+    glide_path_95_m: float | None
     lateral_category: str
     vertical_category: str
 

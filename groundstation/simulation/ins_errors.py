@@ -197,13 +197,18 @@ def propagate(
     state[:, 0, 2:4] = sensors.velocity_mps
     state[:, 0, 4], state[:, 0, 5] = sensors.tilt_rad[:, EAST], -sensors.tilt_rad[:, NORTH]
     state[:, 0, 6] = -sensors.azimuth_rad
+    velocity = motion.velocity_north_mps, motion.velocity_east_mps, motion.velocity_down_mps
+    # read-only whatever they were: the loop is compiled for each kind of array
+    time_s, altitude_m, north_mps, east_mps, down_mps = (
+        frozen(np.ascontiguousarray(part)) for part in (motion.time_s, motion.altitude_m, *velocity)
+    )
     _propagate(
-        np.ascontiguousarray(motion.time_s),
+        time_s,
         latitude_rad,
-        np.ascontiguousarray(motion.altitude_m),
-        np.ascontiguousarray(motion.velocity_north_mps),
-        np.ascontiguousarray(motion.velocity_east_mps),
-        np.ascontiguousarray(motion.velocity_down_mps),
+        altitude_m,
+        north_mps,
+        east_mps,
+        down_mps,
         np.deg2rad(motion.heading_deg),
         np.deg2rad(motion.roll_deg),
         sensors.gyro_radps,

@@ -5,7 +5,7 @@ take-off, climb to 1500 m, a figure-eight, straights on several headings, furthe
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
@@ -17,6 +17,7 @@ from groundstation.simulation.legs import AirTurn, ClimbTo, Fly, GroundTurn, Leg
 from groundstation.simulation.readings import generator
 from groundstation.simulation.scenario import (
     Airport,
+    Anomaly,
     BaroSettings,
     DiscreteSettings,
     ElectricSettings,
@@ -29,6 +30,7 @@ from groundstation.simulation.scenario import (
     Vector,
     Wind,
 )
+from groundstation.tables.declination import NORTH_EAST_DOWN_SIGMA_NT
 
 RATE_HZ = 10.0
 FIELD_ALTITUDE_M, FIGURE_ALTITUDE_M = 200.0, 1500.0
@@ -56,6 +58,13 @@ class MagneticFamilySettings:
         Of the field of the current; with a load there is a topic ``electric``: ``load_a`` is on 40 s of every 100 s.
     heading_error_sigma_deg, drift_sigma_dph, attitude_error_sigma_deg, attitude_wander_deg : float
         Of the INS: azimuth error and its drift, constant and wandering errors of roll and pitch.
+    attitude_wander_s : float
+        Correlation time of the latter.
+    field_error_sigmas : float
+        What the world's field differs from the model's, north, east and down: a normal draw of so many of the sigmas
+        that the model states.
+    anomaly_nt, anomaly_wavelength_m : float, tuple of two float
+        Amplitude of an anomaly of the crust, ends of a uniform draw of its wavelength; direction and phase are drawn.
     latitude_deg, longitude_deg : tuple of two float
         Ends of uniform draws.
     world_field_nt : tuple of three float, optional
@@ -86,6 +95,10 @@ class MagneticFamilySettings:
     drift_sigma_dph: float = number(0.05, 0.0, 100.0)
     attitude_error_sigma_deg: float = number(0.1, 0.0, 5.0)
     attitude_wander_deg: float = number(0.05, 0.0, 5.0)
+    attitude_wander_s: float = number(120.0, 0.0, 1e5)
+    field_error_sigmas: float = number(0.0, 0.0, 100.0)
+    anomaly_nt: float = number(0.0, 0.0, 1e5)
+    anomaly_wavelength_m: tuple[float, float] = (8_000.0, 40_000.0)
     latitude_deg: tuple[float, float] = (30.0, 62.0)
     longitude_deg: tuple[float, float] = (-10.0, 150.0)
     start_utc: str = "2026-05-12T08:00:00Z"
@@ -93,10 +106,11 @@ class MagneticFamilySettings:
 
     def __post_init__(self) -> None:
         check_ranges(self)
-        for name, largest in (("latitude_deg", 85.0), ("longitude_deg", 180.0)):
+        limits = {"latitude_deg": (-85.0, 85.0), "longitude_deg": (-180.0, 180.0), "anomaly_wavelength_m": (100.0, 1e7)}
+        for name, (least, largest) in limits.items():
             low, high = getattr(self, name)
-            if not -largest <= low <= high <= largest:
-                raise SettingsError(name, f"{low:g} to {high:g}", f"two ends in order within {largest:g}")
+            if not least <= low <= high <= largest:
+                raise SettingsError(name, f"{low:g} to {high:g}", f"two ends in order within [{least:g}, {largest:g}]")
 
 
 def simulate_magnetic_family(settings: MagneticFamilySettings, seeds: Iterable[int]) -> Iterator[Simulated]:
@@ -124,6 +138,7 @@ def draw_magnetic_scenario(settings: MagneticFamilySettings, seed: int) -> Scena
     latitude, longitude = rng.uniform(*settings.latitude_deg), rng.uniform(*settings.longitude_deg)
     parking, wind = rng.uniform(0.0, 360.0), settings.wind_sigma_mps * rng.standard_normal(2)
     ins, magnetometer = _ins(settings, rng), _magnetometer(settings, rng)
+    magnetometer = _in_the_world(magnetometer, settings, generator(seed, "magnetic world"))
     return Scenario(
         name="magnetic-family",
         airport=Airport(float(latitude), float(longitude), FIELD_ALTITUDE_M),
@@ -154,7 +169,7 @@ def _ins(settings: MagneticFamilySettings, rng: np.random.Generator) -> InsSetti
         roll_error_deg=float(settings.attitude_error_sigma_deg * roll),
         pitch_error_deg=float(settings.attitude_error_sigma_deg * pitch),
         attitude_wander_deg=settings.attitude_wander_deg,
-        attitude_wander_s=120.0,
+        attitude_wander_s=settings.attitude_wander_s,
     )
 
 
@@ -178,6 +193,18 @@ def _magnetometer(settings: MagneticFamilySettings, rng: np.random.Generator) ->
         correlation_s=settings.correlation_s,
         latency_s=float(rng.uniform(0.0, settings.latency_s)),
         world_field_nt=settings.world_field_nt,
+    )
+
+
+def _in_the_world(
+    magnetometer: MagnetometerSettings, settings: MagneticFamilySettings, rng: np.random.Generator
+) -> MagnetometerSettings:
+    """The same magnetometer in a world that is not the model's."""
+    north, east, down = (rng.standard_normal(3) * settings.field_error_sigmas * NORTH_EAST_DOWN_SIGMA_NT).tolist()
+    wavelength_m, (direction, phase) = rng.uniform(*settings.anomaly_wavelength_m), rng.uniform(0.0, 360.0, 2)
+    anomaly = Anomaly(settings.anomaly_nt, float(wavelength_m), float(direction), float(phase))
+    return replace(
+        magnetometer, field_error_nt=(north, east, down), anomaly=anomaly if settings.anomaly_nt > 0.0 else None
     )
 
 

@@ -4,15 +4,16 @@ import math
 
 import numpy as np
 
-from groundstation.base.angles import FloatArray
+from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.errors import SettingsError
+from groundstation.base.geodesy import SEMI_MAJOR_M
 from groundstation.base.records import Column
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.simulation.electric import current_a
 from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.readings import Readings, every, quantised
-from groundstation.simulation.scenario import MagnetometerSettings, Scenario
+from groundstation.simulation.scenario import Airport, Anomaly, MagnetometerSettings, Scenario
 from groundstation.simulation.trajectory import Trajectory, rotation_n_from_b
 
 FIELD_KNOT_S = 60.0  # the model is evaluated once a minute and interpolated: the field changes slowly with the place
@@ -80,7 +81,9 @@ def sensed_nt(
 
 
 def world_field_nt(motion: Trajectory, scenario: Scenario, settings: MagnetometerSettings) -> FloatArray:
-    """Field of the world north, east, down along a motion, shape (n, 3): the settings' own, else the model's.
+    """Field of the world north, east, down along a motion, shape (n, 3).
+
+    The settings' own, else the model's; and what the world has more.
 
     Raises
     ------
@@ -88,8 +91,30 @@ def world_field_nt(motion: Trajectory, scenario: Scenario, settings: Magnetomete
         When the flight has no date, or no model serves it.
     """
     if settings.world_field_nt is not None:
-        return np.tile(np.array(settings.world_field_nt), (len(motion), 1))
-    return field_ned_nt(motion, decimal_year(scenario, settings), scenario.name)
+        field = np.tile(np.array(settings.world_field_nt), (len(motion), 1))
+    else:
+        field = field_ned_nt(motion, decimal_year(scenario, settings), scenario.name)
+    if settings.anomaly is not None:
+        field = field + anomaly_nt(motion, scenario.airport, settings.anomaly)
+    return np.asarray(field + np.array(settings.field_error_nt))
+
+
+def anomaly_nt(motion: Trajectory, airport: Airport, anomaly: Anomaly) -> FloatArray:
+    """Field of a plane wave of the crust north, east, down along a motion, shape (n, 3), free of curl and divergence.
+
+    It is -grad V of V = amplitude / k exp(-k height) cos(k . position + phase), the exponential counted as 1 at the
+    altitude flown: horizontal and vertical parts have one amplitude and are a quarter of a wave apart.
+
+    Source: Blakely, Potential Theory in Gravity and Magnetic Applications, 1995, section 11.1.
+    """
+    north_m = np.deg2rad(motion.latitude_deg - airport.latitude_deg) * SEMI_MAJOR_M
+    east_m = np.deg2rad(wrap_180(motion.longitude_deg - airport.longitude_deg)) * SEMI_MAJOR_M
+    east_m = east_m * np.cos(np.deg2rad(airport.latitude_deg))
+    cosine, sine = (float(of(np.deg2rad(anomaly.direction_deg))) for of in (np.cos, np.sin))
+    phase_rad = 2.0 * np.pi / anomaly.wavelength_m * (cosine * north_m + sine * east_m)
+    phase_rad = phase_rad + np.deg2rad(anomaly.phase_deg)
+    parts = [cosine * np.sin(phase_rad), sine * np.sin(phase_rad), -np.cos(phase_rad)]
+    return anomaly.amplitude_nt * np.stack(parts, axis=1)
 
 
 def decimal_year(scenario: Scenario, settings: MagnetometerSettings) -> float:

@@ -148,11 +148,22 @@ class GnssSettings:
 
 
 @dataclass(frozen=True)
+class Anomaly:
+    """A plane wave of the field of the crust: ``amplitude_nt`` at the altitude flown, phase that of the stand."""
+
+    amplitude_nt: float = required_number(0.0, 100_000.0)
+    wavelength_m: float = required_number(100.0, 1e7)
+    direction_deg: float = number(0.0, -360.0, 360.0)
+    phase_deg: float = number(0.0, -360.0, 360.0)
+
+
+@dataclass(frozen=True)
 class MagnetometerSettings:
     """Three-axis magnetometer: see :func:`groundstation.simulation.magnetometer.sensed_nt`; vectors are of body axes.
 
     The field is the World Magnetic Model's of the date (``decimal_year``, or that of ``start_utc``) and place, or
-    ``world_field_nt`` (north, east, down) everywhere. ``misalignment_deg`` are roll, pitch, heading of the sensor in
+    ``world_field_nt`` (north, east, down) everywhere; ``field_error_nt`` (north, east, down) and ``anomaly`` are what
+    the world has more. ``misalignment_deg`` are roll, pitch, heading of the sensor in
     the aircraft. ``bank_odd_nt`` and ``bank_even_nt`` move with the bank (control rods, fuel), as sin(roll) and its
     square. ``latency_s`` delays the record behind the time of validity. Noise per axis: white + first-order
     Gauss-Markov.
@@ -173,6 +184,8 @@ class MagnetometerSettings:
     resolution_nt: float = number(1.0, 1e-3, 1000.0)
     decimal_year: float | None = number(None, 2010.0, 2030.0)
     world_field_nt: Vector | None = None
+    field_error_nt: Vector = ZERO
+    anomaly: Anomaly | None = None
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.units import MPS2_PER_G
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, run_filter
 from groundstation.estimators.inertial.model import SIZE, ChannelModel
@@ -61,8 +62,6 @@ def consistency_table(seed: int, runs: int = RUNS, *, uses_velocity: bool = True
     1 is honest; limits are those of 99 % of chi-square with ``freedom`` degrees of freedom: flights and channels are
     independent, and so are innovations of one another.
     """
-    from scipy.stats import chi2
-
     nees, nis, count = np.zeros(len(TIMES_S)), np.zeros(2), np.zeros(2, dtype=np.int64)
     for number in range(runs):
         matched = matched_run(seed, number, uses_velocity=uses_velocity)
@@ -74,7 +73,7 @@ def consistency_table(seed: int, runs: int = RUNS, *, uses_velocity: bool = True
     freedom = np.array([2 * SIZE * runs] * len(TIMES_S) + [number for number in count.tolist() if number])
     total = np.concatenate([nees, nis[count > 0]])
     names = [f"NEES at {seconds} s" for seconds in TIMES_S] + ["NIS position", "NIS velocity"][: int((count > 0).sum())]
-    low, high = (chi2.ppf(part, freedom) / freedom for part in (TAIL, 1.0 - TAIL))
+    low, high = (chi_square_quantile(part, freedom) / freedom for part in (TAIL, 1.0 - TAIL))
     mean = total / freedom
     columns = {
         "measure": np.array(names),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.records import frozen
 from groundstation.results.figures import FigureData
 from groundstation.studies.forecast_cases import Case
@@ -165,8 +166,6 @@ def honesty_table(outcomes: dict[str, tuple[Outcome, ...]], flights_at_least: in
     ``coverage95_worst`` what the tenth of the flights with the least has at most. ``flights_within`` is the share of
     the flights whose own NEES is within its 95 % limits, from the independent starts of each.
     """
-    from scipy.stats import chi2
-
     rows = []
     for case, several in outcomes.items():
         known = [outcome.honesty for outcome in several if outcome.honesty is not None]
@@ -176,7 +175,9 @@ def honesty_table(outcomes: dict[str, tuple[Outcome, ...]], flights_at_least: in
         nees, model = (np.mean([getattr(h, name) for h in known], axis=0) for name in ("nees", "nees_model"))
         first, bare = (np.mean([getattr(h, n) for h in known], axis=0) / 2.0 for n in ("first", "first_model"))
         freedom = 2 * len(known)
-        limits = [float(chi2.ppf(part, freedom) / freedom) for part in (CHI_SQUARE_TAIL, 1.0 - CHI_SQUARE_TAIL)]
+        limits = [
+            float(chi_square_quantile(part, freedom)) / freedom for part in (CHI_SQUARE_TAIL, 1.0 - CHI_SQUARE_TAIL)
+        ]
         spread = inside[..., LEVELS.index(95)].std(axis=0, ddof=1) / np.sqrt(len(known))
         within = _flights_within(known)
         worst = np.quantile(inside[..., LEVELS.index(95)], WORST, axis=0)

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 
 from groundstation.studies import magnetic_tables as tables
-from groundstation.studies.magnetic_cases import CLAIM, SWEEPS, Sweep, setups
+from groundstation.studies.magnetic_cases import CLAIM, SWEEPS, WIDE, Sweep, setups
+from groundstation.studies.magnetic_coverage import SECOND, coverage_table, first_cells
 from groundstation.studies.magnetic_page import page
 from groundstation.studies.magnetic_runs import Progress, jobs_of, run_jobs
 from groundstation.studies.page import StudyResult
@@ -17,8 +18,9 @@ def study_magnetic(
     Parameters
     ----------
     runs : int
-        Whole flights; half as many fly each point of the sweeps, with the same iron, noise and INS at every point, and
-        a quarter fly each incomplete figure.
+        Whole flights of the first family, and as many of the second, run k of its cell k modulo 12; half as many fly
+        each point of the sweeps, with the same iron, noise and INS at every point, and a quarter fly each incomplete
+        figure.
     seed : int
         Flights have the seeds ``7 000 000 + 100 000 seed + run``.
     progress : callable, optional
@@ -32,7 +34,13 @@ def study_magnetic(
     samples = tables.samples_of(swept, flown, seed)
     judged = tables.judged_sample(outcomes, seed)
     kept = tables.accepted(judged, seed)
+    wide = [
+        (SECOND, cell, [run.wide[cell] for run in outcomes if cell in run.wide])
+        for cell in WIDE
+        if any(cell in run.wide for run in outcomes)
+    ]
     found = (
+        coverage_table([*first_cells(judged, sweeps, samples), *wide]),
         tables.honesty_table(kept),
         tables.residual_table(kept),
         tables.claim_table(swept, samples),

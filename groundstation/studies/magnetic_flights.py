@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.estimators.heading.estimate import estimate_heading_error
@@ -18,9 +17,8 @@ from groundstation.simulation.readings import Readings, generator
 from groundstation.simulation.scenario import InsSettings, Scenario
 from groundstation.simulation.sensors import ins_readings
 from groundstation.simulation.trajectory import Trajectory, fly
-from groundstation.studies.magnetic_cases import Legs, Setup, with_figure
+from groundstation.studies.magnetic_cases import Legs, Setup, WideCell, with_figure
 from groundstation.studies.magnetic_judge import Flown, Outcome, judge
-from groundstation.tables.declination import declination_sigma_deg
 from groundstation.tables.phases import Interval, Phases
 from groundstation.tables.table import Flight, Table
 
@@ -51,14 +49,12 @@ class Hangar:
         return judge(flown, heading=heading, phases=phases)
 
     def flown(self, scenario: Scenario, setup: Setup) -> Flown:
-        """The level part of a flight. What the model's declination lacks is one with an azimuth error."""
+        """The level part of a flight."""
         motion = self._motion(scenario)
         assert scenario.magnetometer is not None
         field = world_field_nt(motion, scenario, scenario.magnetometer)
         ins = scenario.ins
         added = ins.azimuth_drift_dph * setup.hours_since_taxi
-        if not setup.is_exact:
-            added += declination_error_deg(self.seed, field)
         moved = replace(ins, azimuth_error_deg=ins.azimuth_error_deg + added)
         tables = [
             ins_readings(motion, moved, generator(self.seed, "ins"), self.seed).only(INS_FIELDS),
@@ -84,13 +80,14 @@ class Hangar:
         return self._taxis[sigma]
 
 
-def judged_outcome(family: MagneticFamilySettings, seed: int) -> Outcome:
-    """A whole flight of a family from stand to landing, answered as the pipeline does: latencies, taxi, deviation."""
-    simulated = simulate(draw_magnetic_scenario(family, seed))
-    scenario, motion = simulated.scenario, simulated.trajectory
+def wide_outcome(cell: WideCell, seed: int) -> Outcome:
+    """A whole flight from stand to landing, answered as the pipeline does: latencies, taxi, deviation."""
+    simulated = simulate(draw_magnetic_scenario(cell.family, seed))
+    scenario, motion, flight = simulated.scenario, simulated.trajectory, simulated.flight
     assert scenario.magnetometer is not None
     field = world_field_nt(motion, scenario, scenario.magnetometer)
-    flight = turned(simulated.flight, declination_error_deg(seed, field))
+    if not cell.is_load_logged:
+        flight = replace(flight, tables={topic: flight[topic] for topic in flight.topics() if topic != "electric"})
     try:
         latencies = estimate_latencies(flight)
     except NotAssessableError:
@@ -98,28 +95,9 @@ def judged_outcome(family: MagneticFamilySettings, seed: int) -> Outcome:
     return judge(Flown(scenario, flight, motion, field), heading=_aligned(flight), latencies=latencies)
 
 
-def declination_error_deg(seed: int, field_ned_nt: FloatArray) -> float:
-    """What the world's declination is more than the model's: a draw of the sigma that the model states."""
-    horizontal = np.hypot(*field_ned_nt[len(field_ned_nt) // 2, :2])
-    sigma = float(declination_sigma_deg(np.asarray(horizontal)))
-    return sigma * float(generator(seed, "declination").standard_normal())
-
-
-def turned(flight: Flight, by_deg: float) -> Flight:
-    """A flight whose every true direction is larger by an angle: the field, then, has so much more declination."""
-    tables = {}
-    for topic in flight.topics():
-        table = flight[topic]
-        columns = dict(table.columns)
-        if "true_heading_deg" in columns:
-            columns["true_heading_deg"] = Column(wrap_360(table.values("true_heading_deg") + by_deg))
-        if "velocity_north_mps" in columns:
-            north, east = table.values("velocity_north_mps"), table.values("velocity_east_mps")
-            sine, cosine = np.sin(np.deg2rad(by_deg)), np.cos(np.deg2rad(by_deg))
-            columns["velocity_north_mps"] = Column(cosine * north - sine * east)
-            columns["velocity_east_mps"] = Column(sine * north + cosine * east)
-        tables[topic] = replace(table, columns=columns)
-    return replace(flight, tables=tables)
+def judged_outcome(family: MagneticFamilySettings, seed: int) -> Outcome:
+    """A whole flight of a family."""
+    return wide_outcome(WideCell(family), seed)
 
 
 def _aligned(flight: Flight) -> HeadingResult | None:

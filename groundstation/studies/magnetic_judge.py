@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, unwrap, wrap_180
 from groundstation.base.errors import NotAssessableError
+from groundstation.base.normal import NORMAL_95
 from groundstation.base.records import frozen
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.magnetic import harmonics
@@ -42,6 +43,8 @@ class Judged:
         Error of A to E over its sigma.
     curve_inside : ndarray, shape (3,)
         Share of the headings on which what is left is within 1, 2, 3 sigma of the curve.
+    curve_inside95 : float
+        Within 1.96 sigma.
     curve_ratio : float
         RMS of what is left over the circle, over that of the curve's sigma.
     held_out_ratio, own_ratio : float
@@ -53,6 +56,7 @@ class Judged:
 
     coefficient_ratio: FloatArray
     curve_inside: FloatArray
+    curve_inside95: float
     curve_ratio: float
     held_out_ratio: float
     own_ratio: float
@@ -84,6 +88,8 @@ class Outcome:
     judged : mapping of method to Judged
     before_rms_deg : float
         Uncorrected RMS error of the readings on the held-out part.
+    recommended : str
+        The method to correct by.
     """
 
     verdict: str
@@ -95,6 +101,7 @@ class Outcome:
     horizontal_nt: float
     judged: dict[str, Judged]
     before_rms_deg: float = float("nan")
+    recommended: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rms_deg", frozen(self.rms_deg))
@@ -157,6 +164,7 @@ def judge(
         horizontal_nt=horizontal,
         judged=judged,
         before_rms_deg=_rms(held_out["before"]) if held_out else float("nan"),
+        recommended=result.recommended_method,
     )
 
 
@@ -241,7 +249,7 @@ def _held_out(flown: Flown, result: MagneticResult) -> dict[str, FloatArray]:
     rows = samples["part"] == "held out"
     if not rows.any():
         return {}
-    time_s, shown = samples["time_s"][rows], samples["magnetic_heading_deg"][rows]
+    time_s, shown = samples["time_s"][rows], samples["uncorrected_magnetic_heading_deg"][rows]
     motion_s = flown.motion.time_ns / NS_PER_S
     field = [np.interp(time_s, motion_s, flown.field_ned_nt[:, axis]) for axis in (0, 1)]
     true_heading = np.interp(time_s, motion_s, unwrap(flown.motion.heading_deg))
@@ -279,6 +287,7 @@ def _judged(
     return Judged(
         coefficient_ratio=error / sigma,
         curve_inside=np.array([np.mean(ratio <= limit) for limit in SIGMAS]),
+        curve_inside95=float(np.mean(ratio <= NORMAL_95)),
         curve_ratio=_rms(left_deg) / _rms(curve_sigma),
         held_out_ratio=held_ratio,
         own_ratio=own[0] / own[1] if own[0] is not None and own[1] else nan,

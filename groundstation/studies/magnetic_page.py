@@ -19,7 +19,7 @@ from groundstation.studies.magnetic_tables import (
     WORSE,
     rows_where,
 )
-from groundstation.studies.page import markdown_rows
+from groundstation.studies.page import markdown_rows, markdown_table
 
 TITLES: dict[str, str] = {"none": "no correction", "one_branch": "one branch alone"}
 TITLES.update((str(name), title) for name, title in METHOD_TITLES.items())
@@ -41,6 +41,7 @@ def page(tables: dict[str, FigureData], runs: int, seed: int, sweeps: Sequence[S
         "The modulus is fitted with its refusals switched off; how often it is refused stands beside it.",
         "",
         *_whole_flights(tables),
+        *_coverage(tables["magnetic_coverage"]),
         *_claim(tables),
         *(line for sweep in sweeps for line in _sweep(sweep, tables)),
         *_incomplete(tables["magnetic_incomplete"]),
@@ -73,6 +74,19 @@ def _whole_flights(tables: dict[str, FigureData]) -> list[str]:
         _left_text(residuals),
         "",
         *_residual_rows(residuals),
+        "",
+    ]
+
+
+def _coverage(table: FigureData) -> list[str]:
+    return [
+        "## Coverage cell by cell",
+        "",
+        "Shares within 1.96 stated sigma on accepted flights, 0.95 wanted: A to E, and the headings of level flight; "
+        "D of the iron as error over sigma. First family: whole flights and the points of the sweeps; wide: the cells "
+        "of docs/magnetic-family.md.",
+        "",
+        *markdown_table(table),
         "",
     ]
 

@@ -5,12 +5,12 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
 from groundstation.studies.magnetic_bias import Biases, formula_biases
-from groundstation.studies.magnetic_cases import BANK_DEG, EXACT, INCOMPLETE, JUDGED, REFERENCE, Setup, seed_of
-from groundstation.studies.magnetic_flights import Hangar, judged_outcome
+from groundstation.studies.magnetic_cases import BANK_DEG, EXACT, INCOMPLETE, JUDGED, REFERENCE, WIDE, Setup, seed_of
+from groundstation.studies.magnetic_flights import Hangar, judged_outcome, wide_outcome
 from groundstation.studies.magnetic_judge import Outcome
 
 Progress = Callable[[str], None]
@@ -23,13 +23,14 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 @dataclass(frozen=True)
 class Job:
-    """One seed: what is flown with it."""
+    """One seed: what is flown with it. ``wide`` is the cell of the second family."""
 
     run: int
     seed: int
     setups: tuple[Setup, ...]
     judged: MagneticFamilySettings | None
     is_incomplete: bool
+    wide: str = ""
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,8 @@ class RunOutcome:
     incomplete : mapping of kind of figure to Outcome
     biases : Biases
         Of this seed's iron, by formula.
+    wide : mapping of cell to Outcome
+        The flight of the second family.
     """
 
     run: int
@@ -53,13 +56,22 @@ class RunOutcome:
     judged: Outcome | None
     incomplete: dict[str, Outcome]
     biases: Biases
+    wide: dict[str, Outcome] = field(default_factory=dict)
 
 
 def jobs_of(runs: int, seed: int, swept_setups: tuple[Setup, ...]) -> list[Job]:
     """One job for each run; the seed alone decides how each setup is flown."""
+    cells = tuple(WIDE)
     swept, incomplete = (max(2, round(share * runs)) for share in (SWEPT_SHARE, INCOMPLETE_SHARE))
     return [
-        Job(run, seed_of(seed, run), swept_setups if run < swept else (), JUDGED, run < incomplete)
+        Job(
+            run,
+            seed_of(seed, run),
+            swept_setups if run < swept else (),
+            JUDGED,
+            run < incomplete,
+            cells[run % len(cells)],
+        )
         for run in range(runs)
     ]
 
@@ -87,11 +99,17 @@ def fly_job(job: Job) -> RunOutcome:
         judged_outcome(job.judged, job.seed) if job.judged else None,
         {kind: hangar.outcome(REFERENCE, figure) for kind, figure in figures.items()},
         formula_biases(iron),
+        {job.wide: wide_outcome(WIDE[job.wide], job.seed)} if job.wide else {},
     )
 
 
 def _told(outcome: RunOutcome) -> str:
-    flights = [*outcome.swept, *outcome.incomplete.values(), *([outcome.judged] if outcome.judged else [])]
+    flights = [
+        *outcome.swept,
+        *outcome.incomplete.values(),
+        *outcome.wide.values(),
+        *([outcome.judged] if outcome.judged else []),
+    ]
     accepted = sum(flight.verdict == "accept" for flight in flights)
     return f"{accepted} of {len(flights)} flights accepted"
 

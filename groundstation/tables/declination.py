@@ -19,6 +19,8 @@ POLE_DEG = 89.99  # nearer to a pole than that east and north are nothing
 KNOT_SPACING_M = 5_000.0
 M_PER_DEG = SEMI_MAJOR_M * np.pi / 180.0
 SIGMA_FLOOR_DEG, SIGMA_SLOPE_DEG_NT = 0.26, 5417.0
+NORTH_EAST_DOWN_SIGMA_NT = (137.0, 89.0, 141.0)  # of the 2025 model, crust and disturbance field in it
+HORIZONTAL_SIGMA_NT = 133.0
 
 
 @dataclass(frozen=True)

@@ -74,6 +74,9 @@ class Odometry:
         Where it stood at the first epoch, frame of the session (north, east).
     heading_deg : float
         Its heading then.
+    gap_s : ndarray, shape (n,)
+        Length of the gap without readings that an epoch lies in, over which the last one is held; 0 where there is
+        none. Empty: none anywhere.
     """
 
     name: str
@@ -82,6 +85,7 @@ class Odometry:
     turn_rate_dps: FloatArray
     position_m: tuple[float, float]
     heading_deg: float
+    gap_s: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         _freeze(self)

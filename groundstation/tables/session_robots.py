@@ -21,6 +21,7 @@ from groundstation.tables.table import Flight, Table
 
 POSE = "position_north_m", "position_east_m", "true_heading_deg"
 LARGEST_BEARING_DEG = 80.0
+LONGEST_HOLD_S = 1.5  # of a reading of the odometry, before it is a gap
 SEES, BLIND = 1, 2  # ranks
 
 
@@ -88,6 +89,8 @@ def session_of_robots(
             findings.append(_left_out(robot.name, "its odometry ends before the others begin"))
             continue
         vehicles.append(track)
+        if track.gap_s.any():
+            findings.append(_gap_found(track, settings.bin_s))
         truth[robot.name] = _truth(robot, zero_ns)
     names = {track.name for track in vehicles} | {point.name for point in landmarks}
     ranges = _ranges([one for one in robots if one.name in truth], subjects, names, zero_ns, settings, findings)
@@ -107,6 +110,12 @@ def blinded(session: Session, robots: Sequence[str]) -> Session:
 
 def _left_out(name: str, why: str) -> Finding:
     return Finding("warn", "session.no_dead_reckoning", f"{name} is left out: {why}", name)
+
+
+def _gap_found(track: Odometry, bin_s: float) -> Finding:
+    lost_s, longest_s = float(np.count_nonzero(track.gap_s)) * bin_s, float(track.gap_s.max())
+    text = f"{track.name} has no odometry for {lost_s:.0f} s, {longest_s:.1f} s at a time: its last reading is held"
+    return Finding("warn", "session.odometry_gap", text, track.name)
 
 
 def _joined(flights: Iterable[Flight], findings: list[Finding]) -> list[_Robot]:
@@ -175,7 +184,17 @@ def _odometry(robot: _Robot, zero_ns: int, bin_s: float) -> Odometry | None:
     speed, turn = means
     at_s, pose = _pose(robot, zero_ns)
     north, east, heading = (float(np.interp(0.0, at_s, pose[:, k])) for k in range(3))
-    return Odometry(robot.name, edges[:-1], speed, turn, (north, east), float(np.rad2deg(heading)))
+    gap_s = _gaps(time_s, edges)
+    return Odometry(robot.name, edges[:-1], speed, turn, (north, east), float(np.rad2deg(heading)), gap_s)
+
+
+def _gaps(time_s: FloatArray, edges: FloatArray) -> FloatArray:
+    """Length of the gap that each bin lies in, 0 where there is none."""
+    found = np.zeros(len(edges) - 1)
+    for row in np.flatnonzero(np.diff(time_s) > LONGEST_HOLD_S):
+        inside = (edges[1:] > time_s[row]) & (edges[:-1] < time_s[row + 1])
+        found[inside] = time_s[row + 1] - time_s[row]
+    return found
 
 
 def _ranges(

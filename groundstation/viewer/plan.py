@@ -5,7 +5,7 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
-from groundstation.chapters import without_chapter
+from groundstation.chapters.by_answer import without_chapter
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight
 from groundstation.viewer.names import clean_text

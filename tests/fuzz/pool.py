@@ -4,16 +4,18 @@ import multiprocessing
 import resource
 import tempfile
 import time
+import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from tests.fuzz.trial import Case, Watch, run_case
 
-LIMIT_S = 5.0
+LIMIT_S = 5.0  # of processor time: other programs may hold the processor
+WALL = 12.0  # so many times the limit have to pass before a child is taken for hung
 START_S = 240.0  # of a child: imports and compiled loops
 MEMORY_BYTES = 1 << 30  # that a case may take beyond what a child has after its first logs
-REPEATS = 2  # a case over the limit of time is run again: other programs may have held the processor
+REPEATS = 2  # a case that hangs is run again
 
 
 def _limit_memory() -> None:
@@ -26,6 +28,7 @@ def _peak_mb() -> float:
 
 
 def _child(pipe: Any, warm_up: list[Case]) -> None:
+    warnings.simplefilter("error", RuntimeWarning)  # what numpy warns of would be told to users
     watch = Watch()
     with tempfile.TemporaryDirectory() as name:
         tempfile.tempdir = name
@@ -34,9 +37,9 @@ def _child(pipe: Any, warm_up: list[Case]) -> None:
         _limit_memory()
         pipe.send(_peak_mb())
         while (case := pipe.recv()) is not None:
-            before, began = _peak_mb(), time.perf_counter()
+            before, began = _peak_mb(), time.process_time()
             found = run_case(case, Path(name), watch)
-            found |= {"seconds": time.perf_counter() - began, "growth_mb": _peak_mb() - before}
+            found |= {"seconds": time.process_time() - began, "growth_mb": _peak_mb() - before}
             pipe.send(found)
 
 
@@ -83,13 +86,15 @@ def run_all(cases: Iterable[Case], limit_s: float = LIMIT_S) -> Iterator[tuple[C
         found, code = None, None
         for _ in range(REPEATS):
             child = child or Child(warm_up)
-            found = child.run(case, limit_s)
+            found = child.run(case, WALL * limit_s)
             if found is not None:
                 break
             code, child = child.end(), None
         if found is None:
             how = f"over {limit_s} s" if code is None else f"the process ended with {code}"
             found = {"came_to": "hang" if code is None else "death", "fault": how, "seconds": limit_s, "growth_mb": 0.0}
+        elif found["seconds"] > limit_s and not found["fault"]:
+            found |= {"came_to": "hang", "fault": f"{found['seconds']:.1f} s of processor time, limit {limit_s} s"}
         yield case, found
     if child is not None:
         child.end()

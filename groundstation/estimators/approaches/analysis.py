@@ -22,6 +22,7 @@ from groundstation.estimators.approaches.geometry import (
     line_through,
     runway_of,
 )
+from groundstation.estimators.approaches.height import height_error
 from groundstation.estimators.approaches.path import METRES_PER_DEG, FlightPath, path_of, position_topics, step_of
 from groundstation.estimators.approaches.protection import protection_along
 from groundstation.estimators.approaches.reference import (
@@ -38,6 +39,7 @@ from groundstation.results.answer import Answers, answer_of
 from groundstation.results.landing import (
     Approach,
     Established,
+    HeightError,
     LandingResult,
     LeftOutApproach,
     PositionError,
@@ -120,6 +122,7 @@ def _approach(number: int, flight: "Flight", path: FlightPath, final: Final, set
         None if protection is None else protection[0],
         _claim(errors, runway),
         step_m if any(step_m) else None,
+        _height_errors(flight, path, runway, final.end.time_s, settings) if lands else (),
     )
     return _Told(approach, path_columns(number, path, near, rows), {} if protection is None else protection[1])
 
@@ -207,6 +210,14 @@ def _position_errors(
         _error_of(flight, topic, path, runway, (start_s, end_s, final.end.time_s), final.end.outcome, settings)
         for topic in position_topics(flight)
     )
+
+
+def _height_errors(
+    flight: "Flight", path: FlightPath, runway: RunwayUsed, touchdown_s: float, settings: LandingSettings
+) -> tuple[HeightError, ...]:
+    """The error of each recorded altitude of an INS or receiver on the roll-out."""
+    found = (height_error(flight, topic, path, runway, touchdown_s, settings) for topic in position_topics(flight))
+    return tuple(one for one in found if one is not None)
 
 
 def _error_of(

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from groundstation.results.columns import AnswerColumn
-from groundstation.results.landing import Approach, Established, LandingResult, PositionError, Touchdown
+from groundstation.results.landing import Approach, Established, HeightError, LandingResult, PositionError, Touchdown
 
 Value = TypeVar("Value")
 
@@ -26,6 +26,15 @@ def _measured(value: Callable[[PositionError], float | None]) -> Callable[[Landi
 
     def of_approach(one: Approach) -> float | None:
         return next((value(error) for error in one.position_errors if error.state == "measured"), None)
+
+    return _last(of_approach)
+
+
+def _height(value: Callable[[HeightError], float | None]) -> Callable[[LandingResult], float | None]:
+    """Of the first topic whose altitude the runway measured."""
+
+    def of_approach(one: Approach) -> float | None:
+        return next((value(error) for error in one.height_errors if error.state == "measured"), None)
 
     return _last(of_approach)
 
@@ -68,4 +77,11 @@ COLUMNS: tuple[AnswerColumn[LandingResult], ...] = (
         _measured(lambda error: error.error_m),
     ),
     AnswerColumn("landing_position_error_sigma_m", "number", "its sigma", _measured(lambda error: error.sigma_m)),
+    AnswerColumn(
+        "landing_height_error_m",
+        "number",
+        "of the recorded altitude on the roll-out of the last approach, by the elevation of the runway, upwards",
+        _height(lambda error: error.error_m),
+    ),
+    AnswerColumn("landing_height_error_sigma_m", "number", "its sigma", _height(lambda error: error.sigma_m)),
 )

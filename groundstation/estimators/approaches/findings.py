@@ -38,6 +38,11 @@ def _of(one: Approach) -> list[Finding]:
         if error.state == "measured" and error.error_m is not None and error.sigma_m is not None:
             text = f"{name}: {error.topic} is {error.error_m:+.0f} m across the course (sigma {error.sigma_m:.0f} m)"
             found.append(Finding("info", "landing.position_error", text, error.topic, place))
+    for height in one.height_errors:
+        if height.state == "measured" and height.error_m is not None and height.sigma_m is not None:
+            text = f"{name}: altitude of {height.topic} is {height.error_m:+.1f} m on the runway"
+            text = f"{text} (sigma {height.sigma_m:.1f} m)"
+            found.append(Finding("info", "landing.height_error", text, height.topic, place))
     if one.runway.placed_by == "positions":
         text = f"{name}: no runway of the site file: course from the positions, threshold {one.runway.place_reason}"
         found.append(Finding("info", "landing.runway_placed", text, one.position_topic, place))

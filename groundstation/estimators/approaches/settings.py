@@ -61,6 +61,10 @@ class LandingSettings:
     position_curvature_mps2: float = number(1e-3, 0.0, 0.1)  # of an INS error over some minutes
     position_noise_m: float = number(3.0, 0.01, 100.0)  # beyond the steps it is written in
     positions_rounded: Rounding = "unknown"
+    reference_height_m: float = number(3.0, 0.0, 20.0)  # of the altitude's reference above the ground, on the wheels
+    reference_height_sigma_m: float = number(2.0, 0.0, 20.0)
+    runway_slope: float = number(0.01, 0.0, 0.1)  # ICAO Annex 14, volume I, 3.1.13: 1 % of the length, as 95 %
+    elevation_sigma_m: float = number(0.3, 0.0, 20.0)
 
     def __post_init__(self) -> None:
         check_ranges(self)

@@ -6,6 +6,8 @@ Source: Skrypnik, Inter-aircraft navigation in air traffic management, 2010, cha
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import combinations
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from groundstation.estimators.control.motion import Motion
 from groundstation.estimators.control.scenario import NEAREST_M, LocalCriterion, SessionPlan
 
 LOCAL_ITERATIONS, LOCAL_TOLERANCE = 60, 1e-9
+FIRST_WEIGHT, LAST_WEIGHT = 1e2, 1e4  # of crowding: the last leaves about a ten-thousandth of the separation
 KNOT_S = 10.0  # of the random starts
 
 
@@ -55,6 +58,9 @@ class Session:
         self.plan, self.motion, self.model = plan, Motion(plan), AccuracyModel(plan)
         size = self.model.size
         self.theta = np.zeros((size, size))
+        steered = {bound.aircraft for bound in self.motion.bounds}
+        pairs = combinations(range(len(plan.aircraft)), 2)
+        self._pairs = [(one, other) for one, other in pairs if one in steered or other in steered]
         own = self.model.first_of(self.model.user) + PLACE
         self.theta[own, own] = [plan.control.weight_north, plan.control.weight_east, plan.control.weight_up]
 
@@ -78,8 +84,25 @@ class Session:
         mine = links.receiver == self.model.user
         return geometry_of(links.direction[:, mine], self.plan.control.axes)
 
-    def variance(self, controls: FloatArray) -> tuple[float, FloatArray]:
-        """Weighted variance tr(Theta P) at the end, and its derivative by the controls.
+    def crowding(self, position_m: FloatArray) -> tuple[float, FloatArray]:
+        """By how much aircraft come nearer to each other than the separation, and its derivative by the positions.
+
+        Sum of max(0, 1 - distance^2 / separation^2)^2 over all epochs but the first and all pairs of which one is
+        controlled: 0 where the separation is kept.
+        """
+        found, limit_m2 = np.zeros(position_m.shape), self.plan.separation_m**2
+        total = 0.0
+        for one, other in self._pairs if limit_m2 > 0.0 else ():
+            line = position_m[1:, one] - position_m[1:, other]
+            lack = np.maximum(0.0, 1.0 - (line**2).sum(axis=1) / limit_m2)
+            total += float((lack**2).sum())
+            by_line = -4.0 * lack[:, None] * line / limit_m2
+            found[1:, one] += by_line
+            found[1:, other] -= by_line
+        return total, found
+
+    def variance(self, controls: FloatArray, weight: float = 0.0) -> tuple[float, FloatArray]:
+        """Weighted variance tr(Theta P) at the end, times 1 + ``weight`` crowding, and its derivative by the controls.
 
         Infinite where anybody comes so near to a source that the geometry has no meaning: no descent steps there.
         """
@@ -90,7 +113,12 @@ class Session:
         by_covariance = np.zeros(found.covariance.shape)
         by_covariance[-1] = self.theta
         by_position = self.model.by_position(found, by_covariance)
-        return float((self.theta * found.covariance[-1]).sum()), self.motion.by_controls(paths, by_position)
+        value = float((self.theta * found.covariance[-1]).sum())
+        if weight > 0.0:
+            crowding, by_place = self.crowding(paths.position_m)
+            by_position = (1.0 + weight * crowding) * by_position + weight * value * by_place
+            value *= 1.0 + weight * crowding
+        return value, self.motion.by_controls(paths, by_position)
 
 
 class StepMeasure:
@@ -113,9 +141,10 @@ class StepMeasure:
         by_direction = np.zeros(links.line_m.shape)
         by_direction[:, mine] = loss_by_direction(geometry, self._criterion, axes)
         by_position = np.zeros(paths.position_m.shape)
-        by_position[step + 1] = links.by_position(by_direction, session.model.sources)[0]
+        crowding, by_place = session.crowding(paths.position_m[step : step + 2])
+        by_position[step + 1] = links.by_position(by_direction, session.model.sources)[0] + LAST_WEIGHT * by_place[1]
         by_controls = session.motion.by_controls(paths, by_position)[:, step]
-        return float(loss(geometry, self._criterion)[0]), by_controls
+        return float(loss(geometry, self._criterion)[0]) + LAST_WEIGHT * crowding, by_controls
 
 
 def local_law(session: Session, criterion: LocalCriterion) -> Law:
@@ -162,22 +191,42 @@ def _best_step(
 
 
 def integral_law(session: Session, starts: Sequence[FloatArray]) -> Law:
-    """The law with the least tr(Theta P) at the end, the best of descents from several starts."""
-    settings, width = session.plan.control, session.width
-    found = [
+    """The law with the least tr(Theta P) at the end, the best of descents from several starts.
+
+    Where it brings aircraft nearer to each other than the separation, descents with a weight on that follow from all
+    starts, and from the best of these one with the last weight.
+    """
+    found = _descents(session, starts, 0.0)
+    work = found
+    best = min(found, key=lambda one: one.loss)
+    if session.crowding(session.motion.paths(best.x).position_m)[0] > 0.0:
+        found = _descents(session, starts, FIRST_WEIGHT)
+        best = min(found, key=lambda one: one.loss)
+        last = _descents(session, [best.x], LAST_WEIGHT)
+        work, best = [*work, *found, *last], last[0]
+    return Law(
+        best.x,
+        best.gap,
+        sum(one.iterations for one in work),
+        sum(one.evaluations for one in work),
+        best.has_converged,
+        tuple(one.loss for one in found),
+    )
+
+
+def _descents(session: Session, starts: Sequence[FloatArray], weight: float) -> list[Minimum]:
+    settings = session.plan.control
+    return [
         minimise(
-            session.variance,
+            partial(session.variance, weight=weight),
             session.project,
             start,
-            width,
+            session.width,
             iterations=settings.iterations,
             tolerance=settings.tolerance,
         )
         for start in starts
     ]
-    best = min(found, key=lambda one: one.loss)
-    work = sum(one.iterations for one in found), sum(one.evaluations for one in found)
-    return Law(best.x, best.gap, *work, best.has_converged, tuple(one.loss for one in found))
 
 
 def random_starts(session: Session, count: int, seed: int) -> list[FloatArray]:

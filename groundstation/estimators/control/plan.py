@@ -22,6 +22,7 @@ INTEGRAL = "covariance"
 AT_BOUND = 1e-6  # of the room a control has
 POOR_DOP = 20.0
 LEAST_GAIN = 1.01
+KEPT = 0.99  # of the separation: the descent leaves a little
 SPREAD = 0.01  # of the losses of several starts: more is worth a remark
 
 
@@ -249,8 +250,13 @@ def _findings(session: Session, flown: dict[str, Flown], answer: ControlPlan) ->
     elif row.dop > POOR_DOP:
         text = f"dilution of precision {row.dop:.0f} at the end: the sources stand nearly on one line"
         found.append(Finding("warn", "control.poor_geometry", text))
-    if row.least_separation_m is not None and row.least_separation_m < session.plan.separation_m:
-        text = f"aircraft come within {row.least_separation_m:.0f} m of each other: the law knows no separation"
+    if row.least_separation_m is not None and row.least_separation_m < KEPT * session.plan.separation_m:
+        why = (
+            "start, bounds or a law of one step ahead leave no more"
+            if session.motion.bounds
+            else "nobody is controlled"
+        )
+        text = f"aircraft come within {row.least_separation_m:.0f} m of each other: {why}"
         found.append(Finding("warn", "control.separation", text))
     if session.motion.bounds and answer.gain < LEAST_GAIN:
         text = f"control gains {100.0 * (answer.gain - 1.0):.1f} % of accuracy: the bounds or the time leave no more"

@@ -283,7 +283,7 @@ class SessionPlan:
     placement : Placement
         Counts where a point ``is_placed``.
     separation_m : float
-        Aircraft nearer to each other than this are a warning.
+        Laws of control keep aircraft so far apart from each other; where they cannot it is a warning. 0: no matter.
     """
 
     title: str

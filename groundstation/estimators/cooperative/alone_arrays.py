@@ -88,6 +88,7 @@ class Room(NamedTuple):
     right: FloatArray  # (r, n)
     gain: FloatArray  # (r, n)
     mixed: FloatArray  # (r, N)
+    by_error: FloatArray  # (r, q)
     cross: FloatArray  # (5, 4, 4)
     entry: Int64Array  # (r,) of Heard, for each measurement of a group
     lines: FloatArray  # (2, n or r)

@@ -100,24 +100,30 @@ def update(
 ) -> None:
     """Kalman update with the noise of the algorithm; shared errors are considered, not estimated.
 
-    The gain solves S K' = H P + C', where C is the covariance of the states with the noise of the rows.
+    The gain solves S K' = H P + C', where C is the covariance of the states with the noise of the rows: errors of the
+    points are in the states, in the rows themselves and in what neighbours tell. Without the last of these a filter
+    comes to claim less than the errors that it shares, and its covariance can lose its positive eigenvalues.
     """
-    n, q, P = fleet.size[who], len(method.point_variance), own.P[who]
-    S, right, is_modified = room.S, room.right, method.algorithm == MODIFIED
+    n, P, S, right, is_modified = fleet.size[who], own.P[who], room.S, room.right, method.algorithm == MODIFIED
+    q = len(method.point_variance) if is_modified else 0
+    by_error = room.by_error
+    for r in range(count):
+        for c in range(q):
+            by_error[r, c] = batch.by_shared[r, c] + _told_shared(r, c, heard, batch) / method.point_variance[c]
     for r in range(count):
         for i in range(n):
             right[r, i] = 0.0
             for j in range(n):
                 right[r, i] += batch.h[r, j] * P[j, i]
-            for c in range(q if is_modified else 0):
-                right[r, i] += own.shared[who, i, c] * batch.by_shared[r, c]
+            for c in range(q):
+                right[r, i] += own.shared[who, i, c] * by_error[r, c]
     for r in range(count):
         for s in range(count):
             S[r, s] = batch.own[r] + batch.brought[r] if r == s else 0.0
             for i in range(n):
                 S[r, s] += right[r, i] * batch.h[s, i]
-                for c in range(q if is_modified else 0):  # H C, the part of C H' stands in right
-                    S[r, s] += batch.h[r, i] * own.shared[who, i, c] * batch.by_shared[s, c]
+                for c in range(q):  # H C, the part of C H' stands in right
+                    S[r, s] += batch.h[r, i] * own.shared[who, i, c] * by_error[s, c]
             if r != s:
                 S[r, s] += _common(events, r, s, method, heard, batch, room.cross)
     gain, kept = room.gain, room.kept

@@ -8,9 +8,11 @@ A range between two aircraft is linearised, value and direction, about a referen
 less an offset, at first 0. While the line between the estimates lies within ``KNOWN_WRONG_SIGMAS`` claimed sigmas of
 the reference line, across it, the reference stays: directions that follow the estimate tell of a turn of the whole
 group, which ranges inside it cannot see (first-estimates Jacobian: Huang, Mourikis and Roumeliotis, 2010). Beyond, the
-reference is known to be wrong and both its ends move to the estimate. A direction that stays while the value is taken
-at the estimate is no such filter: for aircraft in line its sign across the line may be the wrong one, and every update
-then drives the estimate further away.
+reference is known to be wrong and both its ends move to the estimate. Ranges to points and satellites do see a turn of
+the group: with any of them a range is linearised at the estimate, unless the settings say otherwise, for the curvature
+that the reference neglects then costs more than it saves. A direction that stays while the value is taken at the
+estimate is no such filter: for aircraft in line its sign across the line may be the wrong one, and every update then
+drives the estimate further away.
 
 Source: Kalman, A new approach to linear filtering and prediction problems, 1960; sequential use of simultaneous
 measurements: Maybeck, Stochastic Models, Estimation, and Control, volume 1, 1979, section 5.6.
@@ -18,7 +20,7 @@ measurements: Maybeck, Stochastic Models, Estimation, and Control, volume 1, 197
 
 import numpy as np
 
-from groundstation.estimators.cooperative.arrays import Rules
+from groundstation.estimators.cooperative.arrays import POINT, SATELLITE, Rules
 from groundstation.estimators.cooperative.events import Prepared
 from groundstation.estimators.cooperative.joint import Joint, work
 from groundstation.estimators.cooperative.messages import report_bytes
@@ -43,7 +45,7 @@ def run_centralised(
     """
     together = settings.update == "simultaneous"
     items = timeline(prepared, settings, together=together)
-    rules = Rules(settings.gate_sigma, together, settings.derivatives == "reckoning", uses_measurements, innovates)
+    rules = Rules(settings.gate_sigma, together, is_about_reckoning(prepared, settings), uses_measurements, innovates)
     log = log_for(prepared, items)
     work(prepared.fleet, prepared.points, prepared.events, items, rules, _start(prepared), log)
     messages = reports(prepared, settings) if uses_measurements else {}
@@ -63,6 +65,13 @@ def _start(prepared: Prepared) -> Joint:
     k = len(prepared.vehicles)
     first_s = np.array([vehicle.first_s for vehicle in prepared.vehicles])
     return Joint(places, x, np.ascontiguousarray(P), first_s, np.zeros((k, 3)), np.zeros(k, dtype=np.int64))
+
+
+def is_about_reckoning(prepared: Prepared, settings: CooperativeSettings) -> bool:
+    """Whether ranges between aircraft are linearised about their dead reckoning."""
+    if settings.derivatives == "auto":
+        return not np.isin(prepared.events.kind, (POINT, SATELLITE)).any()
+    return settings.derivatives == "reckoning"
 
 
 def reports(prepared: Prepared, settings: CooperativeSettings) -> dict[str, tuple[int, int]]:

@@ -5,11 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.quantiles import chi_square_quantile
+from groundstation.base.records import BoolArray
 from groundstation.estimators.cooperative.tracks import Track
 from groundstation.tables.session import DeadReckoning, Odometry
 
 DIVERGED = 3.0  # horizontal error over the computed sigma_r
 LAST_PART = 0.1
+LONGEST_GAP_S = 1.0  # of the truth, unless it comes more seldom
 
 
 @dataclass(frozen=True)
@@ -43,17 +46,27 @@ class Judgement:
 
 
 def judge(track: Track, vehicle: DeadReckoning | Odometry, time_s: FloatArray, position_m: FloatArray) -> Judgement:
-    """Hold a track against the true positions of its vehicle (m, 3), which are interpolated to its epochs."""
+    """Hold a track against the true positions of its vehicle (m, 3), interpolated to its epochs, not over long gaps."""
     true = np.column_stack(
         [np.interp(track.time_s, time_s, position_m[:, axis], left=np.nan, right=np.nan) for axis in range(3)]
     )
-    error = track.position_m - true
+    error = np.where(_in_gap(track.time_s, time_s)[:, None], np.nan, track.position_m - true)
     if isinstance(vehicle, DeadReckoning):
         nearest = np.clip(np.searchsorted(vehicle.time_s, track.time_s), 0, len(vehicle) - 1)
         horizontal = np.einsum("nij,ni->nj", vehicle.axes[nearest], error)[:, :2]
     else:
         horizontal = error[:, :2]
     return Judgement(horizontal, normalised(horizontal, track.horizontal_m2))
+
+
+def _in_gap(at_s: FloatArray, time_s: FloatArray) -> BoolArray:
+    """Where times lie between two samples that are too far apart."""
+    if len(time_s) < 2:
+        return np.zeros(len(at_s), dtype=bool)
+    steps = np.diff(time_s)
+    is_long = steps > max(LONGEST_GAP_S, 2.0 * float(np.median(steps)))
+    after = np.clip(np.searchsorted(time_s, at_s), 1, len(steps))
+    return np.asarray(is_long[after - 1] & (at_s != time_s[after]))
 
 
 def normalised(error: FloatArray, covariance: FloatArray) -> FloatArray:
@@ -75,8 +88,8 @@ def nees_limits(freedom: int, independent: int, share: float = 0.95) -> tuple[fl
     >>> round(low, 2), round(high, 2)
     (1.63, 2.41)
     """
-    from scipy.stats import chi2
-
     total = freedom * independent
-    low, high = (float(chi2.ppf(part, total)) / independent for part in (0.5 - 0.5 * share, 0.5 + 0.5 * share))
+    low, high = (
+        float(chi_square_quantile(part, total)) / independent for part in (0.5 - 0.5 * share, 0.5 + 0.5 * share)
+    )
     return low, high

@@ -183,6 +183,7 @@ def _room(most: int, n: int, errors: int, width: int) -> Room:
         np.zeros((most, n)),
         np.zeros((most, n)),
         np.zeros((most, width)),
+        np.zeros((most, errors)),
         np.zeros((5, 4, 4)),
         np.zeros(most, dtype=np.int64),
         np.zeros((2, max(most, n))),

@@ -96,9 +96,10 @@ class CooperativeSettings:
     ----------
     update : {'sequential', 'simultaneous'}
         Every measurement at its own time with its own linearisation, or all of one frame together.
-    derivatives : {'estimate', 'reckoning'}
+    derivatives : {'auto', 'estimate', 'reckoning'}
         Where the centralised filter linearises a range between two aircraft: at its estimate, or at their dead
-        reckoning for as long as the estimate lies within three sigmas of it (see ``centralised``).
+        reckoning for as long as the estimate lies within three sigmas of it (see ``centralised``). ``auto``: at the
+        estimate in a session that has ranges to points or satellites, at dead reckoning in one that has none.
     frame_s : float
         Length of a frame, for simultaneous updates and for the modified algorithm.
     gate_sigma : float
@@ -123,7 +124,7 @@ class CooperativeSettings:
     """
 
     update: Update = "sequential"
-    derivatives: Literal["estimate", "reckoning"] = "reckoning"
+    derivatives: Literal["auto", "estimate", "reckoning"] = "auto"
     frame_s: float = number(1.0, 0.01)
     gate_sigma: float = number(6.0, 0.0)
     latency_slots: int = number(1, 0, 10)

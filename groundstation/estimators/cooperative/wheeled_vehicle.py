@@ -20,6 +20,11 @@ LONG_S = 1e6  # a constant
 LOST_M, LOST_RAD = 1.0, 0.5  # a vehicle that slipped or was carried away
 
 
+def _squares(track: Odometry) -> tuple[float, float]:
+    """Mean squares of speed and rate of turn, (m/s)^2 and (rad/s)^2: what a held reading may be wrong by."""
+    return float(np.mean(track.speed_mps**2)), float(np.mean(np.deg2rad(track.turn_rate_dps) ** 2))
+
+
 class WheeledVehicle:
     """North, east, heading, and the errors of odometry and camera that are believed."""
 
@@ -47,6 +52,7 @@ class WheeledVehicle:
         self._at = {name: number for number, name in enumerate(self.states)}
         self.bias = self._at.get("range_bias_m", -1)
         self._sigma = np.array([sigma for sigma, _ in believed.values()])
+        self._unread = _squares(track)
         self._density = np.array([2.0 * sigma**2 / time_s for sigma, time_s in believed.values()])
 
     @property
@@ -94,7 +100,11 @@ class WheeledVehicle:
             half = -0.5 * turn * step_s
             phi[0, at["turn_scale"]], phi[1, at["turn_scale"]] = -way * sine * half, way * cosine * half
             phi[2, at["turn_scale"]] = -turn * step_s
-        return moved, phi, self._noise(speed != 0.0 or turn != 0.0, way, abs(step_s), cosine, sine)
+        noise = self._noise(speed != 0.0 or turn != 0.0, way, abs(step_s), cosine, sine)
+        gap_s = float(self._track.gap_s[epoch]) if len(self._track.gap_s) else 0.0
+        if gap_s > 0.0:  # an error as large as the motion itself, the same for the whole gap
+            noise[[0, 1, 2], [0, 1, 2]] += np.array(self._unread)[[0, 0, 1]] * gap_s * abs(step_s)
+        return moved, phi, noise
 
     def _noise(self, is_moving: bool, way: float, step_s: float, cosine: float, sine: float) -> FloatArray:
         """Covariance of the noise of a short step; a vehicle that stands has none."""

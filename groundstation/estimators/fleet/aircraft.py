@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.quantiles import student_quantile
 from groundstation.estimators.fleet.moments import moments_of
 
 FloatArray = NDArray[np.float64]
@@ -61,14 +62,12 @@ def mean_over_flights(value: FloatArray, sigma: FloatArray, *, confidence: float
     >>> round(found.sigma_between, 6), round(found.heterogeneity, 6)  # 0.1^2 - 0.06^2
     (0.08, 0.64)
     """
-    from scipy.stats import t
-
     found = moments_of(value)
     if not found.count:
         return None
     if found.count == 1:
         return MeanOverFlights(1, found.mean, *(4 * (math.nan,)))
-    half = float(t.ppf(0.5 + 0.5 * confidence, found.count - 1)) * found.sigma / math.sqrt(found.count)
+    half = student_quantile(0.5 + 0.5 * confidence, found.count - 1) * found.sigma / math.sqrt(found.count)
     stated = sigma[np.isfinite(value) & np.isfinite(sigma)]
     between2 = max(found.sigma**2 - float(np.mean(stated**2)), 0.0) if len(stated) else found.sigma**2
     heterogeneity = between2 / found.sigma**2 if found.sigma > 0.0 else 0.0

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.quantiles import share_quantile
 from groundstation.estimators.fleet.moments import moments_of
 from groundstation.results.fleet import FleetCalibration
 
@@ -24,11 +25,9 @@ def share_interval(inside: int, checks: int, confidence: float = 0.95) -> tuple[
     >>> share_interval(0, 0)
     (0.0, 1.0)
     """
-    from scipy.stats import beta
-
     tail = 0.5 * (1.0 - confidence)
-    low = float(beta.ppf(tail, inside, checks - inside + 1)) if inside else 0.0
-    high = float(beta.ppf(1.0 - tail, inside + 1, checks - inside)) if inside < checks else 1.0
+    low = share_quantile(tail, inside, checks - inside + 1) if inside else 0.0
+    high = share_quantile(1.0 - tail, inside + 1, checks - inside) if inside < checks else 1.0
     return low, high
 
 

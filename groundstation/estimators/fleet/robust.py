@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.quantiles import student_quantile
+
 FloatArray = NDArray[np.float64]
 NORMAL_MAD = 0.674490  # median of |x| of a standard normal
 NORMAL_STEP = 0.953873  # median of |x - y| of two of them
@@ -46,6 +48,4 @@ def limit_in_sigmas(values: int, chance: float, values_per_freedom: float) -> fl
     >>> round(limit_in_sigmas(10, 0.0027, VALUES_PER_FREEDOM_STEP), 1)
     5.1
     """
-    from scipy.stats import t
-
-    return float(t.isf(0.5 * chance, max(values / values_per_freedom, 1.0)))
+    return student_quantile(1.0 - 0.5 * chance, max(values / values_per_freedom, 1.0))

@@ -1,4 +1,4 @@
-"""Checks of the differences: how normal, how large beside what GNSS and sway explain, how steady."""
+"""Checks of the differences: how large beside what GNSS and sway explain, how steady."""
 
 from dataclasses import dataclass
 
@@ -7,33 +7,17 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import unwrap
 from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.estimators.heading.lines import fitted_lines, window_bounds
 from groundstation.estimators.heading.samples import Samples
-from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.standstill import effective_samples
 from groundstation.results.heading import Standstill, TaxiSegment
 
 FloatArray = NDArray[np.float64]
-LEAST_NORMALITY = 20  # samples
+LEAST_SAMPLES = 20
 LEAST_IN_LINE = 4
-MADE_FOR_SAMPLES, SCATTER_SIGMAS = 400, 3.0  # of the limits of skewness, kurtosis and distance
-LEAST_SPREAD_DEG = 1e-6  # below it there is nothing to fit a normal to
-
-
-@dataclass(frozen=True)
-class Normality:
-    """Sizes of the deviation from a normal distribution, and p-values that take the samples as independent.
-
-    The p-values are shown and not gated: with hundreds of samples they reject good runs.
-    """
-
-    skewness: float
-    excess_kurtosis: float
-    distance: float
-    skewness_p: float
-    kurtosis_p: float
-    distance_p: float
+LEAST_SPREAD_DEG = 1e-6  # below it there is nothing to compare
 
 
 @dataclass(frozen=True)
@@ -49,31 +33,6 @@ class VarianceRatio:
     high: float
     track_sigma_deg: float
     sway_sigma_deg: float
-
-
-def normality(difference_deg: FloatArray) -> Normality | None:
-    """Skewness, excess kurtosis and largest distance between the sample and fitted normal distribution functions.
-
-    None for fewer than 20 samples or differences without spread.
-
-    Source: moments as in Pearson; distance as in Lilliefors, On the Kolmogorov-Smirnov test for normality with mean and
-    variance unknown, 1967 (the p-value shown is that of a known normal: too large, and said so).
-    """
-    from scipy import stats
-
-    spread = float(np.std(difference_deg)) if len(difference_deg) else 0.0
-    if len(difference_deg) < LEAST_NORMALITY or spread < LEAST_SPREAD_DEG:
-        return None
-    standard = (difference_deg - np.mean(difference_deg)) / spread
-    distance = stats.kstest(standard, "norm")
-    return Normality(
-        skewness=float(np.mean(standard**3)),
-        excess_kurtosis=float(np.mean(standard**4) - 3.0),
-        distance=float(distance.statistic),
-        skewness_p=float(stats.skewtest(standard).pvalue),
-        kurtosis_p=float(stats.kurtosistest(standard).pvalue),
-        distance_p=float(distance.pvalue),
-    )
 
 
 def about_running_line(
@@ -117,11 +76,11 @@ def variance_ratio(used: Samples, standstill: Standstill | None, line_s: float) 
     VarianceRatio or None
         The interval takes both variances as independent, which they are not quite (both contain the sway): it is wide.
     """
-    if standstill is None or len(used) < LEAST_NORMALITY:
+    if standstill is None or len(used) < LEAST_SAMPLES:
         return None
     residual = about_running_line(used.time_s, used.heading_deg, used.segment, line_s)
     residual = residual[np.isfinite(residual)]
-    if len(residual) < LEAST_NORMALITY:
+    if len(residual) < LEAST_SAMPLES:
         return None
     velocity2 = 0.5 * (standstill.sigma_north_mps**2 + standstill.sigma_east_mps**2)
     track2 = velocity2 * float(np.mean(1.0 / used.speed_mps**2)) * DEG_PER_RAD**2
@@ -150,8 +109,6 @@ def disagreement(parts: tuple[TaxiSegment, ...], probability: float) -> Disagree
 
     The limit is what chance exceeds with the probability given, were the sigmas of the parts all there is.
     """
-    from scipy.stats import chi2
-
     if len(parts) < 2:
         return None
     errors = np.array([part.error_deg for part in parts])
@@ -160,20 +117,5 @@ def disagreement(parts: tuple[TaxiSegment, ...], probability: float) -> Disagree
     freedom = len(parts) - 1
     worst = int(np.argmax(weights * off**2))
     told = f"farthest off: {parts[worst].start_s:.0f} to {parts[worst].end_s:.0f} s, by {off[worst]:+.2f} deg"
-    limit = float(chi2.isf(probability, freedom)) / freedom
+    limit = float(chi_square_quantile(1.0 - probability, freedom)) / freedom
     return Disagreement(float(np.sum(weights * off**2)) / freedom, limit, told)
-
-
-def normality_limits(settings: HeadingSettings, samples: int) -> tuple[float, tuple[float, float], float]:
-    """Limits of skewness, excess kurtosis and distance for so many samples.
-
-    The settings are for 400 samples; fewer scatter more by themselves, by three standard errors: sqrt(6 / n) and
-    sqrt(24 / n) of the moments, 0.35 / sqrt(n) of the distance.
-    """
-
-    def more(variance: float) -> float:
-        return SCATTER_SIGMAS * float(np.sqrt(variance) * max(samples**-0.5 - MADE_FOR_SAMPLES**-0.5, 0.0))
-
-    low, high = settings.excess_kurtosis_range
-    kurtosis = low - more(24.0), high + more(24.0)
-    return settings.skewness_max + more(6.0), kurtosis, settings.normal_distance_max + more(0.35**2)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import unwrap
+from groundstation.base.quantiles import length_quantile
 from groundstation.base.records import BoolArray
 from groundstation.estimators.heading.lines import window_bounds
 from groundstation.estimators.heading.samples import Samples
@@ -167,11 +168,9 @@ def speed_bound_mps(length_mps: float, sigma_mps: float) -> float:
 
     Both components of the mean have the standard error ``sigma_mps``.
     """
-    from scipy.stats import rice
-
     if sigma_mps <= 0.0:
         return length_mps
-    return float(rice.ppf(PROBABILITY, length_mps / sigma_mps, scale=sigma_mps))
+    return length_quantile(PROBABILITY, length_mps, sigma_mps)
 
 
 def assess_standstill(samples: Samples, part: slice, settings: HeadingSettings) -> Standstill:

@@ -1,4 +1,4 @@
-"""An INS that GNSS corrects already: INS minus GNSS alone, and what its own filter logged. Nothing is estimated.
+"""An INS that GNSS corrects, or may: INS minus GNSS alone, and what its own filter logged. Nothing is estimated.
 
 Against the GNSS that corrects it an INS cannot show its own errors: tilt and drift are taken out before anyone sees
 them, and a model of an INS left alone would find states with small sigmas that mean nothing.
@@ -13,7 +13,7 @@ from groundstation.base.normal import NORMAL_95
 from groundstation.base.signals import topics_of_kind
 from groundstation.estimators.inertial.differences import Differences, differences, seconds_covered
 from groundstation.estimators.inertial.figures import differences_figure, own_innovations_figure, plain_track_figure
-from groundstation.estimators.inertial.kind import AIDED
+from groundstation.estimators.inertial.kind import AIDED, UNKNOWN
 from groundstation.estimators.inertial.model import FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.results.inertial import CHANNELS, Difference, InertialResult, OwnInnovation
@@ -22,20 +22,28 @@ from groundstation.tables.table import Flight
 
 ANY_JUMP_M = 1e5  # no jump is too large to be shown
 UNITS = (("position", "m"), ("velocity", "mps"))
+FINDINGS = {
+    AIDED: ("inertial.gnss_aided", "GNSS corrects this INS already"),
+    UNKNOWN: ("inertial.unknown_kind", "whether GNSS corrects this INS cannot be told"),
+}
 
 
 def compare_aided(
-    flight: Flight, reason: str, *, settings: InertialSettings, excluded_s: tuple[tuple[float, float], ...] = ()
+    flight: Flight,
+    kind: tuple[str, str],
+    *,
+    settings: InertialSettings,
+    excluded_s: tuple[tuple[float, float], ...] = (),
 ) -> tuple[InertialResult, tuple[Finding, ...]]:
-    """Describe INS minus GNSS of an INS that GNSS corrects, and the innovations its own filter logged.
+    """Describe INS minus GNSS of an INS that GNSS corrects, or may, and the innovations its own filter logged.
 
     Jumps are shown as they are: which of the two jumped cannot be told, and no filter has to be spared them.
 
     Parameters
     ----------
     flight : Flight
-    reason : str
-        Why it is taken for such an INS.
+    kind : (str, str)
+        ``AIDED`` or ``UNKNOWN``, and why.
     settings : InertialSettings
     excluded_s : tuple of (float, float)
         Flight seconds in which GNSS is not used.
@@ -53,8 +61,8 @@ def compare_aided(
     result = InertialResult(
         ins_topic=compared.ins_topic,
         gnss_topic=compared.gnss_topic,
-        kind=AIDED,
-        kind_reason=reason,
+        kind=kind[0],
+        kind_reason=kind[1],
         epochs=len(epochs),
         gnss_seconds=seconds_covered(epochs.time_s[epochs.has_gnss], settings.outage_s),
         other_ins=tuple(name for name in topics_of_kind("ins", flight.topics()) if name != compared.ins_topic),
@@ -63,8 +71,9 @@ def compare_aided(
         own_innovations=() if own is None else _innovations(own),
         figures=figures if own is None else (*figures, own_innovations_figure(flight, own)),
     )
-    text = f"GNSS corrects this INS already ({reason}): INS minus GNSS is shown, errors and forecast are not estimated"
-    return result, (*compared.findings, Finding("info", "inertial.gnss_aided", text, compared.ins_topic))
+    code, says = FINDINGS[kind[0]]
+    text = f"{says} ({kind[1]}): INS minus GNSS is shown, errors and forecast are not estimated"
+    return result, (*compared.findings, Finding("info", code, text, compared.ins_topic))
 
 
 def _differences(compared: Differences) -> tuple[Difference, ...]:

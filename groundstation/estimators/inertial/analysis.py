@@ -31,12 +31,12 @@ def _run(flight: "Flight", known: Known, settings: InertialSettings) -> Found[In
     from groundstation.estimators.inertial.aided import compare_aided
     from groundstation.estimators.inertial.differences import differences
     from groundstation.estimators.inertial.estimate import estimate_compared
-    from groundstation.estimators.inertial.kind import AIDED, kind_of, stated_kind
+    from groundstation.estimators.inertial.kind import UNAIDED, kind_of, stated_kind
 
     compared = differences(flight, settings=settings, excluded_s=known.excluded_s)
     kind = kind_of(compared, settings, stated_kind(known.aircraft.ins_kind, flight.metadata))
-    if kind[0] == AIDED:
-        return Found(*compare_aided(flight, kind[1], settings=settings, excluded_s=known.excluded_s))
+    if kind[0] != UNAIDED:
+        return Found(*compare_aided(flight, kind, settings=settings, excluded_s=known.excluded_s))
     found = estimate_compared(flight, compared, kind, settings=settings, aircraft_class=known.aircraft.ins_class)
     return Found(found.result, found.findings, found)
 
@@ -48,8 +48,10 @@ def _run_forecast(_flight: "Flight", known: Known, settings: InertialSettings) -
     estimation = known.workings_of(Estimation)
     if estimation is None:
         inertial = known.answer(InertialResult)
+        is_unknown = inertial is not None and inertial.kind == "unknown"
+        says = "whether GNSS corrects this INS cannot be told" if is_unknown else "GNSS corrects this INS already"
         why = f" ({inertial.kind_reason})" if inertial is not None else ""
-        raise NotAssessableError("forecast", f"GNSS corrects this INS already{why}: nothing of it is estimated")
+        raise NotAssessableError("forecast", f"{says}{why}: nothing of it is estimated")
     phases = known.phases
     return Found(assess_forecast(estimation, settings=settings, phase_of=phases.at, take_off_s=take_off_s(phases)))
 
@@ -65,21 +67,20 @@ def _rests_on(flight: "Flight", result: InertialResult) -> RestsOn:
 
 
 def _is_forecast_expected(_flight: "Flight", known: Known) -> bool:
-    """Of an INS that GNSS corrects a finding says already that a forecast means nothing."""
+    """Of an INS that GNSS corrects, or may correct, a finding says already that a forecast means nothing."""
     inertial = known.answer(InertialResult)
-    return inertial is None or inertial.kind != "gnss_aided"
+    return inertial is None or inertial.kind == "unaided"
 
 
 def _sentence(answers: Answers) -> str:
     inertial, forecast = answer_of(answers, InertialResult), answer_of(answers, ForecastResult)
     if inertial is None:
         return ""
-    if inertial.kind == "gnss_aided":
+    if inertial.kind != "unaided":
         position = inertial.difference("position")
+        says = "INS corrected by GNSS" if inertial.kind == "gnss_aided" else "INS perhaps corrected by GNSS"
         within = "" if position is None else f", within {position.p95:.1f} m of it (95 %)"
-        return f"INS corrected by GNSS{within}: no errors, no forecast"
-    if inertial.kind == "unknown":
-        return "INS errors estimated, too little to tell whether GNSS corrects it"
+        return f"{says}{within}: no errors, no forecast"
     parts = []
     if inertial.radial_error_rate_50_nmiph is not None:
         parts.append(f"{inertial.radial_error_rate_50_nmiph:.2f} nmi/h")

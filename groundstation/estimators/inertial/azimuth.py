@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.geodesy import EARTH_RATE_RADPS
+from groundstation.base.quantiles import student_quantile
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.estimators.inertial.differences import Differences
@@ -105,11 +106,11 @@ class AzimuthFit:
         Scaled by sqrt(chi-square / degrees of freedom) where that exceeds one, and then by Student's quantile: the
         scatter of a few turns is itself uncertain.
         """
-        from scipy.stats import t
-
         spread = float(np.sum(np.square(self.normalised))) / self.freedom
         sigma = self.sigma_scale * float(np.sqrt(self.covariance[AZIMUTH, AZIMUTH]))
-        return sigma if spread <= 1.0 else sigma * float(np.sqrt(spread) * t.ppf(0.975, self.freedom)) / BOUND95
+        return (
+            sigma if spread <= 1.0 else sigma * float(np.sqrt(spread) * student_quantile(0.975, self.freedom)) / BOUND95
+        )
 
 
 def estimate_azimuth(

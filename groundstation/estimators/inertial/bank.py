@@ -71,7 +71,7 @@ class NoiseBank:
         """By horizon the starts (s,) and the logarithmic likelihood (s, k) of what GNSS showed by each set."""
         epochs, found = self.flown.epochs, {}
         at = start_epochs(epochs, float(epochs.time_s[0]) + PAST_FROM_S, self.settings.start_step_s)
-        for lead_s in JUDGED_S:
+        for lead_s in JUDGED_S if len(at) else ():  # a short flight has no past to judge by
             leads = np.array([lead_s])
             path = Path.of(self.flown, at, leads, self.settings.forecast_step_s)
             means, variances = self._each(path)

@@ -10,13 +10,13 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.base.geodesy import curvature_radii_m, on_earth
 from groundstation.base.records import BoolArray, Int64Array, frozen
-from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.inertial import screening
 from groundstation.estimators.inertial.filter import Epochs
 from groundstation.estimators.inertial.model import FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.tables.resample import join
+from groundstation.tables.sources import is_joined, sources_of_kind
 from groundstation.tables.table import Flight, Table
 
 POSITION_FIELDS = ("latitude_deg", "longitude_deg")
@@ -95,6 +95,8 @@ class Differences:
 def choose_pair(flight: Flight) -> tuple[str, str]:
     """The INS and GNSS topics to compare: of each kind the one whose positions cover the longest time.
 
+    Of a flight of several logs the better source (:func:`groundstation.tables.sources.sources_of_kind`).
+
     Raises
     ------
     NotAssessableError
@@ -102,10 +104,13 @@ def choose_pair(flight: Flight) -> tuple[str, str]:
     """
     found: dict[str, str] = {}
     for kind, title in (("ins", "INS"), ("gnss", "GNSS")):
-        covered = {name: _covered_s(flight[name]) for name in topics_of_kind(kind, flight.topics())}
+        covered = {name: _covered_s(flight[name]) for name in sources_of_kind(flight, kind)}
         covered = {name: seconds for name, seconds in covered.items() if flight[name].has(*POSITION_FIELDS)}
         if not covered:
             raise NotAssessableError("inertial", f"no {title} position in the log")
+        if is_joined(flight):
+            found[kind] = next(iter(covered))
+            continue
         found[kind] = max(covered, key=lambda name: (round(covered[name] / 60.0), -list(covered).index(name)))
     return found["ins"], found["gnss"]
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.findings import Finding
+from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.estimators.inertial import figures
@@ -179,15 +180,13 @@ def _result(
 
 
 def _channel(run: FilterRun, visible: FloatArray, channel: int) -> ChannelResult:
-    from scipy.stats import chi2
-
     seen = np.flatnonzero(run.epochs.has_gnss)
     last = int(seen[-1])
     used = run.used[:, :, channel]
     ratio = np.square(run.innovation[:, :, channel]) / run.innovation_variance[:, :, channel]
     inside = ratio[used != 0]
     count, is_inflated = int((used == 1).sum()), run.noise.gnss.is_inflated
-    bounds = [None if is_inflated else float(chi2.ppf(part, count) / count) for part in (0.025, 0.975)]
+    bounds = [None if is_inflated else float(chi_square_quantile(part, count)) / count for part in (0.025, 0.975)]
     time_s, states = run.epochs.time_s, []
     for index, name in enumerate(STATES):
         _, unit, factor = figures.SHOWN[index]

@@ -45,10 +45,13 @@ def kind_of(compared: Differences, settings: InertialSettings, stated: tuple[str
     minute = np.floor(epochs.time_s[known] / MINUTE_S).astype(np.int64)
     _, which, count = np.unique(minute, return_inverse=True, return_counts=True)
     if len(count) < LEAST_MINUTES:
-        return UNKNOWN, f"{len(count)} min of positions are too short to tell whether GNSS corrects this INS"
+        return UNKNOWN, f"{len(count)} min of positions, {LEAST_MINUTES:.0f} are needed to see it drift from GNSS"
     speed = np.hypot(*compared.velocity_mps.T)
     if np.isfinite(speed).any() and np.nanquantile(speed, 0.95) < AT_REST_MPS:
-        return UNKNOWN, "the aircraft hardly moved: whether GNSS corrects this INS cannot be told"
+        return (
+            UNKNOWN,
+            f"95 % of the time below {AT_REST_MPS:.0f} m/s: an INS at rest need not drift",
+        )
     means = np.stack([np.bincount(which, epochs.position_m[known, axis]) / count for axis in range(2)], axis=1)
     largest = float(np.quantile(np.hypot(*(means - np.median(means, axis=0)).T), 0.95))
     seconds = float(np.ptp(epochs.time_s[known]))

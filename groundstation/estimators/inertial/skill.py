@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.records import BoolArray
 from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.hindcast import Hindcast
@@ -131,8 +132,6 @@ def calibration_rows(
     replay: Hindcast, claimed: dict[str, Claimed | None], horizons_min: Sequence[float], first_start_s: float = 0.0
 ) -> tuple[CalibrationRow, ...]:
     """Coverage of the bands and NEES with chi-square limits from the number of independent starts."""
-    from scipy.stats import chi2
-
     rows = []
     for method, sigma in claimed.items():
         if sigma is None:
@@ -157,8 +156,8 @@ def calibration_rows(
                     inside68=inside[68],
                     inside95=inside[95],
                     nees=float(np.mean(np.square(error[known, lead] / sigma.scaled_m[known, lead]))),
-                    nees_low=float(chi2.ppf(0.5 - 0.5 * BOUND, freedom) / freedom),
-                    nees_high=float(chi2.ppf(0.5 + 0.5 * BOUND, freedom) / freedom),
+                    nees_low=float(chi_square_quantile(0.5 - 0.5 * BOUND, freedom)) / freedom,
+                    nees_high=float(chi_square_quantile(0.5 + 0.5 * BOUND, freedom)) / freedom,
                     scale=float(np.mean(sigma.scale[known, lead])),
                 )
             )

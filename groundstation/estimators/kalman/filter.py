@@ -133,7 +133,7 @@ class Gate:
     def rules(self, kinds: int, size: int) -> Rules:
         """As the compiled loops want it."""
         patience = np.array(np.broadcast_to(np.asarray(self.patience, dtype=np.int64), kinds))
-        opened = np.array(np.broadcast_to(np.asarray(self.opened, dtype=np.float64), (kinds, size)))
+        opened = np.array(np.broadcast_to(np.asarray(self.opened, dtype=np.float64), (kinds, size)), order="C")
         return Rules(float(self.sigmas) ** 2, frozen(patience), frozen(opened), self.is_by_innovation)
 
 

@@ -67,7 +67,8 @@ class Transition:
         ValueError
             For an entry outside the matrix, two at one place, or noise below the diagonal.
         """
-        place = [np.asarray(part, dtype=np.int64) for part in (rows, columns, noise_rows, noise_columns)]
+        # contiguous, as every other column: the loops are compiled for each kind of array
+        place = [np.ascontiguousarray(part, dtype=np.int64) for part in (rows, columns, noise_rows, noise_columns)]
         entries = np.atleast_2d(np.asarray(values, dtype=np.float64))
         added = [_table(part, len(entries), len(place[2])) for part in (noise_before, noise)]
         if (place[2] > place[3]).any():

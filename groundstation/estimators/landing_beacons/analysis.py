@@ -1,6 +1,7 @@
 """Landing by two locators and an additional beacon as an analysis of a flight."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -19,18 +20,23 @@ from groundstation.estimators.landing_beacons.approach import (
     approaches_in,
     belief,
     deviations,
+    over_known_ground,
+    unknown_rise_m,
 )
 from groundstation.estimators.landing_beacons.settings import LandingBeaconsSettings
 from groundstation.results.answer import Answers, answer_of
-from groundstation.results.landing_beacons import BeaconLanding
+from groundstation.results.columns import AnswerColumn
+from groundstation.results.landing_beacons import BeaconLanding, DeviationRow
 from groundstation.tables.resample import values_at
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight
 
+Value = TypeVar("Value")
 NAME, PREFIX, BEARING = "landing_beacons", "adf.", "relative_bearing_deg"
 LEAST_BEACONS, LEAST_WIDTH_M = 3, 50.0
 SPEED_SHARE, HEADING_DEG, CUT_SHORT_M = 0.3, 10.0, 300.0
+GROUND_NEXT = "the site file may give the ground under the approach ([[runways.ground]])"
 NEXT = "correct the beacons of the site file or the scale of the direction finder in the profile"
 
 
@@ -53,10 +59,11 @@ def _run(flight: "Flight", known: Known, settings: LandingBeaconsSettings) -> Fo
             findings.append(_finding("warn", "rejected", f"approach from {part.time_s[0]:.0f} s: {problem}"))
             continue
         number = len(kept) + 1
-        kept.append((part, found, told))
+        rise_m = unknown_rise_m(part, told, runway)
+        kept.append((part, over_known_ground(found, rise_m, settings.terrain_m), told))
         findings += [
             _finding(severity, kind, f"approach {number}: {text}")
-            for severity, kind, text in _doubts(part, found, told, settings)
+            for severity, kind, text in _doubts(part, found, told, runway, settings)
         ]
     if not kept:
         raise NotAssessableError(NAME, findings[0].text, next_step=NEXT)
@@ -77,7 +84,7 @@ def _beacons_heard(flight: "Flight", site: SiteData) -> tuple[Runway, tuple[Beac
     """
     heard = [topic for topic in flight.topics() if topic.startswith(PREFIX) and flight[topic].has(BEARING)]
     if not heard:
-        raise NotAssessableError(NAME, "no bearings of an automatic direction finder in the log (adf.<beacon>)")
+        raise NotAssessableError(NAME, "no bearings of locators in the log (adf.<beacon>)")
     if not site.runways or not site.beacons:
         raise NotAssessableError(NAME, "no [[runways]] with [[beacons]] in the site file")
     name = next((one.runway for one in site.beacons if one.runway), site.runways[0].name)
@@ -114,13 +121,14 @@ def _sampled(flight: "Flight", known: Known, beacons: tuple[Beacon, ...], settin
         return np.full(len(time_ns), np.nan)
 
     north, east = of_kind("ins", "velocity_north_mps"), of_kind("ins", "velocity_east_mps")
+    altitude_m = of_kind("ins", "altitude_ellipsoid_m", "altitude_msl_m")
     time_s = flight.seconds(time_ns)
     return Sampled(
         time_s=time_s,
         bearings_deg=np.column_stack([_bearings(flight, topic, time_ns, settings) for topic in topics]),
         height_m=of_kind("radio_altimeter", "height_m"),
         is_airborne=~np.isin(known.phases.at(time_s), ("standstill", "taxi", "take-off run", "landing roll")),
-        altitude_m=of_kind("ins", "altitude_ellipsoid_m", "altitude_msl_m"),
+        altitude_m=altitude_m if np.isfinite(altitude_m).any() else of_kind("baro", "pressure_altitude_m"),
         ground_speed_mps=np.hypot(north, east),
         heading_deg=of_kind("ins", "true_heading_deg"),
     )
@@ -141,7 +149,7 @@ def _why_not(speed_mps: float) -> str:
 
 
 def _doubts(
-    part: Sampled, found: Deviations, told: Belief, settings: LandingBeaconsSettings
+    part: Sampled, found: Deviations, told: Belief, runway: Runway, settings: LandingBeaconsSettings
 ) -> list[tuple[str, str, str]]:
     """Severity, kind and text of what speaks against an approach."""
     doubts = []
@@ -153,10 +161,16 @@ def _doubts(
         text = f"heading by the bearings is {told.heading_difference_deg:+.0f} deg off that of the INS"
         doubts.append(("warn", "heading", f"{text}: {NEXT}, or the bearing of the runway"))
     if told.terrain_m > settings.terrain_m:
-        text = f"the ground under it rises and falls by {told.terrain_m:.0f} m"
-        doubts.append(("warn", "terrain", f"{text}: deviations from the glide path hold the terrain"))
-    elif not np.isfinite(told.terrain_m):
-        doubts.append(("info", "terrain", "no altitude to tell radio altitude from terrain"))
+        text = f"the ground under it rises and falls by {told.terrain_m:.0f} m by radio altitude against altitude"
+        if runway.ground:
+            text += ", the profile of the site file taken off"
+        left_out = f"no deviation from the glide path where it is more than {settings.terrain_m:g} m"
+        doubts.append(("warn", "terrain", f"{text}: {left_out}; {GROUND_NEXT}"))
+    elif not np.isfinite(told.terrain_m) and not runway.ground:
+        text = (
+            "no altitude to tell radio altitude from terrain: deviations from the glide path take the ground for level"
+        )
+        doubts.append(("warn", "terrain", f"{text}; {GROUND_NEXT}"))
     last_m = float(found.before_m[found.found][-1])
     if last_m > CUT_SHORT_M:
         doubts.append(("info", "cut_short", f"it ends {last_m:.0f} m before the threshold"))
@@ -173,16 +187,40 @@ def _sentence(answers: Answers) -> str:
         return ""
     count = len(answer.approaches)
     last = answer.rows[-1] if answer.rows else None
-    where = (
-        ""
-        if last is None
-        else (
-            f": {last.lateral_m:+.0f} +- {last.lateral_95_m:.0f} m of the course and {last.glide_path_m:+.0f} +- "
-            f"{last.glide_path_95_m:.0f} m of the glide path {last.before_threshold_m:.0f} m before the threshold"
-        )
-    )
+    where = ""
+    if last is not None:
+        where = f": {last.lateral_m:+.0f} +- {last.lateral_95_m:.0f} m of the course"
+        if last.glide_path_m is not None and last.glide_path_95_m is not None:
+            where += f" and {last.glide_path_m:+.0f} +- {last.glide_path_95_m:.0f} m of the glide path"
+        where += f" {last.before_threshold_m:.0f} m before the threshold"
     return f"{count} {'approach' if count == 1 else 'approaches'} by bearings{where}"
 
+
+def _last(value: Callable[[DeviationRow], Value]) -> Callable[[BeaconLanding], Value | None]:
+    """Of the row nearest to the threshold of the last approach."""
+    return lambda landing: value(landing.rows[-1]) if landing.rows else None
+
+
+COLUMNS: tuple[AnswerColumn[BeaconLanding], ...] = (
+    AnswerColumn(
+        "landing_beacons_approaches", "count", "approaches by bearings", lambda landing: len(landing.approaches)
+    ),
+    AnswerColumn(
+        "landing_beacons_lateral_m",
+        "number",
+        "right of the course, nearest to the threshold of the last approach",
+        _last(lambda row: row.lateral_m),
+    ),
+    AnswerColumn(
+        "landing_beacons_lateral_95_m", "number", "what it may err by, 95 %", _last(lambda row: row.lateral_95_m)
+    ),
+    AnswerColumn(
+        "landing_beacons_glide_path_m", "number", "above the glide path there", _last(lambda row: row.glide_path_m)
+    ),
+    AnswerColumn(
+        "landing_beacons_glide_path_95_m", "number", "what it may err by, 95 %", _last(lambda row: row.glide_path_95_m)
+    ),
+)
 
 LANDING_BEACONS = Analysis(
     name=NAME,
@@ -195,4 +233,5 @@ LANDING_BEACONS = Analysis(
     run=_run,
     is_expected=_is_expected,
     sentence=_sentence,
+    columns=COLUMNS,
 )

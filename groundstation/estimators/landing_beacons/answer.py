@@ -73,7 +73,8 @@ def _rows(number: int, flown: Flown) -> list[DeviationRow]:
             LINEAR_95 * float(np.median(sigma[near]))
             for sigma in (found.lateral_sigma_m, found.glide_path_sigma_m, found.distance_sigma_m)
         )
-        met = axis_category_met(lateral, "horizontal"), axis_category_met(glide, "vertical")
+        above = found.glide_path_m[near & np.isfinite(found.glide_path_m)]
+        met = axis_category_met(lateral, "horizontal"), axis_category_met(glide, "vertical") if len(above) else None
         rows.append(
             DeviationRow(
                 number,
@@ -81,8 +82,8 @@ def _rows(number: int, flown: Flown) -> list[DeviationRow]:
                 along,
                 float(np.mean(found.fix.right_m[near])),
                 lateral,
-                float(np.nanmean(found.glide_path_m[near])),
-                glide,
+                float(np.mean(above)) if len(above) else None,
+                glide if len(above) else None,
                 *(one.name if one else "" for one in met),
             )
         )

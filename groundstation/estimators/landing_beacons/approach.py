@@ -1,6 +1,6 @@
 """One approach by bearings: the places along it, deviations with their sigmas, and whether they can be believed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from groundstation.estimators.landing_beacons.settings import LandingBeaconsSett
 
 WELL_KNOWN_M = 300.0  # sigma of a distance that may say something about the speed
 LEAST_FIXES = 10
+GRADIENT_M = 1.0
+END_S = 2.0  # of an approach, over which the ground counts as that of the threshold
 
 
 @dataclass(frozen=True)
@@ -88,8 +90,8 @@ def deviations(sampled: Sampled, beacons_m: FloatArray, runway: Runway, settings
 
     Notes
     -----
-    Above the glide path = radio altitude - (threshold crossing height + distance tan(glide angle)). Bearings of a
-    beacon overhead are left out, and with fewer than three there is no place.
+    Above the glide path = radio altitude + ground - (threshold crossing height + distance tan(glide angle)). Bearings
+    of a beacon overhead are left out, and with fewer than three there is no place.
     """
     fix = solve_bearings(sampled.bearings_deg, beacons_m, settings.bearing_sigma_deg)
     place = np.column_stack([fix.along_m, fix.right_m])
@@ -99,9 +101,49 @@ def deviations(sampled: Sampled, beacons_m: FloatArray, runway: Runway, settings
         np.where(overhead, np.nan, sampled.bearings_deg), beacons_m, settings.bearing_sigma_deg
     )  # where a beacon is overhead nothing is found
     slope = float(np.tan(np.deg2rad(runway.glide_angle_deg)))
-    glide = sampled.height_m - (runway.threshold_crossing_height_m - fix.along_m * slope)
+    ground = ground_m(-fix.along_m, runway)
+    glide = sampled.height_m + ground - (runway.threshold_crossing_height_m - fix.along_m * slope)
     along_sigma, right_sigma = (np.sqrt(fix.covariance[:, axis, axis]) for axis in (0, 1))
-    return Deviations(fix, glide, right_sigma, along_sigma, np.hypot(settings.height_sigma_m, slope * along_sigma))
+    rise = (ground_m(GRADIENT_M - fix.along_m, runway) - ground) / GRADIENT_M
+    by_distance = np.abs(slope - np.nan_to_num(rise)) * along_sigma
+    return Deviations(fix, glide, right_sigma, along_sigma, np.hypot(settings.height_sigma_m, by_distance))
+
+
+def ground_m(before_m: FloatArray, runway: Runway) -> FloatArray:
+    """Height of the ground above the threshold by the profile of the site file; level without one, NaN beyond its ends.
+
+    Examples
+    --------
+    >>> from groundstation.estimators.known import Ground
+    >>> hill = Runway("09", 90.0, ground=(Ground(0.0, 0.0), Ground(2000.0, 40.0)))
+    >>> ground_m(np.array([500.0, 3000.0]), hill).tolist()
+    [10.0, nan]
+    """
+    if not runway.ground:
+        return np.zeros(len(before_m))
+    places, heights = zip(*((one.before_threshold_m, one.height_m) for one in runway.ground), strict=True)
+    return np.asarray(np.interp(before_m, places, heights, left=np.nan, right=np.nan))
+
+
+def unknown_rise_m(sampled: Sampled, told: "Belief", runway: Runway) -> FloatArray:
+    """Rise of the ground above that under the end of the approach, less the profile; NaN where no altitude tells it.
+
+    Altitude less radio altitude is the ground; what altitude errs by for the whole approach drops out. The distance is
+    that of a straight flight: single ones err too much.
+    """
+    ground = sampled.altitude_m - sampled.height_m
+    if runway.ground and np.isfinite(told.threshold_s):
+        ground = ground - ground_m(told.speed_mps * (told.threshold_s - sampled.time_s), runway)
+    known = np.isfinite(ground)
+    if not known.any():
+        return np.asarray(ground)
+    end = known & (sampled.time_s >= sampled.time_s[known][-1] - END_S)
+    return np.asarray(ground - np.median(ground[end]))
+
+
+def over_known_ground(found: Deviations, rise_m: FloatArray, most_m: float) -> Deviations:
+    """Deviations without those from the glide path over ground that rises or falls by more than so much."""
+    return replace(found, glide_path_m=np.where(np.abs(rise_m) > most_m, np.nan, found.glide_path_m))
 
 
 @dataclass(frozen=True)
@@ -132,10 +174,9 @@ def belief(sampled: Sampled, found: Deviations, runway: Runway) -> Belief:
     difference = wrap_180(heading - sampled.heading_deg)
     known = np.isfinite(difference)
     middle = float(wrap_180(mean_heading(difference[known]))) if known.any() else float("nan")
-    ground = sampled.altitude_m - sampled.height_m
-    ground = ground[np.isfinite(ground)]
-    terrain = float(np.ptp(np.quantile(ground, [0.02, 0.98]))) if len(ground) else float("nan")
     known_speed = sampled.ground_speed_mps[np.isfinite(sampled.ground_speed_mps)]
-    return Belief(
-        speed, threshold_s, float(np.median(known_speed)) if len(known_speed) else float("nan"), middle, terrain
-    )
+    median_mps = float(np.median(known_speed)) if len(known_speed) else float("nan")
+    told = Belief(speed, threshold_s, median_mps, middle, float("nan"))
+    rise = unknown_rise_m(sampled, told, runway)
+    rise = rise[np.isfinite(rise)]
+    return replace(told, terrain_m=float(np.ptp(np.quantile(rise, [0.02, 0.98]))) if len(rise) else float("nan"))

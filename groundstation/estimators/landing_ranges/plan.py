@@ -1,5 +1,7 @@
 """The plan of a landing by ranges as one object."""
 
+import numpy as np
+
 from groundstation.base.findings import Finding
 from groundstation.estimators.landing_ranges.scenario import RangeApproach
 from groundstation.estimators.plan import Plan, Planned
@@ -7,12 +9,39 @@ from groundstation.results.answer import Answers, answer_of
 from groundstation.results.landing_categories import CATEGORIES
 from groundstation.results.landing_ranges import ALL_AXES, HONEST, TOUCHDOWN, RangeLanding
 
+LEAST_WIDTH_M = 50.0  # of points that do not stand on one line; beside the course
+OVERFLOWN_M = 100.0
+
 
 def _run(scenario: RangeApproach) -> Planned:
     from groundstation.estimators.landing_ranges.answer import range_landing  # compiles
 
     answer = range_landing(scenario)
-    return Planned({answer.analysis: answer}, scenario.path.duration_s, _findings(answer))
+    findings = (*_of_places(scenario), *_findings(answer))
+    return Planned({answer.analysis: answer}, scenario.path.duration_s, findings)
+
+
+def _of_places(scenario: RangeApproach) -> tuple[Finding, ...]:
+    """Warnings of places that no accuracy makes good: points on one line, and under the path."""
+    found, points = list[Finding](), scenario.points
+    if not points:
+        return ()
+    places = np.array([(point.before_threshold_m, point.right_m) for point in points])
+    width_m = float(np.linalg.svd(places - places.mean(axis=0), compute_uv=False)[-1]) if len(points) > 2 else np.inf
+    if np.abs(places[:, 1]).max() < LEAST_WIDTH_M:
+        text = "all points stand on the line of the course: no range tells right from left of it"
+        found.append(Finding("warn", "landing_ranges.on_course", text))
+    elif width_m < LEAST_WIDTH_M and scenario.moving is None:
+        text = f"all points stand within {width_m:.0f} m of one line: ranges tell little across it"
+        found.append(Finding("warn", "landing_ranges.on_one_line", text))
+    slope = np.tan(np.deg2rad(scenario.path.glide_angle_deg))
+    for point in points:
+        is_under = 0.0 <= point.before_threshold_m <= scenario.path.start_m and abs(point.right_m) < LEAST_WIDTH_M
+        below_m = scenario.path.threshold_height_m + slope * point.before_threshold_m - point.up_m
+        if is_under and below_m < OVERFLOWN_M:
+            text = f"{point.name} stands under the path, {below_m:.0f} m below it: an obstacle, and hard to hear"
+            found.append(Finding("warn", "landing_ranges.under_path", text))
+    return tuple(found)
 
 
 def _findings(answer: RangeLanding) -> tuple[Finding, ...]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.quantiles import student_quantile
 from groundstation.estimators.latency.settings import LatencySettings
 from groundstation.estimators.latency.windows import Noise, Series, Whitened, Windows, noise_of, reweighted, spread_of
 
@@ -32,7 +33,8 @@ class DelayFit:
     ``sigma_s`` allows for errors correlated within a window and for the priors; ``modelled_sigma_s`` is what the noise
     model would give; ``freedom`` the number of degrees it rests on; ``motion`` the RMS rate of the reference,
     ``residual`` that of what is left (units of the signal); ``explained`` the share of the other's motion.
-    ``search_s``, ``search_residual``: residual against delay.
+    ``search_s``, ``search_residual``: residual against delay. ``nuisance`` with its sigma and freedom is that of
+    the one that was asked for.
     """
 
     delay_s: float
@@ -47,13 +49,14 @@ class DelayFit:
     is_converged: bool
     search_s: FloatArray
     search_residual: FloatArray
+    nuisance: float = 0.0
+    nuisance_sigma: float = float("inf")
+    nuisance_freedom: float = 1.0
 
     @property
     def half_width_s(self) -> float:
         """Half of the 95 % interval, by Student's quantile."""
-        from scipy.stats import t
-
-        return float(t.ppf(0.975, self.freedom)) * self.sigma_s
+        return student_quantile(0.975, self.freedom) * self.sigma_s
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,14 @@ class _Step:
     residuals: FloatArray
 
 
-def fit_delay(reference: Series, windows: Windows, prior_sigma: FloatArray, settings: LatencySettings) -> DelayFit:
+def fit_delay(
+    reference: Series,
+    windows: Windows,
+    prior_sigma: FloatArray,
+    settings: LatencySettings,
+    *,
+    wanted: int | None = None,
+) -> DelayFit:
     """Fit the delay of windows behind a reference.
 
     Parameters
@@ -77,6 +87,8 @@ def fit_delay(reference: Series, windows: Windows, prior_sigma: FloatArray, sett
         Two or more.
     prior_sigma : ndarray, shape (q,)
         Of each nuisance about zero.
+    wanted : int, optional
+        The nuisance that is told of with its standard error.
 
     Returns
     -------
@@ -104,7 +116,11 @@ def fit_delay(reference: Series, windows: Windows, prior_sigma: FloatArray, sett
     windows = reweighted(windows, left, spread_of(left), settings.robust_sigmas)
     noise = noise_of(windows, left, settings.degree)
     at, step, is_converged = _iterated(reference, windows, plain, noise, prior, at, settings)
-    variance, freedom, modelled = _variance(step, prior)
+    variance, freedom, modelled = _variance(step, prior, 0)
+    aside = {}
+    if wanted is not None:
+        spread, degrees, _modelled = _variance(step, prior, 1 + wanted)
+        aside = {"nuisance": float(at[1][wanted]), "nuisance_sigma": spread**0.5, "nuisance_freedom": degrees}
     shown, rate = (part[..., :1] for part in reference.at(windows.time_s - at[0]))
     left, seen, shown, rate = (
         _squares(plain.rows(part), windows)
@@ -124,6 +140,7 @@ def fit_delay(reference: Series, windows: Windows, prior_sigma: FloatArray, sett
         is_converged=is_converged and abs(at[0]) < settings.search_s - settings.search_step_s,
         search_s=search_s,
         search_residual=profile,
+        **aside,
     )
 
 
@@ -199,8 +216,8 @@ def _step(reference: Series, windows: Windows, whitened: Whitened, prior: FloatA
     return _Step(rows, target - rows @ solved, normal, solved, parts[..., -1] - parts[..., :-1] @ solved)
 
 
-def _variance(step: _Step, prior: FloatArray) -> tuple[float, float, float]:
-    """Variance of the delay and its degrees of freedom (Satterthwaite), from the scatter of the windows' scores.
+def _variance(step: _Step, prior: FloatArray, number: int) -> tuple[float, float, float]:
+    """Variance of the delay (0) or a nuisance and its degrees of freedom (Satterthwaite), from the windows' scores.
 
     The third is the variance that the noise model alone would give.
     """
@@ -209,13 +226,14 @@ def _variance(step: _Step, prior: FloatArray) -> tuple[float, float, float]:
     own = np.eye(factor.shape[1]) - factor @ inverse @ np.swapaxes(factor, 1, 2)
     size, axes = np.linalg.eigh(0.5 * (own + np.swapaxes(own, 1, 2)))
     scale = np.where(size > LEAST_RATIO, 1.0 / np.sqrt(np.maximum(size, LEAST_RATIO)), 0.0)
-    corrected = ((axes * scale[:, None, :]) @ np.swapaxes(axes, 1, 2) @ factor @ inverse[:, :1])[..., 0]
+    corrected = ((axes * scale[:, None, :]) @ np.swapaxes(axes, 1, 2) @ factor @ inverse[:, [number]])[..., 0]
     scores = np.sum(corrected * np.einsum("wip,wi->wp", basis, step.left), axis=1)
     across = np.einsum("wpq,wp->wq", factor, corrected)
     spectrum = np.diag(np.sum(corrected**2, axis=1)) - across @ inverse @ across.T
     degrees = float(np.trace(spectrum)) ** 2 / max(float(np.sum(spectrum**2)), 1e-300)
-    modelled = float(inverse[0] @ (step.normal - prior) @ inverse[0])
-    from_data, from_priors = float(np.sum(scores**2)), float(inverse[0] @ prior @ inverse[0])
+    of_data, of_priors = inverse[number] @ (step.normal - prior), inverse[number] @ prior
+    modelled = float(of_data @ inverse[number])
+    from_data, from_priors = float(np.sum(scores**2)), float(of_priors @ inverse[number])
     total = from_data + from_priors
     freedom = max(degrees * (total / max(from_data, 1e-300)) ** 2, 1.0)
     return total, freedom, modelled + from_priors

@@ -260,10 +260,13 @@ def _nose(columns: dict[str, FloatArray], north: FloatArray, east: FloatArray) -
 def _rotation(columns: dict[str, FloatArray], heading_deg: FloatArray) -> FloatArray:
     """Rotations n_from_b, shape (m, 3, 3); roll and pitch that are not logged are level."""
     level = np.zeros(len(heading_deg))
-    roll, pitch, yaw = (
-        np.deg2rad(np.nan_to_num(part))
-        for part in (columns.get("roll_deg", level), columns.get("pitch_deg", level), heading_deg)
-    )
+    tilt = [columns.get(name, level) for name in ATTITUDE]
+    return rotation_n_from_b(np.column_stack([*tilt, heading_deg]))
+
+
+def rotation_n_from_b(attitude_deg: FloatArray) -> FloatArray:
+    """Rotations, shape (m, 3, 3), by roll, pitch and heading, shape (m, 3); angles that are not known are zero."""
+    roll, pitch, yaw = np.deg2rad(np.nan_to_num(attitude_deg)).T
     (sr, cr), (sp, cp), (sy, cy) = ((np.sin(part), np.cos(part)) for part in (roll, pitch, yaw))
     return np.array(
         [

@@ -8,7 +8,13 @@ from functools import partial
 from pathlib import Path, PurePath
 
 from groundstation.base.errors import UnclaimedLogError, UsageError
-from groundstation.pipeline.many_flights.found_sessions import Asked, FoundSessions, find_sessions, run_sessions
+from groundstation.pipeline.many_flights.found_sessions import (
+    STATIONS_TOML,
+    Asked,
+    FoundSessions,
+    find_sessions,
+    run_sessions,
+)
 from groundstation.pipeline.many_flights.inputs import collect, flight_folders, is_ours, session_folders
 from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
 from groundstation.pipeline.many_flights.output import LocalOutput, RemoteOutput
@@ -85,6 +91,47 @@ def run_many(
         return _run_remote(remote, asked, crew, force, listen)
     near = [make(Path(log), Path(out), is_named=named) for log, named in inputs]
     return _run_here(near, asked, crew, force, listen)
+
+
+def run_together(
+    paths: Sequence[Path | str],
+    out: Path | str,
+    configuration: Configuration,
+    *,
+    force: bool = False,
+    fail_on: str = "none",
+    with_pdf: bool = True,
+    listen: Listener = silent,
+) -> tuple[Outcome, ...]:
+    """Run several logs of one flight as that flight; see :func:`groundstation.pipeline.one_flight.join.join_logs`.
+
+    The logs are read and joined each time; parameters as of :func:`run_many`.
+
+    Raises
+    ------
+    UsageError
+        As :func:`run_many`; when fewer than two logs are named, one of them twice, or one is a folder or elsewhere.
+    """
+    from groundstation.pipeline.one_flight.join import join_files
+
+    if any(is_remote(str(place)) for place in (out, *paths)):
+        raise UsageError("--together", "logs or results elsewhere", "local ones")
+    named = " + ".join(PurePath(path).name for path in paths)
+    refuse_foreign(Path(out), force)
+    listen(Event("begin", total=1))
+    with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
+        try:
+            mcap = Path(folder) / "joined.mcap"
+            join_files([Path(path) for path in paths], mcap, configuration, listen)
+        except UsageError:
+            raise
+        except Exception as error:
+            reason, trace = reason_of(named, error)
+            listen(Event("end", named, reason))
+            return (Outcome(named, "failed", reason, trace=trace),)
+        job = Job(mcap, Path(out), configuration, fail_on, with_pdf=with_pdf, url=named)
+        asked = Asked(Path(out), configuration, None, fail_on, with_pdf, redo=True)
+        return _run_here([job], asked, partial(in_turn, listen=listen), force, listen)
 
 
 def _run_here(work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen: Listener) -> tuple[Outcome, ...]:
@@ -252,10 +299,15 @@ def _planned(job: Job) -> Outcome:
 
 
 def _planned_sessions(asked: Asked, planned: Sequence[Outcome]) -> list[Outcome]:
-    """Sessions among the flights that are finished; those of the other logs are found when they have been read."""
+    """Sessions among the finished flights; that those of unread logs are looked for, where stations are given."""
     flight_ids = {one.flight_id for one in planned if one.flight_id}
     found = find_sessions(asked, flight_ids) if flight_ids else FoundSessions()
-    return [*map(planned_session, found.jobs), *(one for one in found.told if one.state == "failed")]
+    sessions = [*map(planned_session, found.jobs), *(one for one in found.told if one.state == "failed")]
+    unread = [one.source for one in planned if one.state == "done" and one.text == PLANS["everything"]]
+    if unread and (asked.stations is not None or any(Path(log).with_name(STATIONS_TOML).is_file() for log in unread)):
+        text = "looked for among the flights once the logs are read"
+        sessions.append(Outcome("sessions", "done", text, is_session=True))
+    return sessions
 
 
 def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configuration) -> tuple[tuple[str, bool], ...]:

@@ -29,9 +29,9 @@ from groundstation.pipeline.many_flights.fleet_rows import (
 from groundstation.pipeline.many_flights.fleet_samples import SampleStore
 from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
 from groundstation.pipeline.one_flight.outcome import Outcome
-from groundstation.reports.index import INDEX_JSON
 from groundstation.results.columns import FlightColumn, Kind
 from groundstation.results.figures import FigureData
+from groundstation.results.file_names import INDEX_JSON
 from groundstation.results.files import load, write_bytes
 from groundstation.results.fleet import FleetResults, NotInFleet, SessionRow
 

@@ -5,10 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.one_flight.deviation_to_apply import CORRECTED
 from groundstation.pipeline.one_flight.log import as_log
-from groundstation.reports.index import INDEX_CSV, INDEX_JSON
-from groundstation.results.files import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY
+from groundstation.results.file_names import ARRAYS, CORRECTED, INDEX_CSV, INDEX_JSON, MANIFEST, OLD_ARRAYS, SUMMARY
 
 FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, STUDY_MARK = MANIFEST, INDEX_JSON, ".groundstation-study"
 SESSION_ARRAYS = "session_clocks.parquet"  # what a session of several aircraft has and no flight

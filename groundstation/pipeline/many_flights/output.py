@@ -14,7 +14,7 @@ from groundstation.pipeline.many_flights.remote_runs import BY_LOG, STAGING, arr
 from groundstation.pipeline.one_flight.flight import is_made, place, remove
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports.flight_report import PDF, REPORT
-from groundstation.results.files import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY
+from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY
 
 FLEET_ARRAYS = ("heading_samples.parquet",)  # of a flight's arrays, what the fleet is made from
 

@@ -12,7 +12,7 @@ from groundstation.pipeline.many_flights.output import Output
 from groundstation.pipeline.many_flights.remote import is_remote
 from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.outcome import Outcome
-from groundstation.results.files import MANIFEST
+from groundstation.results.file_names import MANIFEST
 
 
 @dataclass(frozen=True)

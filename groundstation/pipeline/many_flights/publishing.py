@@ -19,7 +19,8 @@ from groundstation.pipeline.many_flights.inputs import (
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
 from groundstation.reports.fleet_report import write_fleet_report
-from groundstation.reports.index import INDEX_CSV, INDEX_JSON, IndexRow, Kind
+from groundstation.reports.index import IndexRow, Kind
+from groundstation.results.file_names import INDEX_CSV, INDEX_JSON
 
 FLEET_RECORDING, FLEET_PDF = "fleet.rrd", str(Path(FLEET_PAGE).with_suffix(".pdf"))
 FLEET_FILES = (INDEX_JSON, INDEX_CSV, FLEET_PARQUET, SAMPLES, FLEET_RECORDING, FLEET_PAGE, FLEET_PDF)

@@ -17,7 +17,7 @@ from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, finished
 from groundstation.reports.flight_report import PDF
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
-from groundstation.results.files import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY
+from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY
 
 STAGING, BY_LOG = ".staging", ".logs"  # in an OUT elsewhere: what is on its way; flight ids by digest of the log
 

@@ -23,7 +23,7 @@ from groundstation.estimators.cooperative.analysis import SessionKnown
 from groundstation.pipeline.many_flights.inputs import session_folders
 from groundstation.pipeline.many_flights.session_figures import session_figures
 from groundstation.pipeline.one_flight.analyse import run_analyses
-from groundstation.pipeline.one_flight.configuration import SESSION_TABLES, Configuration, read_toml
+from groundstation.pipeline.one_flight.configuration import Configuration, read_toml, session_tables
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX, Stopwatch, place, state_of
 from groundstation.pipeline.one_flight.identity import MAX_PART_CHARACTERS, flight_id, safe_part
@@ -33,7 +33,8 @@ from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.pipeline.one_flight.resume import versions
 from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
-from groundstation.results.files import MANIFEST, load_document, load_manifest, save, save_manifest
+from groundstation.results.file_names import MANIFEST
+from groundstation.results.files import load_document, load_manifest, save, save_manifest
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.manifest import Keys, LogOfSession, Manifest, Resume
 from groundstation.tables.assemble import flight_from_batches
@@ -99,7 +100,7 @@ class SessionJob:
         logs = [asdict(log.source) for log in self.logs]
         tables = dict(self.configuration.tables)
         thresholds = tables.get("thresholds", {})
-        used = {name: tables.get(name, {}) for name in SESSION_TABLES}
+        used = {name: tables.get(name, {}) for name in session_tables()}
         conversion = _digest(logs, thresholds, self.configuration.profile, dict(versions()), platform.python_version())
         analysis = _digest(conversion, asdict(self.stations), used, [asdict(note) for note in self.notes])
         return Keys(conversion, analysis, _digest(analysis, self.with_pdf))
@@ -250,7 +251,7 @@ def _flights(partial: Path, job: SessionJob) -> tuple[list[Flight], tuple[LogOfS
             mcap = partial / MCAPS / f"{safe_part(log.path.stem) or 'log'}.mcap"
             if mcap.exists():  # of another folder
                 mcap = mcap.with_stem(f"{mcap.stem}_{source.sha256[:8]}")
-            converted = convert_log(log, mcap, job.configuration.settings.thresholds)
+            converted = convert_log(log, mcap, job.configuration.thresholds)
             info, has_lost = converted.info, converted.has_lost_data
         if has_lost:
             text = f"{source.name} lost data; `groundstation check` tells what"

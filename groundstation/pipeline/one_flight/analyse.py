@@ -51,8 +51,8 @@ class Given:
 class Answered:
     """What the analyses of a flight gave: answers and findings by analysis, and why some gave nothing.
 
-    ``reasons`` has an entry for every analysis without an answer; ``not_assessable`` leaves out those that only lack
-    the answer of another.
+    ``reasons`` has an entry for every analysis that applies and has no answer; ``not_assessable`` leaves out those that
+    only lack the answer of another.
     """
 
     answers: Answers
@@ -73,7 +73,7 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
         flight = replace(flight, metadata=MappingProxyType({**flight.metadata, ALWAYS_ON_GROUND: "true"}))
     known = known_of(flight, configuration)
     found = run_analyses(FLIGHT_ANALYSES, flight, known)
-    thresholds = configuration.settings.thresholds
+    thresholds = configuration.thresholds
     gaps = {name: gaps_of(name, flight[name].time_ns, thresholds=thresholds) for name in flight.topics()}
     findings = list(given.findings)
     for analysis in FLIGHT_ANALYSES:
@@ -131,6 +131,8 @@ def run_analyses(analyses: tuple[Analysis, ...], data: Any, known: Any) -> Answe
     findings: dict[str, tuple[Finding, ...]] = {}
     reasons: dict[str, NotAssessable] = {}
     for analysis in in_order_of_need(analyses):
+        if not analysis.applies(data, known):
+            continue
         missing = next((name for name in analysis.requires if name not in answers), None)
         if missing is not None:
             reasons[analysis.name] = reasons.get(missing) or NotAssessable(missing, f"{missing} did not run")

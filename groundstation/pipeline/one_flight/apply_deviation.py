@@ -13,12 +13,13 @@ from groundstation.base.records import MAX_BATCH_ROWS, Column, RecordBatch
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.one_flight.convert import census_of, recounted
-from groundstation.pipeline.one_flight.deviation_to_apply import CORRECTED, Apply
+from groundstation.pipeline.one_flight.deviation_to_apply import Apply
 from groundstation.results.deviation import (
     Deviation,
     deviation_of,
 )
 from groundstation.results.figures import FigureData
+from groundstation.results.file_names import CORRECTED
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult

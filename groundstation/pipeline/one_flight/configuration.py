@@ -1,27 +1,50 @@
-"""What the user sets: estimator settings, aircraft and site files, intervals left out or forced. Strictly checked."""
+"""What the user sets: estimator settings, aircraft and site files, intervals left out or forced. Strictly checked.
+
+The analyses are imported when their settings are asked for, or when the user gives any: a log is converted without.
+"""
 
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import settings_from
-from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
-from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.integrity.limits import Thresholds, thresholds_from
-from groundstation.pipeline.one_flight.deviation_to_apply import Apply, asked_for
-from groundstation.readers.icd import named_icd
-from groundstation.tables.session_settings import SessionSettings
+
+if TYPE_CHECKING:
+    from groundstation.estimators.known import AircraftData, SiteData
+    from groundstation.pipeline.one_flight.deviation_to_apply import Apply
+    from groundstation.tables.session_settings import SessionSettings
 
 S = TypeVar("S")
-FLIGHT_TABLES = tuple(dict.fromkeys(analysis.settings_table for analysis in FLIGHT_ANALYSES))
-SESSION_TABLES = (*(analysis.settings_table for analysis in SESSION_ANALYSES), "session")
-TABLES = (*FLIGHT_TABLES, *SESSION_TABLES, "aircraft", "site", "thresholds")
-SECTIONS = (*TABLES, "exclude", "force")
 Settings = Path | Mapping[str, Any]  # a TOML file, or its content
+
+
+@cache
+def session_tables() -> tuple[str, ...]:
+    """Names of the settings tables of a session."""
+    from groundstation.estimators.analyses import SESSION_ANALYSES
+
+    return (*(analysis.settings_table for analysis in SESSION_ANALYSES), "session")
+
+
+@cache
+def tables() -> tuple[str, ...]:
+    """Names of all settings tables."""
+    from groundstation.estimators.analyses import FLIGHT_ANALYSES
+
+    of_flights = dict.fromkeys(analysis.settings_table for analysis in FLIGHT_ANALYSES)
+    return (*of_flights, *session_tables(), "aircraft", "site", "thresholds")
+
+
+@cache
+def sections() -> tuple[str, ...]:
+    """Names of all that a settings file may hold."""
+    return (*tables(), "exclude", "force")
 
 
 @dataclass(frozen=True)
@@ -41,10 +64,9 @@ class UserSettings:
     """
 
     analyses: Mapping[str, Any]
-    aircraft: AircraftData
-    site: SiteData
-    thresholds: Thresholds
-    session: SessionSettings
+    aircraft: "AircraftData"
+    site: "SiteData"
+    session: "SessionSettings"
 
     def of(self, kind: type[S]) -> S:
         """The settings of that type."""
@@ -81,19 +103,30 @@ class Configuration:
     profile: str | None = None
     icds: tuple[str, ...] = ()
     files: Mapping[str, str] = field(default_factory=dict)
-    apply: Apply | None = None
-    settings: UserSettings = field(init=False, repr=False, compare=False)
+    apply: "Apply | None" = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "settings", self._parsed())
+        self.thresholds  # noqa: B018 -- a slip is told now
+        if self.tables.keys() - {"thresholds"}:
+            self.settings  # noqa: B018
 
-    def _parsed(self) -> UserSettings:
+    @cached_property
+    def thresholds(self) -> Thresholds:
+        """Limits of the integrity ledger."""
+        return thresholds_from(self.tables.get("thresholds", {}), self._file_of("thresholds"), "thresholds")
+
+    @cached_property
+    def settings(self) -> UserSettings:
+        """Settings of the analyses, the aircraft, the site and the session."""
+        from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
+        from groundstation.estimators.known import AircraftData, SiteData
+        from groundstation.tables.session_settings import SessionSettings
+
         types = {analysis.settings_table: analysis.settings for analysis in (*FLIGHT_ANALYSES, *SESSION_ANALYSES)}
         settings = UserSettings(
             {name: self._table(name, kind) for name, kind in types.items()},
             self._table("aircraft", AircraftData),
             self._table("site", SiteData),
-            thresholds_from(self.tables.get("thresholds", {}), self._file_of("thresholds"), "thresholds"),
             self._table("session", SessionSettings),
         )
         for analysis in FLIGHT_ANALYSES:
@@ -113,7 +146,7 @@ class Configuration:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for the manifest and the MCAP; only what the user set."""
-        document: dict[str, Any] = {name: dict(self.tables[name]) for name in TABLES if self.tables.get(name)}
+        document: dict[str, Any] = {name: dict(self.tables[name]) for name in tables() if self.tables.get(name)}
         for name in ("exclude", "force"):
             intervals = [{"from": part.start, "to": part.end, "reason": part.reason} for part in getattr(self, name)]
             if intervals:
@@ -161,24 +194,26 @@ def load_configuration(
     SettingsError
         For an unreadable file, an unknown section, or a value of the wrong kind, naming file and key.
     """
-    for one in icds or ():
-        named_icd(one)  # a slip in it is told before anything is read
+    if icds:
+        _refuse_wrong(icds)
     document = _content(config) if config else {}
-    _refuse_unknown(document, SECTIONS, _name(config))
+    if config:
+        _refuse_unknown(document, sections(), _name(config))
     own = {"aircraft": aircraft, "site": site, "thresholds": thresholds}
-    files = {name: own.get(name) or config for name in TABLES}
     for name, path in own.items():
         if path:
             document[name] = _content(path)
+    files = {name: own.get(name) or config for name in document}
     if intervals:
         listed = _content(intervals)
         _refuse_unknown(listed, ("exclude", "force"), _name(intervals))
         document.update(listed)
-    for name in TABLES:
-        if not isinstance(document.get(name, {}), Mapping):
-            raise SettingsError(f"{_name(config)}, {name}", repr(document[name]), f"a table [{name}]")
+    given = {name: content for name, content in document.items() if name not in ("exclude", "force")}
+    for name, content in given.items():
+        if not isinstance(content, Mapping):
+            raise SettingsError(f"{_name(config)}, {name}", repr(content), f"a table [{name}]")
     return Configuration(
-        {name: document[name] for name in TABLES if name in document},
+        given,
         exclude=_intervals(document.get("exclude", []), f"{_name(intervals or config)}, exclude"),
         force=_intervals(document.get("force", []), f"{_name(intervals or config)}, force"),
         profile=str(profile) if profile else None,
@@ -199,7 +234,17 @@ def applying(configuration: Configuration, apply: str) -> Configuration:
     """
     if not apply:
         return configuration
+    from groundstation.pipeline.one_flight.deviation_to_apply import asked_for
+
     return replace(configuration, apply=asked_for(apply))
+
+
+def _refuse_wrong(icds: Iterable[str]) -> None:
+    """A slip in the name of an ICD is told before anything is read."""
+    from groundstation.readers.icd import named_icd
+
+    for one in icds:
+        named_icd(one)
 
 
 def _content(settings: Settings) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.ledger import TopicEntry
-from groundstation.base.records import Damage, RecordBatch, Remark
+from groundstation.base.records import HEADING_IS_TRACK, Damage, RecordBatch, Remark
 from groundstation.base.version import __version__
 from groundstation.integrity.ledger import damage_entry
 from groundstation.integrity.ledger_findings import TOPIC_CODES, topic_findings
@@ -66,7 +66,7 @@ def _convert_recorded(log: Log, target: Path, limits: Thresholds) -> Converted:
         source_sha256=log.source.sha256,
         reader=found.header.reader,
         versions={"groundstation": __version__, "mcap": installed.version("mcap")},
-        metadata={**found.header.metadata, **_derivations(found.remarks)},
+        metadata={**found.header.metadata, **_told_of_fields(found.remarks)},
         has_utc=found.clock.is_absolute,
         start_ns=min(topic.first_ns for topic in found.ledger.topics),
         clock=found.clock.document(),
@@ -81,13 +81,16 @@ def _convert_recorded(log: Log, target: Path, limits: Thresholds) -> Converted:
     return Converted(info, findings, any(damage.loses_data for damage in found.damages))
 
 
-def _derivations(remarks: tuple[Remark, ...]) -> dict[str, str]:
-    """What each derived field was derived from, ``derived.<topic>.<field>``: it stays with the flight."""
-    derived = (remark for remark in remarks if remark.code == "derived")
+def _told_of_fields(remarks: tuple[Remark, ...]) -> dict[str, str]:
+    """What the analyses must know of a field: it stays with the flight.
+
+    ``derived.<topic>.<field>``: what it was derived from; ``heading_is_track.<topic>.<field>``: in words.
+    """
     origin = " derived from "
     return {
-        f"derived.{remark.topic}.{field}": remark.text.rpartition(origin)[2]
-        for remark in derived
+        f"{remark.code}.{remark.topic}.{field}": remark.text.rpartition(origin)[2]
+        for remark in remarks
+        if remark.code in ("derived", HEADING_IS_TRACK)
         for field in remark.fields
     }
 

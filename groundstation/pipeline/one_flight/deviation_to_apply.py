@@ -13,10 +13,9 @@ from groundstation.results.deviation import (
     deviation_from_csv,
     deviation_from_summary,
 )
-from groundstation.results.files import SUMMARY
+from groundstation.results.file_names import SUMMARY
 
 OWN = "own"
-CORRECTED = ".corrected.mcap"  # end of the name of what stands beside a flight's MCAP, and is none
 MOST_BYTES = 64 << 20  # a summary of a long log with many damaged spans has some
 EXPECTED = f"{OWN}, a flight folder, its {SUMMARY} or a {DEVIATION_CSV}"
 

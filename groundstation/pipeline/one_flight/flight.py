@@ -25,7 +25,7 @@ from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, Keys, Step, keys_of, remember_reports
 from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
-from groundstation.results.files import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
+from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import Resume
 from groundstation.tables.table import Flight
@@ -144,7 +144,7 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         converted = _taken_over(job.finished.mcap, mcap)
     else:
         with watch.stage("converting"):
-            converted = convert_log(log, mcap, job.configuration.settings.thresholds)
+            converted = convert_log(log, mcap, job.configuration.thresholds)
         _require_unchanged(log, version)
     with watch.stage("reading the MCAP"):
         flight = read_flight(mcap, converted)
@@ -158,7 +158,7 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         results = applied.results
     with watch.stage("saving"):
         corrected = partial / corrected_name(identity)
-        write_corrected(corrected, converted.info, flight, applied, job.configuration.settings.thresholds)
+        write_corrected(corrected, converted.info, flight, applied, job.configuration.thresholds)
         mcap.rename(partial / f"{identity}.mcap")
         text = sentence(results)
         keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf)

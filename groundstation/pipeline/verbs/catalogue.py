@@ -6,7 +6,8 @@ from typing import Any
 
 from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
 from groundstation.pipeline.many_flights.inputs import file_in, is_session
-from groundstation.results.files import SUMMARY, load_document
+from groundstation.results.file_names import SUMMARY
+from groundstation.results.files import load_document
 
 
 def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict[str, Any]]:
@@ -75,6 +76,7 @@ def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
     return [
         {**entry, "would_run": entry["name"] in found.answers, "reason": found.reasons.get(entry["name"], "")}
         for entry in _analyses()
+        if entry["name"] in {*found.answers, *found.reasons}  # what does not apply to such a log is left out
     ]
 
 

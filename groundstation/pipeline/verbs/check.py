@@ -98,7 +98,7 @@ def check_log(log: Log, thresholds: Thresholds | None = None, *, fail_on: str = 
 def _check_or_reason(path: Path, configuration: Configuration, fail_on: str) -> Checked:
     try:
         log = open_log(path, configuration.profile_path, configuration.icds)
-        return check_log(log, configuration.settings.thresholds, fail_on=fail_on)
+        return check_log(log, configuration.thresholds, fail_on=fail_on)
     except Exception as error:
         reason, trace = reason_of(path.name, error)
     return Checked(Outcome(str(path), "failed", reason, trace=trace), {}, Ledger(), Clock(), ())

@@ -95,7 +95,7 @@ def clip(
         When the flight cannot be read, or nothing is left of the part.
     """
     settings = configuration or Configuration()
-    limits = settings.settings.thresholds
+    limits = settings.thresholds
     source = file_in(path, ".mcap") if path.is_dir() else path
     _expect_free(source, target, with_recording, force)
     log = open_log(source, settings.profile_path, settings.icds)

@@ -23,7 +23,8 @@ from groundstation.pipeline.verbs.clip import CUT_SHA256
 from groundstation.results.comparison import Comparison, Delta, Event, SettingPair, Side, Value
 from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.figures import FigureData, numbers, texts
-from groundstation.results.files import MANIFEST, SavedFlight, csv_text, load, mapping, write_text
+from groundstation.results.file_names import MANIFEST
+from groundstation.results.files import SavedFlight, csv_text, load, mapping, write_text
 from groundstation.results.flight import NotAssessable
 from groundstation.results.grouped_findings import grouped
 
@@ -89,6 +90,7 @@ def compare(a: Path, b: Path, event: Event | None = None) -> tuple[Comparison, S
         _only(findings[1], findings[0]),
         tuple(entry for name, entry in reasons[0].items() if name not in reasons[1]),
         tuple(entry for name, entry in reasons[1].items() if name not in reasons[0]),
+        is_session(a),
     )
     return comparison, saved_a, saved_b
 

@@ -23,6 +23,7 @@ from groundstation.reports.figures import (
     placement,
     quality,
     standstill,
+    together,
 )
 from groundstation.results.flight import FlightResults
 
@@ -54,6 +55,7 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "landing_ranges.accuracy": landing_ranges.accuracy,
     "landing_ranges.trials": landing_ranges.trials,
     "latency.search": latency.search,
+    "together.motion": together.motion,
     "magnetic.deviation": magnetic.deviation,
     "magnetic.held_out": magnetic.held_out,
     "magnetic.track": magnetic.track,

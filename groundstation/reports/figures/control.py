@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from groundstation.base.angles import unwrap
 from groundstation.chapters.control import title_of
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
+from groundstation.reports.frames import TIME
 from groundstation.results.control import UNCONTROLLED, ControlPlan
 from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.flight import FlightResults
@@ -48,7 +50,7 @@ def paths(results: FlightResults) -> Drawing | None:
     points = results.figure_with_rows("control_points")
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 18, 12, 174, 104)
+        axes = layout.place(figure, 18, 12, 174, 104)
         for number, name in enumerate(answer.aircraft):
             colour = d.SERIES[number % len(d.SERIES)]
             nominal = np.flatnonzero((law == UNCONTROLLED) & (aircraft == name))
@@ -59,15 +61,17 @@ def paths(results: FlightResults) -> Drawing | None:
             marks = mine[np.linspace(0, len(mine) - 1, TICKS_ON_A_WAY).astype(np.int64)]
             d.dots(axes, east[marks], north[marks], colour, 3.0)
             axes.plot(east[mine[-1:]], north[mine[-1:]], "o", color=colour, markersize=5.0)
+        mine = law == answer.recommended
+        d.tell(axes, east[mine], north[mine], numbers(data, "time_s")[mine], TIME)
         if points is not None:
             places = [numbers(points, f"{axis}_m") / M_PER_KM for axis in ("east", "north")]
             axes.plot(*places, "^", color=d.INK, markersize=4.5, linestyle="none")
             for x, y, name in zip(*places, texts(points, "name"), strict=True):
-                d.beside(axes, x, y, d.label(str(name), 16), d.INK, axes.transData, "center")
+                layout.beside(axes, x, y, d.label(str(name), 16), d.INK, axes.transData, "center")
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_xlabel("east, km")
         axes.set_ylabel("north, km")
-        d.legend_above(axes, 6)
+        layout.legend_above(axes, 6)
 
     between = answer.duration_s / (TICKS_ON_A_WAY - 1)
     caption = (
@@ -96,7 +100,7 @@ def measures(results: FlightResults) -> Drawing | None:
     def paint(figure: Any) -> None:
         for number, (column, title, is_log) in enumerate(panels):
             top = height - 8 - (PANEL_MM + 4) * number
-            axes = d.place(figure, 18, top - PANEL_MM + 4, 174, top)
+            axes = layout.place(figure, 18, top - PANEL_MM + 4, 174, top)
             for name, colour, width in _laws(answer):
                 mine = law == name
                 d.line(axes, time_s[mine], numbers(data, column)[mine], colour, width, label=title_of(name))
@@ -104,9 +108,9 @@ def measures(results: FlightResults) -> Drawing | None:
             if is_log:
                 axes.set_yscale("log")
                 plain_log(axes.yaxis, (1.0, 2.0, 5.0))
-            d.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number == len(panels) - 1)
+            layout.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number == len(panels) - 1)
             if not number:
-                d.legend_above(axes, 3)
+                layout.legend_above(axes, 3)
 
     caption = (
         f"Accuracy of {answer.judged} as the centralised filter computes it, and geometry of its sources, along every "
@@ -128,7 +132,7 @@ def law(results: FlightResults) -> Drawing | None:
     def paint(figure: Any) -> None:
         for number, row in enumerate(answer.controls):
             top = height - 8 - (PANEL_MM + 4) * number
-            axes = d.place(figure, 18, top - PANEL_MM + 4, 174, top)
+            axes = layout.place(figure, 18, top - PANEL_MM + 4, 174, top)
             is_speed = row.control == "speed"
             drawn = []
             for name, colour, width in _laws(answer):
@@ -136,15 +140,15 @@ def law(results: FlightResults) -> Drawing | None:
                 values = numbers(data, "speed_mps")[mine] if is_speed else _unwrapped(data, mine, row.start)
                 d.line(axes, time_s[mine], values, colour, width, label=title_of(name))
                 drawn.append(values)
-            low, high = d.padded(float(d.finite(*drawn).min()), float(d.finite(*drawn).max()), 0.1, 0.5)
+            low, high = layout.padded(float(d.finite(*drawn).min()), float(d.finite(*drawn).max()), 0.1, 0.5)
             axes.set_ylim(low, high)
             for value in (row.low, row.high):
                 if low <= value <= high:
-                    d.limit_line(axes, value, "")
+                    layout.limit_line(axes, value, "")
             axes.set_ylabel(f"{d.label(row.aircraft, 12)}: {row.control}, {'m/s' if is_speed else '°'}")
-            d.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number == len(answer.controls) - 1)
+            layout.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number == len(answer.controls) - 1)
             if not number:
-                d.legend_above(axes, 3)
+                layout.legend_above(axes, 3)
 
     caption = "The laws of control with time; straight grey: no control; dashed: bounds."
     svg = d.draw("control-law", height, paint)

@@ -5,22 +5,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.ellipse import magnified, outlines
 from groundstation.base.local_frame import plane_through
 from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.cooperative import REFERENCE, title_of, trusted
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
+from groundstation.reports.frames import TIME
 from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.flight import FlightResults
 
 ELLIPSES = 8  # of each track
-SEEN_SHARE, MAGNIFIED = 0.03, (1, 2, 5, 10, 20, 50, 100)
 MOST_PANELS = 8
 PANEL_MM = 38.0
 M_PER_KM = 1000.0
-ROUND = np.linspace(0.0, 2.0 * np.pi, 49)
 FloatArray = NDArray[np.float64]
 
 
@@ -50,7 +51,7 @@ def session_map(results: FlightResults) -> Drawing | None:
     when = "at the end" if _is_crowd(answer) else f"at {ELLIPSES} times"
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 18, 12, 174, 104)
+        axes = layout.place(figure, 18, 12, 174, 104)
         for name, colour in zip(answer.vehicle_names, _colours(answer), strict=True):
             mine = np.flatnonzero(vehicle == name)
             if not len(mine):
@@ -62,18 +63,19 @@ def session_map(results: FlightResults) -> Drawing | None:
                 drawn = (plane[row, :2] + larger * ellipses[row]) / M_PER_KM
                 d.line(axes, drawn[:, 1], drawn[:, 0], colour, 0.6)
             if _is_crowd(answer):
-                d.beside(axes, east[0], north[0], d.label(name, 12), colour, axes.transData, "center")
+                layout.beside(axes, east[0], north[0], d.label(name, 12), colour, axes.transData, "center")
         if stations is not None:
             points = _places(stations) if origin is None else origin.from_ecef_m(_places(stations))
             axes.plot(points[:, 1] / M_PER_KM, points[:, 0] / M_PER_KM, "^", color=d.INK, markersize=4.0)
             for point, name in zip(points, texts(stations, "name"), strict=True):
                 text = d.label(str(name), 16)
-                d.beside(axes, point[1] / M_PER_KM, point[0] / M_PER_KM, text, d.INK, axes.transData, "center")
+                layout.beside(axes, point[1] / M_PER_KM, point[0] / M_PER_KM, text, d.INK, axes.transData, "center")
+        d.tell(axes, plane[:, 1] / M_PER_KM, plane[:, 0] / M_PER_KM, numbers(data, "time_s")[rows], TIME)
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_xlabel("east, km")
         axes.set_ylabel("north, km")
         if not _is_crowd(answer):
-            d.legend_above(axes, 10)
+            layout.legend_above(axes, 10)
 
     size = f", drawn {larger} times their size" if larger > 1 else ""
     caption = (
@@ -86,19 +88,13 @@ def session_map(results: FlightResults) -> Drawing | None:
 def _ellipses(data: FigureData, rows: NDArray[np.bool_]) -> FloatArray:
     """2 sigma ellipses about the origin, north and east, shape (n, 49, 2); upright where no correlation is saved."""
     north, east = (numbers(data, f"sigma_{axis}_m")[rows] for axis in ("north", "east"))
-    correlation = np.nan_to_num(numbers(data, "correlation_north_east")[rows])
-    across = np.sqrt(np.clip(1.0 - correlation**2, 0.0, None))
-    drawn_north = north[:, None] * np.cos(ROUND)
-    drawn_east = east[:, None] * (correlation[:, None] * np.cos(ROUND) + across[:, None] * np.sin(ROUND))
-    return 2.0 * np.stack([drawn_north, drawn_east], axis=2)
+    return outlines(north, east, np.nan_to_num(numbers(data, "correlation_north_east")[rows]), 2.0)
 
 
 def _magnified(plane: FloatArray, ellipses: FloatArray) -> int:
-    """How many times larger ellipses are drawn so that they can be seen: 1, or 2, 5, 10 ... times."""
-    half = float(np.nanmedian(np.hypot(*np.moveaxis(ellipses, 2, 0))))
+    """How many times larger ellipses are drawn so that they can be seen."""
     side = float(np.nanmax(np.nanmax(plane[:, :2], axis=0) - np.nanmin(plane[:, :2], axis=0)))
-    wanted = SEEN_SHARE * side / half if half > 0.0 else 1.0
-    return max((step for step in MAGNIFIED if step <= wanted), default=1)
+    return magnified(side, float(np.nanmedian(np.hypot(*np.moveaxis(ellipses, 2, 0)))))
 
 
 def _numbers(results: FlightResults) -> tuple[str, ...]:
@@ -130,7 +126,7 @@ def errors(results: FlightResults) -> Drawing | None:
     def paint(figure: Any) -> None:
         for number, name in enumerate(shown):
             left, top = 14 + 90 * (number % 2), height - 8 - PANEL_MM * (number // 2)
-            axes = d.place(figure, left, top - PANEL_MM + 10, left + 72, top)
+            axes = layout.place(figure, left, top - PANEL_MM + 10, left + 72, top)
             mine, reckoned = ((vehicle == name) & (of == which) for which in (algorithm, REFERENCE))
             axes.fill_between(time_s[mine], 0.0, bound[mine], color=d.FILL, linewidth=0, label="2σ_r")
             d.line(axes, time_s[reckoned], bound[reckoned], d.FAINT, 0.8, label="2σ_r without ranges")
@@ -138,9 +134,9 @@ def errors(results: FlightResults) -> Drawing | None:
                 d.line(axes, time_s[mine], error[mine], d.INS, 1.0, label="error")
             axes.set_ylim(0.0, _ceiling(bound[mine], error[mine]))
             axes.set_ylabel(f"{d.label(name, 12)}, m")
-            d.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number >= len(shown) - 2, most=6)
+            layout.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number >= len(shown) - 2, most=6)
             if not number:
-                d.legend_above(axes, 3)
+                layout.legend_above(axes, 3)
 
     more = len(answer.vehicle_names) - len(shown)
     caption = (
@@ -188,7 +184,7 @@ def geometry(results: FlightResults) -> Drawing | None:
     def paint(figure: Any) -> None:
         for number, (column, title) in enumerate(columns):
             top = height - 8 - 42 * number
-            axes = d.place(figure, 18, top - 34, 174, top)
+            axes = layout.place(figure, 18, top - 34, 174, top)
             for name, (colour, told) in styles.items():
                 mine = vehicle == name
                 when, values = d.broken_at_gaps(time_s[mine], numbers(data, column)[mine])
@@ -198,9 +194,9 @@ def geometry(results: FlightResults) -> Drawing | None:
             if column == "hdop" and known.size and known.max() > 20.0 * np.median(known):
                 axes.set_yscale("log")
                 plain_log(axes.yaxis, (1.0,))
-            d.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number == len(columns) - 1)
+            layout.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number == len(columns) - 1)
             if not number:
-                d.legend_above(axes, 10)
+                layout.legend_above(axes, 10)
 
     caption = (
         "Geometry of the sources that each aircraft hears in a frame: dilution, and determinant and least eigenvalue "
@@ -223,7 +219,7 @@ def links(results: FlightResults) -> Drawing | None:
     ceiling = float(np.clip(1.1 * far.max(initial=3.0), 4.0, 12.0))
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 18, 12, 174, 56)
+        axes = layout.place(figure, 18, 12, 174, 56)
         if _is_crowd(answer):
             d.dots(axes, time_s[mark > 0], np.clip(normal[mark > 0], -ceiling, ceiling), d.INS, label="used")
         for name, colour in () if _is_crowd(answer) else zip(answer.vehicle_names, _colours(answer), strict=True):
@@ -232,12 +228,12 @@ def links(results: FlightResults) -> Drawing | None:
         gated = mark <= 0
         if gated.any():
             d.dots(axes, time_s[gated], np.clip(normal[gated], -ceiling, ceiling), d.LIMIT, 3.0, label="gated")
-        d.limit_line(axes, NORMAL_95, "95 %")
-        d.limit_line(axes, -NORMAL_95, "")
+        layout.limit_line(axes, NORMAL_95, "95 %")
+        layout.limit_line(axes, -NORMAL_95, "")
         axes.set_ylim(-1.05 * ceiling, 1.05 * ceiling)
         axes.set_ylabel("residual over its sigma")
-        d.time_axis(axes, float(time_s.min()), float(time_s.max()))
-        d.legend_above(axes, 10)
+        layout.time_axis(axes, float(time_s.min()), float(time_s.max()))
+        layout.legend_above(axes, 10)
 
     caption = (
         f"Residuals of the ranges over their computed sigma, {title_of(answer.default_algorithm)}"

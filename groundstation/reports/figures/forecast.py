@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import has_values, plain_log
 from groundstation.results.figures import numbers
@@ -37,7 +38,7 @@ def growth(results: FlightResults) -> Drawing | None:
     ordered = sorted(known, key=lambda name: -_last(numbers(data, f"{name}_rms_m")))
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 18, 12, 112, 82)
+        axes = layout.place(figure, 18, 12, 112, 82)
         axes.set_xscale("log")
         axes.set_yscale("log")
         for name in ordered:
@@ -77,7 +78,7 @@ def calibration(results: FlightResults) -> Drawing | None:
         return None
 
     def paint(figure: Any) -> None:
-        left, right = d.place(figure, 18, 12, 86, 56), d.place(figure, 106, 12, 174, 56)
+        left, right = layout.place(figure, 18, 12, 86, 56), layout.place(figure, 106, 12, 174, 56)
         _paint_bands(left, mine)
         _paint_nees(right, mine)
         for axes in (left, right):
@@ -97,7 +98,7 @@ def _paint_bands(axes: Any, rows: list[CalibrationRow]) -> None:
     inside = np.array([[row.inside50, row.inside68, row.inside95] for row in rows])
     for shares, nominal, colour in zip(inside.T, NOMINAL, (d.INS, d.GNSS, d.USED), strict=True):
         axes.plot(horizon, 100.0 * shares, "o-", color=colour, markersize=3.0, linewidth=1.0)
-        d.limit_line(axes, 100.0 * nominal, "", colour=colour)
+        layout.limit_line(axes, 100.0 * nominal, "", colour=colour)
     axes.set_ylim(0.0, 105.0)
     axes.set_ylabel("errors inside the band, %")
     axes.set_yticks([0.0, 25.0, *(100.0 * nominal for nominal in NOMINAL), 100.0])
@@ -113,7 +114,7 @@ def _paint_nees(axes: Any, rows: list[CalibrationRow]) -> None:
     axes.plot(horizon[few], nees[few], "o", color=d.INK, markerfacecolor="white", markersize=3.0)
     axes.axhline(1.0, color=d.FAINT, linewidth=0.6)
     axes.set_ylim(bottom=0.0)
-    d.legend_above(axes)
+    layout.legend_above(axes)
     axes.set_ylabel("NEES, 1 is honest")
 
 
@@ -137,13 +138,14 @@ def hindcast_map(results: FlightResults) -> Drawing | None:
         levels = MaxNLocator(LEVELS).tick_values(0.0, max(top, 1.0))
         drawn = None
         for place, (name, cells) in enumerate(zip(names, cubes, strict=True)):
-            axes = d.place(figure, 16 + 72 * place, 12, 80 + 72 * place, 66)
+            axes = layout.place(figure, 16 + 72 * place, 12, 80 + 72 * place, 66)
             axes.grid(visible=False)
             drawn = axes.contourf(hours, minutes, np.ma.masked_invalid(cells), levels, cmap="viridis", extend="max")
+            d.tell(axes, *np.meshgrid(hours, minutes), cells, "radial error, m")
             axes.set_title(METHODS.get(name, name))
             axes.set_xlabel("start, h of flight time")
             axes.set_ylabel("horizon, min without GNSS" if place == 0 else "")
-        bar = figure.colorbar(drawn, cax=d.place(figure, 157, 12, 161, 66))
+        bar = figure.colorbar(drawn, cax=layout.place(figure, 157, 12, 161, 66))
         bar.set_label("radial error, m")
 
     caption = (

@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.chapters.generic import columns_by_unit, quantity, titled
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.results.figures import numbers
 from groundstation.results.flight import FlightResults
@@ -28,15 +29,15 @@ def series(results: FlightResults, name: str) -> Drawing | None:
     def paint(figure: Any) -> None:
         for place, (unit, columns) in enumerate(reversed(list(panels.items()))):
             bottom = BOTTOM_MM + place * (PANEL_MM + GAP_MM)
-            axes = d.place(figure, 18, bottom, 174, bottom + PANEL_MM)
+            axes = layout.place(figure, 18, bottom, 174, bottom + PANEL_MM)
             for column, colour in zip(columns, d.SERIES, strict=False):
                 x, y = d.broken_at_gaps(time, numbers(data, column)[order])
                 d.line(axes, x, y, colour, 1.0, label=d.label(quantity(column)[0]))
             axes.set_ylabel(
                 d.label(", ".join(filter(None, (quantity(columns[0])[0] if len(columns) == 1 else "", unit))))
             )
-            d.time_axis(axes, *d.padded(float(np.nanmin(time)), float(np.nanmax(time))), title=place == 0)
-            d.legend_above(axes, 4)
+            layout.time_axis(axes, *layout.padded(float(np.nanmin(time)), float(np.nanmax(time))), title=place == 0)
+            layout.legend_above(axes, 4)
 
     title = titled(quantity(name)[0])
     caption = f"Over flight time, n = {len(data)} rows; a line breaks where values are missing."

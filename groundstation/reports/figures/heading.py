@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.normal import NORMAL_95
-from groundstation.chapters.wording import clock, interval, is_number, number
+from groundstation.chapters.wording import clock, is_number, number
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.results.figures import FigureData, flags, numbers, texts
 from groundstation.results.flight import FlightResults
@@ -19,7 +20,7 @@ SLOWEST_TRACK_MPS = 1.0  # below it the direction of motion is noise and is not 
 def taxi_windows(samples: FigureData) -> list[tuple[float, float]]:
     """Spans of flight time that the taxi figures show, one for each ground run that was used; of all where none was."""
     time, used = numbers(samples, "time_s"), flags(samples, "used")
-    return d.windows(time[used] if used.any() else time)
+    return layout.windows(time[used] if used.any() else time)
 
 
 def _within(samples: FigureData, span: tuple[float, float]) -> FigureData:
@@ -39,7 +40,7 @@ def difference(results: FlightResults) -> Drawing | None:
     count = int(np.count_nonzero(used & np.isfinite(value)))
 
     def paint(figure: Any) -> None:
-        panels = d.time_panels(figure, (16, 12, 174, 66), spans)
+        panels = layout.time_panels(figure, (16, 12, 174, 66), spans)
         for axes, (low, high) in zip(panels, spans, strict=True):
             left, kept = ((time >= low) & (time <= high) & rows for rows in (~used, used))
             d.dots(axes, time[left], value[left], d.UNUSED, 1.5, 2500, zorder=1.5, label="not used")
@@ -48,7 +49,7 @@ def difference(results: FlightResults) -> Drawing | None:
                 _running_band(axes, _within(running, (low, high)))
         panels[0].set_ylabel("INS heading − GNSS track, °")
         panels[0].set_ylim(*_sample_range(value, used))
-        d.legend_above(panels[-1])
+        layout.legend_above(panels[-1])
 
     caption = f"A dot is one GNSS epoch, n = {number(count, 0)} used; running mean and e as in Markelov 2015."
     caption += " A panel for each ground run." if len(spans) > 1 else ""
@@ -91,7 +92,7 @@ def _sample_range(value: Any, used: Any) -> tuple[float, float]:
     if not shown.size:
         return -1.0, 1.0
     low, high = (float(shown.min()), float(shown.max())) if used.any() else np.quantile(shown, [0.02, 0.98]).tolist()
-    return d.padded(low, high, 0.12, 0.05)
+    return layout.padded(low, high, 0.12, 0.05)
 
 
 def convergence(results: FlightResults) -> Drawing | None:
@@ -110,7 +111,7 @@ def convergence(results: FlightResults) -> Drawing | None:
     keep = d.thin(len(running), 2000)
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 16, 12, 174, 52)
+        axes = layout.place(figure, 16, 12, 174, 52)
         axes.set_yscale("log")
         for column, text, colour, gate in curves:
             values = numbers(running, column)[keep]
@@ -118,13 +119,13 @@ def convergence(results: FlightResults) -> Drawing | None:
             axes.plot(cycles[keep], values, color=colour, linewidth=1.0, label=text)
             limit = next((value for name, value in limits.items() if gate and name.startswith(gate)), None)
             if is_number(limit):
-                d.limit_line(axes, limit, f"limit {limit:g}°", colour=colour)
+                layout.limit_line(axes, limit, f"limit {limit:g}°", colour=colour)
         _plain_log_labels(axes.yaxis)
         axes.set_xlabel("cycles (distinct GNSS epochs used)")
         axes.set_ylabel("angle, °")
         known = d.finite(cycles)
         axes.set_xlim(0, max(float(known.max()), 2.0) if known.size else 1.0)
-        d.legend_above(axes)
+        layout.legend_above(axes)
 
     caption = "How the figures of merit settle; dashed: limits of the gates."
     alt = "Precision, quality and honest half width against the number of cycles on a logarithmic axis."
@@ -148,7 +149,7 @@ def density(results: FlightResults) -> Drawing | None:
     low, high, height = (numbers(bars, name) for name in ("bin_low_deg", "bin_high_deg", "density_per_deg"))
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 16, 12, 174, 62)
+        axes = layout.place(figure, 16, 12, 174, 62)
         known = np.isfinite(low) & np.isfinite(high) & np.isfinite(height)
         if known.any():
             edges = np.append(low[known], high[known][-1])
@@ -171,7 +172,7 @@ def density(results: FlightResults) -> Drawing | None:
         axes.set_ylim(bottom=0.0)
         axes.set_xlabel("INS heading − GNSS track, °")
         axes.set_ylabel("probability density, 1/°")
-        d.legend_above(axes)
+        layout.legend_above(axes)
 
     count = number(None if answer is None else answer.samples, 0)
     deviation = number(None if answer is None else answer.estimate_sd_deg, 3, "°")
@@ -194,15 +195,15 @@ def taxi(results: FlightResults) -> Drawing | None:
 
     def paint(figure: Any) -> None:
         base = 12.0 + lane_mm + (3.0 if states else 0.0)
-        upper = d.time_panels(figure, (27, base + 33, 174, base + 75), spans, title=False, shared=False)
-        lower = d.time_panels(figure, (27, base, 174, base + 26), spans, title=not states)
+        upper = layout.time_panels(figure, (27, base + 33, 174, base + 75), spans, title=False, shared=False)
+        lower = layout.time_panels(figure, (27, base, 174, base + 26), spans, title=not states)
         _paint_angles(upper, samples, spans)
         _paint_speed(lower, samples, spans, speed_limit_mps)
-        d.legend_above(upper[-1])
-        d.legend_above(lower[-1])
+        layout.legend_above(upper[-1])
+        layout.legend_above(lower[-1])
         if states and lanes is not None:
             start, end, state = numbers(lanes, "start_s"), numbers(lanes, "end_s"), texts(lanes, "state")
-            strips = d.time_panels(figure, (27, 12, 174, 12 + lane_mm), spans)
+            strips = layout.time_panels(figure, (27, 12, 174, 12 + lane_mm), spans)
             for axes, (low, high) in zip(strips, spans, strict=True):
                 mine = (end >= low) & (start <= high)
                 d.lanes(axes, start[mine], end[mine], state[mine], states, {"used": d.USED})
@@ -224,7 +225,7 @@ def _paint_angles(panels: list[Any], samples: FigureData, spans: list[tuple[floa
         d.line(axes, time, d.broken_at_wrap(nose), d.INS, 1.0, 3000, label="INS heading")
         angles = d.finite(nose, track)
         if angles.size:
-            axes.set_ylim(*d.padded(float(angles.min()), float(angles.max()), 0.06, 1.0))
+            axes.set_ylim(*layout.padded(float(angles.min()), float(angles.max()), 0.06, 1.0))
     panels[0].set_ylabel("angle from true north, °")
 
 
@@ -234,7 +235,7 @@ def _paint_speed(panels: list[Any], samples: FigureData, spans: list[tuple[float
         mine = _within(samples, span)
         d.line(axes, numbers(mine, "time_s"), numbers(mine, "ground_speed_mps"), d.GNSS, 0.9, 3000)
         if is_number(limit_mps):
-            d.limit_line(axes, limit_mps, f"used above {limit_mps:g} m/s")
+            layout.limit_line(axes, limit_mps, f"used above {limit_mps:g} m/s")
     panels[0].set_ylabel("ground speed, m/s")
     panels[0].set_ylim(0.0, TAXI_SPEED_MARGIN * float(driven.max()) if driven.size else None)
 
@@ -258,7 +259,7 @@ def forest(results: FlightResults) -> Drawing | None:
     height = 20.0 + 5.2 * (len(rows) + 1)
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 72, 12, 174, height - 6)
+        axes = layout.place(figure, 72, 12, 174, height - 6)
         for place, (_, item, colour) in enumerate(rows):
             error = item.error_deg
             if is_number(error):
@@ -275,11 +276,10 @@ def forest(results: FlightResults) -> Drawing | None:
         axes.set_xlabel("heading error, °")
 
     more = f" The first {len(shown)} of {len(segments)} segments." if len(shown) < len(segments) else ""
-    whole = interval(answer.confidence95_deg, 3, "°")
     blue = "; blue: directions of travel" if answer.directions else ""
     caption = (
-        f"Bar: ± 1.96 σ. Green: straight segments{blue}; black: the whole run, 95 % interval {whole}, thick what this "
-        f"taxi shows by itself. Opposite directions that disagree point to side-slip or mounting.{more}"
+        f"Bars: ± 1.96 σ. Green: straight segments{blue}; black: the whole run, thick: by this taxi alone. Opposite "
+        f"directions that disagree point to side-slip or mounting.{more}"
     )
     alt = "Forest plot of the heading error by segment and by direction."
     return Drawing("Estimates by segment and direction", caption, alt, d.draw("forest", height, paint))
@@ -308,7 +308,7 @@ def spectrum(results: FlightResults) -> Drawing | None:
     columns = (("density_deg2_per_hz", "measured", d.USED), ("model_deg2_per_hz", "fitted model", d.INK))
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 16, 12, 174, 52)
+        axes = layout.place(figure, 16, 12, 174, 52)
         axes.set_xscale("log")
         axes.set_yscale("log")
         for column, text, colour in columns:
@@ -318,7 +318,7 @@ def spectrum(results: FlightResults) -> Drawing | None:
         _plain_log_labels(axes.yaxis, (1.0,))
         axes.set_xlabel("frequency, Hz")
         axes.set_ylabel("spectral density, °²/Hz")
-        d.legend_above(axes)
+        layout.legend_above(axes)
 
     caption = "The low end counts for the error of the mean: slow GNSS errors sit there; sway averages out."
     alt = "Spectral density of the heading residuals with the fitted noise model, logarithmic axes."

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.normal import NORMAL_95
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.results.figures import FigureData, flags, numbers
 from groundstation.results.flight import FlightResults
@@ -35,17 +36,17 @@ def state(results: FlightResults, name: str) -> Drawing | None:
     low, high = span(data)
 
     def paint(figure: Any) -> None:
-        upper, lower = d.place(figure, 18, 58, 174, 98), d.place(figure, 18, 12, 174, 52)
+        upper, lower = layout.place(figure, 18, 58, 174, 98), layout.place(figure, 18, 12, 174, 52)
         for axes, channel in ((upper, "north"), (lower, "east")):
             _outages(axes, data)
             _paint_state(axes, data, channel, name)
             axes.set_ylabel(f"{channel} {name} error, {UNITS[name]}")
-            d.time_axis(axes, low, high, title=axes is lower)
-        d.legend_above(upper)
+            layout.time_axis(axes, low, high, title=axes is lower)
+        layout.legend_above(upper)
 
     caption = (
-        "Grey: INS − GNSS as measured; green: estimate of the filter; black: smoothed with the data on both sides "
-        "(RTS); shaded: estimate ± 1.96 σ. Yellow ground: nothing to compare, the filter forecasts."
+        "Grey: INS − GNSS; green: estimate, shaded ± 1.96 σ; black: smoothed with data on both sides (RTS). Yellow "
+        "ground: nothing to compare, the filter forecasts."
     )
     alt = f"North and east {name} error over flight time with the estimate and its band."
     svg = d.draw(f"inertial-{name}", 106, paint)
@@ -64,13 +65,13 @@ def tilt_and_drift(results: FlightResults) -> Drawing | None:
         for row, name in enumerate(names):
             bottom = 12.0 + 46.0 * (1 - row)
             for column, channel in enumerate(CHANNELS):
-                axes = d.place(figure, 18 + 90 * column, bottom, 84 + 90 * column, bottom + 38)
+                axes = layout.place(figure, 18 + 90 * column, bottom, 84 + 90 * column, bottom + 38)
                 _outages(axes, data)
                 _paint_state(axes, data, channel, name)
                 axes.set_ylabel(f"{channel} {STATES[name]}, {UNITS[name]}")
-                d.time_axis(axes, low, high, title=row == 1, most=5)
+                layout.time_axis(axes, low, high, title=row == 1, most=5)
                 if row == 0 and column == 1:
-                    d.legend_above(axes)
+                    layout.legend_above(axes)
 
     caption = (
         "States GNSS does not measure: what the filter infers of them. A band that does not shrink means that the "
@@ -99,7 +100,7 @@ def _paint_state(axes: Any, data: FigureData, channel: str, name: str) -> None:
     if shown.size:
         edges = [d.finite(estimate - half), d.finite(estimate + half)]
         ends = [float(end) for edge in edges if edge.size for end in np.percentile(edge, BAND_QUANTILES)]
-        axes.set_ylim(*d.padded(min(float(shown.min()), *ends), max(float(shown.max()), *ends), 0.08))
+        axes.set_ylim(*layout.padded(min(float(shown.min()), *ends), max(float(shown.max()), *ends), 0.08))
 
 
 def has_values(data: FigureData, *columns: str) -> bool:
@@ -130,7 +131,7 @@ def radial(results: FlightResults) -> Drawing | None:
     states = results.figure_with_rows("inertial_states")
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 18, 12, 174, 58)
+        axes = layout.place(figure, 18, 12, 174, 58)
         axes.set_yscale("log")
         if states is not None:
             _outages(axes, states)
@@ -142,12 +143,12 @@ def radial(results: FlightResults) -> Drawing | None:
             d.line(axes, numbers(data, "time_s"), np.where(values > 0.0, values, np.nan), colour, 1.0, label=text)
         plain_log(axes.yaxis, (1.0,))
         axes.set_ylabel("radial error against GNSS, m")
-        d.time_axis(axes, low, high)
-        d.legend_above(axes)
+        layout.time_axis(axes, low, high)
+        layout.legend_above(axes)
 
     caption = (
-        "Distance from the GNSS position. While GNSS is there the corrected track follows it as far as the filter "
-        "trusts it; on yellow ground nothing was there to compare with."
+        "Distance from GNSS. While it is there the corrected track follows it as far as the filter trusts it; on "
+        "yellow ground there was nothing to compare with."
     )
     alt = "Radial position error of the INS and of the corrected track over flight time, logarithmic axis."
     svg = d.draw("inertial-radial", 66, paint)
@@ -173,16 +174,16 @@ def innovations(results: FlightResults) -> Drawing | None:
 
     def paint(figure: Any) -> None:
         for channel, bottom in (("north", 46.0), ("east", 12.0)):
-            axes = d.place(figure, 18, bottom, 174, bottom + 28)
+            axes = layout.place(figure, 18, bottom, 174, bottom + 28)
             values = numbers(data, f"{channel}_normalised_innovation")
             d.dots(axes, numbers(data, "time_s"), values, d.INS, 1.6, MOST_DOTS, zorder=2)
             for limit, text in ((NORMAL_95, "± 1.96 σ"), (-NORMAL_95, "")):
-                d.limit_line(axes, limit, text)
+                layout.limit_line(axes, limit, text)
             axes.set_ylim(*_symmetric(values))
             axes.set_ylabel(f"{channel} innovation, σ")
             if channel == "north":
-                d.legend_above(axes)
-            d.time_axis(axes, low, high, title=channel == "east")
+                layout.legend_above(axes)
+            layout.time_axis(axes, low, high, title=channel == "east")
 
     caption = (
         "Innovation (measured − predicted position) over its own σ. If the noise model is right, 95 % lie between the "
@@ -208,14 +209,14 @@ def observability(results: FlightResults) -> Drawing | None:
 
     def paint(figure: Any) -> None:
         for place, channel in enumerate(CHANNELS):
-            axes = d.place(figure, 18 + 66 * place, 12, 76 + 66 * place, 50)
+            axes = layout.place(figure, 18 + 66 * place, 12, 76 + 66 * place, 50)
             for (name, text), colour in zip(STATES.items(), d.SERIES, strict=False):
                 values = numbers(data, f"{channel}_{name}")
                 d.line(axes, numbers(data, "time_s"), values, colour, 1.1, MOST, label=text)
             axes.set_ylim(-0.03, 1.03)
             axes.set_title(channel)
             axes.set_ylabel("observability" if place == 0 else "")
-            d.time_axis(axes, low, high, most=4)
+            layout.time_axis(axes, low, high, most=4)
             if place == 1:
                 axes.legend(loc="center left", bbox_to_anchor=(1.03, 0.5))
 
@@ -235,11 +236,11 @@ def differences(results: FlightResults, quantity: str) -> Drawing | None:
 
     def paint(figure: Any) -> None:
         for bottom, channel, name in ((46.0, "north", names[0]), (12.0, "east", names[1])):
-            axes = d.place(figure, 18, bottom, 174, bottom + 28)
+            axes = layout.place(figure, 18, bottom, 174, bottom + 28)
             _zero(axes)
             d.dots(axes, numbers(data, "time_s"), numbers(data, name), d.INS, 1.6, MOST_DOTS, zorder=2)
             axes.set_ylabel(f"{channel}, {UNITS[quantity]}")
-            d.time_axis(axes, low, high, title=channel == "east")
+            layout.time_axis(axes, low, high, title=channel == "east")
 
     caption = "Every epoch in which both were there. A slow wave here is no Schuler oscillation."
     alt = f"INS minus GNSS, {quantity} north and east, over flight time."
@@ -260,7 +261,7 @@ def own_innovations(results: FlightResults) -> Drawing | None:
         for row, (quantity, unit) in enumerate((("position", "m"), ("velocity", "mps"))):
             for column, channel in enumerate(CHANNELS):
                 bottom = 12.0 + 40.0 * (1 - row)
-                axes = d.place(figure, 18 + 90 * column, bottom, 84 + 90 * column, bottom + 32)
+                axes = layout.place(figure, 18 + 90 * column, bottom, 84 + 90 * column, bottom + 32)
                 values = numbers(data, f"{channel}_{quantity}_{unit}")
                 half = NORMAL_95 * numbers(data, f"{channel}_{quantity}_sigma_{unit}")
                 if np.isfinite(half).any():
@@ -269,7 +270,7 @@ def own_innovations(results: FlightResults) -> Drawing | None:
                 d.dots(axes, time, values, d.INS, 1.6, MOST_DOTS, zorder=2)
                 axes.set_ylim(*_most_of(values))
                 axes.set_ylabel(f"{channel} {quantity}, {UNITS[quantity]}")
-                d.time_axis(axes, low, high, title=row == 1, most=5)
+                layout.time_axis(axes, low, high, title=row == 1, most=5)
 
     band = " Shaded: ± 1.96 of the filter's own σ; 95 % should lie inside." if has_band else ""
     caption = f"GNSS − what the INS's own filter predicted.{band} Rare large ones are off the axis."

@@ -9,6 +9,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray
 from groundstation.base.units import DOTS_PER_FULL_SCALE
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.results.figures import FigureData, numbers
@@ -49,7 +50,7 @@ def deviations(results: FlightResults, of: str) -> Drawing | None:
 
     def paint(figure: Any) -> None:
         for place, (name, guided, placed, dot_m) in enumerate(panels):
-            axes = d.place(figure, 18, 60 - 48 * place, 174, 98 - 48 * place)
+            axes = layout.place(figure, 18, 60 - 48 * place, 174, 98 - 48 * place)
             _corridors(axes, distance, dot_m, vertical=bool(place))
             d.dots(axes, distance / M_PER_KM, placed, d.UNUSED, 2.0, label="positions" if not place else "height")
             d.line(axes, distance / M_PER_KM, guided, d.INS, 1.3, label="guidance")
@@ -60,7 +61,7 @@ def deviations(results: FlightResults, of: str) -> Drawing | None:
             axes.set_ylabel(f"{name}, m")
             axes.set_xlabel("distance before the threshold, km" if place else "")
             if not place:
-                d.legend_above(axes, 7)
+                layout.legend_above(axes, 7)
 
     caption = (
         "Line: deviation by the guidance, in metres. Dots: the same by recorded positions, and by the recorded height. "
@@ -109,22 +110,22 @@ def final(results: FlightResults, of: str) -> Drawing | None:
     height, path = numbers(data, "height_m")[mine], numbers(data, "path_height_m")[mine]
 
     def paint(figure: Any) -> None:
-        above = d.place(figure, 18, 54, 174, 82)
+        above = layout.place(figure, 18, 54, 174, 82)
         _from_above(above, one, numbers(data, "time_s")[mine], distance, across, numbers(data, "lateral_dot_m")[mine])
-        side = d.place(figure, 18, 12, 174, 45)
+        side = layout.place(figure, 18, 12, 174, 45)
         d.line(side, distance, path, d.LIMIT, 0.9, label="path")
         d.line(side, distance, height, d.INS, 1.2, label="flown")
         for gate in one.stabilised:
             side.axhline(gate.height_m, color=d.FAINT, linewidth=0.6, linestyle=(0, (2, 2)))
         if np.isfinite(height).any():
-            side.set_ylim(*d.padded(0.0, float(np.nanmax(height))))
+            side.set_ylim(*layout.padded(0.0, float(np.nanmax(height))))
         else:
-            d.nothing(side, "no height above the threshold")
+            layout.nothing(side, "no height above the threshold")
         for axes in (above, side):
             axes.set_xlim(float(np.nanmax(distance)), min(float(np.nanmin(distance)), -0.5))
         side.set_xlabel("distance before the threshold, km")
         side.set_ylabel("height, m")
-        d.legend_above(side, 3)
+        layout.legend_above(side, 3)
 
     where = "threshold of the site file" if one.runway.placed_by == "site file" else one.runway.place_reason
     caption = (
@@ -152,7 +153,7 @@ def _from_above(
     reach = max(1.3 * float(np.nanmax(np.abs(across_km))), 0.3)
     axes.set_ylim(-reach, reach)
     axes.set_ylabel("right of the course, km")
-    d.legend_above(axes, 5)
+    layout.legend_above(axes, 5)
 
 
 def protection(results: FlightResults, of: str) -> Drawing | None:
@@ -167,7 +168,7 @@ def protection(results: FlightResults, of: str) -> Drawing | None:
         return None
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 18, 12, 174, 56)
+        axes = layout.place(figure, 18, 12, 174, 56)
         for axis, colour in (("horizontal", d.GNSS), ("vertical", d.USED)):
             level, limit = (numbers(data, f"{axis}_{what}_m")[mine] for what in ("protection", "alarm_limit"))
             d.line(axes, time_s, level, colour, 1.3, label=f"{axis} protection level")
@@ -176,8 +177,8 @@ def protection(results: FlightResults, of: str) -> Drawing | None:
         axes.set_yscale("log")
         plain_log(axes.yaxis)
         axes.set_ylabel("m")
-        d.time_axis(axes, float(time_s[0]), float(time_s[-1]))
-        d.legend_above(axes, 4)
+        layout.time_axis(axes, float(time_s[0]), float(time_s[-1]))
+        layout.legend_above(axes, 4)
 
     caption = (
         "Of two kinds of protection level the greater. The error itself is not known: a Stanford plot has no points to "

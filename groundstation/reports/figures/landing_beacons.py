@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.results.figures import numbers
 from groundstation.results.flight import FlightResults
@@ -29,7 +30,7 @@ def deviations(results: FlightResults) -> Drawing | None:
             (118, "lateral", LATERAL_M, [one.horizontal_m for one in CATEGORIES], "right of course, m"),
             (60, "glide_path", VERTICAL_M, [one.vertical_m for one in CATEGORIES], "above glide path, m"),
         ):
-            axes = d.place(figure, 18, top - 46, 174, top)
+            axes = layout.place(figure, 18, top - 46, 174, top)
             for one, colour in zip(answer.approaches, d.SERIES, strict=False):
                 rows = np.flatnonzero((number == one.approach) & (before < FARTHEST_M) & (before > NEAREST_M))
                 x, y = before[rows] / M_PER_KM, numbers(data, f"{column}_m")[rows]
@@ -38,7 +39,7 @@ def deviations(results: FlightResults) -> Drawing | None:
                 axes.fill_between(x, -half, half, color=d.FILL, linewidth=0, label=name, zorder=0.5)
                 d.dots(axes, x, y, colour, 2.6, label=f"approach {one.approach}", zorder=4)
             for limit in dict.fromkeys(limits):
-                d.limit_line(axes, limit, CATEGORIES[0].name if limit == limits[0] else "")
+                layout.limit_line(axes, limit, CATEGORIES[0].name if limit == limits[0] else "")
                 axes.axhline(-limit, color=d.LIMIT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=3)
             for beacon in answer.beacons:
                 if abs(beacon.right_m) < LATERAL_M:
@@ -49,7 +50,7 @@ def deviations(results: FlightResults) -> Drawing | None:
             if column == "glide_path":
                 axes.set_xlabel("before the threshold, km")
             else:
-                d.legend_above(axes, 4)
+                layout.legend_above(axes, 4)
 
     caption = (
         "Every place found by three bearings (dots) and the 95 % band of a single one about zero. Dashed: limits of "

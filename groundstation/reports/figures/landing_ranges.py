@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.results.figures import FigureData, numbers, texts
@@ -34,7 +35,7 @@ def space(results: FlightResults) -> Drawing | None:
     length = float(answer.settings["path.runway_length_m"]) / M_PER_KM
 
     def paint(figure: Any) -> None:
-        above, side = d.place(figure, 18, 58, 174, 104), d.place(figure, 18, 12, 174, 46)
+        above, side = layout.place(figure, 18, 58, 174, 104), layout.place(figure, 18, 12, 174, 46)
         for axes, across, title in ((above, right, "right, km"), (side, M_PER_KM * up, "up, m")):
             axes.plot([0.0, length], [0.0, 0.0], color=d.INK, linewidth=3.0, solid_capstyle="butt", label="runway")
             ways = (("aircraft", d.INS, "aircraft"), ("moving", d.GNSS, "moving point"))
@@ -49,13 +50,13 @@ def space(results: FlightResults) -> Drawing | None:
                     axes.plot(along[row], across[row], "^", color=d.INK, markersize=5.0)
                     if axes is above:
                         place = along[row] + NAME_KM, across[row] - 3.5 * NAME_KM
-                        d.beside(axes, *place, d.label(point.name, 16), d.INK, axes.transData, "left")
+                        layout.beside(axes, *place, d.label(point.name, 16), d.INK, axes.transData, "left")
             axes.set_ylabel(title)
         above.set_aspect("equal", adjustable="datalim")
         side.set_xlim(above.get_xlim())
         above.tick_params(labelbottom=False)
         side.set_xlabel("beyond the threshold, km")
-        d.legend_above(above, 4)
+        layout.legend_above(above, 4)
 
     caption = (
         "Approach from above and from the side; dots: where flights begin, triangles: reference points on the ground."
@@ -78,14 +79,14 @@ def accuracy(results: FlightResults) -> Drawing | None:
 
     def paint(figure: Any) -> None:
         for (title, lines, limit), (bottom, top) in zip(panels, ((66, 112), (12, 58)), strict=True):
-            axes = d.place(figure, 18, bottom, 174, top)
+            axes = layout.place(figure, 18, bottom, 174, top)
             for column, colour, label in lines:
                 d.line(axes, before, np.maximum(numbers(data, column), LEAST_SHOWN_M), colour, 1.4, label=label)
             for value in sorted({getattr(one, limit) for one in CATEGORIES}, reverse=True):
                 named = [one.name for one in CATEGORIES if getattr(one, limit) == value]
                 text = "" if named == [CATEGORIES[-1].name] else f"{named[0]}: {value:g} m"  # too near for a text
-                d.limit_line(axes, value, "")
-                d.beside(axes, 0.66, value, text, d.LIMIT, axes.get_yaxis_transform(), "left")
+                layout.limit_line(axes, value, "")
+                layout.beside(axes, 0.66, value, text, d.LIMIT, axes.get_yaxis_transform(), "left")
             axes.axvline(0.0, color=d.FAINT, linewidth=0.8)
             axes.set_yscale("log")
             plain_log(axes.yaxis)
@@ -94,7 +95,7 @@ def accuracy(results: FlightResults) -> Drawing | None:
             if bottom < 60:
                 axes.set_xlabel("before the threshold, km")
             else:
-                d.legend_above(axes, 3)
+                layout.legend_above(axes, 3)
 
     caption = (
         "What 95 % of the errors stay within, by the covariance of the filter along the true path: the radius in the "
@@ -120,7 +121,7 @@ def trials(results: FlightResults) -> Drawing | None:
         for number, which in enumerate(filters):
             top = height - 8.0 - 54.0 * number
             for left, axis in ((18, "right"), (104, "up")):
-                axes = d.place(figure, left, top - 38.0, left + 70, top)
+                axes = layout.place(figure, left, top - 38.0, left + 70, top)
                 mine = of == which
                 one = mine & (trial == 1)
                 band = LINEAR_95 * numbers(data, f"sigma_{axis}_m")
@@ -137,7 +138,7 @@ def trials(results: FlightResults) -> Drawing | None:
                 if number == len(filters) - 1:
                     axes.set_xlabel("before the threshold, km")
                 if axis == "up":
-                    d.legend_above(axes, 1)
+                    layout.legend_above(axes, 1)
 
     caption = (
         f"Estimate minus truth of {min(answer.trial_count, MOST_TRIALS)} simulated approaches in the 95 % band that "

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.results.figures import numbers, texts
@@ -24,7 +25,7 @@ def search(results: FlightResults) -> Drawing | None:
     known = [row for row in answer.rows if np.any((other == row.other) & (quantity == row.quantity))]
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 18, 12, 174, 56)
+        axes = layout.place(figure, 18, 12, 174, 56)
         for row, colour in zip(known, d.SERIES, strict=False):
             mine = (other == row.other) & (quantity == row.quantity) & (residual > 0.0)
             if not mine.any():
@@ -37,11 +38,10 @@ def search(results: FlightResults) -> Drawing | None:
         plain_log(axes.yaxis)
         axes.set_xlabel("latency tried, s")
         axes.set_ylabel("residual over the smallest")
-        d.legend_above(axes, 4)
+        layout.legend_above(axes, 4)
 
     caption = (
-        "RMS of what is left between sensor and INS, over the smallest, against the latency tried; a sharp valley is "
-        "motion that tells. Shaded: the 95 % interval of what is observed."
+        "RMS left between sensor and INS by latency tried: a sharp valley is motion that tells. Shaded: 95 % interval."
         + (f" The first {MOST_PAIRS} pairs." if len(known) > MOST_PAIRS else "")
     )
     alt = "Residual between sensors and INS against the latency tried, one line for each pair."

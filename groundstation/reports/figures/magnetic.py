@@ -8,7 +8,9 @@ from groundstation.base.geodesy import north_east_m
 from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
+from groundstation.reports.frames import TIME
 from groundstation.results.figures import flags, numbers, texts
 from groundstation.results.flight import FlightResults
 from groundstation.results.magnetic import METHOD_TITLES, MagneticResult
@@ -29,12 +31,12 @@ def deviation(results: FlightResults) -> Drawing | None:
     curves, table = results.figure_with_rows("magnetic_curves"), results.figure_with_rows("magnetic_table")
     if curves is None:
         return None
-    heading = numbers(curves, "magnetic_heading_deg")
+    heading = numbers(curves, "uncorrected_magnetic_heading_deg")
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 16, 12, 174, 74)
+        axes = layout.place(figure, 16, 12, 174, 74)
         if table is not None:
-            bins, values = numbers(table, "magnetic_heading_deg"), numbers(table, "deviation_deg")
+            bins, values = numbers(table, "uncorrected_magnetic_heading_deg"), numbers(table, "deviation_deg")
             d.dots(axes, bins, values, d.UNUSED, 3.0, label="table, bins of 1°")
         for name, title in METHOD_TITLES.items():
             value, half = numbers(curves, f"deviation_{name}_deg"), NORMAL_95 * numbers(curves, f"sigma_{name}_deg")
@@ -46,7 +48,7 @@ def deviation(results: FlightResults) -> Drawing | None:
         axes.axhline(0.0, color=d.FAINT, linewidth=0.6)
         axes.set_ylabel("deviation, to be added, °")
         _heading_axis(axes)
-        d.legend_above(axes, 4)
+        layout.legend_above(axes, 4)
 
     caption = (
         "To be added to the reading, east positive; lines by A to E of each method in level flight, shaded ± 1.96 σ. "
@@ -62,22 +64,22 @@ def held_out(results: FlightResults) -> Drawing | None:
     if answer is None or data is None or not (mine := texts(data, "part") == "held out").any():
         return None
     method = answer.recommended_method
-    time, heading = numbers(data, "time_s")[mine], numbers(data, "magnetic_heading_deg")[mine]
+    time, heading = numbers(data, "time_s")[mine], numbers(data, "uncorrected_magnetic_heading_deg")[mine]
     before, after = numbers(data, "error_before_deg")[mine], numbers(data, f"error_{method}_deg")[mine]
     shown = ((before, d.UNUSED, "before"), (after, METHOD_COLOURS[method], "after"))
 
     def paint(figure: Any) -> None:
-        left, right = d.place(figure, 16, 12, 92, 62), d.place(figure, 106, 12, 174, 62)
+        left, right = layout.place(figure, 16, 12, 92, 62), layout.place(figure, 106, 12, 174, 62)
         for values, colour, name in shown:
             d.dots(left, time, values, colour, 1.6, 2500, label=name)
             d.dots(right, heading, values, colour, 1.6, 2500)
         for axes in (left, right):
             axes.axhline(0.0, color=d.FAINT, linewidth=0.6)
         left.set_ylabel("error of magnetic heading, °")
-        d.time_axis(left, *d.padded(float(time.min()), float(time.max())), most=5)
+        layout.time_axis(left, *layout.padded(float(time.min()), float(time.max())), most=5)
         _heading_axis(right)
         right.set_xticks(range(0, 361, 60))
-        d.legend_above(left, 2)
+        layout.legend_above(left, 2)
 
     caption = (
         f"Level flight that no fit has seen, n = {number(len(time), 0)} drawn, against flight time and heading; "
@@ -107,9 +109,10 @@ def track(results: FlightResults) -> Drawing | None:
     time = time[near]
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 16, 12, 174, 84)
+        axes = layout.place(figure, 16, 12, 174, 84)
         axes.set_aspect("equal", adjustable="datalim")
         d.line(axes, east / 1e3, north / 1e3, d.UNUSED, 0.9)
+        d.tell(axes, east / 1e3, north / 1e3, time, TIME)
         named: set[str] = set()
         for turn in turns:
             mine = (time >= turn.start_s) & (time <= turn.end_s)
@@ -120,7 +123,7 @@ def track(results: FlightResults) -> Drawing | None:
             named.add(name)
         axes.set_xlabel("east, km")
         axes.set_ylabel("north, km")
-        d.legend_above(axes, 2)
+        layout.legend_above(axes, 2)
 
     caption = "Ground track in wind from before the first used turn until after the last one, equal scales."
     alt = "Map of the figures flown, right and left turns in two colours."
@@ -132,12 +135,12 @@ def branches(results: FlightResults) -> Drawing | None:
     samples, table = results.figure_with_rows("magnetic_samples"), results.figure_with_rows("magnetic_table")
     if samples is None or table is None:
         return None
-    part, heading = texts(samples, "part"), numbers(samples, "magnetic_heading_deg")
-    error, bins = numbers(samples, "compass_error_deg"), numbers(table, "magnetic_heading_deg")
+    part, heading = texts(samples, "part"), numbers(samples, "uncorrected_magnetic_heading_deg")
+    error, bins = numbers(samples, "compass_error_deg"), numbers(table, "uncorrected_magnetic_heading_deg")
     average, filled = numbers(table, "compass_error_deg"), flags(table, "is_interpolated")
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 16, 12, 174, 70)
+        axes = layout.place(figure, 16, 12, 174, 70)
         for name, colour in (("right turn", RIGHT), ("left turn", LEFT)):
             mine = part == name
             d.dots(axes, heading[mine], error[mine], colour, 1.4, 2500, label=name)
@@ -145,7 +148,7 @@ def branches(results: FlightResults) -> Drawing | None:
         d.dots(axes, bins[filled], average[filled], d.LIMIT, 3.0, label="interpolated")
         axes.set_ylabel("magnetic − true heading, °")
         _heading_axis(axes)
-        d.legend_above(axes, 4)
+        layout.legend_above(axes, 4)
 
     caption = (
         f"Magnetic minus INS true heading, declination in it, as in the patent. What is odd in bank cancels in the "
@@ -162,11 +165,11 @@ def modulus(results: FlightResults) -> Drawing | None:
     if answer is None or data is None:
         return None
     time = numbers(data, "time_s")
-    spans = d.windows(time)
+    spans = layout.windows(time)
     horizontal, down = answer.declination.horizontal_nt, answer.declination.down_nt
 
     def paint(figure: Any) -> None:
-        panels = d.time_panels(figure, (16, 12, 174, 62), spans)
+        panels = layout.time_panels(figure, (16, 12, 174, 62), spans)
         for axes, (low, high) in zip(panels, spans, strict=True):
             mine = (time >= low) & (time <= high)
             for column, colour, name in (
@@ -178,9 +181,9 @@ def modulus(results: FlightResults) -> Drawing | None:
                     broken_time, broken = d.broken_at_gaps(time[mine], values[mine] / 1e3)
                     d.line(axes, broken_time, broken, colour, 1.0, label=name)
             if horizontal is not None and down is not None:
-                d.limit_line(axes, float(np.hypot(horizontal, down)) / 1e3, "field of the model")
+                layout.limit_line(axes, float(np.hypot(horizontal, down)) / 1e3, "field of the model")
         panels[0].set_ylabel("modulus of the field, µT")
-        d.legend_above(panels[-1], 4)
+        layout.legend_above(panels[-1], 4)
 
     caption = "Readings of the figures alone. A modulus that still waves after the fit is iron the model does not know."
     alt = "Modulus of the magnetic field over flight time before and after the fit."

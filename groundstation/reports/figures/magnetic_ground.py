@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.base.normal import NORMAL_95
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.results.figures import flags, numbers
 from groundstation.results.flight import FlightResults
@@ -29,7 +30,7 @@ def ground_runs(results: FlightResults) -> Drawing | None:
     middle, reach = 0.5 * (low + high), max(0.6 * (high - low), 0.5 * LEAST_SPAN_DEG)
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 16, 12, 174, 66)
+        axes = layout.place(figure, 16, 12, 174, 66)
         if epochs is not None:
             mine = flags(epochs, "is_used")
             x, y = numbers(epochs, "magnetic_heading_deg")[mine], numbers(epochs, "error_deg")[mine]
@@ -47,7 +48,7 @@ def ground_runs(results: FlightResults) -> Drawing | None:
         axes.set_xticks(range(0, 361, 30))
         axes.set_xlabel("magnetic heading as read, °")
         axes.set_ylabel("error of the heading, °")
-        d.legend_above(axes, 3)
+        layout.legend_above(axes, 3)
 
     caption = (
         f"Magnetic heading + declination − track, n = {len(used)} runs with ± 1.96 σ (noise, slip and declination, the "

@@ -5,10 +5,14 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.base.ellipse import ELLIPSE_95, outlines
 from groundstation.base.geodesy import north_east_m
 from groundstation.chapters.wording import number, words
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
+from groundstation.reports.frames import TIME
+from groundstation.results.corrected_position import CorrectedPosition, corrected_position
 from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult, TaxiSegment
@@ -36,21 +40,31 @@ def track_map(results: FlightResults) -> Drawing | None:
     north, east = north_east_m(latitude, longitude, *origin)
     answer = results.answer(HeadingResult)
     segments = () if answer is None else answer.segments
-    used = _used_rows(numbers(data, "time_s"), segments)
-    taxi = _taxi_rows(numbers(data, "time_s"), segments, results.figure_with_rows("phases"))
+    time = numbers(data, "time_s")
+    used = _used_rows(time, segments)
+    taxi = _taxi_rows(time, segments, results.figure_with_rows("phases"))
     on_ground = _extent(north[taxi], east[taxi])
     zoom = on_ground > SMALLEST_TAXI_M and _extent(north, east) > 2.0 * on_ground
 
+    corrected = corrected_position(results)
+    larger = 1 if corrected is None else corrected.larger(_extent(north, east))
+
     def paint(figure: Any) -> None:
-        right = 86.0 if zoom else 174.0
-        _map(d.place(figure, 16, 12, right, 84), north, east, used, "Whole flight" if zoom else "")
+        right, top = (86.0, 84.0) if zoom else (174.0, 90.0)
+        axes = layout.place(figure, 16, 12, right, top)
+        if corrected is not None:
+            _ellipses(axes, corrected, origin, larger, _scale(north, east)[0])
+        _map(axes, time, north, east, used, "Whole flight" if zoom else "")
         if zoom:
-            _map(d.place(figure, 104, 12, 174, 84), north[taxi], east[taxi], used[taxi], "Taxi")
+            _map(layout.place(figure, 104, 12, 174, 84), time[taxi], north[taxi], east[taxi], used[taxi], "Taxi")
 
     start = f"{number(origin[0], 5, '°')}, {number(origin[1], 5, '°')}"
-    caption = f"Ring: start ({start})." + (
-        " Green: straight taxi the heading error was taken from." if used.any() else ""
-    )
+    caption = f"Ring: start ({start})."
+    if used.any():
+        caption += " Green: straight taxi the heading error was taken from."
+    if corrected is not None:
+        size = f", drawn {number(larger, 0)} times their size" if larger > 1 else ""
+        caption += f" Ellipses: 95 % of the corrected position{size}."
     alt = "Map of the track in metres north and east of the start."
     return Drawing("Track", caption, alt, d.draw("map", 92, paint), ("overview",))
 
@@ -76,18 +90,35 @@ def _extent(north: Any, east: Any) -> float:
     return float(max(spans, default=0.0))
 
 
-def _map(axes: Any, north: Any, east: Any, used: Any, title: str) -> None:
-    kilometres = _extent(north, east) > 3000.0
-    scale, unit = (1e-3, "km") if kilometres else (1.0, "m")
+def _scale(north: Any, east: Any) -> tuple[float, str]:
+    """Factor and unit of a map."""
+    return (1e-3, "km") if _extent(north, east) > 3000.0 else (1.0, "m")
+
+
+def _ellipses(axes: Any, corrected: CorrectedPosition, origin: tuple[float, float], larger: int, scale: float) -> None:
+    """95 % ellipses of the corrected position along the track."""
+    rows = corrected.along()
+    north, east = north_east_m(corrected.latitude_deg[rows], corrected.longitude_deg[rows], *origin)
+    sigmas = corrected.sigma_north_m[rows], corrected.sigma_east_m[rows]
+    for middle, outline in zip(
+        np.column_stack([north, east]), outlines(*sigmas, np.zeros(len(rows)), ELLIPSE_95), strict=True
+    ):
+        drawn = scale * (middle + larger * outline)
+        d.line(axes, drawn[:, 1], drawn[:, 0], d.INS, 0.8)
+
+
+def _map(axes: Any, time: Any, north: Any, east: Any, used: Any, title: str) -> None:
+    scale, unit = _scale(north, east)
     north, east = north * scale, east * scale
     axes.set_aspect("equal", adjustable="datalim")
     d.line(axes, east, north, d.GNSS, 0.9)
     d.line(axes, np.where(used, east, np.nan), np.where(used, north, np.nan), d.USED, 2.4, solid_capstyle="round")
+    d.tell(axes, east, north, time, TIME)
     first = int(np.flatnonzero(np.isfinite(north) & np.isfinite(east))[0])
     axes.plot(
         [east[first]], [north[first]], "o", color=d.INK, markersize=5, markerfacecolor="white", markeredgewidth=1.2
     )
-    if _extent(north, east) * (1000.0 if kilometres else 1.0) < SMALLEST_MAP_M:  # scatter of a receiver at rest
+    if _extent(north, east) / scale < SMALLEST_MAP_M:  # scatter of a receiver at rest
         half = 0.5 * SMALLEST_MAP_M
         axes.update_datalim([(east[first] - half, north[first] - half), (east[first] + half, north[first] + half)])
         axes.autoscale_view()
@@ -124,7 +155,7 @@ def profile(results: FlightResults) -> Drawing | None:
 
     def paint(figure: Any) -> None:
         base = 12.0 + lane_mm
-        places = [d.place(figure, 30, base + 35 * row, 174, base + 35 * row + 31) for row in range(len(panels))]
+        places = [layout.place(figure, 30, base + 35 * row, 174, base + 35 * row + 31) for row in range(len(panels))]
         for axes, (column, text, colour) in zip(reversed(places), panels, strict=True):
             if phases is not None:
                 d.spans(
@@ -133,12 +164,12 @@ def profile(results: FlightResults) -> Drawing | None:
             values = numbers(data, column)
             d.line(axes, time, values, colour, 1.0)
             axes.set_ylabel(text)
-            d.time_axis(axes, low, high, title=axes is places[0] and not states)
-        d.legend_above(places[-1])
+            layout.time_axis(axes, low, high, title=axes is places[0] and not states)
+        layout.legend_above(places[-1])
         if states and gnss is not None:
-            strip = d.place(figure, 30, 12, 174, 9 + lane_mm)
+            strip = layout.place(figure, 30, 12, 174, 9 + lane_mm)
             d.lanes(strip, numbers(gnss, "start_s"), numbers(gnss, "end_s"), texts(gnss, "state"), states, GNSS_COLOURS)
-            d.time_axis(strip, low, high)
+            layout.time_axis(strip, low, high)
 
     names = tuple(name for name in ("overview", "phases", "gnss_lanes") if results.figure_with_rows(name) is not None)
     caption = "Ground: phase of flight." + (" Lanes: usability of GNSS." if states else "")
@@ -171,7 +202,7 @@ def attitude(results: FlightResults) -> Drawing | None:
 
     def paint(figure: Any) -> None:
         for place, (names, unit) in enumerate(reversed(panels)):
-            axes = d.place(figure, 30, 12 + 36 * place, 174, 42 + 36 * place)
+            axes = layout.place(figure, 30, 12 + 36 * place, 174, 42 + 36 * place)
             for name, colour in zip(names, (d.INS, d.GNSS), strict=True):
                 values = numbers(data, name)
                 if np.isfinite(values).any():
@@ -179,8 +210,8 @@ def attitude(results: FlightResults) -> Drawing | None:
                     text = words(name.removesuffix("_deg"))
                     d.line(axes, numbers(data, "time_s"), shown, colour, 0.9, label=text)
             axes.set_ylabel(unit)
-            d.time_axis(axes, float(times.min()), float(times.max()), title=place == 0)
-            d.legend_above(axes)
+            layout.time_axis(axes, float(times.min()), float(times.max()), title=place == 0)
+            layout.legend_above(axes)
 
     alt = "Roll, pitch and heading over flight time."
     return Drawing("Attitude", "", alt, d.draw("attitude", height, paint), ("overview",))
@@ -204,9 +235,9 @@ def states(results: FlightResults) -> Drawing | None:
     colours = dict.fromkeys(rows, d.INS) | STATE_COLOURS
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 44, 12, 174, height - 2)
+        axes = layout.place(figure, 44, 12, 174, height - 2)
         d.lanes(axes, start[shown], end[shown], named[shown], rows, colours)
-        d.time_axis(axes, min(float(times.min()), 0.0), float(times.max()))
+        layout.time_axis(axes, min(float(times.min()), 0.0), float(times.max()))
 
     flags = [name for name in dict.fromkeys(lane.tolist()) if name not in ("mode", "arming")]
     caption = "What the log itself says of flight mode and arming"

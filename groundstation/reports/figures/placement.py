@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.chapters.placement import design_title
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.results.figures import FigureData, flags, numbers, texts
@@ -35,10 +36,11 @@ def accuracy_map(results: FlightResults) -> Drawing | None:
     rings, points = results.figure_with_rows("placement_keep_out"), results.figure_with_rows("placement_points")
 
     def paint(figure: Any) -> None:
-        axes, bar = d.place(figure, 18, 12, 150, 112), d.place(figure, 156, 22, 160, 102)
+        axes, bar = layout.place(figure, 18, 12, 150, 112), layout.place(figure, 156, 22, 160, 102)
         filled = axes.contourf(east, north, sigma, levels=levels, cmap="viridis_r", extend="max")
         figure.colorbar(filled, cax=bar, ticks=levels[::2], format="%.3g")
         bar.set_ylabel("weighted sigma, m")
+        d.tell(axes, *np.meshgrid(east, north), sigma, "weighted sigma, m")
         if rings is not None:
             _keep_out(axes, rings)
         if way is not None:
@@ -50,7 +52,7 @@ def accuracy_map(results: FlightResults) -> Drawing | None:
             _stand(axes, points, answer)
         axes.set_aspect("equal", adjustable="box", anchor="W")
         axes.set_xlim(float(east[0]), float(east[-1]))
-        axes.set_ylim(*d.padded(float(north[0]), float(north[-1]), 0.03))
+        axes.set_ylim(*layout.padded(float(north[0]), float(north[-1]), 0.03))
         axes.set_xlabel("east, km")
         axes.set_ylabel("north, km")
         axes.legend(loc="center left", bbox_to_anchor=(1.25, 0.5), bbox_transform=axes.transAxes)
@@ -99,7 +101,7 @@ def _stand(axes: Any, points: FigureData, answer: PlacementPlan) -> None:
         _marks(axes, east[mine], north[mine], mark, 9.0 if is_placed else 6.0, name)
         for x, y, text in zip(east[mine], north[mine], texts(points, "name")[mine], strict=True):
             place = x / M_PER_KM, y / M_PER_KM
-            d.beside(axes, *place, d.label(str(text), 16), d.INK, axes.transData, "center")
+            layout.beside(axes, *place, d.label(str(text), 16), d.INK, axes.transData, "center")
 
 
 def accuracy(results: FlightResults) -> Drawing | None:
@@ -113,7 +115,7 @@ def accuracy(results: FlightResults) -> Drawing | None:
     def paint(figure: Any) -> None:
         for number, axis in enumerate(AXES):
             top = height - 18 - (PANEL_MM + 4) * number
-            axes = d.place(figure, 18, top - PANEL_MM + 4, 174, top)
+            axes = layout.place(figure, 18, top - PANEL_MM + 4, 174, top)
             for place, row in enumerate(answer.designs):
                 mine = design == row.design
                 colour = d.FAINT if row.design == GIVEN else d.SERIES[(place - 1) % len(d.SERIES)]
@@ -123,10 +125,10 @@ def accuracy(results: FlightResults) -> Drawing | None:
             axes.set_ylabel(f"2σ {axis}, m")
             axes.set_yscale("log")
             plain_log(axes.yaxis, (1.0, 2.0, 5.0))
-            d.limit_line(axes, answer.fixed_at_s, "fixed point" if not number else "", vertical=True)
-            d.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number == len(AXES) - 1)
+            layout.limit_line(axes, answer.fixed_at_s, "fixed point" if not number else "", vertical=True)
+            layout.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number == len(AXES) - 1)
             if not number:
-                d.legend_above(axes, 2)
+                layout.legend_above(axes, 2)
 
     caption = "Accuracy along the way as the filter computes it, every design; from the first ranges on."
     svg = d.draw("placement-accuracy", height, paint)

@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.flight import FlightResults
@@ -25,11 +26,11 @@ def gaps(results: FlightResults) -> Drawing | None:
     times = d.finite(first, last)
     if not times.size:
         return None
-    low, high = d.padded(float(times.min()), float(times.max()), 0.01, 0.5)
+    low, high = layout.padded(float(times.min()), float(times.max()), 0.01, 0.5)
     height, least = 20.0 + 4.6 * len(order), (high - low) / 400.0  # narrower marks would not be seen
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 44, 12, 174, height - 6)
+        axes = layout.place(figure, 44, 12, 174, height - 6)
         for place, row in enumerate(order):
             here = slice(row, row + 1)
             d.bars(axes, first[here], np.maximum(last[here], first[here] + least), place, "#b9d3e6", 6.0)
@@ -39,10 +40,10 @@ def gaps(results: FlightResults) -> Drawing | None:
         axes.set_ylim(len(order) - 0.4, -0.6)
         axes.grid(axis="y", visible=False)
         axes.tick_params(axis="y", length=0)
-        d.time_axis(axes, low, high)
+        layout.time_axis(axes, low, high)
 
     count = 0 if holes is None else len(holes)
-    caption = f"Blue: data present; red: gaps, n = {number(count, 0)}, drawn at least wide enough to be seen."
+    caption = f"Blue: data; red: gaps, n = {number(count, 0)}{', widened to be seen' if count else ''}."
     caption += f" {len(order)} of {len(topic)} topics." if len(order) < len(topic) else ""
     names = ("ledger",) if holes is None else ("ledger", "gaps")
     return Drawing(

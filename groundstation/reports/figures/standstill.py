@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.chapters.wording import is_number, number
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.results.figures import flags, numbers
 from groundstation.results.flight import FlightResults
@@ -33,7 +34,7 @@ def components(results: FlightResults) -> Drawing | None:
     reach = 1.1 * max(float(known.max()) if known.size else 0.0, RAW_LIMIT_MPS)
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 16, 12, 101, 65)
+        axes = layout.place(figure, 16, 12, 101, 65)
         window = d.finite(time[inside]) if inside.any() else d.finite(time)
         moments, *lines = d.broken_at_gaps(time, north, east)
         d.line(axes, moments, lines[0], d.INS, 0.8, 3000, label="north")
@@ -44,15 +45,14 @@ def components(results: FlightResults) -> Drawing | None:
             )
         axes.set_ylim(-reach, reach)
         low, high = (float(window.min()), float(window.max())) if window.size else (0.0, 1.0)
-        d.time_axis(axes, *d.padded(low, high, 0.15, 2.0))
+        layout.time_axis(axes, *layout.padded(low, high, 0.15, 2.0))
         axes.set_ylabel("GNSS velocity, m/s")
-        d.legend_above(axes)
-        _plane(d.place(figure, 121, 12, 174, 65), north[inside], east[inside], reach, still)
+        layout.legend_above(axes)
+        _plane(layout.place(figure, 121, 12, 174, 65), north[inside], east[inside], reach, still)
 
     caption = (
-        f"The aircraft stands: whatever velocity GNSS reports is its error. n = {number(count, 0)} in the interval. "
-        f"Right: the same samples in the plane; circle: {RAW_LIMIT_MPS} m/s (2 σ stated for GLONASS and GPS); "
-        "cross: mean."
+        f"The aircraft stands: what GNSS reports is its error. n = {number(count, 0)}. "
+        f"Right: in the plane; circle: {RAW_LIMIT_MPS} m/s (2 σ stated for GLONASS and GPS); cross: mean."
     )
     alt = "North and east velocity at standstill over time, and scattered in the plane around zero."
     return Drawing(
@@ -87,24 +87,24 @@ def mean_speed(results: FlightResults) -> Drawing | None:
     measured = None if still is None else still.speed_of_mean_mps
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 16, 12, 174, 60)
+        axes = layout.place(figure, 16, 12, 174, 60)
         for length, colour in zip(windows, d.SERIES, strict=False):
             rows = window == length
             axes.fill_between(speed[rows], height[rows], step="mid", color=colour, alpha=0.12, linewidth=0)
             name = f"intervals of {length:g} s"
             axes.plot(speed[rows], height[rows], drawstyle="steps-mid", color=colour, linewidth=1.2, label=name)
-        d.limit_line(axes, MEAN_LIMIT_MPS, f"limit {MEAN_LIMIT_MPS} m/s", vertical=True)
+        layout.limit_line(axes, MEAN_LIMIT_MPS, f"limit {MEAN_LIMIT_MPS} m/s", vertical=True)
         if is_number(measured):
             axes.axvline(measured, color=d.USED, linewidth=1.0, label=f"this interval: {number(measured, 4, 'm/s')}")
         axes.set_xlim(left=0.0)
         axes.set_ylim(bottom=0.0)
         axes.set_xlabel("length of the mean velocity vector, m/s")
         axes.set_ylabel("probability density, s/m")
-        d.legend_above(axes)
+        layout.legend_above(axes)
 
     caption = (
-        "Mean speed over overlapping intervals of this flight's standstill. Longer averaging moves the density below "
-        "the limit; an interval of 10 s that fails asks for more time, not for rejection."
+        "Mean speed over overlapping intervals. Longer averaging moves the density below the limit: 10 s that fail ask "
+        "for more time, not for rejection."
     )
     alt = "Densities of the mean speed for two interval lengths against the limit of 0.01 m/s."
     return Drawing(

@@ -7,6 +7,7 @@ import numpy as np
 from groundstation.chapters.parts import Grid, Head, Note, Section
 from groundstation.chapters.wording import number, percent
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.reports.fleet.common import (
@@ -53,7 +54,7 @@ def _forest(fleet: FleetResults, assessed: list[AircraftRow]) -> Drawing:
     height = 18.0 + ROW_MM * (len(shown) + 1)
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 58, 12, 174, height - 6)
+        axes = layout.place(figure, 58, 12, 174, height - 6)
         for place, row in enumerate(shown):
             own = d.finite(error[owner == row.aircraft])
             d.dots(axes, own, np.full(len(own), place), d.UNUSED, dot_size(len(own)), most, zorder=1.5)
@@ -137,7 +138,7 @@ def _rates(rates: dict[str, Any]) -> Drawing:
     drawn = d.finite(*(rates[name] for name in shown))
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 58, 12, 174, height - 6)
+        axes = layout.place(figure, 58, 12, 174, height - 6)
         axes.set_xscale("log")
         for place, name in enumerate(shown):
             own = np.sort(rates[name])

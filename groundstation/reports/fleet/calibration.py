@@ -7,6 +7,7 @@ import numpy as np
 from groundstation.chapters.parts import Grid, Head, Mark, Note, Section
 from groundstation.chapters.wording import number, percent, typeset
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.fleet.common import name_axis, plural
 from groundstation.results.fleet import FleetCalibration, FleetResults
@@ -36,7 +37,7 @@ def _figure(fleet: FleetResults) -> Drawing:
     height = 64.0 + 8.0 * len(rows)
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 62, 62, 174, height - 2.0)
+        axes = layout.place(figure, 62, 62, 174, height - 2.0)
         for place, row in enumerate(rows):
             bar = 100.0 * np.array([row.confidence95])
             d.bars(axes, bar[:, 0], bar[:, 1], place, d.USED, 2.4)
@@ -48,7 +49,7 @@ def _figure(fleet: FleetResults) -> Drawing:
         axes.set_xlabel("inside the stated 95 % interval, %")
         for place, row in enumerate(rows):
             left = 16.0 + 56.0 * place
-            panel = d.place(figure, left, 12, left + 46.0, 42)
+            panel = layout.place(figure, left, 12, left + 46.0, 42)
             panel.stairs(
                 row.pit, np.linspace(0.0, 1.0, len(row.pit) + 1), fill=True, facecolor=d.FILL, edgecolor=d.USED
             )

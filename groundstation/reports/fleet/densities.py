@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from groundstation.chapters.parts import Grid, Head, Note, Part, Section
 from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.fleet.common import aircraft_name, colours_of, left_out, plural, rows_shown
 from groundstation.results.fleet import Densities, FittedNormal, FleetResults
@@ -43,7 +44,7 @@ def _overlay(fleet: FleetResults) -> Drawing:
     colours = colours_of(fleet)
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 16, 12, 174, 81)
+        axes = layout.place(figure, 16, 12, 174, 81)
         top = _paint_flights(axes, densities, everyone, MOST_LINES, colours, named=True)
         d.line(
             axes,
@@ -59,7 +60,7 @@ def _overlay(fleet: FleetResults) -> Drawing:
         axes.set_ylim(0.0, 1.08 * top)
         axes.set_xlabel("INS heading − GNSS track, °")
         axes.set_ylabel("probability density, 1/°")
-        d.legend_above(axes, 5)
+        layout.legend_above(axes, 5)
 
     fitted = "" if normal is None else f" with mean {_angle(normal.mean_deg)} and σ {number(normal.sigma_deg, 3, '°')}"
     caption = (
@@ -90,7 +91,7 @@ def _span(densities: Densities) -> tuple[float, float]:
     first = int(np.searchsorted(below, LEFT_OUT, side="right")) - 1
     last = int(np.searchsorted(below, below[-1] - LEFT_OUT))
     low, high = float(densities.edge_deg[max(first, 0)]), float(densities.edge_deg[min(last, len(below) - 1)])
-    return (low, high) if high > low else d.padded(low, high, 0.06, width)
+    return (low, high) if high > low else layout.padded(low, high, 0.06, width)
 
 
 def _beyond(densities: Densities, low: float, high: float) -> str:
@@ -163,7 +164,7 @@ def _by_aircraft(fleet: FleetResults) -> Drawing:
         for place, name in enumerate(shown):
             line, column = divmod(place, PANEL_COLUMNS)
             left, bottom = 13.0 + 57.0 * column, height - 42.0 * (line + 1) + 4.0
-            axes = d.place(figure, left, bottom, left + 47.0, bottom + 31.0)
+            axes = layout.place(figure, left, bottom, left + 47.0, bottom + 31.0)
             rows = np.flatnonzero(densities.aircraft == name)
             top = _paint_flights(axes, densities, rows, MOST_LINES_OF_A_PANEL, colours, named=False)
             _paint_normal(axes, fleet.normal(name), low, high, None)

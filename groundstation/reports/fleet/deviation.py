@@ -8,6 +8,7 @@ from groundstation.chapters.magnetic import TONES
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Part, Section
 from groundstation.chapters.wording import ABSENT, number
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.fleet.common import aircraft_name, bounded, colours_of
 from groundstation.results.fleet import DeviationRow, FleetResults
@@ -34,7 +35,7 @@ def _curves(fleet: FleetResults, rows: list[DeviationRow]) -> Drawing:
     heading_deg = np.arange(0.0, 361.0, 2.0)
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 18, 12, 136, 62)
+        axes = layout.place(figure, 18, 12, 136, 62)
         named: set[str] = set()
         for row in shown:
             label = None if row.aircraft in named else d.label(aircraft_name(row.aircraft), 20)

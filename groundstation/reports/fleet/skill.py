@@ -7,6 +7,7 @@ import numpy as np
 from groundstation.chapters.parts import Cell, Grid, Head, Note, Part, Section
 from groundstation.chapters.wording import clean, is_number, number, percent
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.forecast import OTHERS
 from groundstation.reports.figures.inertial import plain_log
@@ -71,7 +72,7 @@ def _growth(fleet: FleetResults, rows: list[FleetSkill], shipped: str) -> Drawin
     highest = {name: max(row.rms_m for row in rows if row.method == name) for name in methods}
 
     def paint(figure: Any) -> None:
-        axes = d.place(figure, 18, 12, 112, 82)
+        axes = layout.place(figure, 18, 12, 112, 82)
         axes.set_xscale("log")
         axes.set_yscale("log")
         is_positive = (rms > 0.0) & (horizon > 0.0)
@@ -129,14 +130,14 @@ def _flights(fleet: FleetResults) -> Drawing:
     )
 
     def paint(figure: Any) -> None:
-        left, right = d.place(figure, 16, 12, 112, 54), d.place(figure, 132, 12, 174, 54)
+        left, right = layout.place(figure, 16, 12, 112, 54), layout.place(figure, 132, 12, 174, 54)
         _paint_flights(left, fleet, own)
         left.set_ylabel(f"RMS after {horizon:g} min, m")
         if covered:
             right.plot(*zip(*((x, 100.0 * y) for x, y in covered), strict=True), "o-", color=d.USED, markersize=3.0)
-            d.limit_line(right, CONFIDENCE, "wanted", colour=d.USED)
+            layout.limit_line(right, CONFIDENCE, "wanted", colour=d.USED)
         else:
-            d.nothing(right, "no band claimed")
+            layout.nothing(right, "no band claimed")
         right.set_ylim(0.0, 105.0)
         right.set_xlabel("horizon, min")
         right.set_ylabel("inside the 95 % band, %")
@@ -153,7 +154,7 @@ def _paint_flights(axes: Any, fleet: FleetResults, own: Any) -> None:
     table = fleet.skill_flights
     timed = own[~np.isnat(table["start_utc"][own])]
     if not len(timed):
-        d.nothing(axes, "no flight with a time")
+        layout.nothing(axes, "no flight with a time")
         return
     axes.set_yscale("log")
     colours = colours_of(fleet)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from groundstation.chapters.parts import Cell, Grid, Head, Note, Part, Section
 from groundstation.chapters.wording import number, significant
 from groundstation.reports import drawing as d
+from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.reports.fleet.aircraft import log_limits
@@ -97,7 +98,7 @@ def _charts(fleet: FleetResults, quantity: str) -> Drawing | None:
     def paint(figure: Any) -> None:
         for place, name in enumerate(shown):
             bottom = height - 4.0 - PANEL_MM * (place + 1) + 2.0
-            axes = d.place(figure, 18, bottom, 174, bottom + PANEL_MM - 9.0)
+            axes = layout.place(figure, 18, bottom, 174, bottom + PANEL_MM - 9.0)
             _paint_chart(axes, fleet, quantity, name, rows[name])
             date_axis(axes, times)
             axes.set_title(f"{d.label(name, 24)}, {plural(len(rows[name]), 'flight')}")
@@ -106,7 +107,7 @@ def _charts(fleet: FleetResults, quantity: str) -> Drawing | None:
                 axes.tick_params(labelbottom=False)
                 axes.xaxis.get_offset_text().set_visible(False)
             if place == 0:
-                d.legend_above(axes)
+                layout.legend_above(axes)
 
     more = ""
     if len(shown) < len(names):
@@ -136,14 +137,14 @@ def _paint_chart(axes: Any, fleet: FleetResults, quantity: str, name: str, rows:
     for number_, change in _changes_of(fleet, quantity, name):
         start = float(date_numbers(np.array([change.start_utc_ns], dtype="datetime64[ns]"))[0])
         axes.axvline(start, color=d.INK, linewidth=0.8, linestyle=":")
-        d.beside(axes, start, 0.86, f" {number_}", d.INK, axes.get_xaxis_transform(), "left")
+        layout.beside(axes, start, 0.86, f" {number_}", d.INK, axes.get_xaxis_transform(), "left")
     drawn = d.finite(value, low, high)
     if quantity == POSITIVE:
         axes.set_yscale("log")
         plain_log(axes.yaxis)
         axes.set_ylim(*log_limits(drawn[drawn > 0.0]))
     else:
-        axes.set_ylim(*d.padded(float(drawn.min()), float(drawn.max()), 0.08, 0.05))
+        axes.set_ylim(*layout.padded(float(drawn.min()), float(drawn.max()), 0.08, 0.05))
 
 
 def _runs(*columns: NDArray[np.float64]) -> Sequence[NDArray[np.intp]]:

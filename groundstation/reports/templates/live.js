@@ -1,4 +1,5 @@
 // Figures to zoom into: what reports/live.py took from the axes of each figure, drawn by uPlot in place of its picture.
+// What cannot be drawn so, a map, a forest, stays its picture: there the view is narrowed to what was chosen.
 "use strict";
 (() => {
   const page = JSON.parse(document.getElementById("live").textContent);
@@ -10,8 +11,11 @@
   const LEFT_PX = 66, NAMES_PX = 124, BESIDE_PX = 46; // room for the vertical axis: of a row's first panel, of the others
   const timed = []; // plots over flight time: their axes move together
   const colourOf = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const INKS = { "#1c2530": "--ink", "#6b7683": "--faint" };
-  const shown = (colour) => (INKS[colour] ? colourOf(INKS[colour]) : colour);
+  const INKS = { "#1c2530": "--ink", "#6b7683": "--faint", "#cfe5dd": "--fill" };
+  const shown = (colour) => {
+    const name = INKS[colour.length === 9 && colour.endsWith("ff") ? colour.slice(0, 7) : colour];
+    return name ? colourOf(name) : colour;
+  };
 
   const clock = (seconds) => {
     const whole = Math.round(Math.abs(seconds)), two = (number) => String(number).padStart(2, "0");
@@ -246,18 +250,119 @@
       const tell = readout(box, row, isFirst);
       const line = box.appendChild(document.createElement("div"));
       line.className = "live-row";
+      const lefts = row.map((panel, at) => (at && !isNarrow ? (panel.titles[2] ? LEFT_PX : BESIDE_PX) : first));
       const sum = row.reduce((total, panel) => total + panel.place[2], 0);
-      const spare = room - first - BESIDE_PX * (row.length - 1);
+      const spare = room - lefts.reduce((total, left) => total + left, 0);
       row.forEach((panel, at) => {
         const cell = line.appendChild(document.createElement("div"));
         if (panel.titles[0]) cell.append(Object.assign(document.createElement("div"), { className: "panel-title", textContent: panel.titles[0] }));
-        const left = at && !isNarrow ? BESIDE_PX : first;
+        const left = lefts[at];
         const width = isNarrow ? room : left + (spare * panel.place[2]) / sum;
         const height = Math.round(panel.place[3] * PX_PER_MM) + (hasTimes ? 34 : 14) + (panel.titles[1] ? TITLED_PX : 0);
         draw(cell, panel, Math.floor(width), height, left, hasTimes, tell);
       });
     }
   }
+
+  const PT_PER_MM = 72 / 25.4, SVG = "http://www.w3.org/2000/svg", NEAR_SHARE = 0.04, LEAST_PT = 4;
+  const valueOf = (range, share, isLog) => (isLog ? range[0] * (range[1] / range[0]) ** share : range[0] + share * (range[1] - range[0]));
+  const shareOf = (range, value, isLog) => (isLog ? Math.log(value / range[0]) / Math.log(range[1] / range[0]) : (value - range[0]) / (range[1] - range[0]));
+
+  function nearestSample(frame, x, y) {
+    // The value of the sample nearest to a place, given in shares of the axes; nothing far from all of them.
+    const [xs, ys, values] = frame.samples.map((place) => arrays[place]);
+    let [best, least] = [null, NEAR_SHARE ** 2];
+    xs.forEach((value, row) => {
+      if (value == null || ys[row] == null) return;
+      const far = (shareOf(frame.x, value, frame.log[0]) - x) ** 2 + (shareOf(frame.y, ys[row], frame.log[1]) - y) ** 2;
+      if (far < least) [best, least] = [values[row], far];
+    });
+    return best;
+  }
+
+  function found(frame, x, y) {
+    // Name and value of what stands at a place of the axes, given in shares of them.
+    const [across, up] = [valueOf(frame.x, x, frame.log[0]), valueOf(frame.y, y, frame.log[1])];
+    const name = frame.names.slice().sort((one, two) => Math.abs(one[0] - up) - Math.abs(two[0] - up))[0];
+    const sample = frame.samples ? nearestSample(frame, x, y) : null;
+    const seen = [[frame.titles[1], told(frame, across)], name ? ["", name[1]] : [frame.titles[2], plain(up)]];
+    if (sample != null) seen.unshift([frame.of, frame.of === "flight time" ? clock(sample) : plain(sample)]);
+    return seen;
+  }
+
+  function extent(frame, [left, low], [right, high]) {
+    // What a narrowed view shows of the axes, whose own scales may lie outside it.
+    const within = (range, one, two, isLog) => [one, two].map((share) => valueOf(range, Math.min(Math.max(share, 0), 1), isLog));
+    const x = within(frame.x, left, right, frame.log[0]).map((value) => told(frame, value));
+    const y = within(frame.y, low, high, frame.log[1]).map(plain);
+    const seen = [[frame.titles[1], x.join(" \u2026 ")]];
+    return frame.names.length ? seen : [...seen, [frame.titles[2], y.join(" \u2026 ")]];
+  }
+
+  function picture(host, frames) {
+    const svg = host.querySelector("svg"), [width, height] = [svg.viewBox.baseVal.width, svg.viewBox.baseVal.height];
+    const line = host.insertBefore(document.createElement("div"), svg), chosen = document.createElementNS(SVG, "rect");
+    line.className = "readout";
+    chosen.setAttribute("class", "chosen");
+    let view = [0, 0, width, height], start = null;
+    const say = (seen) => line.replaceChildren(...seen.map(([name, value]) => {
+      const entry = document.createElement("span");
+      entry.append(name, Object.assign(document.createElement("b"), { textContent: value }));
+      return entry;
+    }));
+    const sharesIn = (frame, [x, y]) => {
+      const [left, bottom, wide, high] = frame.place.map((value) => value * PT_PER_MM);
+      return [(x - left) / wide, (height - y - bottom) / high];
+    };
+    const frameAt = (place) => frames.find((frame) => sharesIn(frame, place).every((share) => share >= 0 && share <= 1));
+    const rest = () => {
+      const frame = frameAt([view[0] + view[2] / 2, view[1] + view[3] / 2]);
+      const corners = [[view[0], view[1] + view[3]], [view[0] + view[2], view[1]]];
+      say(frame && view[2] < width ? extent(frame, ...corners.map((place) => sharesIn(frame, place))) : []);
+    };
+    const tell = (place) => {
+      const frame = frameAt(place);
+      if (frame) say(found(frame, ...sharesIn(frame, place)));
+      else rest();
+    };
+    const show = (next) => {
+      view = next;
+      svg.setAttribute("viewBox", view.join(" "));
+      host.classList.toggle("is-zoomed", view[2] < width);
+      rest();
+    };
+    const placeOf = (event) => {
+      const box = svg.getBoundingClientRect();
+      return [view[0] + ((event.clientX - box.left) / box.width) * view[2], view[1] + ((event.clientY - box.top) / box.height) * view[3]];
+    };
+    const between = (one, two) => [Math.min(one[0], two[0]), Math.min(one[1], two[1]), Math.abs(one[0] - two[0]), Math.abs(one[1] - two[1])];
+    svg.addEventListener("pointerdown", (event) => {
+      if (event.pointerType !== "mouse" || event.button) return;
+      event.preventDefault();
+      svg.setPointerCapture(event.pointerId);
+      start = placeOf(event);
+    });
+    svg.addEventListener("pointermove", (event) => {
+      const here = placeOf(event);
+      tell(here);
+      if (!start) return;
+      const box = between(start, here);
+      ["x", "y", "width", "height"].forEach((name, at) => chosen.setAttribute(name, box[at]));
+      svg.append(chosen);
+    });
+    svg.addEventListener("pointerup", (event) => {
+      if (!start) return;
+      const [x, y, wide, high] = between(start, placeOf(event));
+      start = null;
+      chosen.remove();
+      if (Math.max(wide, high) < (LEAST_PT * view[2]) / width) return;
+      const across = Math.max(wide, (high * width) / height), up = (across * height) / width; // of the picture's shape
+      show([x + (wide - across) / 2, y + (high - up) / 2, across, up]);
+    });
+    svg.addEventListener("pointerleave", rest);
+    svg.addEventListener("dblclick", () => show([0, 0, width, height]));
+  }
+  for (const host of document.querySelectorAll(".plot[data-framed]")) picture(host, page.pictures[Number(host.dataset.framed)]);
 
   const hosts = [...document.querySelectorAll(".plot[data-live]")];
   const seen = new IntersectionObserver((entries) => {

@@ -3,7 +3,7 @@
 import numpy as np
 import rerun.blueprint as rrb
 
-from groundstation.chapters import chapter_of
+from groundstation.chapters.by_answer import chapter_of
 from groundstation.chapters.generic import columns_by_unit, figures_over_time, quantity, titled
 from groundstation.chapters.markdown import markdown
 from groundstation.results.answer import Answer

@@ -1,20 +1,23 @@
-"""Landing by locators: deviations from course and glide path with their bands, and what was found."""
+"""Landing by locators: deviations from course and glide path with their bands, over each approach's own time."""
 
 import numpy as np
 import rerun.blueprint as rrb
 
 from groundstation.chapters.landing_beacons import landing_beacons as chapter
 from groundstation.chapters.markdown import markdown
+from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
-from groundstation.results.landing_beacons import BeaconLanding
+from groundstation.results.landing_beacons import BeaconApproachRow, BeaconLanding
 from groundstation.results.landing_categories import LINEAR_95
 from groundstation.viewer import colours
 from groundstation.viewer.recorder import Line, Recorder
-from groundstation.viewer.series import gap_after
-from groundstation.viewer.views import document, figure_of, numbers, plot
+from groundstation.viewer.run_chart import Run, RunChart
+from groundstation.viewer.views import document, figure_of, numbers
 
 DEVIATIONS = (("lateral", "Right of course, m", 150.0), ("glide_path", "Above glide path, m", 40.0))
-BOLD, THIN = 1.5, 1.0
+FARTHEST_M, NEAREST_M = 6000.0, -1000.0
+SMALL, THIN, BOLD = 1.2, 1.0, 1.5
+MOST_APPROACHES = 6
 
 
 def landing_beacons(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
@@ -24,21 +27,28 @@ def landing_beacons(recorder: Recorder, results: FlightResults) -> rrb.Container
     if answer is None or section is None or data is None:
         return None
     recorder.document("landing_beacons/answer", markdown(section))
-    time_ns = recorder.time_ns(numbers(data, "time_s"))
-    views: list[rrb.View] = []
-    for column, title, most in DEVIATIONS:
-        half = LINEAR_95 * numbers(data, f"{column}_sigma_m")
-        path, gaps = f"landing_beacons/{column}", gap_after(time_ns)
-        place = np.clip(numbers(data, f"{column}_m"), -most, most)
-        name = Line("95 % of one place, m", colours.HONEST, THIN)
-        recorder.band(f"{path}/a_band", time_ns, np.zeros(len(half)), np.clip(half, 0.0, most), name, gaps)
-        line = Line("deviation, m", colours.ANSWER, BOLD)
-        recorder.lines(f"{path}/b_deviation", time_ns, place[:, None], [line], gaps)
-        views.append(plot(f"{title} (cut at {most:g} m)", path, axis_range=(-most, most)))
-    path = "landing_beacons/distance"
-    far = numbers(data, "before_threshold_m")[:, None]
-    recorder.lines(path, time_ns, far, [Line("before the threshold, m", colours.LIGHT, BOLD)], gap_after(time_ns))
-    views.append(plot("Before the threshold, m", path, axis_range=(-1000.0, 6000.0)))
+    tabs = [_approach(recorder, one, data) for one in answer.approaches[:MOST_APPROACHES]]
+    approaches = tabs[0] if len(tabs) == 1 else rrb.Tabs(contents=tabs, active_tab=0)
     text = document("What was found", "landing_beacons/answer")
-    contents: list[rrb.View | rrb.Container] = [rrb.Vertical(contents=views), text]
-    return rrb.Horizontal(contents=contents, column_shares=[3.0, 2.0], name="Landing by locators")
+    return rrb.Horizontal(contents=[approaches, text], column_shares=[3.0, 2.0], name="Landing by locators")
+
+
+def _approach(recorder: Recorder, one: BeaconApproachRow, data: FigureData) -> rrb.Container:
+    """Deviations of one approach and its distance, from its start to its end; what lies beyond the axes is cut."""
+    mine = np.flatnonzero(numbers(data, "approach") == one.approach)
+    column = {name: numbers(data, name)[mine] for name in data.columns}
+    run, time_s, path = Run(one.start_s, one.end_s), column["time_s"], f"landing_beacons/{one.approach}"
+    band, dots = Line("95 % of one place", colours.HONEST, BOLD), Line("deviation", colours.ANSWER, SMALL)
+    views: list[rrb.View] = []
+    for name, title, most in DEVIATIONS:
+        half = np.clip(LINEAR_95 * column[f"{name}_sigma_m"], 0.0, most)
+        chart = RunChart(recorder, f"{path}/{name}", f"{title},", run, [], (-most, most))
+        chart.band("a_band", time_s, -half, half, band)
+        chart.dots("b_deviation", time_s, np.clip(column[f"{name}_m"], -most, most), dots)
+        views.append(chart.view([band, dots]))
+    line = Line("before the threshold", colours.LIGHT, THIN)
+    chart = RunChart(recorder, f"{path}/distance", "Before the threshold, m,", run, [], (NEAREST_M, FARTHEST_M))
+    far = column["before_threshold_m"]
+    chart.line("line", time_s, np.where((far > NEAREST_M) & (far < FARTHEST_M), far, np.nan), line)
+    views.append(chart.view())
+    return rrb.Vertical(contents=views, name=f"Approach {one.approach}")

@@ -8,8 +8,10 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from groundstation.base.ellipse import ELLIPSE_95
 from groundstation.base.geodesy import north_east_m, on_earth
 from groundstation.base.records import BoolArray
+from groundstation.results.corrected_position import corrected_position
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.viewer import colours
@@ -39,7 +41,9 @@ def track(recorder: Recorder, results: FlightResults, figure: FigureData) -> rrb
     pieces, shades = _pieces(results, time_s, known)
     north, east = north_east_m(positions[:, 0], positions[:, 1], *positions[known][0].tolist())
     space = flight_space(recorder, figure, np.column_stack([east, north]), pieces, shades)
-    plan = _plan(recorder, time_s, np.column_stack([east, -north]), known, pieces, shades)
+    plan_m = np.column_stack([east, -north])
+    ellipses = _ellipses(recorder, results, positions[known][0], plan_m[known])
+    plan = _plan(recorder, time_s, plan_m, known, pieces, shades, ellipses)
     views = [plan, _map(recorder, time_s, positions, known, pieces, shades)]
     return rrb.Tabs(contents=[*([] if space is None else [space]), *views], active_tab=0)
 
@@ -51,8 +55,12 @@ def _plan(
     known: BoolArray,
     pieces: list[slice],
     shades: list[Colour],
+    ellipses: str,
 ) -> rrb.Spatial2DView:
-    """Log the plan: ``points`` are metres east and south, for the axes of a Rerun picture run right and down."""
+    """Log the plan: ``points`` are metres east and south, for the axes of a Rerun picture run right and down.
+
+    ``ellipses`` says in the title what those on it are.
+    """
     low, high = bounds_of(points[known])
     recorder.static("plan/grid", grid(low, high))
     recorder.static(
@@ -79,8 +87,33 @@ def _plan(
     )
     bounds = rrb.VisualBounds2D(x_range=[low[0], high[0]], y_range=[low[1], high[1]])
     unit = grid_unit(float((high - low).max()))[0]
-    name = f"Plan, {unit} east and north"
+    name = f"Plan, {unit} east and north{ellipses}"
     return rrb.Spatial2DView(name=name, origin="/plan", visual_bounds=bounds)
+
+
+def _ellipses(recorder: Recorder, results: FlightResults, origin_deg: FloatArray, points: FloatArray) -> str:
+    """Log 95 % ellipses of the corrected position along the plan and at the cursor; what they are, empty for none."""
+    corrected = corrected_position(results)
+    if corrected is None:
+        return ""
+    larger = corrected.larger(float(np.ptp(points, axis=0).max()))
+    north, east = north_east_m(corrected.latitude_deg, corrected.longitude_deg, *origin_deg.tolist())
+    middle = np.column_stack([east, -north]).astype(np.float32)
+    half = larger * ELLIPSE_95 * np.column_stack([corrected.sigma_east_m, corrected.sigma_north_m]).astype(np.float32)
+    thin, rows = rr.Radius.ui_points(GRID_LINE), corrected.along()
+    along = rr.Ellipses2D(
+        half_sizes=half[rows], centers=middle[rows], colors=[colours.INS], line_radii=thin, draw_order=2.5
+    )
+    recorder.static("plan/ellipses", along)
+    now = rr.Ellipses2D.from_fields(colors=[colours.PAPER], line_radii=thin, draw_order=2.6)
+    recorder.static("plan/ellipse_now", now)
+    recorder.stream.send_columns(
+        "plan/ellipse_now",
+        recorder.indexes(recorder.time_ns(corrected.time_s)),
+        rr.Ellipses2D.columns(half_sizes=half, centers=middle),
+    )
+    size = f", {larger} times" if larger > 1 else ""
+    return f"; ellipses: 95 % of the corrected position{size}"
 
 
 def bounds_of(points: FloatArray) -> tuple[FloatArray, FloatArray]:

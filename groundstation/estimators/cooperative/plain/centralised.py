@@ -7,7 +7,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import Int64Array
 from groundstation.estimators.cooperative.arrays import HEIGHT, PEER, POINT
-from groundstation.estimators.cooperative.centralised import reports
+from groundstation.estimators.cooperative.centralised import is_about_reckoning, reports
 from groundstation.estimators.cooperative.events import Prepared
 from groundstation.estimators.cooperative.joint import KNOWN_WRONG_SIGMAS
 from groundstation.estimators.cooperative.judging import PATIENCE
@@ -23,7 +23,7 @@ class _Joint:
     """State x and covariance P of all vehicles and uncertain points."""
 
     def __init__(self, prepared: Prepared, settings: CooperativeSettings) -> None:
-        self.prepared, self.about_reckoning = prepared, settings.derivatives == "reckoning"
+        self.prepared, self.about_reckoning = prepared, is_about_reckoning(prepared, settings)
         starts = [vehicle.start() for vehicle in prepared.vehicles]
         sizes = [len(x) for x, _ in starts]
         edges = np.concatenate([[0], np.cumsum(sizes)])

@@ -300,7 +300,7 @@ class Decentralised:
                 if used.offer.heard is not None and used.offer.heard.message.shared is not None:
                     told[number] = used.told @ used.offer.heard.message.shared
             R = R + self._through_what_they_share(rows, told)
-        cross = shared @ Hc.T if self._algorithm == "modified" else np.zeros((len(own.x), len(rows)))
+        cross = shared @ (Hc + told @ self._inverse_Pc).T  # the points' errors are in the state and in what is told
         S = H @ own.P @ H.T + H @ cross + cross.T @ H.T + R
         gain = np.linalg.solve(S, (own.P @ H.T + cross).T).T
         x = own.x + gain @ np.array([used.row.innovation for used in rows])

@@ -1,0 +1,26 @@
+"""Rows of words in aligned columns, for a terminal."""
+
+from collections.abc import Collection, Sequence
+
+GAP = "  "
+
+
+def columns(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
+    """Lay rows out in aligned columns; those numbered in ``right`` are aligned to the right.
+
+    Examples
+    --------
+    >>> print(columns([["topic", "rows"], ["ins", "3020"], ["baro", "302"]], right=(1,)))
+    topic  rows
+    ins    3020
+    baro    302
+    """
+    widths = [max(len(row[place]) for row in rows) for place in range(len(rows[0]))]
+    lines = []
+    for row in rows:
+        cells = [
+            cell.rjust(width) if place in right else cell.ljust(width)
+            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append(GAP.join(cells).rstrip())
+    return "\n".join(lines)

@@ -1,0 +1,48 @@
+"""The corrected position of an unaided INS with its sigmas, as pages and recordings draw it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.ellipse import ELLIPSE_95, magnified
+from groundstation.results.figures import numbers
+from groundstation.results.flight import FlightResults
+
+FloatArray = NDArray[np.float64]
+SHOWN_ALONG = 8  # ellipses of a track
+
+
+@dataclass(frozen=True)
+class CorrectedPosition:
+    """INS minus its estimated error, with the sigmas north and east, arrays of shape (n,); their errors are apart."""
+
+    time_s: FloatArray
+    latitude_deg: FloatArray
+    longitude_deg: FloatArray
+    sigma_north_m: FloatArray
+    sigma_east_m: FloatArray
+
+    def along(self) -> NDArray[np.int64]:
+        """Rows whose ellipses are drawn along a track, evenly spread."""
+        return np.unique(np.linspace(0, len(self.time_s) - 1, SHOWN_ALONG).round().astype(np.int64))
+
+    def larger(self, side_m: float) -> int:
+        """How many times their size the 95 % ellipses are drawn on a map of a given side."""
+        half_m = ELLIPSE_95 * np.hypot(self.sigma_north_m, self.sigma_east_m)[self.along()]
+        return magnified(side_m, float(np.median(half_m)))
+
+
+def corrected_position(results: FlightResults) -> CorrectedPosition | None:
+    """The rows with a place and finite sigmas; None of an INS that was not corrected."""
+    track, states = results.figure_with_rows("inertial_track"), results.figure_with_rows("inertial_states")
+    names = "corrected_latitude_deg", "corrected_longitude_deg"
+    sigmas = "north_position_sigma_m", "east_position_sigma_m"
+    if track is None or states is None or len(track) != len(states):
+        return None
+    if not (set(names) <= set(track.columns) and set(sigmas) <= set(states.columns)):
+        return None
+    columns = [numbers(track, "time_s"), *(numbers(track, name) for name in names)]
+    columns += [numbers(states, name) for name in sigmas]
+    known = np.isfinite(columns).all(axis=0)
+    return CorrectedPosition(*(column[known] for column in columns)) if known.any() else None
