@@ -32,6 +32,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "run": (
         "run flight3.ulg -o out",
         "run logs -o out --aircraft aircraft.toml --site airfield.toml",
+        "run flight3.ulg --reference sbet_20250708.out -o out",
         "run logs -o out --dry-run",
     ),
     "report": ("report out",),
@@ -120,6 +121,16 @@ IntervalsFile = Annotated[
 ThresholdsFile = Annotated[
     Path | None,
     typer.Option("--thresholds", help="Limits of the integrity ledger (TOML).", metavar="FILE", readable=False),
+]
+ReferenceFiles = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--reference",
+        help="Reference beside the log (SBET, .pos, another log), or a folder of them: judges the results, is seen by "
+        "no estimator.",
+        metavar="FILE",
+        readable=False,
+    ),
 ]
 
 
