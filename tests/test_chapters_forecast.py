@@ -165,7 +165,7 @@ def test_captions_say_which_starts_and_how_many_states() -> None:
     assert "These starts are not those of the table of skill: they come every 60 s from 10 min" in (
         grid(section, "Outages by phase of flight").caption
     )
-    assert grid(section, "Coupled model").caption.startswith("Fourteen states")
+    assert grid(section, "Coupled model").caption.startswith("Sixteen states")
     assert grid(section, SKILL).caption.replace("\u202f", " ").startswith("Starts every 300 s from 1:20:00 of flight")
 
 

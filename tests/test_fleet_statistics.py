@@ -229,6 +229,14 @@ def test_normals_are_those_of_all_samples_together() -> None:
     assert b.mean_deg == pytest.approx(np.mean(np.concatenate(parts[:2])))  # not the mean of the means
 
 
+def test_flights_are_judged_one_by_one_where_they_have_starts_enough() -> None:
+    merger = SkillMerger()
+    for verdict in (True, False, True, None):
+        merger.add(SkillOfFlight("noise_bank", 60.0, 10, 100.0, 0.9, is_within=verdict))
+    (row,) = merger.rows()
+    assert (row.flights, row.flights_judged, row.flights_within) == (4, 3, 2)
+
+
 def test_skill_is_what_all_starts_in_one_array_give() -> None:
     rng = np.random.default_rng(14)
     errors = [np.abs(rng.normal(0.0, scale, size)) for scale, size in ((1.0, 3), (10.0, 40), (100.0, 7))]

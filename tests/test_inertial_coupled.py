@@ -16,8 +16,8 @@ from groundstation.estimators.inertial.coupled import (
     EAST,
     NORTH,
     CoupledRun,
-    CraftMotion,
 )
+from groundstation.estimators.inertial.craft_motion import CraftMotion
 from groundstation.estimators.inertial.differences import Differences, drag_per_s
 from groundstation.estimators.inertial.filter import PATIENCE_S, Epochs, run_filter
 from groundstation.estimators.inertial.hindcast import hindcast

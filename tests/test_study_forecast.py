@@ -15,8 +15,15 @@ from groundstation.results.forecast import METHODS
 from groundstation.simulation.inertial_family import simulate_family
 from groundstation.studies import forecast_tables
 from groundstation.studies.forecast import study_forecast
-from groundstation.studies.forecast_cases import FIRST_SEED, Case, epochs_of, study_cases
-from groundstation.studies.forecast_runs import METHOD_NAMES, STUDY_HORIZONS_MIN, Outcome, replay_flight, run_cases
+from groundstation.studies.forecast_cases import FIRST_SEED, NEW_ROUTES, Case, epochs_of, study_cases
+from groundstation.studies.forecast_runs import (
+    COUPLED,
+    METHOD_NAMES,
+    STUDY_HORIZONS_MIN,
+    Outcome,
+    replay_flight,
+    run_cases,
+)
 from groundstation.studies.forecast_tables import BETTER, UNDECIDED, WORSE, Resampled, finding
 from groundstation.studies.page import StudyResult
 
@@ -77,6 +84,9 @@ def test_sigma_of_the_matched_last_estimate_is_honest(outcomes: dict[str, tuple[
     assert table["coverage95"][chosen] == pytest.approx(0.95, abs=COVERAGE_SPREAD)
     assert table["coverage95_model"][chosen] == pytest.approx(0.95, abs=COVERAGE_SPREAD)
     assert ((table["coverage50"] < table["coverage68"]) & (table["coverage68"] < table["coverage95"])).all()
+    share = table["flights_within"][table["method"] == "last_estimate"]
+    assert (share >= 0.6).all()  # of 12 flights that the model fits: fewer than 8 once in 10 000 times
+    assert (table["coverage95_worst"] <= table["coverage95"] + table["coverage95_sigma"]).all()
     inside = (table["first_model"] >= table["first_low"]) & (table["first_model"] <= table["first_high"])
     assert inside[table["method"] == "last_estimate"].all()
 
@@ -105,7 +115,9 @@ def test_seeds_were_not_used_for_tuning_and_pairs_share_flights() -> None:
     assert CASES["coloured"].seed == CASES["inflated"].seed == CASES["gated"].seed
     assert CASES["coloured"].family == CASES["inflated"].family
     assert CASES["matched"].family == CASES["walk"].family
-    assert sum(case.is_held_out for case in CASES.values()) == 3
+    assert sum(case.is_held_out for case in CASES.values()) == 8
+    assert [case.name for case in CASES.values() if case.is_new] == list(NEW_ROUTES)
+    assert all(case.family.each_its_own == case.is_new for case in CASES.values())
 
 
 def test_a_case_measures_what_it_says() -> None:
@@ -121,7 +133,7 @@ def test_a_case_measures_what_it_says() -> None:
 
 def flat(value: float) -> Outcome:
     """A flight on which every method errs by ``value`` metres, the windows by half as much again."""
-    squares = np.full((len(METHODS), 5, len(STUDY_HORIZONS_MIN)), value**2)
+    squares = np.full((len(METHOD_NAMES), 5, len(STUDY_HORIZONS_MIN)), value**2)
     squares[METHOD_NAMES.index("windows")] *= 1.5**2
     return Outcome(squares, 0.0, None)
 
@@ -155,10 +167,12 @@ def test_study_writes_its_tables_and_page() -> None:
     tables: dict[str, FigureData] = {table.name: table for table in study.tables}
     assert len(tables) == len(study.tables)
     assert all(len(table) for table in study.tables)
-    assert set(tables["forecast_rms"]["method"]) == set(METHODS)
+    assert set(tables["forecast_rms"]["method"]) == {*METHODS, COUPLED}
+    held_out = {case.name for case in CASES.values() if case.is_held_out}
+    assert set(tables["forecast_rms"]["case"][tables["forecast_rms"]["method"] == COUPLED]) == held_out
     assert set(tables["forecast_rms"]["starts"]) == {"all", "1.5 h", "2 h", "2.5 h", "3 h"}
     assert set(tables["forecast_rms"]["case"]) == set(CASES)
-    assert set(tables["forecast_honesty"]["case"]) == {"matched", "i21", "straight", "manoeuvring"}
+    assert set(tables["forecast_honesty"]["case"]) == {"matched", *held_out}
     for text in ("Are windows better than the last estimate?", "Best by score: ", "confirmed at "):
         assert text in study.markdown
     assert "nan" not in study.markdown

@@ -136,7 +136,9 @@ class FleetSkill:
     """Forecast skill of a method at a horizon over all flights: mean squares and coverage merged by starts.
 
     ``rms_m`` is over all starts of all flights; ``median_flight_rms_m``, ``highest_flight_rms_m`` over the flights'
-    own RMS; ``coverage95`` over the ``coverage_starts`` starts that had a band, None without any.
+    own RMS; ``coverage95`` over the ``coverage_starts`` starts that had a band, None without any. Outages of one flight
+    overlap, so a flight's own coverage says little: of the ``flights_judged`` with enough independent starts
+    ``flights_within`` had a NEES within its 95 % limits.
     """
 
     method: str
@@ -148,6 +150,8 @@ class FleetSkill:
     highest_flight_rms_m: float
     coverage95: float | None
     coverage_starts: int
+    flights_judged: int = 0
+    flights_within: int = 0
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from typing import ClassVar
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 
+WITHIN, TOO_FEW = "within limits", "too few to judge"  # what NEES says
 FEWEST_STARTS = 5  # independent ones: with fewer the limits of NEES are so wide that anything passes
 
 # Names of the contract, in the order they are shown; titles for people.
@@ -159,7 +160,7 @@ def honesty(independent_starts: int, nees: float, nees_low: float, nees_high: fl
     'too few to judge'
     """
     if independent_starts < FEWEST_STARTS:
-        return "too few to judge"
+        return TOO_FEW
     if nees > nees_high:
         return "too sure"
-    return "modest" if nees < nees_low else "within limits"
+    return "modest" if nees < nees_low else WITHIN

@@ -5,7 +5,7 @@ from groundstation.studies import forecast_tables as tables
 from groundstation.studies.forecast_cases import study_cases
 from groundstation.studies.forecast_consistency import RUNS, consistency_table
 from groundstation.studies.forecast_page import page
-from groundstation.studies.forecast_runs import Progress, run_cases
+from groundstation.studies.forecast_runs import COUPLED, Progress, run_cases
 from groundstation.studies.page import StudyResult
 
 CALIBRATED_SHARE = 0.3  # of the flights: sigmas take longer than forecasts, and their shares converge sooner
@@ -19,7 +19,7 @@ def study_forecast(runs: int = 200, seed: int = 71, progress: Progress | None = 
     runs : int
         Flights of each case; 200 give a ratio of two methods to some 5 %.
     seed : int
-        Family seeds are ``50 000 + 10 seed`` and the four that follow.
+        Family seeds are ``50 000 + 10 seed`` and the nine that follow.
     progress : callable, optional
         Called with one line for each flight.
     """
@@ -38,5 +38,7 @@ def study_forecast(runs: int = 200, seed: int = 71, progress: Progress | None = 
         tables.gate_table(outcomes),
         consistency_table(cases[0].seed, min(runs, RUNS)),
     )
-    text = page(cases, {table.name: table for table in found}, runs, calibrated, settings.default_method)
+    is_coupled = settings.model == "coupled" and settings.default_method == tables.REFERENCE
+    shipped = COUPLED if is_coupled else settings.default_method
+    text = page(cases, {table.name: table for table in found}, runs, calibrated, shipped)
     return StudyResult("forecast", found, text)

@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.units import MPS2_PER_G
-from groundstation.estimators.inertial.differences import drag_per_s
+from groundstation.estimators.inertial.differences import Differences, drag_per_s
 from groundstation.estimators.inertial.filter import STANDARD_GATE, Epochs
 from groundstation.estimators.inertial.model import ChannelModel
 from groundstation.estimators.inertial.noise import GnssNoise, InsNoise, load_class
@@ -14,6 +14,7 @@ from groundstation.simulation.channel_truth import RADIUS_M
 from groundstation.simulation.inertial_family import ErrorBatch, FamilySettings
 from groundstation.simulation.inertial_family import GnssNoise as SimulatedGnss
 from groundstation.simulation.ins_class import InsClass, load_ins_class
+from groundstation.simulation.routes import RouteKind
 
 FIRST_SEED = 50_000  # no smaller seed belongs to a study: those below were used for tuning the classes
 SEEDS_PER_STUDY = 10
@@ -21,6 +22,13 @@ WHITE_M = 10.0
 COLOURED_M, COLOURED_S, TAKEN_FOR_M = 10.0, 300.0, 3.0
 WALKS_DPH_PER_SQRT_H = (0.03, 0.1)  # three and ten times the constant drift of the class, within an hour
 NO_GATE = 1e12
+NEW_ROUTES: dict[str, RouteKind] = {
+    "own_straight": "straight",
+    "out_and_back": "out_and_back",
+    "dogleg": "dogleg",
+    "racetrack": "racetrack",
+    "late_survey": "late_survey",
+}
 RECEIVER = SimulatedGnss(
     position_white_m=2.0,
     position_correlated_m=3.0,
@@ -53,6 +61,8 @@ class Case:
         Whether the study looks at the sigma of the forecasts, too.
     is_held_out : bool
         Whether the flights stand for real ones, on which the methods are compared for good.
+    is_new : bool
+        Whether nothing was tuned on flights of its route; fewer of them are flown (docs/forecast-family.md).
     """
 
     name: str
@@ -65,6 +75,7 @@ class Case:
     is_misled: bool = False
     is_calibrated: bool = False
     is_held_out: bool = False
+    is_new: bool = False
 
 
 def study_cases(seed: int) -> tuple[Case, ...]:
@@ -73,7 +84,8 @@ def study_cases(seed: int) -> tuple[Case, ...]:
     Examples
     --------
     >>> [case.name for case in study_cases(0)]
-    ['matched', 'coloured', 'gated', 'inflated', 'walk', 'larger_walk', 'i21', 'straight', 'manoeuvring']
+    ['matched', 'coloured', 'gated', 'inflated', 'walk', 'larger_walk', 'i21', 'straight', 'manoeuvring',
+    'own_straight', 'out_and_back', 'dogleg', 'racetrack', 'late_survey']
     """
     first = FIRST_SEED + SEEDS_PER_STUDY * seed
     ins = load_ins_class("i-21")
@@ -108,14 +120,29 @@ def study_cases(seed: int) -> tuple[Case, ...]:
         full_case("i21", "full truth, I-21 class, Norilsk to Moscow", "i-21", "norilsk_moscow", first + 2),
         full_case("straight", "full truth, navigation grade, straight", "navigation", "straight", first + 3),
         full_case("manoeuvring", "full truth, navigation grade, manoeuvring", "navigation", "manoeuvring", first + 4),
+        *(own_case(name, route, first + place) for place, (name, route) in enumerate(NEW_ROUTES.items(), start=5)),
     )
 
 
-def full_case(name: str, title: str, ins_class: str, route: str, seed: int) -> Case:
+def full_case(name: str, title: str, ins_class: str, route: RouteKind, seed: int) -> Case:
     """A case of full truth, filtered with the noise of its class as shipped."""
-    family = FamilySettings(ins=ins_class, route=route, gnss=RECEIVER)  # type: ignore[arg-type]
+    family = FamilySettings(ins=ins_class, route=route, gnss=RECEIVER)
     noise = load_class(ins_class)
     return Case(name, title, family, seed, noise, uses_velocity=True, is_calibrated=True, is_held_out=True)
+
+
+def own_case(name: str, route: RouteKind, seed: int) -> Case:
+    """A case of a route nothing was tuned on, every flight with an instrument of its own."""
+    title = f"navigation grade, {route.replace('_', ' ')}, each flight its own instrument"
+    case = full_case(name, title, "navigation", route, seed)
+    return replace(case, family=replace(case.family, each_its_own=True), is_new=True)
+
+
+def differences_of(batch: ErrorBatch, row: int, epochs: Epochs) -> Differences:
+    """Epochs of one simulated flight with the motion of its INS."""
+    velocity = np.stack([batch.velocity_north_mps[row], batch.velocity_east_mps[row]], axis=1)
+    place = (batch.latitude_deg[row], batch.longitude_deg[row], batch.altitude_m[row])
+    return Differences("ins", "gnss", epochs, *place, velocity, 0.0, (), batch.heading_deg[row])
 
 
 def matched_noise(ins: InsClass, gnss: GnssNoise) -> InsNoise:

@@ -9,19 +9,22 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import frozen
+from groundstation.estimators.inertial.coupled import coupled_variance, hindcast_coupled, run_coupled
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, run_filter
 from groundstation.estimators.inertial.hindcast import Hindcast, hindcast
-from groundstation.estimators.inertial.leads import built_up
+from groundstation.estimators.inertial.leads import MEMORY_S, built_up
 from groundstation.estimators.inertial.replay import plan_replay
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import QUANTILES, WITH_SIGMA, Claimed, claimed_sigma
 from groundstation.results.forecast import METHODS
 from groundstation.simulation.inertial_family import ErrorBatch, simulate_family
-from groundstation.studies.forecast_cases import Case, epochs_of, model_of
+from groundstation.studies.forecast_cases import Case, differences_of, epochs_of, model_of
 
 Progress = Callable[[str], None]
 
-METHOD_NAMES = tuple(METHODS)
+COUPLED = "coupled"  # the last estimate of the coupled model; the others are those of two separate channels
+METHOD_NAMES = (*METHODS, COUPLED)
+JUDGED_NAMES = (*WITH_SIGMA, COUPLED)
 STUDY_HORIZONS_MIN = (10.0, 30.0, 60.0, 84.0, 120.0)
 CLASSIC_START_H = (1.5, 2.0, 2.5, 3.0)
 SETS_OF_STARTS = ("all", *(f"{hours:g} h" for hours in CLASSIC_START_H))
@@ -35,12 +38,14 @@ class Honesty:
 
     Parameters
     ----------
-    inside, inside_model : ndarrays, shape (5, h, 3)
+    inside, inside_model : ndarrays, shape (7, h, 3)
         Shares of the channel errors inside the 50, 68 and 95 % bands, over all starts: sigma scaled, and by the model.
-    nees, nees_model : ndarrays, shape (5, h)
+    nees, nees_model : ndarrays, shape (7, h)
         Mean squared ratio of error to sigma over all starts and both channels.
-    first, first_model : ndarrays, shape (5, h)
+    first, first_model : ndarrays, shape (7, h)
         Sum of the squared ratios over both channels from the first start alone: flights are independent, starts not.
+    independent : ndarray, shape (h,)
+        How many independent starts the flight has.
     """
 
     inside: FloatArray
@@ -49,6 +54,7 @@ class Honesty:
     nees_model: FloatArray
     first: FloatArray
     first_model: FloatArray
+    independent: FloatArray
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -61,7 +67,7 @@ class Outcome:
 
     Parameters
     ----------
-    mean_square_m2 : ndarray, shape (8, 5, h)
+    mean_square_m2 : ndarray, shape (10, 5, h)
         Of the radial error built up, against the truth: method, set of starts (all; 1.5, 2, 2.5, 3 h), horizon; NaN
         where the horizon ends after the flight.
     rejected_share : float
@@ -99,7 +105,9 @@ def run_cases(
     """
     flights: list[tuple[list[Case], int]] = []
     for seed in dict.fromkeys(case.seed for case in cases):
-        flights += [([case for case in cases if case.seed == seed], run) for run in range(runs)]
+        together = [case for case in cases if case.seed == seed]
+        flown = calibrated_runs if together[0].is_new else runs
+        flights += [(together, run) for run in range(flown)]
     outcomes: dict[str, list[Outcome]] = {case.name: [] for case in cases}
 
     def fly(flight: tuple[list[Case], int]) -> list[Outcome]:
@@ -125,7 +133,9 @@ def replay_flight(case: Case, batch: ErrorBatch, row: int, is_calibrated: bool, 
     epochs = epochs_of(case, batch, row)
     run = run_filter(epochs, model_of(case, batch, row), case.noise, gate=case.gate)
     plan = plan_replay(run, settings)
-    replay = hindcast(run, plan.at, plan.lead_s, METHOD_NAMES, settings)
+    replay = hindcast(run, plan.at, plan.lead_s, tuple(METHODS), settings)
+    if case.is_held_out:
+        replay = _with_coupled(replay, case, batch, row, settings)
     since = slice(int(np.searchsorted(replay.start_s, settings.first_start_s - 1e-6)), None)
     truth = Epochs.plain(epochs.time_s, batch.position_error_m[row], batch.velocity_error_mps[row])
     judged = replay.of(since)
@@ -137,12 +147,37 @@ def replay_flight(case: Case, batch: ErrorBatch, row: int, is_calibrated: bool, 
     )
 
 
+def _with_coupled(replay: Hindcast, case: Case, batch: ErrorBatch, row: int, settings: InertialSettings) -> Hindcast:
+    """The replay with the last estimate of the coupled model beside the others."""
+    run = run_coupled(differences_of(batch, row, epochs_of(case, batch, row)), case.noise, settings)
+    forecast = hindcast_coupled(run, replay.at, replay.lead_s, settings)
+    variance = coupled_variance(run, replay.at, replay.lead_s)
+    return replace(
+        replay,
+        forecast_m=replay.forecast_m | {COUPLED: forecast},
+        variance_m2=replay.variance_m2 | {COUPLED: variance},
+    )
+
+
+def _claimed(method: str, run: FilterRun, replay: Hindcast, settings: InertialSettings) -> Claimed:
+    """What a method claims; the coupled last estimate as where the settings choose that model."""
+    if method == COUPLED:
+        own = {"last_estimate": replay.variance_m2[COUPLED]}
+        replay = replace(replay, forecast_m={"last_estimate": replay.forecast_m[COUPLED]}, variance_m2=own)
+        method = "last_estimate"
+    claimed = claimed_sigma(method, run, replay, settings)
+    assert claimed is not None
+    return claimed
+
+
 def mean_squares(replay: Hindcast) -> FloatArray:
     """Mean square of the radial error over each set of starts: shape (methods, sets, horizons)."""
     leads = leads_at(replay)
     classic = [np.flatnonzero(np.abs(replay.start_s - 3600.0 * hours) < 1.0) for hours in CLASSIC_START_H]
     out = np.full((len(METHOD_NAMES), len(SETS_OF_STARTS), len(leads)), np.nan)
     for index, method in enumerate(METHOD_NAMES):
+        if method not in replay.forecast_m:
+            continue
         square = np.square(replay.radial_m(method)[:, leads])
         for place, rows in enumerate((np.arange(len(square)), *classic)):
             out[index, place] = _mean_known(square[rows])
@@ -158,9 +193,11 @@ def _honesty(run: FilterRun, replay: Hindcast, since: slice, settings: InertialS
     """Errors over sigmas against what GNSS shows: its error at both ends belongs to the claim."""
     leads = leads_at(replay)
     parts: list[list[FloatArray]] = []
-    for method in WITH_SIGMA:
-        claimed = claimed_sigma(method, run, replay, settings)
-        assert isinstance(claimed, Claimed)
+    for method in JUDGED_NAMES:
+        if method not in replay.forecast_m:
+            parts.append([np.full_like(part, np.nan) for part in parts[0]])
+            continue
+        claimed = _claimed(method, run, replay, settings)
         error = replay.error_m(method)[since][:, leads]
         ratios = [np.square(error / sigma[since][:, leads]) for sigma in (claimed.scaled_m, claimed.model_m)]
         parts.append(
@@ -170,7 +207,13 @@ def _honesty(run: FilterRun, replay: Hindcast, since: slice, settings: InertialS
                 *(ratio[0].sum(axis=1) for ratio in ratios),
             ]
         )
-    return Honesty(*(np.stack([method[item] for method in parts]) for item in range(len(fields(Honesty)))))
+    starts_s = replay.start_s[since]
+    last_s = float(run.epochs.time_s[-1]) - 60.0 * np.array(STUDY_HORIZONS_MIN)
+    spans_s = np.minimum(last_s, starts_s[-1]) - starts_s[0]
+    independent = 1.0 + np.floor(spans_s / np.maximum(60.0 * np.array(STUDY_HORIZONS_MIN), MEMORY_S))
+    stacked = [np.stack([method[item] for method in parts]) for item in range(len(parts[0]))]
+    names = [item.name for item in fields(Honesty)]
+    return Honesty(**dict(zip(names, [*stacked, independent], strict=True)))
 
 
 def _share_inside(ratio: FloatArray, level: int) -> FloatArray:

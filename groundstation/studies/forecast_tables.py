@@ -8,16 +8,25 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.records import frozen
-from groundstation.estimators.inertial.skill import WITH_SIGMA
 from groundstation.results.figures import FigureData
 from groundstation.studies.forecast_cases import Case
-from groundstation.studies.forecast_runs import LEVELS, METHOD_NAMES, SETS_OF_STARTS, STUDY_HORIZONS_MIN, Outcome
+from groundstation.studies.forecast_runs import (
+    COUPLED,
+    JUDGED_NAMES,
+    LEVELS,
+    METHOD_NAMES,
+    SETS_OF_STARTS,
+    STUDY_HORIZONS_MIN,
+    Honesty,
+    Outcome,
+)
 
 DRAWS = 1000  # of the bootstrap: 95 % limits are good to 2 % of their distance
 TAIL = 0.025
 CHI_SQUARE_TAIL = 0.005  # either side of the 99 % limits
+WORST = 0.1
 REFERENCE = "last_estimate"
-COMPARED = ("windows", "drift_windows", "consistent_windows", "smoothed_start")
+COMPARED = ("windows", "drift_windows", "consistent_windows", "smoothed_start", "noise_bank", COUPLED)
 BETTER, WORSE, UNDECIDED = "better", "worse", "no difference shown"
 _ALL = SETS_OF_STARTS.index("all")
 
@@ -28,7 +37,7 @@ class Resampled:
 
     Parameters
     ----------
-    mean_square_m2 : ndarray, shape (1 + draws, 8, 5, h)
+    mean_square_m2 : ndarray, shape (1 + draws, 10, 5, h)
         First the flights themselves, then the bootstrap; flights are the independent units, starts are not.
     flights : int
     """
@@ -133,8 +142,12 @@ def held_out_table(cases: Sequence[Case], samples: dict[str, Resampled]) -> Figu
     ``against_best`` the same over the best method, with 95 % limits over flights.
     """
     held_out = [samples[case.name] for case in cases if case.is_held_out]
-    logs = {m: np.mean([np.log(s.ratio(m)).mean(axis=1) for s in held_out], axis=0) for m in METHOD_NAMES}
-    ranking = sorted(METHOD_NAMES, key=lambda method: float(logs[method][0]))
+    logs = {}
+    for method in METHOD_NAMES:
+        known = [sample.ratio(method) for sample in held_out]
+        if all(np.isfinite(ratio).all() for ratio in known):
+            logs[method] = np.mean([np.log(ratio).mean(axis=1) for ratio in known], axis=0)
+    ranking = sorted(logs, key=lambda method: float(logs[method][0]))
     rows = []
     for method in ranking:
         score = tuple(float(part) for part in interval(np.exp(logs[method])))
@@ -149,7 +162,9 @@ def honesty_table(outcomes: dict[str, tuple[Outcome, ...]], flights_at_least: in
 
     ``nees`` is the mean over all starts (1 is honest); ``first`` the mean over the first start of each flight, whose
     99 % limits come from chi-square with two degrees of freedom a flight. Columns ``_model`` are before the sigma is
-    scaled by the class and the flight's past. ``coverage95_sigma`` is the spread of the mean over flights.
+    scaled by the class and the flight's past. ``coverage95_sigma`` is the spread of the mean over flights,
+    ``coverage95_worst`` what the tenth of the flights with the least has at most. ``flights_within`` is the share of
+    the flights whose own NEES is within its 95 % limits, from the independent starts of each.
     """
     rows = []
     for case, several in outcomes.items():
@@ -164,16 +179,45 @@ def honesty_table(outcomes: dict[str, tuple[Outcome, ...]], flights_at_least: in
             float(chi_square_quantile(part, freedom)) / freedom for part in (CHI_SQUARE_TAIL, 1.0 - CHI_SQUARE_TAIL)
         ]
         spread = inside[..., LEVELS.index(95)].std(axis=0, ddof=1) / np.sqrt(len(known))
-        for index, method in enumerate(WITH_SIGMA):
+        within = _flights_within(known)
+        worst = np.quantile(inside[..., LEVELS.index(95)], WORST, axis=0)
+        for index, method in enumerate(JUDGED_NAMES):
             for at, horizon in enumerate(STUDY_HORIZONS_MIN):
-                shares = (*inside.mean(axis=0)[index, at], spread[index, at], inside_model.mean(axis=0)[index, at, 2])
+                if not np.isfinite(nees[index, at]):
+                    continue
+                shares = (
+                    *(*inside.mean(axis=0)[index, at], spread[index, at], worst[index, at]),
+                    *(within[index, at], inside_model.mean(axis=0)[index, at, 2]),
+                )
                 ratios = (nees[index, at], model[index, at], first[index, at], bare[index, at], *limits)
                 rows.append((case, method, horizon, len(known), *(float(value) for value in (*shares, *ratios))))
     names = (
         *("case", "method", "horizon_min", "flights", "coverage50", "coverage68", "coverage95", "coverage95_sigma"),
-        *("coverage95_model", "nees", "nees_model", "first", "first_model", "first_low", "first_high"),
+        *(
+            "coverage95_worst",
+            "flights_within",
+            "coverage95_model",
+            "nees",
+            "nees_model",
+            "first",
+            "first_model",
+            "first_low",
+            "first_high",
+        ),
     )
     return _table("forecast_honesty", names, rows, {"horizon_min": 0} | dict.fromkeys(names[4:], 3))
+
+
+def _flights_within(known: Sequence[Honesty]) -> FloatArray:
+    """Share of the flights whose NEES lies within its 95 % limits, shape (methods, h)."""
+    from scipy.stats import chi2
+
+    inside = []
+    for honesty in known:
+        freedom = 2.0 * honesty.independent
+        low, high = (chi2.ppf(part, freedom) / freedom for part in (TAIL, 1.0 - TAIL))
+        inside.append((honesty.nees >= low) & (honesty.nees <= high))
+    return np.asarray(np.mean(inside, axis=0))
 
 
 def gate_table(outcomes: dict[str, tuple[Outcome, ...]]) -> FigureData:

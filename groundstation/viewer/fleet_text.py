@@ -157,6 +157,7 @@ def forecast_text(fleet: FleetResults) -> str:
         "median flight, m",
         "worst flight, m",
         "95 % holds",
+        "flights with NEES within limits",
     ]
     rows = [
         [
@@ -168,6 +169,7 @@ def forecast_text(fleet: FleetResults) -> str:
             number(one.median_flight_rms_m, 0),
             number(one.highest_flight_rms_m, 0),
             "–" if one.coverage95 is None else f"{100.0 * one.coverage95:.0f} % of {one.coverage_starts}",
+            f"{one.flights_within} of {one.flights_judged}" if one.flights_judged else "–",
         ]
         for one in fleet.skill
     ]

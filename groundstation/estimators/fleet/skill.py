@@ -13,13 +13,17 @@ from groundstation.results.forecast import METHODS
 
 @dataclass(frozen=True)
 class SkillOfFlight:
-    """Forecast skill of one method at one horizon on one flight; ``coverage95`` NaN where there is no band."""
+    """Forecast skill of one method at one horizon on one flight; ``coverage95`` NaN where there is no band.
+
+    ``is_within`` says whether NEES of the flight is within its 95 % limits, None where it has too few starts to judge.
+    """
 
     method: str
     horizon_min: float
     starts: int
     rms_m: float
     coverage95: float
+    is_within: bool | None = None
 
 
 @dataclass
@@ -28,6 +32,8 @@ class _Sums:
     squares_m2: float = 0.0
     covered: float = 0.0
     coverage_starts: int = 0
+    judged: int = 0
+    within: int = 0
     rms_m: array = field(default_factory=lambda: array("d"))
 
 
@@ -56,6 +62,9 @@ class SkillMerger:
         sums.starts += row.starts
         sums.squares_m2 += row.starts * row.rms_m**2
         sums.rms_m.append(row.rms_m)
+        if row.is_within is not None:
+            sums.judged += 1
+            sums.within += row.is_within
         if math.isfinite(row.coverage95):
             sums.covered += row.starts * row.coverage95
             sums.coverage_starts += row.starts
@@ -79,4 +88,6 @@ def _row(method: str, horizon_min: float, all_sums: Mapping[tuple[str, float], _
         highest_flight_rms_m=max(sums.rms_m),
         coverage95=sums.covered / sums.coverage_starts if sums.coverage_starts else None,
         coverage_starts=sums.coverage_starts,
+        flights_judged=sums.judged,
+        flights_within=sums.within,
     )

@@ -9,14 +9,15 @@ the east tilt +phi_N - positive where the velocity error falls - and the heading
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
+from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.base.records import Int64Array, frozen
 from groundstation.base.units import MPS2_PER_G
+from groundstation.estimators.inertial.craft_motion import CraftMotion, latitude_rad, radii_m, rates_radps
 from groundstation.estimators.inertial.differences import Differences, only_used
 from groundstation.estimators.inertial.filter import (
     PATIENCE_S,
@@ -26,7 +27,7 @@ from groundstation.estimators.inertial.filter import (
     measurement_variances,
 )
 from groundstation.estimators.inertial.hindcast import Hindcast
-from groundstation.estimators.inertial.model import POSITION, VELOCITY, FloatArray, normal_gravity_mps2
+from groundstation.estimators.inertial.model import POSITION, VELOCITY, FloatArray
 from groundstation.estimators.inertial.noise import InsNoise
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.kalman import filter as kalman
@@ -41,9 +42,7 @@ FORWARD_BIAS, RIGHT_BIAS = 14, 15
 SIZE = 16
 CHANNELS = np.array([[0, 1, 2, 3, 4, 5], [6, 7, 8, 9, 10, 11]])
 _PN, _VN, _TN, _DN, _SN, _RN, _PE, _VE, _TE, _DE, _SE, _RE = range(12)
-LATITUDE_MAX_DEG = 88.0  # beyond, north is no axis for an error model
 MPS2_PER_UG = 1e-6 * MPS2_PER_G
-ACCELERATION_MAX_MPS2 = 50.0  # a faster change of the INS velocity is a reset of it
 
 # Pattern of the matrix: (row, column) of every entry that is not always zero, in the order of _values.
 PATTERN = (
@@ -65,70 +64,6 @@ AT_ONCE = 4096  # epochs whose transitions are held in memory, 3 MB
 KEPT = kalman.Kept(gains=False, variances=True, judged=True)
 EVERY = 10  # epochs from one covariance that is kept to the next
 VARIANCE_STEP_S = 60.0  # of covariances carried forward: 0.07 of a Schuler radian
-
-
-@dataclass(frozen=True)
-class CraftMotion:
-    """Motion of the craft over m intervals, as its INS knows it: the means of each interval.
-
-    Parameters
-    ----------
-    latitude_deg, altitude_m : ndarrays, shape (m,)
-    velocity_mps, acceleration_mps2 : ndarrays, shape (m, 2)
-        Over the ground, north and east; the acceleration is change of velocity over the interval.
-    heading_rad : ndarray, shape (m,)
-        Of what the sensors are fixed to: the nose of a strapdown, north of a platform that is slaved to it.
-    """
-
-    latitude_deg: FloatArray
-    altitude_m: FloatArray
-    velocity_mps: FloatArray
-    acceleration_mps2: FloatArray
-    heading_rad: FloatArray
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            object.__setattr__(self, item.name, frozen(np.asarray(getattr(self, item.name), dtype=np.float64)))
-
-    @classmethod
-    def between(cls, differences: Differences, time_s: FloatArray, *, is_strapdown: bool = True) -> "CraftMotion":
-        """The motion between neighbouring times, m of them, from the INS alone; m - 1 intervals.
-
-        Held where the INS is silent, at rest on the equator where it never spoke.
-        """
-        n = len(time_s)
-        latitude, altitude, north, east = (
-            _interpolated(differences.epochs.time_s, column, time_s)
-            for column in (differences.latitude_deg, differences.altitude_m, *differences.velocity_mps.T)
-        )
-        velocity = np.stack([north, east], axis=1)
-        seconds = np.diff(time_s)[:, None]
-        acceleration = np.diff(velocity, axis=0) / np.where(seconds > 0.0, seconds, np.inf)
-        is_step = (np.abs(acceleration) > ACCELERATION_MAX_MPS2).any(axis=1)
-        acceleration[is_step] = 0.0
-        mean = [0.5 * (part[1:] + part[:-1]) for part in (latitude, altitude, velocity)]
-        heading = np.zeros(n)
-        if is_strapdown:
-            heading = np.interp(time_s, differences.epochs.time_s, differences.unwrapped_heading_rad)
-        return cls(mean[0], mean[1], mean[2], acceleration, 0.5 * (heading[1:] + heading[:-1]))
-
-    def specific_force_mps2(self) -> FloatArray:
-        """Specific force north, east and down, shape (m, 3), m/s^2; vertical motion is left out.
-
-        f = acceleration + (2 Earth rate + craft rate) x velocity - gravity.
-        """
-        earth_north, earth_down, craft_north, craft_east, craft_down = _rates_radps(self)
-        north, east = self.velocity_mps.T
-        down_rate = 2.0 * earth_down + craft_down
-        gravity = normal_gravity_mps2(self.latitude_deg, self.altitude_m)
-        return np.stack(
-            [
-                self.acceleration_mps2[:, 0] - down_rate * east,
-                self.acceleration_mps2[:, 1] + down_rate * north,
-                (2.0 * earth_north + craft_north) * east - craft_east * north - gravity,
-            ],
-            axis=1,
-        )
 
 
 @dataclass(frozen=True)
@@ -182,10 +117,10 @@ def coupled_values(motion: CraftMotion, beta_per_s: float) -> FloatArray:
     Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems, 2nd ed. 2013, section 14.2.4 (attitude
     error of opposite sign).
     """
-    meridian, normal = _radii_m(motion)
-    earth_north, earth_down, craft_north, craft_east, craft_down = _rates_radps(motion)
-    latitude_rad = _latitude_rad(motion)
-    slope, cosine = np.tan(latitude_rad) / normal, np.cos(latitude_rad)
+    meridian, normal = radii_m(motion)
+    earth_north, earth_down, craft_north, craft_east, craft_down = rates_radps(motion)
+    latitude = latitude_rad(motion)
+    slope, cosine = np.tan(latitude) / normal, np.cos(latitude)
     north, east = motion.velocity_mps.T
     force_north, force_east, force_down = motion.specific_force_mps2().T
     coriolis_down = 2.0 * earth_down + craft_down
@@ -418,26 +353,3 @@ def _opened_variances(noise: InsNoise, epochs: Epochs) -> FloatArray:
     is_measured = bool(np.isfinite(epochs.position_m).any())
     position = max(RESET_POSITION_M, noise.position_m) if is_measured else noise.position_m
     return np.square([position, max(RESET_VELOCITY_MPS, noise.velocity_mps)])
-
-
-def _latitude_rad(motion: CraftMotion) -> FloatArray:
-    return np.deg2rad(np.clip(motion.latitude_deg, -LATITUDE_MAX_DEG, LATITUDE_MAX_DEG))
-
-
-def _radii_m(motion: CraftMotion) -> tuple[FloatArray, FloatArray]:
-    meridian, prime_vertical = curvature_radii_m(motion.latitude_deg)
-    return meridian + motion.altitude_m, prime_vertical + motion.altitude_m
-
-
-def _rates_radps(motion: CraftMotion) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Earth rate north and down, craft rate (transport rate) north, east and down, each (m,)."""
-    latitude_rad = _latitude_rad(motion)
-    meridian, normal = _radii_m(motion)
-    north, east = motion.velocity_mps.T
-    earth = (EARTH_RATE_RADPS * np.cos(latitude_rad), -EARTH_RATE_RADPS * np.sin(latitude_rad))
-    return *earth, east / normal, -north / meridian, -east * np.tan(latitude_rad) / normal
-
-
-def _interpolated(time_s: FloatArray, values: FloatArray, at_s: FloatArray) -> FloatArray:
-    known = np.isfinite(values)
-    return np.interp(at_s, time_s[known], values[known]) if known.any() else np.zeros(len(at_s))

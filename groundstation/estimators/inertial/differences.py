@@ -65,6 +65,16 @@ class Differences:
                 object.__setattr__(self, item.name, frozen(value))
 
     @cached_property
+    def motion_known(self) -> tuple[FloatArray, ...]:
+        """Latitude, altitude and velocities north and east of the INS at every epoch, filled in where it was silent."""
+        time_s, found = self.epochs.time_s, []
+        for values in (self.latitude_deg, self.altitude_m, *self.velocity_mps.T):
+            known = np.isfinite(values)
+            filled = np.interp(time_s, time_s[known], values[known]) if known.any() else np.zeros(len(time_s))
+            found.append(frozen(filled))
+        return tuple(found)
+
+    @cached_property
     def unwrapped_heading_rad(self) -> FloatArray:
         """Heading at every epoch without steps of a turn, shape (n,): of the INS, of its track where that is unknown.
 

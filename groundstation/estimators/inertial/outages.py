@@ -103,7 +103,10 @@ def _sigma(
     if method not in WITH_SIGMA:
         return None
     lead_s = np.array([length_s])
-    growth, scale = lead_growth(run, lead_s), float(run.noise.calibration.at(lead_s, scale_of(method, settings))[0])
+    growth, scale = (
+        lead_growth(run, lead_s),
+        float(run.noise.calibration.at(lead_s, scale_of(method, is_own=own_m2 is not None))[0]),
+    )
     total = 0.0
     for channel in range(run.x.shape[2]):
         if own_m2 is None:

@@ -56,11 +56,9 @@ def claimed_sigma(method: str, run: FilterRun, replay: Hindcast, settings: Inert
     if method not in WITH_SIGMA:
         return None
     channels = replay.actual_m.shape[2]
-    growth, of_class = (
-        lead_growth(run, replay.lead_s),
-        run.noise.calibration.at(replay.lead_s, scale_of(method, settings)),
-    )
-    if method in replay.variance_m2:
+    growth, is_own = lead_growth(run, replay.lead_s), method in replay.variance_m2
+    of_class = run.noise.calibration.at(replay.lead_s, scale_of(method, is_own=is_own))
+    if is_own:
         ins = replay.variance_m2[method]
     else:
         parts = [
@@ -74,11 +72,11 @@ def claimed_sigma(method: str, run: FilterRun, replay: Hindcast, settings: Inert
     return Claimed(np.sqrt(ins + judge), expected * own[:, :, None], own * of_class[None, :])
 
 
-def scale_of(method: str, settings: InertialSettings) -> ScaleName:
-    """Which scale of its class a method's sigma is multiplied by."""
+def scale_of(method: str, *, is_own: bool) -> ScaleName:
+    """Which scale of its class a sigma is multiplied by; ``is_own``: it is none of the two separate channels."""
     if method == "noise_bank":
         return "bank"
-    return "coupled" if method == "last_estimate" and settings.model == "coupled" else "separate"
+    return "coupled" if is_own else "separate"
 
 
 def _own_scale(ratio: FloatArray, replay: Hindcast, run: FilterRun) -> FloatArray:

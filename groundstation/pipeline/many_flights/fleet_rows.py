@@ -24,7 +24,7 @@ from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.figures import FigureData, flags, numbers, texts
 from groundstation.results.files import SavedFlight, utf8_text
 from groundstation.results.fleet import SessionRow
-from groundstation.results.forecast import ForecastResult
+from groundstation.results.forecast import TOO_FEW, WITHIN, CalibrationRow, ForecastResult, honesty
 from groundstation.results.heading import HeadingResult
 from groundstation.results.reference import ReferenceResult
 
@@ -219,9 +219,22 @@ def skill_of(saved: SavedFlight) -> tuple[str, list[SkillOfFlight]]:
     forecast = saved.results.answer(ForecastResult)
     if forecast is None:
         return "", []
+    told = {(row.method, row.horizon_min): _is_within(row) for row in forecast.calibration}
     rows = [
-        SkillOfFlight(row.method, row.horizon_min, row.starts, row.rms_m, to_number(row.coverage95))
+        SkillOfFlight(
+            *(row.method, row.horizon_min, row.starts, row.rms_m, to_number(row.coverage95)),
+            is_within=told.get((row.method, row.horizon_min)),
+        )
         for row in forecast.skill
         if row.starts >= 1 and math.isfinite(to_number(row.horizon_min) + to_number(row.rms_m))
     ]
     return forecast.default_method, rows
+
+
+def _is_within(row: CalibrationRow) -> bool | None:
+    """Whether NEES is within its limits; None of one with too few starts, or damaged on the disk."""
+    figures = [to_number(value) for value in (row.independent_starts, row.nees, row.nees_low, row.nees_high)]
+    if not all(map(math.isfinite, figures)):
+        return None
+    says = honesty(int(figures[0]), *figures[1:])
+    return None if says == TOO_FEW else says == WITHIN

@@ -179,7 +179,7 @@ def _in_detail(fleet: FleetResults, rows: list[FleetSkill]) -> Grid:
             Head("RMS, m", True),
         ),
         *(Head("Median flight, m", True), Head("Worst flight, m", True)),
-        *(Head("Inside 95 % band", True), Head("of starts", True)),
+        *(Head("Inside 95 % band", True), Head("of starts", True), Head("NEES within limits", True)),
     )
     table: list[tuple[Cell, ...]] = [
         (
@@ -187,8 +187,13 @@ def _in_detail(fleet: FleetResults, rows: list[FleetSkill]) -> Grid:
             *(bounded(value, 0) for value in (row.rms_m, row.median_flight_rms_m, row.highest_flight_rms_m)),
             percent(row.coverage95),
             number(row.coverage_starts, 0) if is_number(row.coverage95) else "",
+            f"{row.flights_within} of {row.flights_judged}" if row.flights_judged else "",
         )
         for row in rows
         if row.method in shipped
     ]
-    return Grid("The shipped method in detail", heads, table, "Median and worst of the flights' own RMS.")
+    caption = (
+        "Median and worst of the flights' own RMS. Outages of one flight overlap: the band is judged over flights, "
+        "each by its NEES where it has starts enough."
+    )
+    return Grid("The shipped method in detail", heads, table, caption)
