@@ -23,9 +23,10 @@ MAY_IMPORT: dict[str, set[str]] = {
     "studies": {"base", "tables", "results", "estimators", "simulation"},
     "viewer": {"base", "tables", "results", "chapters"},
     "reports": {"base", "tables", "results", "chapters"},
+    "exports": {"base", "readers", "tables", "results"},
     "pipeline": {
         *("base", "readers", "store", "integrity", "tables", "results"),
-        *("chapters", "estimators", "simulation", "studies", "viewer", "reports"),
+        *("chapters", "estimators", "simulation", "studies", "viewer", "reports", "exports"),
     },
     "cli": {"base", "results", "chapters", "pipeline"},
 }

@@ -106,6 +106,7 @@ def test_list_of_a_log_says_whether_it_would_run_and_why_not(tmp_path: Path) -> 
         "magnetic_ground",
         "landing",
         "landing_beacons",
+        "reference",
     }
     assert not any(entry["would_run"] for entry in answers.values())
     assert "GNSS" in answers["heading"]["reason"] and "INS position" in answers["inertial"]["reason"]

@@ -17,6 +17,7 @@ SUBJECTS = {
     "landing": "Approaches",
     "landing_beacons": "Landing by locators",
     "together": "Joining of logs",
+    "reference": "Comparison with the reference",
     "cooperative": "Navigation between aircraft",
 }
 

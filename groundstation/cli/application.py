@@ -20,7 +20,7 @@ EXIT_CODES = (
 )
 
 VERBS = (
-    *("info", "check", "convert", "run", "report", "view", "clip", "compare", "cooperative", "plan", "serve"),
+    *("info", "check", "convert", "run", "report", "view", "clip", "export", "compare", "cooperative", "plan", "serve"),
     *("simulate", "study", "list"),
 )
 
@@ -32,10 +32,12 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "run": (
         "run flight3.ulg -o out",
         "run logs -o out --aircraft aircraft.toml --site airfield.toml",
+        "run flight3.ulg --reference sbet_20250708.out -o out",
         "run logs -o out --dry-run",
     ),
     "report": ("report out",),
     "view": ("view out", "view flight3.ulg --web"),
+    "export": ("export out/20260504T060000Z_SIM-1_101 -o flight.kml", "export flight3.ulg -o flight3.csv --track gnss"),
     "clip": ("clip flight3.mcap --from +05:00 --to +12:30 -o part.mcap",),
     "compare": ("compare out/first out/second -o comparison",),
     "cooperative": ("cooperative a.csv b.csv --stations stations.toml -o out",),
@@ -120,6 +122,16 @@ IntervalsFile = Annotated[
 ThresholdsFile = Annotated[
     Path | None,
     typer.Option("--thresholds", help="Limits of the integrity ledger (TOML).", metavar="FILE", readable=False),
+]
+ReferenceFiles = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--reference",
+        help="Reference beside the log (SBET, .pos, another log), or a folder of them: judges the results, is seen by "
+        "no estimator.",
+        metavar="FILE",
+        readable=False,
+    ),
 ]
 
 

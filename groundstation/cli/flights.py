@@ -1,4 +1,4 @@
-"""The verbs on flights that exist: ``clip`` cuts a part out of one, ``compare`` holds two against each other."""
+"""The verbs on flights that exist: ``clip`` cuts a part out, ``export`` writes tracks, ``compare`` holds two up."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -69,6 +69,41 @@ def clip(
             force=force,
             listen=listen,
         )
+    printing.outcomes((outcome,), as_json_text=json, quiet=quiet)
+    return outcome.code
+
+
+@app.command(epilog=examples("export"))
+@answers_with_exit_code
+def export(
+    flight: Annotated[Path, typer.Argument(help="Flight folder, MCAP or log.", metavar="X", readable=False)],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", help=".kml, .gpx, .csv, .parquet, .nmea or .sbet (.out).", metavar="FILE"),
+    ],
+    tracks: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--track",
+            help="Topic of the log (gnss, ins ...), or corrected and reference of a flight folder; may be repeated. "
+            "Left out: all, or the first that the format can hold.",
+            metavar="NAME",
+        ),
+    ] = None,
+    config: ConfigFile = None,
+    profile: Profile = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+) -> int | None:
+    """Write the tracks of a flight for other programs: Google Earth, GPX, a table, NMEA sentences, SBET."""
+    from groundstation.cli import printing
+    from groundstation.pipeline.one_flight.configuration import load_configuration
+    from groundstation.pipeline.verbs.export import export as written
+
+    settings = load_configuration(config, profile=profile)
+    outcome = written(flight, output, names=tuple(tracks or ()), configuration=settings, force=force)
     printing.outcomes((outcome,), as_json_text=json, quiet=quiet)
     return outcome.code
 

@@ -26,6 +26,7 @@ from groundstation.cli.application import (
     Profile,
     Progress,
     Quiet,
+    ReferenceFiles,
     SiteFile,
     ThresholdsFile,
     Together,
@@ -125,6 +126,7 @@ def convert(
     profile: Profile = None,
     icd: IcdFiles = None,
     together: Together = False,
+    reference: ReferenceFiles = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -134,10 +136,12 @@ def convert(
     """Convert recorded logs to MCAP (protobuf channels, zstd, indexed); the clock is repaired, both times are kept."""
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
+    from groundstation.pipeline.many_flights.references import judged_by
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.conversions import convert_many, convert_together
 
-    configuration = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
+    settings = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
+    configuration = judged_by(settings, reference or (), is_one_log=together or len(logs) == 1)
     with listener("none" if quiet else progress) as listen:
         convert_logs = convert_together if together else convert_many
         outcomes = convert_logs(logs, output, configuration=configuration, force=force, listen=listen)
@@ -157,6 +161,7 @@ def run(
     thresholds: ThresholdsFile = None,
     profile: Profile = None,
     icd: IcdFiles = None,
+    reference: ReferenceFiles = None,
     jobs: Annotated[int, typer.Option("-j", "--jobs", help="Processes; 0: one per core.", min=0)] = 0,
     scheduler: Annotated[
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
@@ -199,10 +204,12 @@ def run(
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
     from groundstation.pipeline.many_flights.batch import plan_many, run_many, run_together
+    from groundstation.pipeline.many_flights.references import judged_by
     from groundstation.pipeline.one_flight.configuration import applying, load_configuration
 
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd)
-    configuration = applying(settings, apply)
+    is_one_log = together or (len(paths) == 1 and not Path(paths[0]).is_dir())
+    configuration = judged_by(applying(settings, apply), reference or (), is_one_log=is_one_log)
     if together and (dry_run or scheduler or stations is not None):
         raise UsageError("--together", "--dry-run, --scheduler or --stations beside it", "it without them")
     if dry_run:

@@ -91,6 +91,9 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
         What it gives to the tables of flights: index.json, index.csv, fleet.parquet. Names differ between analyses.
     check : callable
         ``check(settings, aircraft)`` raises SettingsError for settings that contradict what is known of the aircraft.
+    judges : bool
+        Whether it is given the truth, by which it judges the others: it runs where there is one, and last; every other
+        analysis is given a flight without it.
     """
 
     name: str
@@ -109,6 +112,7 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     sentence: Callable[[Answers], str] = _nothing
     columns: tuple[AnswerColumn[AnswerT], ...] = ()
     check: Callable[[Any, Any], None] = _any_settings
+    judges: bool = False
 
     def __post_init__(self) -> None:
         known = {field.name for field in dataclasses.fields(cast(Any, self.answer))}

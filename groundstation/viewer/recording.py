@@ -30,6 +30,7 @@ from groundstation.viewer.tabs.magnetic import magnetic
 from groundstation.viewer.tabs.overview import overview
 from groundstation.viewer.tabs.quality import quality
 from groundstation.viewer.tabs.raw import raw
+from groundstation.viewer.tabs.reference import reference
 from groundstation.viewer.tabs.together import together
 
 APPLICATION = "groundstation"
@@ -44,6 +45,7 @@ ANSWER_TABS: tuple[tuple[Callable[[Recorder, FlightResults], rrb.Container | Non
     (landing, ("landing",)),
     (landing_beacons, ("landing_beacons",)),
     (together, ("together",)),
+    (reference, ("reference",)),
 )
 SHOWN_ELSEWHERE = ("latency",)  # in the tab on data quality
 CONNECT_SECONDS, FLUSH_SECONDS = 3.0, 60.0

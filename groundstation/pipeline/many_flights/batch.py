@@ -316,7 +316,9 @@ def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configu
     """Logs by path or URL, in a stable order, each with whether the user named it."""
     near = [Path(path) for path in paths if not is_remote(str(path))]
     found = {log: named for path in paths if is_remote(str(path)) for log, named in far_logs(str(path))}
-    found |= {str(one.path): one.is_named for one in collect(near, None if is_remote(str(out)) else Path(out))}
+    judges = {path.resolve() for path in configuration.references.paths}  # in a folder they are no logs to run
+    listed = collect(near, None if is_remote(str(out)) else Path(out))
+    found |= {str(one.path): one.is_named for one in listed if one.is_named or one.path.resolve() not in judges}
     if not found:
         hint = "what groundstation made is no input" if any(path.is_dir() and is_ours(path) for path in near) else ""
         raise UsageError(", ".join(map(str, paths)), "no log in it", "", hint)

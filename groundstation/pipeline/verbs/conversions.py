@@ -26,7 +26,7 @@ def convert_many(
     """Convert logs to MCAP: one to the file ``output``, several into the folder ``output``.
 
     A file ``*.ch10`` is written as Chapter 10, with the ICD of its buses beside it. Of the configuration, the profile,
-    the ICDs and the thresholds of the ledger count.
+    the ICDs, the thresholds of the ledger and the references count.
 
     Raises
     ------
@@ -95,13 +95,13 @@ def convert_together(
 
 
 def _convert_one(path: Path, target: Path, configuration: Configuration) -> Outcome:
-    told, thresholds = "", configuration.thresholds
+    told, thresholds, references = "", configuration.thresholds, configuration.references
     try:
         log = open_log(path, configuration.profile_path, configuration.icds)
         if target.suffix == ".ch10":
             converted, told = _to_chapter10(log, target, thresholds)
         else:
-            converted = convert_log(log, target, thresholds)
+            converted = convert_log(log, target, thresholds, references)
     except GroundstationError as error:
         return Outcome(str(path), "failed", str(error))
     return _converted(str(path), converted, target, told)

@@ -22,6 +22,7 @@ from groundstation.reports.figures import (
     overview,
     placement,
     quality,
+    reference,
     standstill,
     together,
 )
@@ -70,6 +71,9 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "overview.attitude": overview.attitude,
     "overview.states": overview.states,
     "quality.gaps": quality.gaps,
+    "reference.errors": reference.errors,
+    "reference.track": reference.track,
+    "reference.claims": reference.claims,
     "cooperative.map": cooperative.session_map,
     "cooperative.errors": cooperative.errors,
     "cooperative.geometry": cooperative.geometry,

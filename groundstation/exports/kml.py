@@ -1,0 +1,86 @@
+"""KML 2.2 with Google's tracks, for Google Earth and QGIS (OGC 12-007r2, 2015; Google KML extension ``gx:Track``)."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from groundstation.base.timescales import utc_ns_to_iso
+from groundstation.exports.text import coordinates, number
+from groundstation.exports.tracks import ELLIPSOID, MSL, PRESSURE, Track
+
+KML, GX = "http://www.opengis.net/kml/2.2", "http://www.google.com/kml/ext/2.2"
+COLOURS = ("ffd18802", "ff3c8f00", "ff1f6fd8", "ff8f3f97", "ff5a5a5a")  # alpha, blue, green, red
+ALTITUDES = {MSL: "above sea level", ELLIPSOID: "above the ellipsoid", PRESSURE: "by pressure"}  # the best first
+SCHEMA = "values"
+
+
+def write_kml(path: Path, title: str, tracks: Sequence[Track]) -> None:
+    """Write a folder with a placemark for each track; what is known of every position goes with it.
+
+    With UTC a track moves with the time slider; without, it is a line. KML knows altitudes above sea level alone; where
+    a track has none another is written, and the description says which.
+    """
+    ET.register_namespace("", KML)
+    ET.register_namespace("gx", GX)
+    root = ET.Element(f"{{{KML}}}kml")
+    document = _sub(root, "Document")
+    _sub(document, "name", title)
+    for number_of in range(len(tracks)):
+        style = _sub(document, "Style", id=f"track{number_of}")
+        line = _sub(style, "LineStyle")
+        _sub(line, "color", COLOURS[number_of % len(COLOURS)])
+        _sub(line, "width", "3")
+    names = sorted({name for track in tracks for name in track.columns})
+    schema = _sub(document, "Schema", id=SCHEMA)
+    for name in names:
+        field = _sub(schema, f"{{{GX}}}SimpleArrayField", name=name, type="float")
+        _sub(field, "displayName", name)
+    for number_of, track in enumerate(tracks):
+        place = _sub(document, "Placemark")
+        _sub(place, "name", track.name)
+        altitude = _altitude(track)
+        told = f", altitude {ALTITUDES[altitude]}" if altitude else ""
+        _sub(place, "description", f"{track.title}{told}")
+        _sub(place, "styleUrl", f"#track{number_of}")
+        _timed(place, track) if track.has_utc else _line(place, track)
+    ET.indent(root)
+    ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+
+
+def _timed(place: ET.Element, track: Track) -> None:
+    shape = _sub(place, f"{{{GX}}}Track")
+    _sub(shape, "altitudeMode", "absolute" if _altitude(track) else "clampToGround")
+    for time_ns in track.time_ns.tolist():
+        _sub(shape, "when", utc_ns_to_iso(time_ns))
+    for spot in _spots(track):
+        _sub(shape, f"{{{GX}}}coord", " ".join(spot))
+    data = _sub(_sub(shape, "ExtendedData"), "SchemaData", schemaUrl=f"#{SCHEMA}")
+    for name, values in track.columns.items():
+        array = _sub(data, f"{{{GX}}}SimpleArrayData", name=name)
+        for value in values.tolist():
+            _sub(array, f"{{{GX}}}value", number(value, 4))
+
+
+def _line(place: ET.Element, track: Track) -> None:
+    shape = _sub(place, "LineString")
+    _sub(shape, "altitudeMode", "absolute" if _altitude(track) else "clampToGround")
+    _sub(shape, "coordinates", " ".join(",".join(spot) for spot in _spots(track)))
+
+
+def _altitude(track: Track) -> str:
+    """Column of the best altitude, empty where there is none."""
+    return next((name for name in ALTITUDES if np.isfinite(track.column(name)).any()), "")
+
+
+def _spots(track: Track) -> list[tuple[str, str, str]]:
+    altitude = np.nan_to_num(track.column(_altitude(track))).tolist()
+    both = zip(coordinates(track.longitude_deg), coordinates(track.latitude_deg), altitude, strict=True)
+    return [(longitude, latitude, number(height, 3)) for longitude, latitude, height in both]
+
+
+def _sub(parent: ET.Element, tag: str, text: str | None = None, **attributes: str) -> ET.Element:
+    element = ET.SubElement(parent, tag if tag.startswith("{") else f"{{{KML}}}{tag}", attributes)
+    element.text = text
+    return element

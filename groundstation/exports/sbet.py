@@ -1,0 +1,56 @@
+"""SBET records of the track of an INS (Applanix, POSPac MMS file formats): 17 doubles, heading from true north."""
+
+from pathlib import Path
+
+import numpy as np
+
+from groundstation.base.angles import wrap_180
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.timescales import GPS_EPOCH_NS, leap_seconds_at
+from groundstation.base.units import NS_PER_S
+from groundstation.exports.tracks import ELLIPSOID, Track
+from groundstation.readers.sbet import RECORD, S_PER_WEEK
+
+NEEDED = (
+    ELLIPSOID,
+    "velocity_north_mps",
+    "velocity_east_mps",
+    "velocity_down_mps",
+    "roll_deg",
+    "pitch_deg",
+    "true_heading_deg",
+)
+
+
+def write_sbet(path: Path, track: Track) -> int:
+    """Write the positions whose altitude, attitude and velocity are known; returns how many were left out.
+
+    The wander angle is zero. Accelerations and rates are not in a track and stay zero, as SBET has no mark for what
+    is missing. Seconds of the GPS week go on beyond its end. A file name with the date (sbet_20260504.out) tells the
+    week.
+
+    Raises
+    ------
+    NotAssessableError
+        Without UTC, or a position of which all of these are known.
+    """
+    if not track.has_utc:
+        raise NotAssessableError(track.name, "no UTC in this flight", "a log with absolute time")
+    known = np.isfinite([track.column(name) for name in NEEDED]).all(axis=0)
+    if not known.any():
+        raise NotAssessableError(
+            track.name, "no position with altitude above the ellipsoid, velocity and attitude", "an INS with them"
+        )
+    records = np.zeros(int(np.count_nonzero(known)), RECORD)
+    leap_s = leap_seconds_at(int(track.time_ns[0]))
+    gps_ns = track.time_ns[known] - GPS_EPOCH_NS + leap_s * NS_PER_S
+    week_ns = gps_ns[0] // (S_PER_WEEK * NS_PER_S) * S_PER_WEEK * NS_PER_S
+    records["time"] = (gps_ns - week_ns) / NS_PER_S
+    records["latitude"] = np.deg2rad(track.latitude_deg[known])
+    records["longitude"] = np.deg2rad(track.longitude_deg[known])
+    records["altitude"], north, east, down, roll, pitch, heading = (track.column(name)[known] for name in NEEDED)
+    records["x_velocity"], records["y_velocity"], records["z_velocity"] = north, east, down
+    records["roll"], records["pitch"] = np.deg2rad(roll), np.deg2rad(pitch)
+    records["platform_heading"] = np.deg2rad(wrap_180(heading))
+    path.write_bytes(records.tobytes())
+    return int(len(track) - len(records))

@@ -1,0 +1,127 @@
+"""What is exported: the tracks of a flight as logged, and those that the estimator of INS errors made of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray, interpolate_heading
+from groundstation.base.ellipse import ELLIPSE_95, principal_axes
+from groundstation.base.records import Int64Array
+from groundstation.base.signals import topics_of_kind
+from groundstation.base.units import NS_PER_S
+from groundstation.results.figures import FigureData
+from groundstation.tables.motion import horizontal_speed_mps
+from groundstation.tables.table import Flight, Table
+
+POSITION = ("latitude_deg", "longitude_deg")
+MSL, ELLIPSOID, PRESSURE = "altitude_msl_m", "altitude_ellipsoid_m", "pressure_altitude_m"
+MOVES = ("velocity_north_mps", "velocity_east_mps", "velocity_down_mps", "roll_deg", "pitch_deg")
+DIRECTIONS = ("track_deg", "true_heading_deg")
+OF_THE_FIX = ("hdop", "satellites_used")
+BRIDGED_S = 0.25  # attitude and velocity of other rows are interpolated over at most so long
+SPEED, HALF_WIDTH = "ground_speed_mps", "horizontal95_m"
+MADE = {"corrected": "INS less its estimated error", "reference": "INS less its smoothed error"}
+NORTH_SIGMA, EAST_SIGMA = "north_sigma_m", "east_sigma_m"
+
+
+@dataclass(frozen=True)
+class Track:
+    """Positions in the order of time, all of them known.
+
+    Parameters
+    ----------
+    name : str
+        Topic of the log, or ``corrected`` and ``reference`` of the estimator.
+    title : str
+        For people.
+    time_ns : ndarray of int64, shape (n,)
+        UTC where ``has_utc``, else since the log's own zero.
+    start_ns : int
+        Time of flight second zero.
+    latitude_deg, longitude_deg : ndarrays, shape (n,)
+    columns : mapping of str to ndarray, shape (n,)
+        What else is known of each position, altitudes among it, NaN where it is not.
+    """
+
+    name: str
+    title: str
+    time_ns: Int64Array
+    start_ns: int
+    has_utc: bool
+    latitude_deg: FloatArray
+    longitude_deg: FloatArray
+    columns: Mapping[str, FloatArray]
+
+    def __len__(self) -> int:
+        return len(self.time_ns)
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Flight seconds, shape (n,)."""
+        return (self.time_ns - self.start_ns) / NS_PER_S
+
+    def column(self, name: str) -> FloatArray:
+        """A column, NaN where the track has none."""
+        return self.columns.get(name, np.full(len(self), np.nan))
+
+
+def tracks_of(flight: Flight, figures: Mapping[str, FigureData]) -> tuple[Track, ...]:
+    """Tracks of a flight: of every receiver and INS that has positions, then those of the estimator."""
+    topics = [topic for kind in ("gnss", "ins", "truth") for topic in topics_of_kind(kind, flight.topics())]
+    logged = [_logged(flight, flight[topic].unique_times()) for topic in topics]
+    made = [_made(flight, figures, name) for name in MADE]
+    return tuple(track for track in (*logged, *made) if track is not None and len(track))
+
+
+def _logged(flight: Flight, table: Table) -> Track | None:
+    known = np.isfinite(table.values(POSITION[0])) & np.isfinite(table.values(POSITION[1]))
+    known &= table.values("integrity_ok") != 0.0
+    placed = table.take(known)
+    time_s, at_s = flight.seconds(table.time_ns), flight.seconds(placed.time_ns)
+    columns = {name: placed.values(name) for name in (MSL, ELLIPSOID, PRESSURE, *OF_THE_FIX) if placed.has(name)}
+    for name in (*MOVES, *DIRECTIONS):
+        if table.has(name):
+            columns[name] = _bridged(at_s, time_s, table.values(name), is_direction=name in DIRECTIONS)
+    speed = horizontal_speed_mps(table)
+    if np.isfinite(speed).any():
+        columns[SPEED] = _bridged(at_s, time_s, speed)
+    place = (placed.values(POSITION[0]), placed.values(POSITION[1]))
+    return Track(
+        table.topic, f"{table.topic} as logged", placed.time_ns, flight.start_ns, flight.has_utc, *place, columns
+    )
+
+
+def _bridged(at_s: FloatArray, time_s: FloatArray, values: FloatArray, *, is_direction: bool = False) -> FloatArray:
+    """Values at other times of the topic: many logs give position and attitude in rows of their own."""
+    known = np.isfinite(values)
+    if not known.any():
+        return np.full(len(at_s), np.nan)
+    time_s, values = time_s[known], values[known]
+    after = np.clip(np.searchsorted(time_s, at_s), 0, len(time_s) - 1)
+    before = np.clip(np.searchsorted(time_s, at_s, side="right") - 1, 0, None)
+    near = (time_s[after] - time_s[before] <= BRIDGED_S) & (time_s[before] <= at_s) & (at_s <= time_s[after])
+    between = interpolate_heading(at_s, time_s, values) if is_direction else np.interp(at_s, time_s, values)
+    return np.where(near, between, np.nan)
+
+
+def _made(flight: Flight, figures: Mapping[str, FigureData], name: str) -> Track | None:
+    """A track of the estimator, at the times its figures have; half of the 95 % ellipse's major axis is its width."""
+    data, states = figures.get("inertial_track"), figures.get("inertial_states")
+    if data is None or f"{name}_latitude_deg" not in data.columns:
+        return None
+    latitude, longitude = (np.asarray(data[f"{name}_{axis}"], dtype=np.float64) for axis in POSITION)
+    known = np.isfinite(latitude) & np.isfinite(longitude)
+    time_s = np.asarray(data["time_s"], dtype=np.float64)[known]
+    columns: dict[str, FloatArray] = {}
+    if name == "corrected" and states is not None and len(states):
+        at_s = np.asarray(states["time_s"], dtype=np.float64)
+        north, east = (
+            np.interp(time_s, at_s, np.asarray(states[f"{axis}_position_sigma_m"], dtype=np.float64))
+            for axis in ("north", "east")
+        )
+        major = principal_axes(north, east, np.zeros(len(north)))[0]
+        columns = {NORTH_SIGMA: north, EAST_SIGMA: east, HALF_WIDTH: ELLIPSE_95 * major}
+    time_ns = flight.start_ns + np.rint(time_s * NS_PER_S).astype(np.int64)
+    place = (latitude[known], longitude[known])
+    return Track(name, MADE[name], time_ns, flight.start_ns, flight.has_utc, *place, columns)

@@ -1,0 +1,162 @@
+"""``export``: the tracks of a flight in the file of another program, chosen by the suffix of the file."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from groundstation.base.errors import NotAssessableError, UsageError, told_in_a_line
+from groundstation.base.records import Damage, RecordBatch
+from groundstation.exports.tracks import Track, tracks_of
+from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, file_in, no_log
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.convert import convert_log
+from groundstation.pipeline.one_flight.log import as_log, open_log
+from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.results.figures import FigureData
+from groundstation.tables.table import Flight
+
+
+def export(
+    path: Path,
+    target: Path,
+    *,
+    names: Sequence[str] = (),
+    configuration: Configuration | None = None,
+    force: bool = False,
+) -> Outcome:
+    """Write tracks of a flight to ``target``: .kml, .gpx, .csv, .parquet, .nmea, .sbet or .out (SBET).
+
+    Parameters
+    ----------
+    path : Path
+        A flight folder, an MCAP or a log. The tracks of the estimator are in a folder alone.
+    names : sequence of str
+        Tracks wanted: topics, ``corrected``, ``reference``; none: all, or the first that the format can hold.
+
+    Raises
+    ------
+    UsageError
+        For another suffix, a track that the flight lacks, several where one is written, or a file that is there.
+    NotAssessableError
+        When the flight has no track, or the format needs what it lacks.
+    """
+    suffixes = ", ".join((*WRITERS, *WRITERS_OF_ONE))
+    suffix = target.suffix.lower()
+    if suffix not in WRITERS and suffix not in WRITERS_OF_ONE:
+        raise UsageError(str(target), f"suffix {target.suffix or 'none'}", f"one of {suffixes}")
+    if not path.exists():
+        raise UsageError(str(path), "no such file or folder")
+    if target.is_dir() or (target.exists() and (not force or target.resolve() == path.resolve())):
+        raise UsageError(str(target), "a file that exists", "a new name", "-f overwrites it")
+    flight, figures, has_lost = _read(path, configuration or Configuration())
+    tracks = _wanted(tracks_of(flight, figures), names, path.name)
+    with told_in_a_line(str(target)):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if suffix in WRITERS:
+            WRITERS[suffix](target, flight.source_name, tracks)
+        else:
+            tracks = (_written_alone(WRITERS_OF_ONE[suffix], target, tracks, bool(names)),)
+    told = ", ".join(f"{track.name} ({len(track)})" for track in tracks)
+    return Outcome(str(path), "data_lost" if has_lost else "done", f"-> {target}: {told}", folder=str(target))
+
+
+def _read(path: Path, configuration: Configuration) -> tuple[Flight, Mapping[str, FigureData], bool]:
+    """Tables of a flight, the arrays that a run saved of it, and whether data were lost on the way."""
+    from groundstation.store.reader import read, read_info
+    from groundstation.tables.assemble import flight_from_batches
+
+    figures: Mapping[str, FigureData] = {}
+    log_path = as_log(path)
+    if log_path.is_dir():
+        figures, log_path = _saved_figures(path), file_in(path, ".mcap")
+    log = open_log(log_path, configuration.profile_path, configuration.icds)
+    with told_in_a_line(log_path.name), TemporaryDirectory(prefix="groundstation-") as folder:
+        mcap, has_lost = log.path, False
+        if not log.is_store:
+            mcap = Path(folder) / "flight.mcap"
+            has_lost = convert_log(log, mcap, configuration.thresholds).has_lost_data
+        info, items = read_info(mcap), list(read(mcap))
+    batches = (item for item in items if isinstance(item, RecordBatch))
+    has_lost |= any(isinstance(item, Damage) and item.loses_data for item in items)
+    flight = flight_from_batches(batches, metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name)
+    return flight, figures, has_lost
+
+
+def _saved_figures(folder: Path) -> Mapping[str, FigureData]:
+    from groundstation.estimators.analyses import ANSWER_TYPES
+    from groundstation.results.files import load
+
+    if not (folder / FLIGHT_FOLDER_MARK).is_file():
+        raise no_log(folder)
+    return load(folder, ANSWER_TYPES).figures
+
+
+def _wanted(tracks: tuple[Track, ...], names: Sequence[str], source: str) -> tuple[Track, ...]:
+    if not tracks:
+        raise NotAssessableError(source, "no positions", "a log with positions of a receiver or an INS")
+    by_name = {track.name: track for track in tracks}
+    for name in names:
+        if name not in by_name:
+            raise UsageError(f"track {name}", f"not in {source}", f"one of {', '.join(by_name)}")
+    return tuple(by_name[name] for name in names) if names else tracks
+
+
+def _written_alone(
+    write: Callable[[Path, Track], object], target: Path, tracks: tuple[Track, ...], is_named: bool
+) -> Track:
+    """Write the one track of a format: the one named, else the first that has what the format needs."""
+    if is_named and len(tracks) > 1:
+        raise UsageError(str(target), f"{len(tracks)} tracks", "one", "name one --track")
+    reasons = []
+    for track in tracks:
+        try:
+            write(target, track)
+            return track
+        except NotAssessableError as error:
+            reasons.append(error)
+    raise reasons[-1]
+
+
+def _kml(path: Path, title: str, tracks: Sequence[Track]) -> None:
+    from groundstation.exports.kml import write_kml
+
+    write_kml(path, title, tracks)
+
+
+def _gpx(path: Path, title: str, tracks: Sequence[Track]) -> None:
+    from groundstation.exports.gpx import write_gpx
+
+    write_gpx(path, title, tracks)
+
+
+def _csv(path: Path, _title: str, tracks: Sequence[Track]) -> None:
+    from groundstation.exports.table import write_csv
+
+    write_csv(path, tracks)
+
+
+def _parquet(path: Path, _title: str, tracks: Sequence[Track]) -> None:
+    from groundstation.exports.table import write_parquet
+
+    write_parquet(path, tracks)
+
+
+def _nmea(path: Path, track: Track) -> None:
+    from groundstation.exports.nmea import write_nmea
+
+    write_nmea(path, track)
+
+
+def _sbet(path: Path, track: Track) -> None:
+    from groundstation.exports.sbet import write_sbet
+
+    write_sbet(path, track)
+
+
+WRITERS: Mapping[str, Callable[[Path, str, Sequence[Track]], None]] = {
+    ".kml": _kml,
+    ".gpx": _gpx,
+    ".csv": _csv,
+    ".parquet": _parquet,
+}
+WRITERS_OF_ONE: Mapping[str, Callable[[Path, Track], None]] = {".nmea": _nmea, ".sbet": _sbet, ".out": _sbet}

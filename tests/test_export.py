@@ -1,0 +1,202 @@
+"""Tracks for other programs: written files read back, by our own readers and by the peers' where there are any."""
+
+import csv
+import math
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pyarrow.parquet as pq
+import pynmeagps
+import pytest
+
+import groundstation
+from groundstation.base.errors import NotAssessableError, UsageError
+from groundstation.base.records import Column, frozen
+from groundstation.exports.nmea import write_nmea
+from groundstation.exports.sbet import write_sbet
+from groundstation.exports.tracks import HALF_WIDTH, MSL, Track, tracks_of
+from groundstation.pipeline.verbs.export import export
+from groundstation.results.figures import FigureData
+from groundstation.tables.table import Flight, Table
+
+SAMPLES = Path(__file__).parents[1] / "sample_logs"
+START_NS = 1_777_874_400_000_000_000  # 2026-05-04T06:00Z
+KML, GX = "{http://www.opengis.net/kml/2.2}", "{http://www.google.com/kml/ext/2.2}"
+GPX, OWN = "{http://www.topografix.com/GPX/1/1}", "{https://groundstation.invalid/gpx/1}"
+
+
+def table(topic: str, time_s: np.ndarray, **columns: np.ndarray) -> Table:
+    time_ns = START_NS + np.rint(time_s * 1e9).astype(np.int64)
+    return Table(
+        topic,
+        time_ns,
+        {name: Column(frozen(values)) for name, values in columns.items()},
+        np.arange(len(time_ns)),
+        Column(time_s),
+    )
+
+
+def flight(has_utc: bool = True, **left_out: None) -> Flight:
+    """A turn over the south-west: positions at 5 Hz, attitude between them at 20 Hz in rows of its own."""
+    time_s = np.arange(0.0, 10.0, 0.05)
+    fix = np.arange(len(time_s)) % 4 == 1
+    heading = np.mod(350.0 + 4.0 * time_s, 360.0)
+
+    def at_fix(values: np.ndarray) -> np.ndarray:
+        return np.where(fix, values, np.nan)
+
+    ins = {
+        "latitude_deg": at_fix(-33.5 - 1e-4 * time_s),
+        "longitude_deg": at_fix(-70.6 - 2e-4 * time_s),
+        "altitude_ellipsoid_m": at_fix(530.0 + time_s),
+        "velocity_north_mps": np.where(fix, np.nan, -11.0 + 0.1 * time_s),
+        "velocity_east_mps": np.where(fix, np.nan, -18.0),
+        "velocity_down_mps": np.where(fix, np.nan, -1.0),
+        "roll_deg": np.where(fix, np.nan, 10.0 - time_s),
+        "pitch_deg": np.where(fix, np.nan, 2.0),
+        "true_heading_deg": np.where(fix, np.nan, heading),
+    }
+    gnss = {
+        "latitude_deg": np.linspace(-33.5, -33.501, 11),
+        "longitude_deg": np.linspace(-70.6, -70.602, 11),
+        "altitude_msl_m": np.linspace(500.0, 510.0, 11),
+        "velocity_north_mps": np.full(11, -3.0),
+        "velocity_east_mps": np.full(11, -4.0),
+        "hdop": np.full(11, 0.8),
+        "satellites_used": np.full(11, 9.0),
+        "integrity_ok": np.where(np.arange(11) == 4, 0.0, 1.0),
+    }
+    kept = {name: values for name, values in ins.items() if name not in left_out}
+    tables = {"ins": table("ins", time_s, **kept), "gnss": table("gnss", np.arange(11.0), **gnss)}
+    return Flight(tables, {}, START_NS, has_utc, "a<b>.csv")
+
+
+def track_of(name: str, **options: bool) -> Track:
+    (found,) = (one for one in tracks_of(flight(**options), {}) if one.name == name)
+    return found
+
+
+def test_a_fix_that_the_receiver_does_not_trust_is_left_out() -> None:
+    assert track_of("gnss").time_s.tolist() == [0.0, 1.0, 2.0, 3.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0]
+
+
+def test_attitude_of_other_rows_is_interpolated_over_a_short_time_alone() -> None:
+    ins = track_of("ins")
+    expected = np.mod(350.0 + 4.0 * ins.time_s, 360.0)
+    assert np.allclose(ins.column("true_heading_deg"), expected, atol=1e-6), "through north"
+    assert np.allclose(ins.column("roll_deg"), 10.0 - ins.time_s, atol=1e-9)
+    sparse = table(
+        "ins",
+        np.array([0.0, 0.5, 1.0]),
+        latitude_deg=np.array([math.nan, 1.0, math.nan]),
+        longitude_deg=np.array([math.nan, 1.0, math.nan]),
+        roll_deg=np.array([0.0, math.nan, 1.0]),
+    )
+    (alone,) = tracks_of(Flight({"ins": sparse}, {}, START_NS, True, "b.csv"), {})
+    assert np.isnan(alone.column("roll_deg")).all()
+
+
+def test_the_corrected_track_has_its_interval() -> None:
+    at_s = np.array([0.0, 5.0, 10.0])
+    place = {"corrected_latitude_deg": at_s * 1e-4, "corrected_longitude_deg": at_s * 0.0}
+    sigmas = {"north_position_sigma_m": np.full(3, 3.0), "east_position_sigma_m": np.array([4.0, 1.0, 4.0])}
+    figures = {
+        "inertial_track": FigureData("inertial_track", {"time_s": at_s, **place}, {}),
+        "inertial_states": FigureData("inertial_states", {"time_s": at_s, **sigmas}, {}),
+    }
+    (track,) = (one for one in tracks_of(flight(), figures) if one.name == "corrected")
+    assert np.allclose(track.column(HALF_WIDTH), math.sqrt(-2.0 * math.log(0.05)) * np.array([4.0, 3.0, 4.0]))
+
+
+def test_sentences_are_what_another_program_reads(tmp_path: Path) -> None:
+    track = track_of("gnss")
+    write_nmea(tmp_path / "a.nmea", track)
+    with (tmp_path / "a.nmea").open("rb") as stream:
+        found = [message for _, message in pynmeagps.NMEAReader(stream, quitonerror=pynmeagps.ERR_RAISE)]
+    gga = [message for message in found if message.msgID == "GGA"]
+    rmc = [message for message in found if message.msgID == "RMC"]
+    assert np.allclose([message.lat for message in gga], track.latitude_deg, atol=1e-8)
+    assert np.allclose([message.lon for message in gga], track.longitude_deg, atol=1e-8)
+    assert [message.alt for message in gga] == track.column(MSL).tolist()
+    assert {str(message.date) for message in rmc} == {"2026-05-04"}
+    assert np.allclose([message.spd for message in rmc], 5.0 / 0.514444, atol=1e-3)
+    assert np.allclose([message.cog for message in rmc], 180.0 + math.degrees(math.atan2(4.0, 3.0)), atol=1e-3)
+
+
+def test_our_reader_reads_the_trajectory_back(tmp_path: Path) -> None:
+    track = track_of("ins")
+    assert write_sbet(tmp_path / "sbet_20260504.out", track) == 0
+    read = groundstation.open(tmp_path / "sbet_20260504.out").flight["ins"]
+    assert read.time_ns.tolist() == pytest.approx(track.time_ns.tolist(), abs=1000)
+    for name in ("altitude_ellipsoid_m", "velocity_north_mps", "velocity_east_mps", "roll_deg", "true_heading_deg"):
+        assert np.allclose(read.values(name), track.column(name), atol=1e-6), name
+    assert np.allclose(read.values("latitude_deg"), track.latitude_deg, atol=1e-9)
+
+
+def test_what_a_format_needs_and_the_flight_lacks_is_told(tmp_path: Path) -> None:
+    (gnss, ins) = tracks_of(flight(altitude_ellipsoid_m=None), {})
+    with pytest.raises(NotAssessableError, match="ins: found no position with altitude above the ellipsoid"):
+        write_sbet(tmp_path / "a.out", ins)
+    with pytest.raises(NotAssessableError, match="gnss: found no UTC"):
+        write_nmea(tmp_path / "a.nmea", track_of("gnss", has_utc=False))
+    assert len(gnss) and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("has_utc", [True, False])
+def test_pages_of_the_earth_hold_every_position(tmp_path: Path, has_utc: bool) -> None:
+    from groundstation.exports.gpx import write_gpx
+    from groundstation.exports.kml import write_kml
+
+    tracks = tracks_of(flight(has_utc=has_utc), {})
+    write_kml(tmp_path / "a.kml", "a<b>", tracks)
+    root = ET.parse(tmp_path / "a.kml").getroot()
+    places = root.findall(f".//{KML}Placemark")
+    assert [place.findtext(f"{KML}name") for place in places] == ["gnss", "ins"]
+    assert "above sea level" in str(places[0].findtext(f"{KML}description"))
+    if has_utc:
+        spots = [coord.text.split() for coord in places[1].iter(f"{GX}coord")]
+        assert len(spots) == len(list(places[1].iter(f"{KML}when"))) == len(tracks[1])
+        values = places[1].find(f".//{GX}SimpleArrayData[@name='roll_deg']")
+        assert [float(one.text) for one in values] == pytest.approx(tracks[1].column("roll_deg").tolist(), abs=1e-4)
+    else:
+        spots = [spot.split(",") for spot in str(places[1].findtext(f".//{KML}coordinates")).split()]
+    assert np.allclose(np.array(spots, dtype=float)[:, 1], tracks[1].latitude_deg, atol=1e-9)
+
+    write_gpx(tmp_path / "a.gpx", "a<b>", tracks)
+    root = ET.parse(tmp_path / "a.gpx").getroot()
+    points = root.findall(f"{GPX}trk")[0].findall(f".//{GPX}trkpt")
+    assert [float(point.get("lat")) for point in points] == pytest.approx(tracks[0].latitude_deg.tolist(), abs=1e-9)
+    assert [float(point.findtext(f"{GPX}ele")) for point in points] == tracks[0].column(MSL).tolist()
+    assert (points[0].find(f"{GPX}time") is not None) == has_utc
+    children = [child.tag.removeprefix(GPX) for child in points[0]]
+    assert children == [*["ele"], *(["time"] if has_utc else []), "sat", "hdop", "extensions"], "the schema's order"
+
+
+def test_a_flight_becomes_a_table(tmp_path: Path) -> None:
+    log = SAMPLES / "taxi-good.csv"
+    outcome = export(log, tmp_path / "a.csv")
+    assert outcome.state == "done" and "gnss (" in outcome.text
+    with (tmp_path / "a.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    gnss = groundstation.open(log).flight["gnss"]
+    assert [float(row["latitude_deg"]) for row in rows if row["track"] == "gnss"] == gnss.values(
+        "latitude_deg"
+    ).tolist()
+    assert rows[0]["time_utc"].startswith("2026-05-04T06:00:0")
+    export(log, tmp_path / "a.parquet", names=["gnss"])
+    assert pq.read_table(tmp_path / "a.parquet").num_rows == len(gnss)
+
+
+def test_refusals_are_one_line_and_leave_nothing(tmp_path: Path) -> None:
+    log = SAMPLES / "taxi-good.csv"
+    with pytest.raises(UsageError, match=r"suffix \.shp"):
+        export(log, tmp_path / "a.shp")
+    with pytest.raises(UsageError, match=r"track gnss\.9: found not in taxi-good\.csv, expected one of gnss"):
+        export(log, tmp_path / "a.csv", names=["gnss.9"])
+    (tmp_path / "b.csv").write_text("mine", encoding="utf-8")
+    with pytest.raises(UsageError, match="a file that exists"):
+        export(log, tmp_path / "b.csv")
+    with pytest.raises(UsageError, match="no such file"):
+        export(tmp_path / "none.csv", tmp_path / "a.csv")
+    assert [path.name for path in tmp_path.iterdir()] == ["b.csv"]
