@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -40,6 +41,23 @@ def is_above(values: np.ndarray, limit: float) -> bool:
     return False
 
 
+class Limits(NamedTuple):
+    """What :func:`inside` is handed."""
+
+    low: float
+    highs: np.ndarray
+    steps: tuple[int, ...]
+
+
+@in_place
+def inside(values: np.ndarray, limits: Limits) -> int:
+    """How many values, taken in steps, lie between the limits."""
+    found = 0
+    for k in range(0, len(values), limits.steps[0]):
+        found += limits.low < values[k] < limits.highs[k]
+    return found
+
+
 @compiled
 def mean(values: np.ndarray) -> float:
     """Mean of values."""
@@ -50,7 +68,7 @@ def mean(values: np.ndarray) -> float:
 def kept_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of compiled code of its own, and loops that have found nothing yet."""
     monkeypatch.setattr(compiling, "_cache_folder", lambda: tmp_path)
-    for loop in (total, is_above):
+    for loop in (total, is_above, inside):
         monkeypatch.setattr(loop, "_linked", {})
     return tmp_path
 
@@ -62,6 +80,18 @@ def test_a_loop_answers_as_its_plain_function(kept_here: Path) -> None:
     np.testing.assert_array_equal(sums, [0.0, *table[1:].sum(axis=1)])
     assert is_above(np.array([1.0, 2.0]), 1.5) is True and is_above(np.array([1.0]), 1.5) is False
     assert len(list(kept_here.glob("*.machine_code"))) == 2
+
+
+def test_tuples_are_handed_on_by_name(kept_here: Path) -> None:
+    values = np.arange(10.0)
+    assert inside(values, Limits(2.0, values + 1.0, (3, 0))) == 3  # of 0, 3, 6, 9
+    assert inside(values, Limits(3.0, np.full(10, 9.0), (3, 0))) == 1
+    assert len(list(kept_here.glob("*.machine_code"))) == 1
+    assert not compiling.is_first_run()
+
+
+def test_a_folder_without_compiled_code_is_that_of_a_first_run(kept_here: Path) -> None:
+    assert compiling.is_first_run()
 
 
 def test_arrays_with_gaps_are_left_to_numba(kept_here: Path) -> None:

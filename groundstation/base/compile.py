@@ -19,6 +19,7 @@ import numpy as np
 
 from groundstation.base.machine_code import (
     INTEGER,
+    SUFFIX,
     Form,
     KeptCode,
     Linked,
@@ -58,6 +59,12 @@ def _cache_folder() -> Path | None:
         os.environ["NUMBA_CACHE_DIR"] = str(user_cache)
         return user_cache
     return None
+
+
+def is_first_run() -> bool:
+    """Whether nothing that was compiled is kept yet: what a log needs takes some seconds more, once."""
+    folder = _cache_folder()
+    return folder is None or not any(folder.glob(f"*{SUFFIX}"))
 
 
 def _njit(numba: Any) -> Callable[..., Any]:
@@ -102,7 +109,8 @@ class Loop:
             return self._called(*arguments)
         if forms not in self._linked:
             with _LOCK:
-                self._linked[forms] = self._found(forms)
+                if forms not in self._linked:
+                    self._linked[forms] = self._found(forms)
         return (self._linked[forms] or self._called)(*arguments)
 
     def _found(self, forms: tuple[Form, ...]) -> Linked | None:

@@ -23,7 +23,7 @@ INTEGER, NUMBER = "integer", "number"
 ARRAY_DTYPES = frozenset(
     ("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64", "bool")
 )
-ENTRY = "groundstation_entry"
+ENTRY, SUFFIX = "groundstation_entry", ".machine_code"
 _RESULTS: dict[Any, type] = {int: ctypes.c_int64, bool: ctypes.c_int64, float: ctypes.c_double, None: ctypes.c_int64}
 _NUMBERS = count()  # every library has a name of its own
 _HARMLESS = frozenset(("memset", "memcpy", "memmove", "memcmp", "sqrt", "sin", "cos", "exp", "log", "pow", "atan2"))
@@ -155,7 +155,7 @@ class KeptCode:
 
     def __init__(self, folder: Path, function: Callable[..., Any], forms: Sequence[Form]) -> None:
         short = hashlib.sha256(repr(forms).encode()).hexdigest()[:8]
-        self._path = folder / f"{function.__module__}.{function.__qualname__}-{short}.machine_code"
+        self._path = folder / f"{function.__module__}.{function.__qualname__}-{short}{SUFFIX}"
         self._digest = digest_of(function, forms)
 
     def read(self) -> bytes | None:
