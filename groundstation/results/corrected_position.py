@@ -11,6 +11,7 @@ from groundstation.results.flight import FlightResults
 
 FloatArray = NDArray[np.float64]
 SHOWN_ALONG = 8  # ellipses of a track
+LARGEST_SIGMA_M = 1e7  # more is no position on Earth
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class CorrectedPosition:
 
 
 def corrected_position(results: FlightResults) -> CorrectedPosition | None:
-    """The rows with a place and finite sigmas; None of an INS that was not corrected."""
+    """The rows with a place and sigmas; None of an INS that was not corrected."""
     track, states = results.figure_with_rows("inertial_track"), results.figure_with_rows("inertial_states")
     names = "corrected_latitude_deg", "corrected_longitude_deg"
     sigmas = "north_position_sigma_m", "east_position_sigma_m"
@@ -44,5 +45,5 @@ def corrected_position(results: FlightResults) -> CorrectedPosition | None:
         return None
     columns = [numbers(track, "time_s"), *(numbers(track, name) for name in names)]
     columns += [numbers(states, name) for name in sigmas]
-    known = np.isfinite(columns).all(axis=0)
+    known = np.isfinite(columns).all(axis=0) & (np.abs(columns[3:]) < LARGEST_SIGMA_M).all(axis=0)
     return CorrectedPosition(*(column[known] for column in columns)) if known.any() else None

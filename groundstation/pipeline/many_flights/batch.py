@@ -303,8 +303,10 @@ def _planned_sessions(asked: Asked, planned: Sequence[Outcome]) -> list[Outcome]
     flight_ids = {one.flight_id for one in planned if one.flight_id}
     found = find_sessions(asked, flight_ids) if flight_ids else FoundSessions()
     sessions = [*map(planned_session, found.jobs), *(one for one in found.told if one.state == "failed")]
-    unread = [one.source for one in planned if one.state == "done" and one.text == PLANS["everything"]]
-    if unread and (asked.stations is not None or any(Path(log).with_name(STATIONS_TOML).is_file() for log in unread)):
+    logs = [one for one in planned if one.state == "done"]
+    unread = [one.source for one in logs if one.text == PLANS["everything"]]
+    has_stations = asked.stations is not None or any(Path(log).with_name(STATIONS_TOML).is_file() for log in unread)
+    if unread and len(logs) > 1 and has_stations:
         text = "looked for among the flights once the logs are read"
         sessions.append(Outcome("sessions", "done", text, is_session=True))
     return sessions
