@@ -18,12 +18,13 @@ from pathlib import Path
 
 import numpy as np
 from chapter10 import C10
+from recorded import LOGS, are_here
 
 from groundstation.base.records import RecordBatch
 from groundstation.readers import registry
 from groundstation.readers.icd import Icd, load
 
-DATA = Path(__file__).parents[2] / "shared" / "data" / "ch10"
+DATA = LOGS / "ch10"
 SPEED_GOAL_MB_S, TIMES_GOAL, DAMAGED_GOAL = 100.0, 10.0, 1.5
 DAMAGE_EVERY = 20_000  # bytes between flipped ones
 PEER_MB = 8  # of the log that the peer reads: it needs a second for each
@@ -166,6 +167,8 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--large-mb", type=int, default=0, help="also peak memory of a log of this size")
     options = parser.parse_args()
+    if not are_here(*options.log, options.icd):
+        return
     icds, met = (load(options.icd),), True
     with tempfile.TemporaryDirectory() as folder:
         for log in options.log:

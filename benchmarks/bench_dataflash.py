@@ -3,7 +3,6 @@
 Seconds are by the clock, best of several rounds in which ours and pymavlink take turns: other programs slow both.
 """
 
-import os
 import re
 import subprocess
 import sys
@@ -13,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from recorded import LOGS, are_here
 
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.ordering import corrected
@@ -24,7 +24,6 @@ from groundstation.readers.dataflash.blocks import Scanner
 from groundstation.readers.source import Source
 from groundstation.tables.assemble import flight_from_batches
 
-LOGS = Path(os.environ.get("GROUNDSTATION_REAL_LOGS", Path(__file__).parents[2] / "shared" / "data")) / "dataflash"
 LONG_BYTES = (14_000_000, 60_000_000)
 PEERS = ("bare", "values")
 REPEATS = 4  # of ours in each round
@@ -156,13 +155,12 @@ def main() -> None:
     if len(sys.argv) > 2:
         child(sys.argv[1], Path(sys.argv[2]))
         return
-    logs = sorted(LOGS.glob("*.BIN"), key=lambda path: path.stat().st_size)
-    if not logs:
-        print(f"no recorded logs in {LOGS} (GROUNDSTATION_REAL_LOGS)")
+    log = LOGS / "dataflash" / "TestLog2_REENCODED_plane.BIN"
+    if not are_here(log):
         return
     with tempfile.TemporaryDirectory() as folder:
-        flight = Path(folder) / logs[-1].name
-        flight.write_bytes(logs[-1].read_bytes())
+        flight = Path(folder) / log.name
+        flight.write_bytes(log.read_bytes())
         report(flight, Path(folder), rounds=5)
         for size in LONG_BYTES:
             long = Path(folder) / f"long_{size // 1_000_000}.BIN"

@@ -6,7 +6,6 @@ nothing. Logs are a recorded or simulated one with its data repeated, times goin
 """
 
 import argparse
-import os
 import re
 import subprocess
 import sys
@@ -19,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from bench_ulog import data_messages
+from recorded import LOGS, are_here
 
 from groundstation.integrity import ordering, survey  # noqa: F401 -- imported before the base is taken
 from groundstation.pipeline.one_flight.convert import convert_log
@@ -30,7 +30,6 @@ from groundstation.readers.ulog import reader  # noqa: F401
 from groundstation.store import writer  # noqa: F401
 
 ROOT = Path(__file__).parents[1]
-LOGS = Path(os.environ.get("GROUNDSTATION_REAL_LOGS", ROOT.parent / "shared" / "data"))
 SIZES_MB = (15, 60, 240)
 LIMIT_MB = 250  # above the base, at any size
 
@@ -130,7 +129,7 @@ def main() -> None:
     }
     highest = 0.0
     for suffix, (source, make) in makers.items():
-        for size in options.sizes if source.exists() else ():
+        for size in options.sizes if are_here(source) else ():
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / f"log.{suffix}"
                 make(source, path, size * 1_000_000)

@@ -20,11 +20,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bench_memory import LOGS, ROOT, repeated_csv, repeated_dataflash, repeated_ulog
+from bench_memory import ROOT, repeated_csv, repeated_dataflash, repeated_ulog
+from recorded import LOGS, are_here
 
 from groundstation.base.units import NS_PER_S
 
-SIZES_KB = (20, 2_000, 15_000, 60_000)
+SIZES_KB = (20, 2_000, 15_000)  # and 60_000 by --sizes-kb
 VERBS = ("info", "check", "convert")
 WHOLE_VERBS = ("run", "report")  # minutes for a long log: asked for by name
 SOURCES: dict[str, tuple[Path, Callable[[Path, Path, int], None]]] = {
@@ -51,7 +52,8 @@ class Timed:
         """Run it once and keep the times; codes up to 3 are answers (3: data lost)."""
         with tempfile.TemporaryFile() as said:
             started = time.perf_counter_ns()
-            process = subprocess.Popen(self.command, stdout=said, stderr=said, env=self.environment)
+            # Elsewhere: Python would import the package from the folder it is started in.
+            process = subprocess.Popen(self.command, stdout=said, stderr=said, env=self.environment, cwd="/")
             _, status, usage = os.wait4(process.pid, 0)
             wall_s = (time.perf_counter_ns() - started) / NS_PER_S
             process.returncode = os.waitstatus_to_exitcode(status)
@@ -71,8 +73,7 @@ class Timed:
 def make_log(suffix: str, size_kb: int, folder: Path) -> Path | None:
     """A log of about a size; None where the recorded one is absent."""
     source, repeat = SOURCES[suffix]
-    if not source.exists():
-        print(f"no {source}: {suffix} is left out (GROUNDSTATION_REAL_LOGS)")
+    if not are_here(source):
         return None
     target = folder / f"log_{size_kb}.{suffix}"
     if size_kb * 1_000 >= 0.9 * source.stat().st_size:
@@ -81,6 +82,11 @@ def make_log(suffix: str, size_kb: int, folder: Path) -> Path | None:
         beginning = source.read_bytes()[: size_kb * 1_000]
         target.write_bytes(beginning[: beginning.rindex(b"\n") + 1] if suffix == "csv" else beginning)
     return target
+
+
+def without_bytecode_switch() -> dict[str, str]:
+    """The environment as of a user, whose modules are compiled once and not in every process."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
 
 
 def peers(log: Path, out: Path) -> Iterator[tuple[str, list[str]]]:
@@ -101,7 +107,7 @@ def commands(log: Path, work: Path, verbs: list[str], against: Path | None) -> l
     """What is run on a log: our verbs, the same of another checkout, the peers'."""
     found = []
     for label, root in (("groundstation", ROOT), *([("against", against)] if against else [])):
-        environment = os.environ | {"PYTHONPATH": str(root)}
+        environment = without_bytecode_switch() | {"PYTHONPATH": str(root)}
         ours = [sys.executable, "-m", "groundstation"]
         for verb in verbs:
             target = str(work / f"{label}_{verb}")
@@ -116,7 +122,7 @@ def commands(log: Path, work: Path, verbs: list[str], against: Path | None) -> l
         if program is None:
             print(f"  {name}: {command[0]} is not installed, left out")
         else:
-            found.append(Timed(name, [program, *command[1:]], dict(os.environ)))
+            found.append(Timed(name, [program, *command[1:]], without_bytecode_switch()))
     return found
 
 
@@ -146,9 +152,11 @@ def main() -> None:
     parser.add_argument("--formats", nargs="+", default=[*SOURCES, "mcap"], metavar="SUFFIX")
     parser.add_argument("--sizes-kb", nargs="+", type=int, default=SIZES_KB, metavar="KB")
     parser.add_argument("--verbs", nargs="+", default=list(VERBS), help=f"of {', '.join((*VERBS, *WHOLE_VERBS))}")
-    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--cold", action="store_true", help="also with nothing compiled")
-    parser.add_argument("--against", type=Path, help="another checkout, measured beside this one")
+    parser.add_argument(
+        "--against", type=lambda text: Path(text).resolve(), help="another checkout, measured beside this one"
+    )
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         for suffix in options.formats:

@@ -4,16 +4,16 @@ Seconds are by the clock, best of several rounds in which ours and the peer take
 """
 
 import logging
-import os
 import time
 from collections.abc import Callable
 from pathlib import Path
+
+from recorded import LOGS, are_here
 
 from groundstation.base.records import RecordBatch
 from groundstation.readers.receiver import read
 from groundstation.readers.source import Source
 
-LOGS = Path(os.environ.get("GROUNDSTATION_REAL_LOGS", Path(__file__).parents[2] / "shared" / "data")) / "gnss"
 STREAMS = ("walk_0827_gnss_1730.ubx", "pygpsdata_testobsdata.log", "inertialsense_Serial38400.nmea")
 ROUNDS = 3
 WANTED = 50
@@ -43,9 +43,8 @@ def main() -> None:
     """Print speeds and their ratios."""
     logging.disable(logging.CRITICAL)  # complaints of the peers
     for name in STREAMS:
-        path = LOGS / name
-        if not path.exists():
-            print(f"no {path} (GROUNDSTATION_REAL_LOGS)")
+        path = LOGS / "gnss" / name
+        if not are_here(path):
             continue
         by_groundstation(path)  # compiles
         best = {by_peers: float("inf"), by_groundstation: float("inf")}

@@ -16,13 +16,14 @@ from pathlib import Path
 
 import numpy as np
 from pyulog import ULog
+from recorded import LOGS, are_here
 
 from groundstation.base.records import Column, RecordBatch
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.readers import registry
 
-DEFAULT_LOG = Path(__file__).parents[2] / "shared" / "data" / "ulog" / "Proto_FLT09_REENCODED_fixedwing.ulg"
+DEFAULT_LOG = LOGS / "ulog" / "Proto_FLT09_REENCODED_fixedwing.ulg"
 TABLES_GOAL, CONVERT_GOAL, DAMAGED_GOAL = 5.0, 1.0, 1.5
 REPEATS = 4
 DAMAGE_EVERY = 20_000  # bytes between flipped ones: some 700 damaged places in 14 MB
@@ -109,6 +110,8 @@ def main() -> None:
     parser.add_argument("--log", type=Path, default=DEFAULT_LOG)
     parser.add_argument("--rounds", type=int, default=7)
     options = parser.parse_args()
+    if not are_here(options.log):
+        return
     data = options.log.read_bytes()
     with tempfile.TemporaryDirectory() as folder:
         paths = {name: Path(folder) / f"{name}.ulg" for name in ("whole", "long", "damaged")}

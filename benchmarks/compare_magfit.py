@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from recorded import LOGS, are_here
 
 from groundstation.estimators.magnetic.earth import earth_field
 from groundstation.estimators.magnetic.iron import Iron
@@ -28,8 +29,7 @@ from groundstation.readers.source import Source
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.phases import flight_phases
 
-LOGS = Path(os.environ.get("GROUNDSTATION_REAL_LOGS", Path(__file__).parents[2] / "shared" / "data")) / "dataflash"
-LOG = "TestLog2_REENCODED_plane.BIN"
+LOG = LOGS / "dataflash" / "TestLog2_REENCODED_plane.BIN"
 NT_PER_MILLIGAUSS = 100.0
 VECTOR = r"Vector3\((\S+), (\S+), (\S+)\)"
 Array = NDArray[np.float64]
@@ -37,14 +37,12 @@ Array = NDArray[np.float64]
 
 def main() -> None:
     """Print offsets and what each leaves of the modulus of the field."""
-    path = LOGS / LOG
-    if not path.exists():
-        print(f"no {LOG} in {LOGS} (GROUNDSTATION_REAL_LOGS)")
+    if not are_here(LOG):
         return
-    items = list(read(Source(path)))
+    items = list(read(Source(LOG)))
     found = survey(items)
     flight = flight_from_batches(
-        corrected(items, found.clock), metadata={}, has_utc=found.clock.is_absolute, source_name=LOG
+        corrected(items, found.clock), metadata={}, has_utc=found.clock.is_absolute, source_name=LOG.name
     )
     settings = MagneticSettings(attitude_condition_max=1e6, modulus_condition_max=1e6, modulus_sigma_max_deg=180.0)
     readings, _latency_s = gather(flight, choose_topics(flight), None, settings)
@@ -52,7 +50,7 @@ def main() -> None:
     _along, declination, earth = earth_field(flight, readings, np.arange(len(readings)), settings)
     strength = float(np.hypot(earth.horizontal_nt, earth.down_nt))
     spans = f"banks {_span(readings.roll_deg)}, pitch {_span(readings.pitch_deg)}"
-    print(f"{LOG}: {len(readings)} readings in flight, {spans}")
+    print(f"{LOG.name}: {len(readings)} readings in flight, {spans}")
     print(f"field of {declination.model}: {strength:.0f} nT, declination {declination.value_deg:.2f} deg")
     logged = np.array([flight["raw.MAG"].values(f"Ofs{axis}")[0] for axis in "XYZ"])
     attitude, modulus = fit_iron(readings, earth, settings), fit_modulus(readings.field_nt, earth, settings)
@@ -64,7 +62,7 @@ def main() -> None:
         "modulus fit": (modulus.iron, f"condition {modulus.condition_number:.0f} {modulus.reason}"),
     }
     for name, options in (("MAGFit", ()), ("MAGFit --elliptical", ("--elliptical",))):
-        offsets, diagonal, off_diagonal, scale = magfit(path, *options)
+        offsets, diagonal, off_diagonal, scale = magfit(LOG, *options)
         a, b, c = off_diagonal
         matrix = scale * (np.diag(diagonal) + np.array([[0, a, b], [a, 0, c], [b, c, 0]]))
         rows[name] = (Iron(np.linalg.inv(matrix), (logged - offsets) * NT_PER_MILLIGAUSS), f"scale {scale:.3f}")

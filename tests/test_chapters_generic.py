@@ -158,7 +158,7 @@ def test_the_verdict_stands_first_and_in_the_headline(verdict: str, tone: str) -
 def test_gates_and_settings_are_told_as_in_every_chapter() -> None:
     gate = Gate("gust", "gusts", 12.0, 8.0, "mps", "failed", required=False)
     section = chapter(wind(gates=(gate,), settings={"window_s": 30.0}))
-    assert rows(section, "Gates") == [("▲ failed", "Gusts", "12 m/s", "≤ 8 m/s", "informs", "")]
+    assert rows(section, "Gates") == [("▲ failed", "Gusts", "12 m/s", "≤ 8 m/s", "informs")]
     (settings,) = (part for part in section.appendix if isinstance(part, Facts))
     assert settings.title == "Settings: [wind]" and settings.compact
     assert list(settings.pairs) == [("window_s", "30", "")]

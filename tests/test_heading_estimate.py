@@ -23,7 +23,8 @@ from groundstation.tables.table import Flight, Table
 
 NOISELESS_DEG = 1e-6  # rounding of headings and positions
 SAME_DEG = 1e-6  # the same numbers in another order of rounding
-AIRCRAFT = AircraftData(antenna_arm_m=4.0)
+UNSTATED = AircraftData(antenna_arm_m=4.0)
+AIRCRAFT = replace(UNSTATED, sideslip_sigma_deg=0.1, mounting_sigma_deg=0.05)
 CASE = TaxiCase(
     segments_s=(45.0, 45.0),
     turns_deg=(-95.0,),
@@ -117,7 +118,7 @@ def test_parking_heading_is_corrected_and_compared() -> None:
     found = estimate(taxi_flight(run), site=site)
     assert found.parking_ins_heading_deg == pytest.approx(310.8, abs=0.01)
     assert found.parking_heading_deg == pytest.approx(310.8 - found.error_deg, abs=0.03)  # an INS of no known class
-    known = estimate(taxi_flight(run), aircraft=AircraftData(antenna_arm_m=4.0, ins_class="navigation"))
+    known = estimate(taxi_flight(run), aircraft=replace(AIRCRAFT, ins_class="navigation"))
     assert known.parking_heading_deg == pytest.approx(310.8 - known.error_deg, abs=2e-3)
     assert known.parking_sigma_deg < found.parking_sigma_deg
     assert found.reference_residual_arcmin == pytest.approx((found.parking_heading_deg or 0.0) * 60 - 310.0 * 60)
@@ -442,7 +443,7 @@ def test_figures_agree_with_the_answer(result: HeadingResult) -> None:
     assert int(samples["used"].sum()) == result.samples == len(running)
     assert float(running["mean_deg"][-1]) == pytest.approx(result.paper_error_deg)
     assert float(np.mean(samples["weight"][samples["used"]])) == pytest.approx(1.0)
-    low, high = result.confidence95_measured_deg
+    low, high = result.confidence95_deg
     assert float(running["honest_half_width_deg"][-1]) == pytest.approx(0.5 * (high - low), rel=0.1)
     bins = figures["heading_distribution"]
     width = bins["bin_high_deg"] - bins["bin_low_deg"]
@@ -460,7 +461,7 @@ def test_figures_agree_with_the_answer(result: HeadingResult) -> None:
 def disturbed(disturbance: Disturbance, **changes: object) -> HeadingResult:
     run = run_of(replace(CASE, disturbance=disturbance, **changes))
     flight = taxi_flight(run)
-    return estimate(flight, phases=flight_phases(flight))
+    return estimate(flight, phases=flight_phases(flight), aircraft=UNSTATED)
 
 
 def test_a_step_of_the_ins_heading_is_named_and_the_error_is_that_after_it() -> None:
@@ -495,9 +496,10 @@ def test_known_wind_says_how_large_the_sideslip_may_be(flight: Flight) -> None:
 
     def blowing(speed_mps: float) -> HeadingResult:
         wind = {"wind_north_mps": np.zeros(len(time_ns)), "wind_east_mps": np.full(len(time_ns), speed_mps)}
-        return estimate(replace(flight, tables={**flight.tables, "air": table_of("air", time_ns, wind)}))
+        windy = replace(flight, tables={**flight.tables, "air": table_of("air", time_ns, wind)})
+        return estimate(windy, aircraft=UNSTATED)
 
-    calm, gale, unknown = blowing(0.0), blowing(15.0), estimate(flight)
+    calm, gale, unknown = blowing(0.0), blowing(15.0), estimate(flight, aircraft=UNSTATED)
     assert calm.steady_sigma_deg == pytest.approx(0.1, abs=1e-3), "mounting alone"
     assert calm.steady_sigma_deg < min(unknown.steady_sigma_deg, gale.steady_sigma_deg)
 
@@ -541,9 +543,24 @@ def test_a_car_is_always_on_the_ground(flight: Flight) -> None:
     assert gate_of(found, "ground").state == "passed"
 
 
-def test_steady_terms_decide_where_the_settings_say_so(flight: Flight, result: HeadingResult) -> None:
-    strict = estimate(flight, settings=HeadingSettings(whole_decides=True))
-    known = AircraftData(antenna_arm_m=4.0, sideslip_sigma_deg=0.03, mounting_sigma_deg=0.03)
-    stated = estimate(flight, settings=HeadingSettings(whole_decides=True), aircraft=known)
-    assert (result.verdict, strict.verdict, stated.verdict) == ("accept", "extend", "accept")
-    assert (result.steady_origin, stated.steady_origin) == ("shipped figures", "aircraft file")
+def test_steady_terms_decide(flight: Flight) -> None:
+    """Directions 95 deg apart leave two thirds of the shipped sideslip: too much, unless the aircraft file knows it."""
+    bare = estimate(flight, aircraft=UNSTATED)
+    assert (bare.verdict, [gate.name for gate in bare.gates if gate.required and gate.state != "passed"]) == (
+        "extend",
+        ["whole_half_width"],
+    )
+    assert "taxi the other way too" in bare.verdict_reason and bare.correction_deg is None
+    assert bare.steady_sigma_deg == pytest.approx(np.hypot(0.1, 0.25 * np.cos(np.deg2rad(47.5))), abs=0.01)
+    lax = estimate(flight, aircraft=UNSTATED, settings=HeadingSettings(whole_decides=False))
+    known = estimate(flight)
+    assert (lax.verdict, known.verdict) == ("accept", "accept")
+    assert (bare.steady_origin, known.steady_origin) == ("shipped figures", "aircraft file")
+    assert bare.error_deg == known.error_deg
+
+
+def test_sideslip_on_the_way_back_takes_the_other_sign() -> None:
+    """What it leaves in the number is what the samples' weights let through: nothing, there and back."""
+    back = estimate(taxi_flight(run_of(replace(CASE, turns_deg=(180.0,)))), aircraft=UNSTATED)
+    assert back.steady_sigma_deg == pytest.approx(0.1, abs=0.01)
+    assert back.verdict == "accept"

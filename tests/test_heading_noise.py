@@ -113,9 +113,8 @@ def test_likelihood_of_standstill_and_taxi_together_is_the_dense_one() -> None:
     prior = (np.zeros(1), np.zeros(1))
     ends = np.array([len(data.time_s)], dtype=np.int64)
     gap_s = float(data.time_s[0] - still[-1])
-    noise.evaluate(
-        theta[None, :], (still, north, east, 0, gap_s), taxi, prior, ends, log_likelihood, estimate, variance
-    )
+    found, still_velocities = (log_likelihood, estimate, variance), (still, north, east, 0, gap_s)
+    noise.evaluate(theta[None, :], still_velocities, taxi, prior, ends, *found, noise.room_for(2))
     assert log_likelihood[0] == pytest.approx(expected, rel=DENSE_TOLERANCE)
     assert estimate[0, 0] == pytest.approx(mean, rel=DENSE_TOLERANCE)
     assert variance[0, 0, 0] == pytest.approx(1 / information, rel=DENSE_TOLERANCE)

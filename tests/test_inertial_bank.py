@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import SettingsError
-from groundstation.estimators.inertial.bank import COARSE_S, NoiseBank, coarse_epochs, run_bank
+from groundstation.estimators.inertial.bank import NoiseBank, run_bank
+from groundstation.estimators.inertial.coarse import COARSE_S, Coarse
 from groundstation.estimators.inertial.estimate import estimate_ins_errors
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, initial_of, run_filter
 from groundstation.estimators.inertial.hindcast import hindcast
@@ -45,17 +46,17 @@ def test_sets_are_every_combination_and_random_drifts_go_with_their_times() -> N
 
 
 def test_coarse_epochs_are_means_of_what_was_used(run: FilterRun) -> None:
-    coarse, end_s, count = coarse_epochs(run)
-    epochs = run.epochs
-    assert count == COARSE_S
+    found = Coarse.of(run)
+    coarse, epochs = found.epochs, run.epochs
+    assert found.samples == COARSE_S
     third = slice(20, 30)
     assert coarse.time_s[2] == pytest.approx(epochs.time_s[third].mean())
     assert coarse.position_m[2] == pytest.approx(epochs.position_m[third].mean(axis=0))
     assert coarse.velocity_mps[2] == pytest.approx(epochs.velocity_mps[third].mean(axis=0))
-    assert end_s[2] == epochs.time_s[29]
+    assert (found.begin_s[2], found.end_s[2]) == (epochs.time_s[20], epochs.time_s[29])
     used = np.array(run.used)
     used[22, 0] = -1
-    without, _, _ = coarse_epochs(replace(run, used=used))
+    without = Coarse.of(replace(run, used=used)).epochs
     kept = np.delete(np.arange(20, 30), 2)
     assert without.position_m[2] == pytest.approx(epochs.position_m[kept].mean(axis=0))
     assert without.time_s[2] == pytest.approx(epochs.time_s[kept].mean())
@@ -69,14 +70,24 @@ def test_slow_gnss_and_a_reset_have_epochs_of_their_own() -> None:
     noise = load_class("navigation")
     model = estimate_ins_errors(flight_of(batch_of(duration_s=600.0))).run.model
     run = run_filter(epochs, model, noise, initial=initial_of(epochs, noise), gate=1e12)
-    coarse, _, count = coarse_epochs(run)
-    assert count == 1.0
+    found = Coarse.of(run)
+    coarse = found.epochs
+    assert found.samples == 1.0
     seen = np.isfinite(coarse.position_m[:, 0])
     assert coarse.position_m[seen, 0] == pytest.approx(coarse.time_s[seen])
     assert seen.sum() == 40
     assert np.flatnonzero(coarse.is_reset).tolist() == [9]
     assert coarse.time_s[9] == pytest.approx(np.mean([87.0, 88.0, 89.0]))
     assert np.all(np.diff(coarse.time_s) > 0.0)
+
+
+def test_nothing_of_a_gap_is_in_the_epochs_that_are_blinded(run: FilterRun) -> None:
+    begin_s, end_s = float(run.epochs.time_s[5405]), float(run.epochs.time_s[6013])
+    cut = Coarse.of(run).blinded(5405, begin_s, end_s, end_s + 600.0)
+    assert cut.time_s[0] == begin_s
+    assert np.isnan(cut.position_m[cut.time_s < end_s + COARSE_S / 2.0]).all()
+    assert np.isfinite(cut.position_m[cut.time_s > end_s + COARSE_S]).all()
+    assert end_s + 580.0 < cut.time_s[-1] < end_s + 600.0
 
 
 def test_a_bank_of_the_class_alone_forecasts_as_the_last_estimate(run: FilterRun) -> None:

@@ -120,12 +120,15 @@ def test_the_map_is_rectangular_and_empty_beyond_the_flight(forecast: ForecastRe
 
 
 def test_the_coupled_model_is_used_when_it_is_chosen(found: Estimation, forecast: ForecastResult) -> None:
-    coupled = assess_forecast(found, settings=InertialSettings(model="coupled"))
-    chosen = {row.horizon_min: row.rms_m for row in coupled.skill if row.method == "last_estimate"}
-    for row in forecast.coupled:  # what the separate model's result announces is what the coupled one delivers
+    separate = assess_forecast(found, settings=InertialSettings(model="separate"))
+    assert separate.coupled == forecast.coupled
+    chosen = {row.horizon_min: row.rms_m for row in forecast.skill if row.method == "last_estimate"}
+    for row in separate.coupled:  # what the separate model's result announces is what the coupled one delivers
         assert chosen[row.horizon_min] == pytest.approx(row.rms_m, rel=1e-9)
-    others = [row for row in coupled.skill if row.method == "windows"]
-    assert others == [row for row in forecast.skill if row.method == "windows"]
+    scales = [{row.scale for row in each.calibration if row.method == "last_estimate"} for each in (forecast, separate)]
+    assert not scales[0] & scales[1]
+    others = [row for row in forecast.skill if row.method == "windows"]
+    assert others == [row for row in separate.skill if row.method == "windows"]
 
 
 def test_an_outage_of_the_log_is_crossed_by_the_method_and_model_chosen() -> None:
@@ -137,12 +140,12 @@ def test_an_outage_of_the_log_is_crossed_by_the_method_and_model_chosen() -> Non
         ("filter", InertialSettings()),
         ("windows", InertialSettings(default_method="windows")),
         ("bank", InertialSettings(default_method="noise_bank")),
-        ("coupled", InertialSettings(model="coupled")),
+        ("separate", InertialSettings(model="separate")),
     ):
         tracks[name] = estimate_ins_errors(lost, settings=settings).corrected_error_m
     inside = slice(5000, 5700)
     assert np.array_equal(tracks["filter"][:4000], tracks["windows"][:4000])
-    for other in ("windows", "bank", "coupled"):
+    for other in ("windows", "bank", "separate"):
         apart = np.abs(tracks[other][inside] - tracks["filter"][inside]).max()
         assert 1.0 < apart < 5000.0  # m: another forecast, of the same INS
 

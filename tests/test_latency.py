@@ -22,12 +22,16 @@ from groundstation.estimators.latency.settings import LatencySettings
 from groundstation.estimators.latency.windows import Series
 from groundstation.pipeline.one_flight.analyse import Answered, known_of, run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.convert import convert_log
+from groundstation.pipeline.one_flight.flight import read_flight
+from groundstation.pipeline.one_flight.log import open_log
 from groundstation.results import latency as answers
 from groundstation.results.files import save
 from groundstation.results.manifest import Manifest
 from groundstation.simulation.flight import simulate
 from groundstation.simulation.scenario import load_scenario
 from groundstation.tables.table import Flight, Table
+from tests.real_logs import real_log
 from tests.report_example import example
 from tests.saved import load
 from tests.schema_fields import SCHEMA, expect_fields
@@ -283,3 +287,20 @@ def test_scenarios_without_latency_show_none() -> None:
     row = row_of(simulate(load_scenario("taxi-good")).flight, "gnss")
     assert row.confidence95_s is not None
     assert row.confidence95_s[0] <= 0.0 <= row.confidence95_s[1]
+
+
+@pytest.mark.real_log
+def test_one_installation_has_one_latency_in_the_whole_drive_and_in_its_parts(tmp_path: Path) -> None:
+    """A car with an INS of two antennas, GNSS 0.28 s late by the correlation of velocities; it stands at first."""
+    mcap = tmp_path / "drive.mcap"
+    drive = read_flight(mcap, convert_log(open_log(real_log("reference_heading/pntos_drive_first_half.csv")), mcap))
+    parts = [(0.0, 1300.0), *((start, start + 325.0) for start in (0.0, 325.0, 650.0, 975.0))]
+    for start_s, end_s in parts:
+        tables = {}
+        for topic in drive.topics():
+            time_s = drive.time_s(topic)
+            tables[topic] = drive[topic].take((time_s >= start_s) & (time_s < end_s))
+        (row,) = estimate_latencies(replace(drive, tables=tables), kinds={"ins": "gnss_aided"}).rows
+        assert row.state == "observed", row.reason
+        assert row.confidence95_s is not None and row.confidence95_s[0] < 0.28 < row.confidence95_s[1]
+        assert row.latency_s == pytest.approx(0.28, abs=0.01)

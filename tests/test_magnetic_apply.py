@@ -293,7 +293,7 @@ def test_the_next_flights_of_forty_aircraft_get_better() -> None:
         by_iron = deviation_of(magnetic, results.flight_id, "SIM-3")
         curve = results.figure("magnetic_curves")
         assert curve is not None
-        by_curve = replace(by_iron, iron=None, table_deg=tuple(curve["deviation_recommended_deg"].tolist()))
+        by_curve = replace(by_iron, iron=None, table_deg=tuple(curve["deviation_to_add_deg"].tolist()))
         latencies = analysed(flown.flight).answer(Latencies)
         found.append(
             [

@@ -12,11 +12,15 @@ from groundstation.estimators.magnetic.alignment import align
 from groundstation.estimators.magnetic.apply import corrected_by_coefficients, corrected_by_iron, corrected_by_table
 from groundstation.estimators.magnetic.attitude import field_in_body, levelled_heading_deg
 from groundstation.estimators.magnetic.compass_table import CENTRES_DEG, build_table
+from groundstation.estimators.magnetic.held_out import Unseen, advantage
 from groundstation.estimators.magnetic.iron import Iron, bank_bias, heading_errors, parameters_of
 from groundstation.estimators.magnetic.manoeuvre import covered_bins, widest_gap_deg
+from groundstation.estimators.magnetic.methods import recommend
 from groundstation.estimators.magnetic.modulus import fit_modulus
 from groundstation.estimators.magnetic.poisson import EarthField
+from groundstation.estimators.magnetic.readings import Readings
 from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.results.magnetic import Method, MethodName
 from tests.magnetic_example import correlated, taxi_heading
 
 EARTH = EarthField(11.0, 17_000.0, 50_000.0)
@@ -179,3 +183,44 @@ def test_roll_held_wrong_is_seen_as_c_and_pitch_as_b(roll: float, pitch: float, 
     found = harmonics.fit(shown, wrap_180(shown - heading))[0]
     assert abs(found[letter]) == pytest.approx(0.1 * 50.0 / 17.0, rel=0.01)
     assert np.abs(np.delete(found, letter)).max() < 0.005
+
+
+# Which method
+
+
+def rows_of(table_deg: float, iron_deg: float, sigma_table: float, sigma_iron: float) -> tuple[Method, ...]:
+    def row(name: MethodName, left_deg: float, sigma_deg: float) -> Method:
+        sigmas = dict.fromkeys("ABCDE", sigma_deg)
+        return Method(name, "fitted", held_out_after_deg=left_deg, coefficients_sigma_deg=sigmas)
+
+    return row("compass_table", table_deg, sigma_table), row("poisson_attitude", iron_deg, sigma_iron)
+
+
+@pytest.mark.parametrize(
+    ("gain_sigmas", "sigmas", "method", "reason"),
+    [
+        (3.0, (0.1, 0.5), "poisson_attitude", "the iron leaves less: 0.30 against 0.90 deg rms"),
+        (-3.0, (0.5, 0.1), "compass_table", "the iron leaves more: 0.30 against 0.90 deg rms"),
+        (1.0, (0.5, 0.1), "poisson_attitude", "has none"),
+        (1.0, (0.1, 0.5), "compass_table", "known less well (0.71 against 0.14 deg)"),
+    ],
+)
+def test_what_is_left_decides_where_it_tells_and_the_sigma_elsewhere(
+    gain_sigmas: float, sigmas: tuple[float, float], method: str, reason: str
+) -> None:
+    found, told = recommend(rows_of(0.9, 0.3, *sigmas), gain_sigmas, 0.2, 20.0, MagneticSettings())
+    assert found == method
+    assert told.endswith(reason)
+
+
+def test_advantage_counts_stretches_not_readings() -> None:
+    """Six stretches of 20 s, 1 deg in each against 0.5 in all but one: mean gain over its scatter."""
+    time_s = np.concatenate([100.0 * stretch + np.arange(0.0, 20.0, 0.5) for stretch in range(6)])
+    nothing = np.zeros(len(time_s))
+    readings = Readings(time_s, np.zeros((len(time_s), 3)), *[nothing] * 7)
+    unseen = Unseen(readings, nothing, 0.0)
+    second = np.where(time_s < 50.0, 1.2, 0.5)
+    gains = np.array([1.0 - 1.44, *[0.75] * 5])
+    expected = np.mean(gains) / np.std(gains, ddof=1) * np.sqrt(6)
+    assert advantage(unseen, np.ones(len(time_s)), second) == pytest.approx(expected)
+    assert advantage(unseen, second, second) == 0.0

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.base.errors import GroundstationError
+import groundstation
+from groundstation.base.errors import GroundstationError, NotAssessableError
 from groundstation.base.records import Damage, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.timescales import iso_to_utc_ns, utc_ns_to_iso
 from groundstation.readers import registry
@@ -286,6 +287,10 @@ def test_a_heading_that_is_the_track_is_told(tmp_path: Path, apart_deg: float) -
     read = Read(tmp_path, pvt("2026-05-04T11:59:59Z") + b"".join(fixes))
     assert ("same in 9 of 9" in read.remark("heading_is_track")) == (apart_deg == 0.0)
     assert read.values("ins", "true_heading_deg")[0] == 90.0 + apart_deg
+    if apart_deg == 0.0:
+        (tmp_path / "track.ubx").write_bytes(pvt("2026-05-04T11:59:59Z") + b"".join(fixes))
+        with pytest.raises(NotAssessableError, match="the heading of ins is the receiver's own track"):
+            groundstation.open(tmp_path / "track.ubx").heading()
 
 
 @pytest.mark.parametrize(

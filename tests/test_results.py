@@ -79,6 +79,17 @@ def test_arrays_in_a_folder_of_the_earlier_name_are_read_and_go_with_the_next_ru
     assert not (tmp_path / "results.parquet").exists() and set(load(tmp_path).figures) == expected
 
 
+def test_columns_of_an_earlier_name_are_read_by_their_new_one(tmp_path: Path) -> None:
+    columns = {"magnetic_heading_deg": np.array([0.5]), "deviation_recommended_deg": np.array([2.0])}
+    curves = FigureData("magnetic_curves", columns, {"deviation_recommended_deg": 4})
+    other = FigureData("magnetic_ground_curve", {"magnetic_heading_deg": np.array([0.5])}, {})
+    save(tmp_path, example(None, figures=(curves, other)), MANIFEST)
+    figures = load(tmp_path).figures
+    assert list(figures["magnetic_curves"].columns) == ["uncorrected_magnetic_heading_deg", "deviation_to_add_deg"]
+    assert figures["magnetic_curves"].digits["deviation_to_add_deg"] == 4
+    assert list(figures["magnetic_ground_curve"].columns) == ["magnetic_heading_deg"]
+
+
 def test_parquet_that_is_broken_is_refused(tmp_path: Path) -> None:
     save(tmp_path, example(None), MANIFEST)
     (tmp_path / "arrays" / "overview.parquet").write_bytes(b"PAR1 no")

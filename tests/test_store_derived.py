@@ -5,6 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
@@ -166,3 +169,34 @@ def test_reading_skips_them_and_a_copy_has_them_again(tmp_path: Path) -> None:
     for topic in ("pose.ins", "location_fix.gnss", "log"):
         told = [[(time_ns, str(message)) for time_ns, message in messages(path, topic)] for path in (first, copy)]
         assert told[0] == told[1] != []
+
+
+def test_schemas_and_messages_are_those_that_foxglove_publishes(tmp_path: Path) -> None:
+    turn = {name: np.linspace(0.0, 10.0, 60) for name in ("roll_deg", "pitch_deg", "true_heading_deg")}
+    place = {"latitude_deg": np.full(60, 56.0), "longitude_deg": np.full(60, 38.0)}
+    geometry = {"hdop": np.full(60, 1.2), "pdop": np.full(60, 2.0)}
+    rows = batch("ins", 60, **turn, **place), batch("gnss", 60, **place, **geometry)
+    path = written(tmp_path / "a.mcap", *rows, findings=(Finding("warn", "gaps.long", "no data", "gnss", "at 0.5 s"),))
+    published = {one.DESCRIPTOR.full_name: one for one in (LocationFix, PoseInFrame, Log)}
+    seen = set()
+    with path.open("rb") as file:
+        for schema, _, message in make_reader(file).iter_messages():
+            if schema is None or not schema.name.startswith("foxglove."):
+                continue
+            kind = published[schema.name]
+            if schema.name not in seen:
+                seen.add(schema.name)
+                own = {item.name: item for item in FileDescriptorSet.FromString(schema.data).file}
+                pool = kind.DESCRIPTOR.file.pool
+                for name, item in own.items():
+                    assert item.SerializeToString() == pool.FindFileByName(name).serialized_pb, name
+                assert schema.encoding == "protobuf" and kind.DESCRIPTOR.file.name in own
+            decoded = kind.FromString(message.data)
+            assert decoded.timestamp.ToNanoseconds() == message.log_time
+            whole = decoded.ByteSize()
+            decoded.DiscardUnknownFields()
+            assert decoded.ByteSize() == whole, "a field that the schema does not have"
+            if schema.name == "foxglove.PoseInFrame":
+                turned = decoded.pose.orientation
+                assert np.hypot(np.hypot(turned.x, turned.y), np.hypot(turned.z, turned.w)) == pytest.approx(1.0)
+    assert seen == set(published)

@@ -1,10 +1,15 @@
 """Honesty of the interval over simulated taxi runs, and the figures of the paper measured again."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from groundstation.base.errors import UsageError
+from groundstation.pipeline.verbs.kept_runs import KeptRuns
+from groundstation.simulation.taxi import Family
 from groundstation.studies.heading import StudyResult, study_heading
-from groundstation.studies.heading_family import RunOutcome, run_family
+from groundstation.studies.heading_family import RunOutcome, run_families
 from groundstation.studies.heading_paper import arm_table, precision_table, quality_table, standstill_tables
 
 FEW_RUNS, FEW_SEED = 24, 5
@@ -14,7 +19,7 @@ JUDGING_SEEDS = {"grid": 71, "continuous": 72}
 
 @pytest.fixture(scope="module")
 def few() -> tuple[RunOutcome, ...]:
-    return run_family("continuous", FEW_SEED, FEW_RUNS)
+    return run_families([("continuous", FEW_SEED)], FEW_RUNS)["continuous"]
 
 
 def test_error_squared_is_what_the_interval_says(few: tuple[RunOutcome, ...]) -> None:
@@ -32,6 +37,30 @@ def test_interval_holds_the_truth_more_often_than_e(few: tuple[RunOutcome, ...])
     inside, inside_paper = (sum(getattr(run, name) for run in few) for name in names)
     assert inside >= 20  # of 24 at 0.95: fewer in 1 of 200 seeds
     assert inside > inside_paper
+
+
+def test_a_study_goes_on_where_it_was_stopped(few: tuple[RunOutcome, ...], tmp_path: Path) -> None:
+    """Every second run kept, and the last line cut: what is there is taken, the rest made, equal to the last digit."""
+    name, made = f"heading-continuous-{FEW_SEED}", list[str]()
+    kept = KeptRuns(tmp_path / "runs", RunOutcome)
+    for outcome in few[:4:2]:
+        assert kept.get(name, outcome.number) is None
+        kept.put(name, outcome.number, outcome)
+    path = tmp_path / "runs" / f"{name}.jsonl"
+    path.write_text(path.read_text()[:-9])
+    again = KeptRuns(tmp_path / "runs", RunOutcome)
+    found = run_families([("continuous", FEW_SEED)], 3, made.append, kept=again)["continuous"]
+    assert found == few[:3]
+    assert [line.split(":")[0] for line in made] == ["continuous run 1", "continuous run 2"]
+    assert KeptRuns(tmp_path / "runs", RunOutcome).get(name, 2) == few[2]
+    path.write_text(path.read_text().replace('"version": "', '"version": "0.', 1))
+    with pytest.raises(UsageError, match="runs of version 0"):
+        KeptRuns(tmp_path / "runs", RunOutcome).get(name, 0)
+
+
+def test_a_study_whose_time_is_over_stops_between_numbers(few: tuple[RunOutcome, ...]) -> None:
+    found = run_families([("continuous", FEW_SEED)], FEW_RUNS, is_over=lambda: True)["continuous"]
+    assert found == few[:1]
 
 
 def test_accepted_runs_are_within_twenty_arcmin(few: tuple[RunOutcome, ...]) -> None:
@@ -82,8 +111,8 @@ def test_study_writes_its_tables_and_page() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ["grid", "continuous"])
-def test_interval_holds_the_truth_in_93_to_97_of_100_runs(family: str) -> None:
-    outcomes = run_family(family, JUDGING_SEEDS[family], MANY_RUNS)  # type: ignore[arg-type]
+def test_interval_holds_the_truth_in_93_to_97_of_100_runs(family: Family) -> None:
+    outcomes = run_families([(family, JUDGING_SEEDS[family])], MANY_RUNS)[family]
     assert 0.93 <= np.mean([run.is_inside_measured for run in outcomes]) <= 0.98
     twenty = [run.is_inside_measured for run in outcomes if sum(run.case.segments_s) <= 20.5]
     assert 0.91 <= np.mean(twenty) <= 0.99  # some 200 runs: sampling error 1.5 %

@@ -106,6 +106,7 @@ def test_list_of_a_log_says_whether_it_would_run_and_why_not(tmp_path: Path) -> 
         "magnetic_ground",
         "landing",
         "landing_beacons",
+        "reference",
     }
     assert not any(entry["would_run"] for entry in answers.values())
     assert "GNSS" in answers["heading"]["reason"] and "INS position" in answers["inertial"]["reason"]
@@ -123,7 +124,10 @@ def test_study_writes_page_and_tables(tmp_path: Path) -> None:
     assert code == 0
     assert text.strip() == (tmp_path / "heading.md").read_text(encoding="utf-8").strip()
     assert (tmp_path / "tables/heading_published.csv").is_file()
-    assert groundstation("study", "heading", "-o", str(tmp_path), "--runs", "10")[0] == 2
+    kept = (tmp_path / "runs/heading-wide-73.jsonl").stat().st_mtime_ns
+    assert groundstation("study", "heading", "-o", str(tmp_path), "--runs", "10")[:2] == (0, text), "none made again"
+    assert (tmp_path / "runs/heading-wide-73.jsonl").stat().st_mtime_ns == kept
+    assert groundstation("study", "magnetic", "-o", str(tmp_path), "--minutes", "1")[0] == 2
 
 
 def test_progress_as_json_lines_goes_to_stderr(tmp_path: Path) -> None:

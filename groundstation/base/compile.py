@@ -1,17 +1,38 @@
 """The one wrapper around numba: loops that must be loops are compiled here and nowhere else.
 
-The cache goes beside the code when that folder can be written, else into the user's cache folder, else there is none;
-``numba.njit(cache=True)`` alone raises at import in a read-only install without a home.
+A loop is compiled at its first call, and numba imported then. What was compiled goes beside the code when that folder
+can be written, else into the user's cache folder, else it is compiled again in each process; ``numba.njit(cache=True)``
+alone raises at import in a read-only install without a home. Loops over numbers and arrays are kept as machine code of
+their own (``base.machine_code``), and found again without numba.
 Keep compiled functions scalar: small matrix products inside njit take 7-10 s to compile.
 """
 
 import os
 import tempfile
 from collections.abc import Callable
+from functools import cache, cached_property, update_wrapper
 from pathlib import Path
+from threading import RLock
 from typing import Any, TypeVar, cast
 
+import numpy as np
+
+from groundstation.base.machine_code import (
+    INTEGER,
+    Form,
+    KeptCode,
+    Linked,
+    answers_with_integer,
+    can_answer,
+    entry_source,
+    forms_of,
+    linked,
+    object_file,
+    plain_forms,
+)
+
 Function = TypeVar("Function", bound=Callable[..., Any])
+_LOCK = RLock()  # numba and its linker are told one thing at a time
 
 
 def _is_writable(folder: Path) -> bool:
@@ -23,23 +44,106 @@ def _is_writable(folder: Path) -> bool:
         return False
 
 
-def _choose_cache() -> bool:
+@cache
+def _cache_folder() -> Path | None:
+    """Where compiled code is kept; numba is told of it where it is not beside the code."""
     if os.environ.get("NUMBA_CACHE_DIR"):
-        return _is_writable(Path(os.environ["NUMBA_CACHE_DIR"]))
-    if _is_writable(Path(__file__).parent / "__pycache__"):
-        return True
+        chosen = Path(os.environ["NUMBA_CACHE_DIR"])
+        return chosen if _is_writable(chosen) else None
+    beside = Path(__file__).parent / "__pycache__"
+    if _is_writable(beside):
+        return beside
     user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "groundstation" / "numba"
     if _is_writable(user_cache):
         os.environ["NUMBA_CACHE_DIR"] = str(user_cache)
-        return True
-    return False
+        return user_cache
+    return None
+
+
+def _njit(numba: Any) -> Callable[..., Any]:
+    """Its stubs do not know all of its options."""
+    return cast(Callable[..., Any], numba.njit)
+
+
+class Loop:
+    """A function that is compiled when it is first called, by Python or by another one that is compiled."""
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, bool]) -> None:
+        self.py_func, self._options = function, options
+        self._is_kept = options.get("_nrt", True) is False and can_answer(function)
+        self._linked: dict[tuple[Form, ...], Linked | None] = {}
+        update_wrapper(self, function)
+
+    @cached_property
+    def _called(self) -> Any:
+        """The function as numba has it for calls from Python, kept in its cache."""
+        return self._dispatcher(is_cached=_cache_folder() is not None)  # numba reads NUMBA_CACHE_DIR at its import
+
+    @cached_property
+    def _part(self) -> Any:
+        """The function as numba has it inside others, with whose code it is kept."""
+        return self._dispatcher(is_cached=False) if self._is_kept else self._called
+
+    def _dispatcher(self, is_cached: bool) -> Any:
+        import numba
+
+        with _LOCK:
+            return _njit(numba)(cache=is_cached, nogil=True, error_model="numpy", **self._options)(self.py_func)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba takes it for where another compiled function calls it."""
+        return self._part._numba_type_
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run it: kept machine code where there is any, else what numba compiles."""
+        forms = forms_of(arguments) if self._is_kept else None
+        if forms is None:
+            return self._called(*arguments)
+        if forms not in self._linked:
+            with _LOCK:
+                self._linked[forms] = self._found(forms)
+        return (self._linked[forms] or self._called)(*arguments)
+
+    def _found(self, forms: tuple[Form, ...]) -> Linked | None:
+        """Machine code for such arguments, kept before or compiled now; None where there cannot be any."""
+        folder = _cache_folder()
+        if folder is None:
+            return None
+        kept = KeptCode(folder, self.py_func, forms)
+        code = kept.read()
+        if code is None:
+            code = self._machine_code(forms)
+            if code is None:
+                return None
+            kept.write(code)
+        return linked(code, self.py_func, forms)
+
+    def _machine_code(self, forms: tuple[Form, ...]) -> bytes | None:
+        """Compile the loop for such arguments, with an entry that takes plain C values."""
+        import numba
+        from numba.core import config
+        from numba.np.arrayobj import get_cfarray_intrinsic
+
+        if getattr(config, "DISABLE_JIT", False):
+            return None
+        names: dict[str, Any] = {"kernel": self._part, "array": get_cfarray_intrinsic("C", None)}
+        source, kinds = entry_source(self.py_func, forms)
+        exec(source, names | kinds, names)
+        types: list[Any] = [numba.types.CPointer(numba.int64 if answers_with_integer(self.py_func) else numba.float64)]
+        for form in plain_forms(forms):
+            if isinstance(form, str):
+                types.append(numba.int64 if form == INTEGER else numba.float64)
+            else:
+                types += [numba.types.CPointer(numba.from_dtype(np.dtype(form[0]))), *[numba.int64] * form[1]]
+        options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
+        entry = _njit(numba)(tuple(types), nogil=True, error_model="numpy", **options)(names["entry"])
+        ((signature, compiled),) = entry.overloads.items()
+        return object_file(entry.inspect_llvm(signature), compiled.fndesc.llvm_func_name)
 
 
 def compiled(function: Function) -> Function:
-    """Compile a scalar-loop function with numba at its first call (no Python objects, errors as in numpy).
-
-    Modules that use it are imported lazily: importing numba takes about half a second.
-    """
+    """Compile a scalar-loop function with numba at its first call (no Python objects, errors as in numpy)."""
     return _compile(function)
 
 
@@ -62,8 +166,4 @@ def inlined(function: Function) -> Function:
 
 
 def _compile(function: Function, **options: bool) -> Function:
-    cache = _choose_cache()  # before numba is imported: it reads NUMBA_CACHE_DIR once
-    import numba
-
-    decorate: Callable[..., Any] = numba.njit  # its stubs do not know all of its options
-    return cast(Function, decorate(cache=cache, nogil=True, error_model="numpy", **options)(function))
+    return cast(Function, Loop(function, options))

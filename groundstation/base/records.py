@@ -164,12 +164,15 @@ class Damage:
     between_records: tuple[int, int] | None = None
 
 
+HEADING_IS_TRACK = "heading_is_track"  # code of a remark: the receiver lets the nose point along the motion
+
+
 @dataclass(frozen=True)
 class Remark:
     """Something the reader derived, converted or assumed that a user must know of.
 
-    ``code`` is stable (``derived``, ``assumed_utc``, ``converted``), ``text`` is for people. ``fields`` are those of
-    ``topic`` that the remark is about: what a derived field was derived from is kept with the flight.
+    ``code`` is stable (``derived``, ``assumed_utc``, :data:`HEADING_IS_TRACK`), ``text`` is for people. ``fields`` are
+    those of ``topic`` that the remark is about: what a derived field was derived from is kept with the flight.
     """
 
     code: str

@@ -16,6 +16,8 @@ SUBJECTS = {
     "magnetic_ground": "Heading sensor on the ground",
     "landing": "Approaches",
     "landing_beacons": "Landing by locators",
+    "together": "Joining of logs",
+    "reference": "Comparison with the reference",
     "cooperative": "Navigation between aircraft",
 }
 

@@ -12,6 +12,8 @@ from groundstation.chapters.latency import latency
 from groundstation.chapters.magnetic import magnetic
 from groundstation.chapters.parts import Rank, Section
 from groundstation.chapters.plan import PLAN_CHAPTERS, is_plan
+from groundstation.chapters.reference import reference
+from groundstation.chapters.together import together
 from groundstation.results.answer import Answer
 from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.flight import FlightResults
@@ -23,6 +25,8 @@ from groundstation.results.landing_beacons import BeaconLanding
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
 from groundstation.results.magnetic_ground import GroundDeviation
+from groundstation.results.reference import ReferenceResult
+from groundstation.results.together import Together
 
 # In the order of the report. An answer that none of them tells has the generic chapter.
 FLIGHT_CHAPTERS: tuple[Chapter, ...] = (
@@ -33,6 +37,8 @@ FLIGHT_CHAPTERS: tuple[Chapter, ...] = (
     Chapter((MagneticResult, GroundDeviation), magnetic),
     Chapter((LandingResult,), landing),
     Chapter((BeaconLanding,), landing_beacons),
+    Chapter((Together,), together),
+    Chapter((ReferenceResult,), reference),
 )
 SESSION_CHAPTERS: tuple[Chapter, ...] = (Chapter((CooperativeResult,), cooperative),)
 

@@ -11,7 +11,7 @@ from groundstation.results.reasons import explained
 
 MOST_FINDINGS = 200
 TOLD_ABOVE = (".not_assessable", "heading.accept", "heading.reject", "heading.extend", "heading.undecided")
-TITLE, LEAD = "Findings", "What was noticed about this log, the most severe first; summary.json lists every one."
+TITLE, LEAD = "Findings", "The most severe first; all of them in summary.json."
 MARKS = {"fail": Mark("bad", "fail"), "warn": Mark("warn", "warn"), "info": Mark("plain", "info")}
 GRAVITY = {"fail": 0, "warn": 1, "info": 2}
 HEADS = (Head("Severity"), Head("Finding"), Head("Where"), Head("Count", True))

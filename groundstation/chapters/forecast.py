@@ -195,7 +195,7 @@ def _coupled(coupled: tuple[CoupledRow, ...]) -> Grid | None:
     ]
     heads = _heads("Horizon", ("Coupled, RMS m", "Gain"))
     caption = (
-        "Fourteen states (six of each channel, coupled, azimuth and its drift) against two separate channels; last "
-        "estimate of both."
+        "Sixteen states (six of each channel, coupled, azimuth and its drift, accelerometer biases) against two "
+        "separate channels; last estimate of both."
     )
     return Grid("Coupled model", heads, rows, caption) if rows else None

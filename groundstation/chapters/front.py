@@ -1,5 +1,6 @@
 """The top of the report: which flight this is, its best answer, the others as tiles, what could not be assessed."""
 
+from groundstation.base.signals import RAW_PREFIX
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.assessed import not_assessed
 from groundstation.chapters.by_answer import answer_chapters
@@ -32,7 +33,7 @@ def front(results: FlightResults) -> Front:
     left_open = tuple((one.title, one.headline) for one in chapters if one.is_open)
     pairs, missing = _pairs(results), (*left_open, *not_assessed(results))
     if not tiles:
-        return Front(title, pairs, NO_ANSWER, NOTHING, missing=missing)
+        return Front(title, pairs, NO_ANSWER, NOTHING, _recorded(results), missing=missing)
     best, *others = tiles
     told = best.claim
     return Front(
@@ -48,6 +49,12 @@ def front(results: FlightResults) -> Front:
         others=others,
         missing=missing,
     )
+
+
+def _recorded(results: FlightResults) -> tuple[str, ...]:
+    """A sentence that names the topics of the log, those of raw data left out; none without such topics."""
+    topics = sorted(topic for topic in results.completeness if not topic.startswith(RAW_PREFIX))
+    return (f"In the log: {', '.join(topics)}.",) if topics else ()
 
 
 def _pairs(results: FlightResults) -> tuple[tuple[str, Cell], ...]:

@@ -13,11 +13,9 @@ STATES = {
     "failed": Mark("bad", "failed"),
     "not_measured": Mark("unknown", "not measured"),
 }
-HEADS = (
-    *(Head("State"), Head("Gate"), Head("Figure", True), Head("Limit", True)),
-    *(Head("Role"), Head("Reason")),
-)
-CAPTION = "Accept asks for every gate that decides."
+HEADS = (Head("State"), Head("Gate"), Head("Figure", True), Head("Limit", True), Head("Reason"))
+INFORMS = "informs"
+CAPTION = "Accept asks for every gate but those that inform."
 
 
 def gate_grid(gates: Sequence[Gate]) -> Grid | None:
@@ -29,14 +27,9 @@ def _row(gate: Gate) -> tuple[Cell, ...]:
     value = number_with_unit(significant(gate.value, 3), unit_sign(gate.unit))
     title = gate.title or gate.name
     title = title[:1].upper() + title[1:]
-    return (
-        state_of(gate),
-        title,
-        value,
-        limit_text(gate),
-        "decides" if gate.required else "informs",
-        "" if gate.state == "passed" else typeset(gate.reason),
-    )
+    reason = "" if gate.state == "passed" else typeset(gate.reason)
+    note = "; ".join(filter(None, ("" if gate.required else INFORMS, reason)))
+    return state_of(gate), title, value, limit_text(gate), note
 
 
 def failed_to_inform(gates: Sequence[Gate]) -> str:
@@ -97,7 +90,8 @@ def setting_facts(settings: Mapping[str, float | str | bool], table: str = "") -
     ('Settings: [heading]', [('kurtosis', '[-1.2, 2]', ''), ('turn_rate_kind', '"slope"', '')])
     """
     pairs = [(clean(name), value, "") for name, value in sorted(_in_toml(settings).items())]
-    return Facts(f"Settings: [{table}]" if table else "Settings", pairs, compact=True) if pairs else None
+    title = f"Settings: [{table}]" if table else "Settings"
+    return Facts(title, pairs, compact=True, settings_of=table) if pairs else None
 
 
 def _in_toml(settings: Mapping[str, float | str | bool]) -> dict[str, str]:

@@ -77,18 +77,12 @@ def _estimates(answer: HeadingResult) -> Grid:
         name: number(getattr(answer, f"{name}_deg"), places, "°", signed=name.endswith("error"))
         for name, places in (("error", 4), ("paper_error", 4), ("precision", 4), ("uncorrected_error", 4))
     }
-    alone = interval(answer.confidence95_measured_deg, 3, "°")
     rows = (
         (
             "Heading error, robust and weighted by speed",
             value["error"],
             interval(answer.confidence95_deg, 3, "°"),
-            "corrected by; allows for errors correlated over seconds, steady sideslip and mounting",
-        ),
-        *(
-            (("The same by this taxi alone", value["error"], alone, "without steady sideslip and mounting"),)
-            if answer.confidence95_measured_deg
-            else ()
+            "corrected by; correlation, steady sideslip and mounting allowed for",
         ),
         (
             "Heading error, running mean of Markelov 2015",
@@ -96,7 +90,7 @@ def _estimates(answer: HeadingResult) -> Grid:
             f"± {value['precision']} (e)",
             "e is right for white errors only",
         ),
-        ("Heading error, antenna velocity as logged", value["uncorrected_error"], ABSENT, "no lever arm"),
+        ("Heading error without lever arm", value["uncorrected_error"], ABSENT, ""),
         ("Standard deviation of the differences", number(answer.estimate_sd_deg, 3, "°"), ABSENT, ""),
         ("Quality: scatter of the running mean", number(answer.quality_deg, 3, "°"), ABSENT, ""),
     )
@@ -171,7 +165,7 @@ def _standstill_facts(still: Standstill | None) -> Facts | None:
         (
             "Mean of the speeds",
             number(still.mean_of_speed_mps, 4, "m/s"),
-            "the other reading of Markelov 2015; not gated",
+            "other reading of Markelov 2015; not gated",
         ),
         ("Raw samples above 0.2 m/s", share, ""),
         ("Make-up of the velocity error", _make_up(still), ""),

@@ -37,11 +37,10 @@ TITLE = "Approaches"
 TONES: dict[str, Tone] = {"stabilised": "good", "not stabilised": "warn", "not measured": "unknown"}
 MOST_TOLD = 6
 HOW = (
-    "How computed: a final is what leads straight to a touchdown, or on the guidance down to a height from which the "
-    "aircraft climbs again. Guidance deviations become metres by the width of the course sector, two dots being its "
-    "edge, and by 0.12 of the glide angle a dot. Where runway and localizer are known, position minus localizer is the "
-    "error of the positions across the course, without GNSS; generalised least squares with the tolerance of the "
-    "course line, its bends, its width, steps of the positions and bearing of the runway in the covariance."
+    "How computed: a final leads straight to a touchdown, or on the guidance to a height from which a climb follows. "
+    "Deviations become metres by the course sector, two dots to its edge, and 0.12 of the glide angle a dot. With "
+    "runway and localizer known, position minus localizer is the error across the course, without GNSS: generalised "
+    "least squares, with tolerances of course line, bends, width, steps and runway bearing in the covariance."
 )
 
 

@@ -1,18 +1,18 @@
 """Chapter: latency between sensors: how much later than the INS each shows the same motion."""
 
 from groundstation.chapters.assessed import without_answer
-from groundstation.chapters.parts import Claim, Figure, Grid, Head, Mark, Rank, Section
+from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Part, Rank, Section
 from groundstation.chapters.wording import interval, number, significant, typeset
 from groundstation.results.flight import FlightResults
 from groundstation.results.latency import Latencies, Latency
 
 TITLE = "Latency between sensors"
-LEAD = "How much later than the INS each sensor shows the same motion, by the time stamps of the log."
+LEAD = "How much later than the INS each sensor shows the same motion."
 HEADS = (
     *(Head("Sensor"), Head("Quantity"), Head("State"), Head("Latency, s", True), Head("95 % interval", True)),
-    *(Head("Windows", True), Head("Motion in 1 s / left, RMS", True), Head("What it rests on, or why not")),
+    *(Head("Windows", True), Head("Motion in 1 s / left, RMS", True), Head("Basis, or why not")),
 )
-CAPTION = "Windows: degrees of freedom of the interval, of the windows used."
+CAPTION = "Windows: degrees of freedom of the interval, of those used."
 
 
 def latency(results: FlightResults) -> Section | None:
@@ -24,9 +24,13 @@ def latency(results: FlightResults) -> Section | None:
     told = _claim(answer)
     of = ", ".join(dict.fromkeys(row.other for row in answer.rows))
     headline = f"not observable for {of}: too little motion" if told is None else told.headline
-    return Section(
-        "latency", TITLE, LEAD, (table, Figure("latency.search")), headline, claim=told, is_open=told is None
-    )
+    if told is None:
+        unseen = [
+            (f"{row.other} {row.quantity} against {row.reference}", typeset(row.reason), "") for row in answer.rows
+        ]
+        parts: tuple[Part, ...] = (Facts("Not observable", unseen), Figure("latency.search"))
+        return Section("latency", TITLE, LEAD, parts, headline, is_open=True)
+    return Section("latency", TITLE, LEAD, (table, Figure("latency.search")), headline, claim=told)
 
 
 def _claim(answer: Latencies) -> Claim | None:

@@ -13,10 +13,9 @@ MOST_RUNS = 40
 TITLE = "Heading sensor on ground runs"
 LEAD = "On straight ground runs the nose points along the GNSS track: reading + declination − track is the error."
 HOW = (
-    "How computed: runs of steady heading with ground contact proven; one noise model for all, correlated over "
-    "seconds, and an error of its own for each run. A to E with what a run has of its own (iron in the ground, loads) "
-    "integrated out; what the directions do not show is not given and counts in σ of the rest. A = level, B and C = "
-    "semicircular, D and E = quadrantal."
+    "How computed: runs of steady heading, ground contact proven; one noise model for all, correlated over seconds. "
+    "A to E (A level, B and C semicircular, D and E quadrantal) with an error of its own for each run (iron in the "
+    "ground, loads) integrated out; what the directions do not show counts in σ of the rest."
 )
 
 

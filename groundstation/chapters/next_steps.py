@@ -10,7 +10,7 @@ from groundstation.results.heading import Gate, HeadingResult
 from groundstation.results.inertial import InertialResult
 
 TITLE = "What to do next"
-LEAD = "For a better answer next time."
+LEAD = ""
 LINES = ("Fly", "Record", "Check")
 MOST_OF_A_LINE = 4
 TAXI = "taxi straight above 6 m/s for 20 s before take-off"
@@ -21,6 +21,7 @@ BY_GATE = {
     "before_take_off": ("Fly", "taxi straight before take-off: that after landing does not count"),
     "half_width": ("Fly", "taxi straight for longer"),
     "precision": ("Fly", "taxi straight for longer"),
+    "whole_half_width": ("Fly", "taxi the other way too, or state the sigmas of sideslip and mounting"),
     "standstill_duration": ("Fly", "stand still for 30 s before taxi"),
     "standstill_speed_of_mean": ("Fly", "stand still for 30 s before taxi, with an open sky"),
     "geometry": ("Record", "GDOP, PDOP or HDOP"),

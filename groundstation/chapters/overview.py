@@ -3,7 +3,6 @@
 from groundstation.chapters.parts import Figure, Section
 from groundstation.results.flight import FlightResults
 
-LEAD = "Where the aircraft was and what it did, as logged."
 FIGURES = (
     *(Figure("overview.track"), Figure("overview.profile")),
     *(Figure("overview.attitude"), Figure("overview.states")),
@@ -13,4 +12,4 @@ FIGURES = (
 def overview(results: FlightResults) -> Section | None:
     """The chapter, None when the flight has no overview."""
     known = any(results.figure_with_rows(name) is not None for name in ("overview", "state_lanes"))
-    return Section("overview", "Overview of the flight", LEAD, FIGURES) if known else None
+    return Section("overview", "Overview of the flight", "", FIGURES) if known else None

@@ -71,13 +71,17 @@ class Grid(Part):
 
 @dataclass(frozen=True)
 class Facts(Part):
-    """Pairs of a label and a value, each with an optional remark; ``compact`` sets many short ones in columns."""
+    """Pairs of a label and a value, each with an optional remark; ``compact`` sets many short ones in columns.
+
+    ``settings_of`` names the table of a settings file that the pairs are keys and values of.
+    """
 
     kind: ClassVar[str] = "facts"
     title: str
     pairs: Sequence[tuple[str, str, str]]
     caption: str = ""
     compact: bool = False
+    settings_of: str = ""
 
 
 @dataclass(frozen=True)
@@ -103,12 +107,13 @@ class Rank(IntEnum):
     INERTIAL = 2
     FORECAST = 3
     LANDING = 4
-    HEADING_OPEN = 5  # undecided
-    GROUND_RUNS = 6
-    MAGNETIC_OPEN = 7
-    INERTIAL_OPEN = 8  # aided by GNSS, or not known whether
-    LATENCY = 9
-    OTHER = 10
+    REFERENCE = 5
+    HEADING_OPEN = 6  # undecided
+    GROUND_RUNS = 7
+    MAGNETIC_OPEN = 8
+    INERTIAL_OPEN = 9  # aided by GNSS, or not known whether
+    LATENCY = 10
+    OTHER = 11
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,15 @@ from groundstation.chapters.plan import is_plan
 from groundstation.chapters.wording import ABSENT, clean, number
 from groundstation.results.flight import FlightResults, Source
 
-LONG_LISTS = ("parameter.", "units.")  # of autopilot logs, hundreds of them
+LONG_LISTS = ("parameter.", "units.", "together")  # of autopilot logs, hundreds of them; a chapter tells the last
+DERIVED = "derived."  # a finding tells it
+ON_TOP = ("aircraft", "flight", "start_utc")  # of the page
 MOST_METADATA = 8
 REST = "More metadata in summary.json."
-CHECKS = "Every number stands in summary.json or tables/*.csv; versions and configuration in manifest.json."
+CHECKS = (
+    "All numbers and settings stand in summary.json and tables/*.csv; listed here are settings that were set. "
+    "Versions, configuration: manifest.json."
+)
 
 
 def provenance(results: FlightResults) -> Section:
@@ -23,16 +28,17 @@ def provenance(results: FlightResults) -> Section:
         store = ("Lossless store", f"{flight_id}.mcap", "every topic of the log")
     pairs = (
         *source_pairs(results.source, "scenario" if is_plan(results) else "log"),
-        ("Flight id", flight_id, ""),
         ("Recording", f"{flight_id}.rrd", "open with: groundstation view"),
         store,
     )
     parts: list[Part] = [Facts("Source and files", pairs)]
     if results.metadata:
         listed = sorted(results.metadata.items())
-        rows = [(key, value, "") for key, value in listed if not key.startswith(LONG_LISTS)][:MOST_METADATA]
-        parts.append(Facts("Title and kind" if is_plan(results) else "Metadata of the log", rows))
-        if len(rows) < len(listed):
+        own = [pair for pair in listed if not pair[0].startswith((*LONG_LISTS, DERIVED)) and pair[0] not in ON_TOP]
+        rows = [(key, value, "") for key, value in own[:MOST_METADATA]]
+        if rows:
+            parts.append(Facts("Title and kind" if is_plan(results) else "Metadata of the log", rows))
+        if len(rows) < len(own) or any(key.startswith(LONG_LISTS) for key, _ in listed):
             parts.append(Note(REST))
     parts.append(Note(CHECKS))
     return Section("provenance", "Provenance", "", parts)

@@ -23,7 +23,7 @@ from groundstation.chapters.wording import (
 from groundstation.results.figures import numbers, texts
 from groundstation.results.flight import FlightResults
 
-LEAD = "What the recorder delivered."
+LEAD = ""
 MOST_TOPICS = 60
 MOST_ENTRIES = 20
 MOST_DAMAGES = 60
@@ -52,9 +52,9 @@ CLOCK_HEADS = (
     *(Head("Other clock"), Head("From"), Head("Length, s", True)),
     *(Head("Other less recorder"), Head("Drift of the recorder"), Head("Scatter, s", True)),
 )
-CLOCK_CAPTION = "± is one standard error; positive drift: the recorder is fast. Drift does not change corrected time."
+CLOCK_CAPTION = "±: standard error; positive drift: the recorder is fast. Drift does not change corrected time."
 DAMAGE_HEADS = (Head("Kind"), Head("What"), Head("Where"), Head("Count", True), Head("Data lost"))
-WHOLE = "No damage was found in the log: nothing lost, nothing unreadable."
+WHOLE = "Nothing lost, nothing unreadable."
 
 
 def quality(results: FlightResults) -> Section:

@@ -60,11 +60,11 @@ def steady_terms(heading: HeadingResult) -> str:
     measured, sigma = heading.confidence95_measured_deg, heading.steady_sigma_deg
     if measured is None or not all(map(is_number, measured)) or not is_number(sigma):
         return ""
-    driven = "the directions driven leave" if heading.directions else "one direction cannot show"
+    driven = "the directions driven leave" if heading.directions else "this taxi cannot show"
     origin = "as the aircraft file states" if heading.steady_origin == "aircraft file" else "shipped figures"
     return (
-        f"95 % interval {interval(measured, 3, '°')} by this taxi alone, {interval(heading.confidence95_deg, 3, '°')} "
-        f"with the steady sideslip and mounting that {driven} (σ {number(sigma, 2, '°')}, {origin})."
+        f"95 % interval {interval(heading.confidence95_deg, 3, '°')} with the steady sideslip and mounting that "
+        f"{driven} (σ {number(sigma, 2, '°')}, {origin}), {interval(measured, 3, '°')} by this taxi alone."
     )
 
 
@@ -98,10 +98,7 @@ def figures(heading: HeadingResult) -> tuple[tuple[str, str, str], ...]:
     """The figures that decide, each with what it rests on."""
     samples, taxi = number(heading.samples, 0), number(heading.taxi_seconds, 0, "s")
     shown, sigma = number(heading.parking_ins_heading_deg, 2, "°"), number(heading.parking_sigma_deg, 2, "°")
-    measured = heading.confidence95_measured_deg or heading.confidence95_deg
     remark = f"95 % interval {interval(heading.confidence95_deg, 3, '°')}"
-    if measured != heading.confidence95_deg:
-        remark += f"; without steady sideslip and mounting {interval(measured, 3, '°')}"
     found = (
         ("Heading error", number(heading.error_deg, 3, "°", signed=True), remark),
         ("Precision e", number(heading.precision_deg, 3, "°"), f"{samples} samples, {taxi} of straight taxi"),

@@ -32,6 +32,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "run": (
         "run flight3.ulg -o out",
         "run logs -o out --aircraft aircraft.toml --site airfield.toml",
+        "run flight3.ulg --reference sbet_20250708.out -o out",
         "run logs -o out --dry-run",
     ),
     "report": ("report out",),
@@ -81,6 +82,10 @@ Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more; show w
 Json = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
 FailOn = Annotated[FailOnMode, typer.Option("--fail-on", help="Exit 4 at a finding this severe or worse.")]
 Force = Annotated[bool, typer.Option("-f", "--force", help="Overwrite what is there.")]
+Together = Annotated[
+    bool,
+    typer.Option("--together", help="The logs are of one flight: put them on one clock, by GNSS time or by motion."),
+]
 NoPdf = Annotated[bool, typer.Option("--no-pdf", help="Leave report.pdf and steer_card.pdf out.")]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
 Profile = Annotated[
@@ -116,6 +121,16 @@ IntervalsFile = Annotated[
 ThresholdsFile = Annotated[
     Path | None,
     typer.Option("--thresholds", help="Limits of the integrity ledger (TOML).", metavar="FILE", readable=False),
+]
+ReferenceFiles = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--reference",
+        help="Reference beside the log (SBET, .pos, another log), or a folder of them: judges the results, is seen by "
+        "no estimator.",
+        metavar="FILE",
+        readable=False,
+    ),
 ]
 
 

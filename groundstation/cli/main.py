@@ -2,11 +2,13 @@
 
 import io
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 
+from groundstation.base.errors import UsageError
 from groundstation.base.version import __version__
 from groundstation.cli import fleets, flights, plans
 from groundstation.cli.application import (
@@ -24,8 +26,10 @@ from groundstation.cli.application import (
     Profile,
     Progress,
     Quiet,
+    ReferenceFiles,
     SiteFile,
     ThresholdsFile,
+    Together,
     Verbose,
     answers_with_exit_code,
     app,
@@ -121,6 +125,8 @@ def convert(
     config: ConfigFile = None,
     profile: Profile = None,
     icd: IcdFiles = None,
+    together: Together = False,
+    reference: ReferenceFiles = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -130,12 +136,15 @@ def convert(
     """Convert recorded logs to MCAP (protobuf channels, zstd, indexed); the clock is repaired, both times are kept."""
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
+    from groundstation.pipeline.many_flights.references import judged_by
     from groundstation.pipeline.one_flight.configuration import load_configuration
-    from groundstation.pipeline.verbs.conversions import convert_many
+    from groundstation.pipeline.verbs.conversions import convert_many, convert_together
 
-    configuration = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
+    settings = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
+    configuration = judged_by(settings, reference or (), is_one_log=together or len(logs) == 1)
     with listener("none" if quiet else progress) as listen:
-        outcomes = convert_many(logs, output, configuration=configuration, force=force, listen=listen)
+        convert_logs = convert_together if together else convert_many
+        outcomes = convert_logs(logs, output, configuration=configuration, force=force, listen=listen)
     printing.outcomes(outcomes, as_json_text=json, quiet=quiet)
     return printing.worst_code(outcomes)
 
@@ -152,6 +161,7 @@ def run(
     thresholds: ThresholdsFile = None,
     profile: Profile = None,
     icd: IcdFiles = None,
+    reference: ReferenceFiles = None,
     jobs: Annotated[int, typer.Option("-j", "--jobs", help="Processes; 0: one per core.", min=0)] = 0,
     scheduler: Annotated[
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
@@ -166,6 +176,7 @@ def run(
             metavar="own|PATH",
         ),
     ] = "",
+    together: Together = False,
     stations: Annotated[
         Path | None,
         typer.Option(
@@ -192,29 +203,26 @@ def run(
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.many_flights.batch import plan_many, run_many
+    from groundstation.pipeline.many_flights.batch import plan_many, run_many, run_together
+    from groundstation.pipeline.many_flights.references import judged_by
     from groundstation.pipeline.one_flight.configuration import applying, load_configuration
 
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd)
-    configuration = applying(settings, apply)
+    is_one_log = together or (len(paths) == 1 and not Path(paths[0]).is_dir())
+    configuration = judged_by(applying(settings, apply), reference or (), is_one_log=is_one_log)
+    if together and (dry_run or scheduler or stations is not None):
+        raise UsageError("--together", "--dry-run, --scheduler or --stations beside it", "it without them")
     if dry_run:
         planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)
         return DONE
+    run_logs = partial(run_many, jobs=jobs, scheduler=scheduler, redo=redo, stations=stations)
+    if together:
+        run_logs = partial(run_together)
     try:
         with listener("none" if quiet else progress) as listen:
-            outcomes = run_many(
-                paths,
-                output,
-                configuration,
-                jobs=jobs,
-                scheduler=scheduler,
-                force=force,
-                fail_on=fail_on,
-                with_pdf=not no_pdf,
-                redo=redo,
-                stations=stations,
-                listen=listen,
+            outcomes = run_logs(
+                paths, output, configuration, force=force, fail_on=fail_on, with_pdf=not no_pdf, listen=listen
             )
     except KeyboardInterrupt:
         say(f"interrupted: {output} keeps what is finished; the same command again goes on with the rest")
@@ -305,6 +313,10 @@ def study(
         Path | None,
         typer.Option("--recorded", help="Folder of recorded robots (cooperative only): run on them.", metavar="FOLDER"),
     ] = None,
+    minutes: Annotated[
+        float | None,
+        typer.Option("--minutes", help="End after so long (heading only); the same command goes on.", min=0.1),
+    ] = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -315,7 +327,9 @@ def study(
     from groundstation.pipeline.verbs.synthesis import study_to
 
     with listener("none" if quiet else progress) as listen:
-        text = study_to(name, output, runs=runs, seed=seed, force=force, listen=listen, recorded=recorded)
+        text = study_to(
+            name, output, runs=runs, seed=seed, force=force, listen=listen, recorded=recorded, minutes=minutes
+        )
     if not quiet:
         typer.echo(text)
     return DONE

@@ -15,11 +15,15 @@ from groundstation.estimators.landing_ranges.plan import LANDING_PLAN
 from groundstation.estimators.latency.analysis import LATENCY
 from groundstation.estimators.magnetic.analysis import MAGNETIC, MAGNETIC_GROUND
 from groundstation.estimators.plan import Plan
+from groundstation.estimators.reference.analysis import REFERENCE
+from groundstation.estimators.together.analysis import TOGETHER_ANALYSIS
 from groundstation.results.answer import Answer
 
 FLIGHT_ANALYSES: tuple[Analysis, ...] = (
     *(HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND),
     *(LANDING, LANDING_BEACONS),
+    TOGETHER_ANALYSIS,
+    REFERENCE,
 )
 SESSION_ANALYSES: tuple[Analysis, ...] = (COOPERATIVE,)
 PLANS: tuple[Plan[Any], ...] = (SESSION_PLAN, LANDING_PLAN)

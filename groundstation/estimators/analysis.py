@@ -79,6 +79,8 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
         Analyses whose answers it uses where there are any; they run first.
     requires : tuple of str
         Those of them without which it cannot run; that it then did not run is their reason, told once.
+    applies : callable
+        Whether data of that kind can have it at all: of other data nothing is said of it, not even why not.
     is_expected : callable
         Whether such data let one expect an answer: then a finding says why there is none.
     rests_on : callable
@@ -89,6 +91,9 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
         What it gives to the tables of flights: index.json, index.csv, fleet.parquet. Names differ between analyses.
     check : callable
         ``check(settings, aircraft)`` raises SettingsError for settings that contradict what is known of the aircraft.
+    judges : bool
+        Whether it is given the truth, by which it judges the others: it runs where there is one, and last; every other
+        analysis is given a flight without it.
     """
 
     name: str
@@ -101,11 +106,13 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     table: str = ""
     builds_on: tuple[str, ...] = ()
     requires: tuple[str, ...] = ()
+    applies: Callable[[Any, Any], bool] = _always
     is_expected: Callable[[Any, Any], bool] = _always
     rests_on: Callable[[Any, Any], RestsOn | None] = _no_samples
     sentence: Callable[[Answers], str] = _nothing
     columns: tuple[AnswerColumn[AnswerT], ...] = ()
     check: Callable[[Any, Any], None] = _any_settings
+    judges: bool = False
 
     def __post_init__(self) -> None:
         known = {field.name for field in dataclasses.fields(cast(Any, self.answer))}

@@ -1,17 +1,18 @@
 """Chapters of the flight report, in its order, with their figures drawn."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from string import ascii_uppercase
+from typing import Any
 
 from groundstation.chapters.by_answer import answer_chapters, chapters_of
 from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.findings import findings
 from groundstation.chapters.next_steps import next_steps
 from groundstation.chapters.overview import overview
-from groundstation.chapters.parts import Note, Section
+from groundstation.chapters.parts import Facts, Note, Part, Section, kept
 from groundstation.chapters.plan import is_plan
 from groundstation.chapters.provenance import provenance
 from groundstation.chapters.quality import quality
@@ -38,7 +39,8 @@ def flight_sections(saved: SavedFlight) -> tuple[Section, ...]:
         else (*chapters_of(results), *(build(results) for build in ON_THE_SESSION))
     )
     chapters = [section for section in told if section is not None]
-    appendix = [*map(_workings, chapters), *((provenance(results), sources(results)) if is_flight else ())]
+    workings = (_workings(section, saved.manifest.configuration) for section in chapters)
+    appendix = [*workings, *((provenance(results), sources(results)) if is_flight else ())]
     shown = [replace(section, appendix=()) for section in chapters if not section.is_open]
     return (*_numbered(shown, saved, count(1)), *_numbered(appendix, saved, ascii_uppercase))
 
@@ -50,10 +52,20 @@ def _numbered(sections: Sequence[Section | None], saved: SavedFlight, numbers: I
     return tuple(replace(section, number=str(number)) for section, number in zip(shown, numbers, strict=False))
 
 
-def _workings(section: Section) -> Section:
-    """What a chapter leaves to the appendix."""
-    parts = (*section.parts, *section.appendix) if section.is_open else section.appendix
+def _workings(section: Section, configuration: Mapping[str, Any]) -> Section:
+    """What a chapter leaves to the appendix; of the settings those that were set."""
+    every = (*section.parts, *section.appendix) if section.is_open else section.appendix
+    parts = kept(_as_set(part, configuration) for part in every)
     return Section(f"{section.key}-workings", f"{section.title}: workings", "", parts)
+
+
+def _as_set(part: Part, configuration: Mapping[str, Any]) -> Part | None:
+    """Settings cut down to those that the user set, None where there is none; any other part as it is."""
+    if not isinstance(part, Facts) or not part.settings_of:
+        return part
+    given = configuration.get(part.settings_of)
+    pairs = [pair for pair in part.pairs if isinstance(given, Mapping) and pair[0].partition(".")[0] in given]
+    return replace(part, pairs=pairs) if pairs else None
 
 
 def on_a_page(section: Section, saved: SavedFlight) -> Section:

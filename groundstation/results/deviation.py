@@ -149,9 +149,9 @@ def deviation_csv(results: FlightResults) -> str | None:
     if magnetic is None or curves is None or table is None:
         return None
     wanted = (
-        (READING, table, "magnetic_heading_deg"),
-        (TO_ADD, curves, "deviation_recommended_deg"),
-        (SIGMA, curves, "sigma_recommended_deg"),
+        (READING, table, READING),
+        (TO_ADD, curves, TO_ADD),
+        (SIGMA, curves, SIGMA),
         (TABLE_TO_ADD, table, "deviation_deg"),
         (TABLE_SIGMA, curves, "sigma_compass_table_deg"),
         (COVERAGE, table, "is_interpolated"),

@@ -24,6 +24,15 @@ from groundstation.results.restore import restored
 from groundstation.results.summary import digits_of, summary_of
 
 Document = TypeVar("Document")
+OLD_COLUMNS: Mapping[str, Mapping[str, str]] = {  # names of an earlier version, still read
+    "magnetic_samples": {"magnetic_heading_deg": "uncorrected_magnetic_heading_deg"},
+    "magnetic_table": {"magnetic_heading_deg": "uncorrected_magnetic_heading_deg"},
+    "magnetic_curves": {
+        "magnetic_heading_deg": "uncorrected_magnetic_heading_deg",
+        "deviation_recommended_deg": "deviation_to_add_deg",
+        "sigma_recommended_deg": "deviation_sigma_deg",
+    },
+}
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 PARQUET_MAGIC = b"PAR1"  # at both ends of a whole file
 PARQUET_LEAST_BYTES = 12  # both, and the length of what describes the file
@@ -241,15 +250,15 @@ def _write_parquet(path: Path, figure: FigureData) -> None:
 def _read_parquet(path: Path) -> FigureData:
     import pyarrow.parquet as pq
 
-    columns = {}
+    columns, names = {}, OLD_COLUMNS.get(path.stem, {})
     try:
         with pq.ParquetFile(path) as file:  # read_table would import pandas
             table = file.read(use_threads=False)
         for name in table.column_names:
             values = table.column(name).to_numpy()
-            columns[name] = values.astype(np.str_) if values.dtype.kind == "O" else values
+            columns[names.get(name, name)] = values.astype(np.str_) if values.dtype.kind == "O" else values
         digits = json.loads((table.schema.metadata or {}).get(b"digits", b"{}"))
-        return FigureData(path.stem, columns, {name: int(places) for name, places in digits.items()})
+        return FigureData(path.stem, columns, {names.get(name, name): int(places) for name, places in digits.items()})
     except (OSError, ValueError, TypeError, AttributeError, LookupError, NotImplementedError) as error:
         raise UnreadableLogError(
             str(path), type(error).__name__, "a Parquet file of a run", "run the log again"

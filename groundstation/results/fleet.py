@@ -156,8 +156,9 @@ class FleetCalibration:
 
     Parameters
     ----------
-    quantity : {'reference', 'runway', 'onboard'}
-        Corrected parking heading against its reference, INS heading against the runway, the aircraft's own figure.
+    quantity : str
+        ``reference``, ``runway``, ``onboard``: corrected parking heading against its reference, INS heading against the
+        runway, the aircraft's own figure; ``truth_*``: heading error and positions against a reference beside the log.
     checks, inside : int
     share_inside, confidence95 : float, (float, float)
         Share and its exact (Clopper and Pearson) interval: honest sigmas have ``stated`` inside it.

@@ -103,7 +103,7 @@ class CalibrationRow:
 class CoupledRow:
     """Gain of the coupled model over two separate channels: 1 - RMS ratio, last estimate of both.
 
-    The coupled model has fourteen states: six of each channel, the azimuth error and its drift.
+    The coupled model has sixteen states: six of each channel, the azimuth error, its drift, two accelerometer biases.
     """
 
     horizon_min: float

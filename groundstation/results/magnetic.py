@@ -268,6 +268,7 @@ class MagneticResult(Answer):
     poisson: PoissonParameters | None = None
     modulus: PoissonParameters | None = None
     table_fit_rms_deg: float | None = None
+    attitude_wander_deg: float | None = None
     remarks: tuple[str, ...] = ()
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()

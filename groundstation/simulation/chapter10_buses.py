@@ -161,7 +161,8 @@ def _carried(table: Table, words: tuple[Word429, ...]) -> list[tuple[Word429, Fl
         coarse = word.elements[0].fine_of
         if coarse in found:
             holder, values = found[coarse]
-            step = step_429(holder.elements[0])
+            step, fine_step = step_429(holder.elements[0]), step_429(word.elements[0])
+            values = np.round(values / fine_step) * fine_step  # first, so that the rest never rounds up to a whole step
             cut_off = np.floor(values / step) * step
             found[coarse], found[word.name] = (holder, cut_off), (word, values - cut_off)
     return list(found.values())

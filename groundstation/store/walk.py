@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.base.compile import compiled
+from groundstation.base.compile import in_place
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.store.messages import HEAD, MESSAGE_OPCODE, RECORD_PREFIX, ByteArray, Messages
 from groundstation.store.schema import WireField
@@ -120,7 +120,7 @@ def fields_of(
 
 @cache
 def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    return compiled(function)
+    return in_place(function)
 
 
 class Walker:

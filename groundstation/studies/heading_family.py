@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from groundstation.tables.phases import flight_phases
 BoolArray = NDArray[np.bool_]
 Progress = Callable[[str], None]
 NAMED_ARM_SIGMA_M = 0.05
+MOST_SEGMENTS = 3  # so many and more count as one
 
 
 @dataclass(frozen=True)
@@ -106,19 +108,51 @@ def outcome_of(number: int, case: TaxiCase, result: HeadingResult, truth_deg: fl
     )
 
 
-def run_family(
-    family: Family, seed: int, runs: int, progress: Progress | None = None, settings: HeadingSettings | None = None
-) -> tuple[RunOutcome, ...]:
-    """Runs 0 to ``runs`` - 1 of a seed. ``progress`` is called with a line for each."""
-    outcomes = []
+class Kept(Protocol):
+    """Outcomes of runs that ended before, by a name for family and seed, and by number."""
+
+    def get(self, name: str, number: int) -> RunOutcome | None: ...
+
+    def put(self, name: str, number: int, outcome: RunOutcome) -> None: ...
+
+
+def run_families(
+    families: Sequence[tuple[Family, int]],
+    runs: int,
+    progress: Progress | None = None,
+    *,
+    kept: Kept | None = None,
+    is_over: Callable[[], bool] | None = None,
+) -> dict[Family, tuple[RunOutcome, ...]]:
+    """Runs 0 to ``runs`` - 1 of each family and seed, by turns; fewer, equally many of each, where time is over.
+
+    Parameters
+    ----------
+    families : sequence of (family, seed)
+    runs : int
+    progress : callable, optional
+        Called with a line for each run that is made.
+    kept : Kept, optional
+        Runs that it has are taken from there; those that are made are put there.
+    is_over : callable, optional
+        Asked before each number but the first whether to stop.
+    """
+    outcomes: dict[Family, list[RunOutcome]] = {family: [] for family, _seed in families}
     for number in range(runs):
-        outcome = run_once(family, seed, number, settings)
-        outcomes.append(outcome)
-        if progress:
-            progress(
-                f"{family} run {number}: error {outcome.error_deg * ARCMIN_PER_DEG:+.1f} arcmin, {outcome.verdict}"
-            )
-    return tuple(outcomes)
+        if number > 0 and is_over is not None and is_over():
+            break
+        for family, seed in families:
+            name = f"heading-{family}-{seed}"
+            outcome = kept.get(name, number) if kept else None
+            if outcome is None:
+                outcome = run_once(family, seed, number)
+                if kept:
+                    kept.put(name, number, outcome)
+                if progress:
+                    error = f"{outcome.error_deg * ARCMIN_PER_DEG:+.1f} arcmin"
+                    progress(f"{family} run {number}: error {error}, {outcome.verdict}")
+            outcomes[family].append(outcome)
+    return {family: tuple(found) for family, found in outcomes.items()}
 
 
 def runs_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
@@ -218,6 +252,28 @@ def coverage_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
         "accepted_max_arcmin": column(lambda mask: float(np.max(np.abs(error[mask & accepted]), initial=0.0))),
     }
     return FigureData(name, columns, {key: 3 if "coverage" in key else 1 for key in columns})
+
+
+def segments_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
+    """Coverage with and without steady terms by number of segments, for each kind of disturbance.
+
+    What is the same all along one segment cannot be told from the error by that segment: with more of them, in other
+    directions, their spread shows it.
+    """
+    kinds = np.array([outcome.case.disturbance.kind for outcome in outcomes])
+    segments = np.minimum([len(outcome.case.segments_s) for outcome in outcomes], MOST_SEGMENTS)
+    inside = np.array([(outcome.is_inside, outcome.is_inside_measured) for outcome in outcomes], dtype=np.float64)
+    rows = []
+    for kind in KINDS:
+        masks = [(kinds == kind) & (segments == number) for number in range(1, MOST_SEGMENTS + 1)]
+        if any(mask.any() for mask in masks):
+            means = [inside[mask].mean(axis=0) if mask.any() else np.full(2, np.nan) for mask in masks]
+            rows.append((kind, *(int(mask.sum()) for mask in masks), *(float(x) for m in means for x in m)))
+    numbers = range(1, MOST_SEGMENTS + 1)
+    names = ["cell", *(f"runs_of_{number}" for number in numbers)]
+    names += [f"{what}_{number}" for number in numbers for what in ("coverage", "measured_coverage")]
+    columns = {name: np.array([row[place] for row in rows]) for place, name in enumerate(names)}
+    return FigureData(name, columns, dict.fromkeys(names[1 + MOST_SEGMENTS :], 3))
 
 
 def gates_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:

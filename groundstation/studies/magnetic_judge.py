@@ -249,7 +249,7 @@ def _held_out(flown: Flown, result: MagneticResult) -> dict[str, FloatArray]:
     rows = samples["part"] == "held out"
     if not rows.any():
         return {}
-    time_s, shown = samples["time_s"][rows], samples["magnetic_heading_deg"][rows]
+    time_s, shown = samples["time_s"][rows], samples["uncorrected_magnetic_heading_deg"][rows]
     motion_s = flown.motion.time_ns / NS_PER_S
     field = [np.interp(time_s, motion_s, flown.field_ned_nt[:, axis]) for axis in (0, 1)]
     true_heading = np.interp(time_s, motion_s, unwrap(flown.motion.heading_deg))

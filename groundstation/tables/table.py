@@ -284,6 +284,10 @@ class Flight:
         """Topics in alphabetical order."""
         return tuple(sorted(self.tables))
 
+    def without(self, kind: str) -> "Flight":
+        """The flight without the topics of a kind; its clock stays as it is."""
+        return replace(self, tables={name: one for name, one in self.tables.items() if kind_of(name) != kind})
+
     def seconds(self, time_ns: Int64Array) -> FloatArray:
         """Seconds since the start of the flight, float64, shape as ``time_ns``."""
         return (np.asarray(time_ns, dtype=np.int64) - self.start_ns) / NS_PER_S

@@ -30,6 +30,8 @@ from groundstation.viewer.tabs.magnetic import magnetic
 from groundstation.viewer.tabs.overview import overview
 from groundstation.viewer.tabs.quality import quality
 from groundstation.viewer.tabs.raw import raw
+from groundstation.viewer.tabs.reference import reference
+from groundstation.viewer.tabs.together import together
 
 APPLICATION = "groundstation"
 DEFAULT_VIEWER_URL = "rerun+http://127.0.0.1:9876/proxy"
@@ -42,6 +44,8 @@ ANSWER_TABS: tuple[tuple[Callable[[Recorder, FlightResults], rrb.Container | Non
     (magnetic, ("magnetic", "magnetic_ground")),
     (landing, ("landing",)),
     (landing_beacons, ("landing_beacons",)),
+    (together, ("together",)),
+    (reference, ("reference",)),
 )
 SHOWN_ELSEWHERE = ("latency",)  # in the tab on data quality
 CONNECT_SECONDS, FLUSH_SECONDS = 3.0, 60.0

@@ -40,6 +40,11 @@ CHECKS: Mapping[str, str] = {
     "reference": "corrected parking heading against its reference",
     "runway": "INS heading less its error against the runway",
     "onboard": "heading error found on board against ours",
+    "truth_heading": "heading error found against the reference beside the log",
+    "truth_gnss": "GNSS position against it",
+    "truth_ins": "INS position against it",
+    "truth_corrected": "INS less its estimated errors against it",
+    "truth_smoothed": "INS less its smoothed errors against it",
 }
 
 

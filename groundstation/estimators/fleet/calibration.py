@@ -13,8 +13,8 @@ FloatArray = NDArray[np.float64]
 PIT_BINS = 10
 
 
-def share_interval(inside: int, checks: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Exact interval of a share.
+def share_interval(inside: float, checks: float, confidence: float = 0.95) -> tuple[float, float]:
+    """Exact interval of a share; of correlated checks both numbers are effective ones.
 
     Source: Clopper, Pearson, Biometrika 26 (1934), 404-413.
 
@@ -26,7 +26,7 @@ def share_interval(inside: int, checks: int, confidence: float = 0.95) -> tuple[
     (0.0, 1.0)
     """
     tail = 0.5 * (1.0 - confidence)
-    low = share_quantile(tail, inside, checks - inside + 1) if inside else 0.0
+    low = share_quantile(tail, inside, checks - inside + 1) if inside > 0.0 else 0.0
     high = share_quantile(1.0 - tail, inside + 1, checks - inside) if inside < checks else 1.0
     return low, high
 

@@ -31,7 +31,8 @@ from groundstation.tables.table import Flight
 class _Error:
     """The error with the sigma of what all samples share (declination, mounting) in it, wrapped.
 
-    ``whole_deg`` and ``measured_deg`` are the intervals with and without steady sideslip and mounting.
+    ``whole_deg`` and ``measured_deg`` are the intervals with and without steady sideslip and mounting;
+    ``common_sigma_deg`` is what declination and mounting add to the former.
     """
 
     error_deg: float
@@ -39,6 +40,7 @@ class _Error:
     whole_deg: tuple[float, float]
     measured_deg: tuple[float, float]
     steady_sigma_deg: float
+    common_sigma_deg: float
 
 
 def build_answer(
@@ -91,7 +93,7 @@ def build_answer(
         wander_s=solution.posterior.parameter("wander_s"),
         steps=solution.steps,
         settings=_settings_of(settings, aircraft),
-        figures=_figures_of(solution, standstill, settings),
+        figures=_figures_of(solution, standstill, settings, error.common_sigma_deg),
     )
     drift_prior_deg_per_h = drift_prior(aircraft.ins_class, flight.metadata.get("ins_class", ""))
     with_arm = _with_arm(plain, solution)
@@ -111,6 +113,7 @@ def _error_of(solution: Solution, steady: SteadyPrior) -> _Error:
         (low + shift, high + shift),
         (least + shift, most + shift),
         float(np.hypot(posterior.apart_sigma_deg, steady.mounting_sigma_deg)),
+        common_deg,
     )
 
 
@@ -141,6 +144,7 @@ def _judged_figures(
         quality_deg=float(running.quality_deg[-1]),
         half_width_deg=0.5 * (error.measured_deg[1] - error.measured_deg[0]),
         whole_half_width_deg=0.5 * (error.whole_deg[1] - error.whole_deg[0]),
+        steady_sigma_deg=error.steady_sigma_deg,
         taxi_seconds=float(sum(part.end_s - part.start_s + interval_s for part in solution.segments)),
         normality=normality(solution.difference_deg),
         variance=variance_ratio(used, assessed, settings.sway_line_s),
@@ -217,8 +221,11 @@ def _settings_of(settings: HeadingSettings, aircraft: AircraftData) -> dict[str,
     return out
 
 
-def _figures_of(solution: Solution, standstill: StandstillData, settings: HeadingSettings) -> tuple[FigureData, ...]:
+def _figures_of(
+    solution: Solution, standstill: StandstillData, settings: HeadingSettings, common_sigma_deg: float
+) -> tuple[FigureData, ...]:
     used, differences, posterior = solution.used, solution.differences, solution.posterior
+    half_width_deg = posterior.growth_half_width_deg(extra_sigma_deg=common_sigma_deg)
     spectrum = drawn.spectrum_figure(
         differences.time_s,
         differences.difference_deg - posterior.error_deg,
@@ -228,7 +235,7 @@ def _figures_of(solution: Solution, standstill: StandstillData, settings: Headin
     return (
         drawn.samples_figure(solution.samples, posterior.error_deg, solution.weight),
         drawn.lanes_figure(solution.samples),
-        drawn.running_figure(used.time_s, solution.running, solution.growth_samples, posterior.growth_half_width_deg()),
+        drawn.running_figure(used.time_s, solution.running, solution.growth_samples, half_width_deg),
         *drawn.distribution_figures(used.time_s, differences.difference_deg, settings.growth_steps),
         *drawn.standstill_figures(solution.samples, standstill),
         *(() if spectrum is None else (spectrum,)),

@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 
 # Priors: each parameter is log-normal. (median, sigma of the natural logarithm): two sigma either side reach over
 # 0.007-0.37 m/s, 0.007-0.12 m/s, 0.4-45 s, 0.05-3 deg, 0.1-1.3 Hz, 0.012-0.99, 0.003-0.2 deg, 0.2-5 times,
-# 0.1-11 arcmin (twice), 8-440 s.
+# 0.1-11 arcmin, 0.1-40 arcmin, 8-440 s.
 PRIOR: dict[str, tuple[float, float]] = {
     "white_mps": (0.05, 1.0),
     "correlated_mps": (0.03, 0.7),
@@ -32,7 +32,7 @@ PRIOR: dict[str, tuple[float, float]] = {
     "heading_white_deg": (0.025, 1.05),
     "motion_factor": (1.0, 0.8),
     "segment_deg": (1.0 / ARCMIN_PER_DEG, 1.2),
-    "wander_deg": (1.0 / ARCMIN_PER_DEG, 1.2),
+    "wander_deg": (2.0 / ARCMIN_PER_DEG, 1.5),
     "wander_s": (60.0, 1.0),
 }
 PRIOR_MEAN = np.log([PRIOR[name][0] for name in noise.PARAMETER_NAMES])
@@ -176,11 +176,12 @@ class ErrorPosterior:
             mixture_quantile(1.0 - tail, self.mean_deg, sigma, self.weight),
         )
 
-    def growth_half_width_deg(self, probability: float = 0.95) -> FloatArray:
-        """Half width of the interval after ``growth_samples``, noise as known at the end, shape (m,)."""
+    def growth_half_width_deg(self, probability: float = 0.95, extra_sigma_deg: float = 0.0) -> FloatArray:
+        """Half width of the interval after ``growth_samples``, shape (m,), noise and terms told apart as at the end."""
+        extra_deg = np.hypot(self.apart_sigma_deg, extra_sigma_deg)
         upper = 0.5 * (1.0 + probability)
         zeros = np.zeros(len(self.weight))
-        columns = self.growth_sigma_deg.T
+        columns = np.hypot(self.growth_sigma_deg, extra_deg).T
         return np.array([mixture_quantile(upper, zeros, sigma, self.weight) for sigma in columns])
 
     def even_draws(self, count: int = 40) -> FloatArray:
@@ -260,7 +261,10 @@ class _Target:
         log_likelihood, estimate = np.empty(count), np.empty((count, width))
         variance = np.empty((count, len(checkpoints), width))
         bounded = np.clip(thetas, PRIOR_MEAN - 6.0 * PRIOR_SIGMA, PRIOR_MEAN + 6.0 * PRIOR_SIGMA)
-        noise.evaluate(bounded, self.still, self.taxi, self.prior, checkpoints, log_likelihood, estimate, variance)
+        room = noise.room_for(width + 1, len(checkpoints))
+        noise.evaluate(
+            bounded, self.still, self.taxi, self.prior, checkpoints, log_likelihood, estimate, variance, room
+        )
         scaled = ((thetas - PRIOR_MEAN) / PRIOR_SIGMA)[:, self.free]
         return log_likelihood - 0.5 * np.sum(scaled**2, axis=1), estimate, variance
 
@@ -319,11 +323,10 @@ def error_posterior(
     _log_density, coefficients, variance = target.evaluate(points, checkpoints)
     coefficients[:, 0] += target.reference_deg
     measured = np.sqrt(np.maximum(variance, 1e-18))
-    # The terms told apart widen the interval and do not move the number: from a few directions they would extrapolate.
-    whole = _Target(standstill, differences).evaluate(points, target.last)[2][:, -1, 0]
+    apart_deg = _left_in_error(differences, np.asarray(weight @ points))
     return ErrorPosterior(
         mean_deg=coefficients[:, 0],
-        sigma_deg=np.maximum(np.sqrt(np.maximum(whole, 1e-18)), measured[:, -1, 0]),
+        sigma_deg=np.hypot(measured[:, -1, 0], apart_deg),
         measured_sigma_deg=measured[:, -1, 0],
         weight=weight,
         coefficients=coefficients,
@@ -334,6 +337,22 @@ def error_posterior(
         effective_draws=float(1.0 / np.sum(weight**2)),
         has_converged=has_converged,
     )
+
+
+def _left_in_error(differences: Differences, parameters: FloatArray) -> float:
+    """Standard deviation of what the terms told apart leave in the error, degrees.
+
+    They do not move the number, for from a few directions they would extrapolate: so all of them that the weights of
+    the samples let through is in it, and as the number is linear in the differences, that is what it would be were
+    each term the differences.
+    """
+    variance, measured = 0.0, without_apart(differences)
+    known = tuple(replace(one, prior_mean=0.0) for one in measured.regressors)
+    for term in (one for one in differences.regressors if one.is_apart):
+        alone = replace(measured, difference_deg=term.values, regressors=known, error_prior_deg=None)
+        through = float(fixed_noise_estimate(alone, parameters[None, :])[0][0])
+        variance += (term.prior_sigma * through) ** 2
+    return float(np.sqrt(variance))
 
 
 def without_apart(differences: Differences) -> Differences:
@@ -361,12 +380,10 @@ def misfit(differences: Differences, parameters: FloatArray) -> float:
     """Mean square of the whitened residuals: 1 where the differences are as noisy as the parameters say, shape ()."""
     target = _Target(NO_STANDSTILL, differences)
     width = int(target.taxi[1].shape[1])
-    information = np.zeros((1, width, width))
-    noise.taxi_filter(
-        *target.taxi, -1.0, parameters, np.zeros(3), target.last, information, np.zeros((0, 1 + noise.STATES))
-    )
-    mean, inverse = np.zeros(width - 1), np.zeros((width - 1, width - 1))
-    noise.solve_normal_equations(information[0], target.prior[0], target.prior[1], mean, inverse)
+    room = noise.room_for(width)
+    noise.taxi_filter(*target.taxi, -1.0, parameters, room.start, target.last, room.information, room.history, room)
+    information, mean = room.information, room.mean
+    noise.solve_normal_equations(information[0], target.prior[0], target.prior[1], mean, room.inverse, room)
     full = np.concatenate([[1.0], -mean])
     squares = float(np.sum(np.outer(full, full) * information[0]))
     return squares / max(len(differences.time_s) - width + 1, 1)
@@ -377,6 +394,9 @@ def sample_weights(differences: Differences, parameters: FloatArray) -> FloatArr
     target = _Target(NO_STANDSTILL, differences)
     time_s, columns, from_north, from_east, is_start = target.taxi
     history = np.zeros((len(time_s), 1 + noise.STATES))
-    information = np.zeros((1, columns.shape[1], columns.shape[1]))
-    noise.taxi_filter(*target.taxi, -1.0, parameters, np.zeros(3), target.last, information, history)
-    return np.asarray(noise.generalised_weights(time_s, from_north, from_east, is_start, parameters, history))
+    room, weights = noise.room_for(columns.shape[1]), np.zeros(len(time_s))
+    noise.taxi_filter(*target.taxi, -1.0, parameters, room.start, target.last, room.information, history, room)
+    noise.generalised_weights(
+        time_s, from_north, from_east, is_start, parameters, history, room, np.zeros(len(time_s)), weights
+    )
+    return weights

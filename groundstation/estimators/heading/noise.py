@@ -20,11 +20,12 @@ Structural Time Series Models and the Kalman Filter, 1989, sections 3.4 and 9.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.compile import compiled, inlined
+from groundstation.base.compile import in_place, inlined
 
 FloatArray = NDArray[np.float64]
 
@@ -48,7 +49,55 @@ DAMPING_MAX = 0.99
 _LOG_2PI = math.log(2.0 * math.pi)
 
 
-@compiled
+class Room(NamedTuple):
+    """What the loops work in, made once for many calls: loops that make no array are found again without numba.
+
+    Of ``taxi_filter``: q, P, x, K, H, the sums of products, innovations, decays and F; of ``solve_normal_equations``:
+    the matrix beside its inverse and the right side; the others are what ``evaluate`` hands from one to the other.
+    """
+
+    q: FloatArray  # (STATES,)
+    P: FloatArray  # (STATES, STATES)
+    x: FloatArray  # (c, STATES)
+    K: FloatArray  # (STATES,)
+    H: FloatArray  # (STATES,)
+    total: FloatArray  # (c, c)
+    innovation: FloatArray  # (c,)
+    keep: FloatArray  # (STATES,)
+    F: FloatArray  # (2, 2)
+    matrix: FloatArray  # (c - 1, 2 (c - 1))
+    right: FloatArray  # (c - 1,)
+    start: FloatArray  # (3,)
+    information: FloatArray  # (checkpoints, c, c)
+    history: FloatArray  # (0, 1 + STATES)
+    mean: FloatArray  # (c - 1,)
+    inverse: FloatArray  # (c - 1, c - 1)
+
+
+def room_for(width: int, checkpoints: int = 1) -> Room:
+    """Room for ``width`` columns, data and regressors."""
+    rest = width - 1
+    return Room(
+        q=np.zeros(STATES),
+        P=np.zeros((STATES, STATES)),
+        x=np.zeros((width, STATES)),
+        K=np.zeros(STATES),
+        H=np.zeros(STATES),
+        total=np.zeros((width, width)),
+        innovation=np.zeros(width),
+        keep=np.zeros(STATES),
+        F=np.zeros((2, 2)),
+        matrix=np.zeros((rest, 2 * rest)),
+        right=np.zeros(rest),
+        start=np.zeros(3),
+        information=np.zeros((checkpoints, width, width)),
+        history=np.zeros((0, 1 + STATES)),
+        mean=np.zeros(rest),
+        inverse=np.zeros((rest, rest)),
+    )
+
+
+@in_place
 def standstill_filter(
     time_s: FloatArray,
     north: FloatArray,
@@ -98,7 +147,7 @@ def _oscillator(theta: FloatArray, step_s: float, f: FloatArray) -> None:
     f[1, 0], f[1, 1] = -natural * natural * f[0, 1], shrink * (cosine - decay / damped * sine)
 
 
-@compiled
+@in_place
 def taxi_filter(
     time_s: FloatArray,
     columns: FloatArray,
@@ -111,6 +160,7 @@ def taxi_filter(
     checkpoints: NDArray[np.int64],
     information: FloatArray,
     history: FloatArray,
+    room: Room,
 ) -> float:
     """Filter the differences and the regressors; returns the sum of log innovation variances.
 
@@ -137,21 +187,26 @@ def taxi_filter(
     count, width = columns.shape
     white2, heading2 = math.exp(2.0 * theta[WHITE]), math.exp(2.0 * theta[HEADING_WHITE])
     motion = math.exp(theta[MOTION])
-    q = np.zeros(STATES)
+    q, P, x, K, H = room.q, room.P, room.x, room.K, room.H
+    total, innovation, keep, F = room.total, room.innovation, room.keep, room.F
     q[0] = q[1] = math.exp(2.0 * theta[CORRELATED])
     q[2] = math.exp(2.0 * theta[SWAY])
     q[3] = q[2] * (2.0 * math.pi * math.exp(theta[FREQUENCY])) ** 2
     q[4], q[5] = math.exp(2.0 * theta[SEGMENT]), math.exp(2.0 * theta[WANDER])
-    P, x, K, H = np.zeros((STATES, STATES)), np.zeros((width, STATES)), np.zeros(STATES), np.zeros(STATES)
     for a in range(STATES):
+        for b in range(STATES):
+            P[a, b] = 0.0
         P[a, a] = q[a]
+        keep[a], H[a] = 1.0, 0.0
+    for j in range(width):
+        for a in range(STATES):
+            x[j, a] = 0.0
+        for m in range(width):
+            total[j, m] = 0.0
     if start_gap_s >= 0.0:
         kept = math.exp(-start_gap_s / math.exp(theta[TAU]))
         P[0, 0] = P[1, 1] = kept * kept * (start[2] - q[0]) + q[0]
         x[0, 0], x[0, 1] = kept * start[0], kept * start[1]
-    total, innovation = np.zeros((width, width)), np.zeros(width)
-    keep, F = np.zeros(STATES), np.zeros((2, 2))
-    keep[2] = keep[3] = 1.0
     log_determinant, last_step, written = 0.0, -1.0, 0
     for i in range(count):
         step = time_s[i] - time_s[i - 1] if i > 0 else 0.0
@@ -196,7 +251,7 @@ def taxi_filter(
             K[a] *= inverse
         if len(history) > 0:
             history[i, 0] = s
-            for a in range(STATES):  # a slice assigned would take 3 s to compile
+            for a in range(STATES):  # a slice would take as long to compile as all the rest
                 history[i, 1 + a] = K[a]
         for j in range(width):
             v = columns[i, j] - H[0] * x[j, 0] - H[1] * x[j, 1] - x[j, 2] - x[j, 4] - x[j, 5]
@@ -214,7 +269,7 @@ def taxi_filter(
     return log_determinant
 
 
-@compiled
+@in_place
 def generalised_weights(
     time_s: FloatArray,
     from_north: FloatArray,
@@ -222,18 +277,21 @@ def generalised_weights(
     is_start: NDArray[np.bool_],
     theta: FloatArray,
     history: FloatArray,
-) -> FloatArray:
-    """Weight of every sample in the generalised least-squares mean, shape (n,), sum 1.
+    room: Room,
+    innovation: FloatArray,
+    weights: FloatArray,
+) -> None:
+    """Weight of every sample in the generalised least-squares mean, into ``weights`` of shape (n,), sum 1.
 
     The weights are the row sums of the inverse covariance: the gradient of half the quadratic form of a constant,
     taken backwards through the filter whose ``history`` (S and K) is given. Letters as in ``taxi_filter``; r is the
-    gradient with respect to the state.
+    gradient with respect to the state. ``innovation`` of shape (n,) is room to work in.
     """
     count, motion = len(time_s), math.exp(theta[MOTION])
-    H, x, r, keep, F = np.zeros(STATES), np.zeros(STATES), np.zeros(STATES), np.zeros(STATES), np.zeros((2, 2))
-    keep[2] = keep[3] = 1.0
+    H, x, r, keep, F = room.H, room.x[0], room.K, room.keep, room.F
+    for a in range(STATES):
+        H[a], x[a], r[a], keep[a] = 0.0, 0.0, 0.0, 1.0
     H[2] = H[4] = H[5] = 1.0
-    innovation, weights = np.zeros(count), np.zeros(count)
     for turn in range(2 * count):
         is_forward = turn < count
         i = turn if is_forward else 2 * count - 1 - turn
@@ -263,12 +321,16 @@ def generalised_weights(
         total += weights[i]
     for i in range(count):
         weights[i] /= total
-    return weights
 
 
-@compiled
+@in_place
 def solve_normal_equations(
-    information: FloatArray, prior_mean: FloatArray, prior_precision: FloatArray, mean: FloatArray, inverse: FloatArray
+    information: FloatArray,
+    prior_mean: FloatArray,
+    prior_precision: FloatArray,
+    mean: FloatArray,
+    inverse: FloatArray,
+    room: Room,
 ) -> float:
     """Solve the normal equations with normal priors; returns log determinant plus residual sum of squares.
 
@@ -276,12 +338,12 @@ def solve_normal_equations(
     A prior precision of 0 is a flat prior. Gauss-Jordan: the matrix is positive definite and small.
     """
     width = len(prior_mean)
-    work = np.zeros((width, 2 * width))
-    right = np.zeros(width)
+    work, right = room.matrix, room.right
     squares = information[0, 0]
     for j in range(width):
         for m in range(width):
             work[j, m] = information[j + 1, m + 1]
+            work[j, width + m] = 0.0
         work[j, j] += prior_precision[j]
         work[j, width + j] = 1.0
         right[j] = information[j + 1, 0] + prior_precision[j] * prior_mean[j]
@@ -309,7 +371,7 @@ def solve_normal_equations(
     return float(log_determinant + squares)
 
 
-@compiled
+@in_place
 def evaluate(
     thetas: FloatArray,
     standstill: tuple[FloatArray, FloatArray, FloatArray, int, float],
@@ -319,6 +381,7 @@ def evaluate(
     log_likelihood: FloatArray,
     estimate: FloatArray,
     variance: FloatArray,
+    room: Room,
 ) -> None:
     """Log likelihood, estimate and its variance for every row of ``thetas``, shape (k, 11).
 
@@ -336,10 +399,7 @@ def evaluate(
         Out: log likelihood, coefficients, and the variances of the coefficients at the checkpoints.
     """
     width = taxi[1].shape[1]
-    information = np.zeros((len(checkpoints), width, width))
-    start = np.zeros(3)
-    mean, inverse = np.zeros(width - 1), np.zeros((width - 1, width - 1))
-    history = np.zeros((0, 1 + STATES))
+    information, start, mean, inverse, history = room.information, room.start, room.mean, room.inverse, room.history
     for k in range(len(thetas)):
         theta = thetas[k]
         total = standstill_filter(
@@ -354,11 +414,11 @@ def evaluate(
         )
         gap_s = standstill[4]
         log_determinant = taxi_filter(
-            taxi[0], taxi[1], taxi[2], taxi[3], taxi[4], gap_s, theta, start, checkpoints, information, history
+            taxi[0], taxi[1], taxi[2], taxi[3], taxi[4], gap_s, theta, start, checkpoints, information, history, room
         )
         rest = 0.0
         for m in range(len(checkpoints)):
-            rest = solve_normal_equations(information[m], prior[0], prior[1], mean, inverse)
+            rest = solve_normal_equations(information[m], prior[0], prior[1], mean, inverse, room)
             for j in range(width - 1):
                 variance[k, m, j] = inverse[j, j]
         for j in range(width - 1):

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import direction_of, interpolate_heading, unwrap, wrap_180
 from groundstation.base.errors import NotAssessableError
-from groundstation.base.records import BoolArray, Int64Array
+from groundstation.base.records import HEADING_IS_TRACK, BoolArray, Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.heading.lines import fitted_lines, window_bounds
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.tables.sources import sources_of_kind
 from groundstation.tables.table import Flight, Table
 
 FloatArray = NDArray[np.float64]
@@ -144,19 +145,22 @@ def choose_topics(flight: Flight, request: HeadingRequest) -> tuple[str, str]:
         (
             topic
             for field in ("true_heading_deg", "magnetic_heading_deg")
-            for topic in topics_of_kind("ins", flight.topics())
+            for topic in sources_of_kind(flight, "ins")
             if flight[topic].has(field)
         ),
         "",
     )
     velocities = ("velocity_north_mps", "velocity_east_mps")
     gnss = request.gnss_topic or next(
-        (topic for topic in topics_of_kind("gnss", flight.topics()) if flight[topic].has(*velocities)), ""
+        (topic for topic in sources_of_kind(flight, "gnss") if flight[topic].has(*velocities)), ""
     )
     if ins not in flight:
         raise NotAssessableError("heading", f"no topic {ins}" if ins else "no INS heading in the log")
     if gnss not in flight:
         raise NotAssessableError("heading", f"no topic {gnss}" if gnss else "no GNSS velocity in the log")
+    if f"{HEADING_IS_TRACK}.{ins}.true_heading_deg" in flight.metadata:
+        text = f"the heading of {ins} is the receiver's own track: their difference is zero whatever the nose does"
+        raise NotAssessableError("heading", text)
     return ins, gnss
 
 

@@ -141,16 +141,17 @@ def _is_informative(samples: Samples, still: BoolArray) -> bool:
     return bool(np.mean(changed) > 0.5 and len(np.unique(north)) + len(np.unique(east)) > 6)
 
 
-def effective_samples(values: FloatArray) -> float:
+def effective_samples(values: FloatArray, about: float | None = None) -> float:
     """Number of independent samples that give the mean the same variance: n / (1 + 2 sum of autocorrelations).
 
-    The sum ends at the first pair of lags whose sum is not positive.
+    The sum ends at the first pair of lags whose sum is not positive. ``about`` is the true mean where it is known, else
+    that of the samples: errors that are claimed to have none are one another's repetition where they share one.
 
     Source: C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992), section 3.3 (initial
     positive sequence).
     """
     count = len(values)
-    centred = values - np.mean(values)
+    centred = values - (np.mean(values) if about is None else about)
     variance = float(np.mean(centred**2))
     if count < 4 or variance <= 0.0:
         return float(count)

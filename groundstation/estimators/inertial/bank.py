@@ -15,15 +15,13 @@ from functools import cached_property
 import numpy as np
 
 from groundstation.base.records import frozen
-from groundstation.estimators.inertial.differences import mean_in
-from groundstation.estimators.inertial.filter import Epochs, FilterRun, Initial, initial_of, run_filter
+from groundstation.estimators.inertial.coarse import Coarse
+from groundstation.estimators.inertial.filter import FilterRun, Initial, initial_of, run_filter
 from groundstation.estimators.inertial.leads import PAST_FROM_S, Path, built_up, past_mean, start_epochs
 from groundstation.estimators.inertial.model import POSITION, FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.start_covariance import lead_growth
-from groundstation.estimators.kalman.arrays import USED
 
-COARSE_S = 10.0  # epochs of the bank are means over such intervals: a Schuler period has 500 of them
 JUDGED_S = (600.0, 1800.0, 3600.0)  # horizons at which finished outages tell the sets apart
 # Share of the logarithmic likelihood that counts: the horizons tell partly the same. Chosen on simulated flights
 TRUST = 0.6
@@ -114,32 +112,9 @@ class NoiseBank:
 
 def run_bank(run: FilterRun, settings: InertialSettings) -> NoiseBank:
     """Filter a flight with every set of its class's bank; what the flight's own filter rejected is used by none."""
-    coarse, end_s, count = coarse_epochs(run)
-    runs = []
+    coarse, runs = Coarse.of(run), []
     for noise in run.noise.bank.sets(run.noise):
-        averaged = replace(noise, gnss=noise.gnss.averaged(count))
         model = replace(run.model, beta_per_s=noise.beta_per_s)
-        runs.append(run_filter(coarse, model, averaged, initial=initial_of(coarse, noise)))
-    return NoiseBank(run, tuple(runs), end_s, settings)
-
-
-def coarse_epochs(run: FilterRun) -> tuple[Epochs, FloatArray, float]:
-    """Means of what was used over :data:`COARSE_S`, the time of the last sample in each, and how many are in one.
-
-    An epoch is at the mean time of the samples that measured; a reset of the INS begins one.
-    """
-    epochs = run.epochs
-    begins = np.diff(np.floor((epochs.time_s - epochs.time_s[0]) / COARSE_S), prepend=-1.0) > 0.0
-    interval = np.cumsum(begins | epochs.is_reset) - 1
-    bins = int(interval[-1]) + 1
-    both = [np.where(run.used[:, kind] == USED, run.measured(kind), np.nan) for kind in range(2)]
-    measures = [np.isfinite(part).any(axis=1) for part in both]
-    times = np.stack([*(np.where(known, epochs.time_s, np.nan) for known in measures), epochs.time_s], axis=1)
-    at_position, at_velocity, of_all = mean_in(interval, times, bins).T
-    means = [mean_in(interval, part, bins) for part in (*both, epochs.drag_per_s.reshape(-1, 4))]
-    time_s = np.where(np.isfinite(at_position), at_position, np.where(np.isfinite(at_velocity), at_velocity, of_all))
-    is_reset = np.bincount(interval, weights=epochs.is_reset, minlength=bins) > 0.0
-    count = np.bincount(interval[measures[0] | measures[1]], minlength=bins)
-    last = np.searchsorted(interval, np.arange(bins), side="right") - 1
-    usual = float(np.median(count[count > 0])) if count.any() else 1.0
-    return Epochs(time_s, means[0], means[1], means[2].reshape(-1, 2, 2), is_reset), epochs.time_s[last], usual
+        initial = initial_of(coarse.epochs, noise)
+        runs.append(run_filter(coarse.epochs, model, coarse.noise(noise), initial=initial))
+    return NoiseBank(run, tuple(runs), coarse.end_s, settings)

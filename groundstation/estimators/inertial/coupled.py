@@ -1,6 +1,8 @@
 """The coupled north-east model: both channels, azimuth, Earth and craft rate; its gain over the two separate channels.
 
-Fourteen states: the six of each channel (``model.STATES``; north, then east), the azimuth error and its drift.
+Sixteen states: the six of each channel (``model.STATES``; north, then east), the azimuth error and its drift, and two
+accelerometer biases. Gyro drifts and biases are those of sensors fixed to the body, named by the channel they act on
+when it heads north: where a strapdown turns, they act on the other one. On a platform slaved to north they stay.
 
 Signs: error = INS - truth. With the phi-angle (computed attitude = (I - [phi x]) n_from_b) the north tilt is -phi_E,
 the east tilt +phi_N - positive where the velocity error falls - and the heading error -phi_D.
@@ -14,7 +16,8 @@ from numpy.typing import NDArray
 
 from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
 from groundstation.base.records import Int64Array, frozen
-from groundstation.estimators.inertial.differences import Differences
+from groundstation.base.units import MPS2_PER_G
+from groundstation.estimators.inertial.differences import Differences, only_used
 from groundstation.estimators.inertial.filter import (
     PATIENCE_S,
     RESET_POSITION_M,
@@ -31,13 +34,15 @@ from groundstation.estimators.kalman.arrays import NO_STEP, REJECTED, Lines
 from groundstation.estimators.kalman.rates import Rates
 from groundstation.results.forecast import HORIZONS_MIN, CoupledRow
 
-# The six states of each channel (model.STATES), then the azimuth error and its constant drift.
+# The six states of each channel (model.STATES), the azimuth error and its constant drift, the accelerometer biases.
 NORTH, EAST = 0, 6
 AZIMUTH, AZIMUTH_DRIFT = 12, 13
-SIZE = 14
+FORWARD_BIAS, RIGHT_BIAS = 14, 15
+SIZE = 16
 CHANNELS = np.array([[0, 1, 2, 3, 4, 5], [6, 7, 8, 9, 10, 11]])
 _PN, _VN, _TN, _DN, _SN, _RN, _PE, _VE, _TE, _DE, _SE, _RE = range(12)
 LATITUDE_MAX_DEG = 88.0  # beyond, north is no axis for an error model
+MPS2_PER_UG = 1e-6 * MPS2_PER_G
 ACCELERATION_MAX_MPS2 = 50.0  # a faster change of the INS velocity is a reset of it
 
 # Pattern of the matrix: (row, column) of every entry that is not always zero, in the order of _values.
@@ -49,13 +54,17 @@ PATTERN = (
     *((_TE, _VE), (_TE, _TN), (_TE, AZIMUTH), (_TE, _PN), (_TE, _DE), (_TE, _RE)),
     *((AZIMUTH, _TN), (AZIMUTH, _TE), (AZIMUTH, _PN), (AZIMUTH, _VE), (AZIMUTH, AZIMUTH_DRIFT)),
     *((_DN, _SN), (_DE, _SE), (_RN, _RN), (_RE, _RE)),
+    *((_TN, _DE), (_TN, _RE), (_TE, _DN), (_TE, _RN)),
+    *((_VN, FORWARD_BIAS), (_VN, RIGHT_BIAS), (_VE, FORWARD_BIAS), (_VE, RIGHT_BIAS)),
 )
 ROWS = np.array([row for row, _ in PATTERN], dtype=np.int64)
 COLUMNS = np.array([column for _, column in PATTERN], dtype=np.int64)
 RATES = Rates(SIZE, ROWS, COLUMNS)
 LONGEST_STEP_S = 10.0  # (Earth and Schuler rate x step)^5 / 120: below 1e-10 of the state
 AT_ONCE = 4096  # epochs whose transitions are held in memory, 3 MB
-KEPT = kalman.Kept(covariances=False, gains=False, variances=True, judged=True)
+KEPT = kalman.Kept(gains=False, variances=True, judged=True)
+EVERY = 10  # epochs from one covariance that is kept to the next
+VARIANCE_STEP_S = 60.0  # of covariances carried forward: 0.07 of a Schuler radian
 
 
 @dataclass(frozen=True)
@@ -67,23 +76,27 @@ class CraftMotion:
     latitude_deg, altitude_m : ndarrays, shape (m,)
     velocity_mps, acceleration_mps2 : ndarrays, shape (m, 2)
         Over the ground, north and east; the acceleration is change of velocity over the interval.
+    heading_rad : ndarray, shape (m,)
+        Of what the sensors are fixed to: the nose of a strapdown, north of a platform that is slaved to it.
     """
 
     latitude_deg: FloatArray
     altitude_m: FloatArray
     velocity_mps: FloatArray
     acceleration_mps2: FloatArray
+    heading_rad: FloatArray
 
     def __post_init__(self) -> None:
         for item in fields(self):
             object.__setattr__(self, item.name, frozen(np.asarray(getattr(self, item.name), dtype=np.float64)))
 
     @classmethod
-    def between(cls, differences: Differences, time_s: FloatArray) -> "CraftMotion":
+    def between(cls, differences: Differences, time_s: FloatArray, *, is_strapdown: bool = True) -> "CraftMotion":
         """The motion between neighbouring times, m of them, from the INS alone; m - 1 intervals.
 
         Held where the INS is silent, at rest on the equator where it never spoke.
         """
+        n = len(time_s)
         latitude, altitude, north, east = (
             _interpolated(differences.epochs.time_s, column, time_s)
             for column in (differences.latitude_deg, differences.altitude_m, *differences.velocity_mps.T)
@@ -94,7 +107,10 @@ class CraftMotion:
         is_step = (np.abs(acceleration) > ACCELERATION_MAX_MPS2).any(axis=1)
         acceleration[is_step] = 0.0
         mean = [0.5 * (part[1:] + part[:-1]) for part in (latitude, altitude, velocity)]
-        return cls(mean[0], mean[1], mean[2], acceleration)
+        heading = np.zeros(n)
+        if is_strapdown:
+            heading = np.interp(time_s, differences.epochs.time_s, differences.unwrapped_heading_rad)
+        return cls(mean[0], mean[1], mean[2], acceleration, 0.5 * (heading[1:] + heading[:-1]))
 
     def specific_force_mps2(self) -> FloatArray:
         """Specific force north, east and down, shape (m, 3), m/s^2; vertical motion is left out.
@@ -121,8 +137,11 @@ class CoupledRun:
 
     Parameters
     ----------
-    x, sigma : ndarrays, shape (n, 14)
-        States after each epoch (north channel, east channel, azimuth error rad, its drift rad/s) and their sigmas.
+    x, sigma : ndarrays, shape (n, 16)
+        States after each epoch (north channel, east channel, azimuth error rad, its drift rad/s, accelerometer biases
+        forward and right m/s^2) and their sigmas.
+    P : ndarray, shape (m, 16, 16)
+        Covariances at every tenth epoch from the first.
     innovation, innovation_variance : ndarrays, shape (n, 2, 2)
         Measured minus predicted (position, velocity; north, east), NaN where absent.
     used : ndarray of int8, shape (n, 2, 2)
@@ -138,10 +157,11 @@ class CoupledRun:
     innovation: FloatArray
     innovation_variance: FloatArray
     used: NDArray[np.int8]
+    P: FloatArray
     reopened: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("x", "sigma", "innovation", "innovation_variance", "used"):
+        for name in ("x", "sigma", "P", "innovation", "innovation_variance", "used"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     @property
@@ -151,7 +171,7 @@ class CoupledRun:
 
 
 def coupled_values(motion: CraftMotion, beta_per_s: float) -> FloatArray:
-    """Entries of A (x' = A x) over each interval, in the order of :data:`PATTERN`, shape (m, 33).
+    """Entries of A (x' = A x) over each interval, in the order of :data:`PATTERN`, shape (m, 41).
 
     Velocity error' = -phi x f - (2 Earth rate + craft rate) x velocity error - (2 error of the Earth rate + error of
     the craft rate) x velocity; phi' = -(Earth rate + craft rate) x phi + error of both - gyro error, where the errors
@@ -172,22 +192,25 @@ def coupled_values(motion: CraftMotion, beta_per_s: float) -> FloatArray:
     # what an error of latitude does to the down rates, with the sign turned
     convergence = east / (normal * cosine**2)
     one = np.ones_like(north)
+    along, across = np.cos(motion.heading_rad), np.sin(motion.heading_rad)
     columns = (
         *(one, one, slope * east, -slope * north),
         *(force_down, -force_east, coriolis_down - slope * east),
         -east * (2.0 * earth_north + convergence) / meridian,
         *(force_down, force_north, -coriolis_down, slope * north),
         north * (2.0 * earth_north + convergence) / meridian,
-        *(1.0 / meridian, earth_down + craft_down, earth_north + craft_north, one, one),
-        *(1.0 / normal, -(earth_down + craft_down), craft_east, earth_down / meridian, one, one),
+        *(1.0 / meridian, earth_down + craft_down, earth_north + craft_north, along, along),
+        *(1.0 / normal, -(earth_down + craft_down), craft_east, earth_down / meridian, along, along),
         *(-(earth_north + craft_north), -craft_east, (earth_north + convergence) / meridian, slope, one),
         *(one, one, -beta_per_s * one, -beta_per_s * one),
+        *(-across, -across, across, across),
+        *(along, -across, across, along),
     )
     return np.ascontiguousarray(np.stack(columns, axis=1))
 
 
 def coupled_matrix(motion: CraftMotion, beta_per_s: float) -> FloatArray:
-    """A of x' = A x over each interval, shape (m, 14, 14), SI units; see :func:`coupled_values`."""
+    """A of x' = A x over each interval, shape (m, 16, 16), SI units; see :func:`coupled_values`."""
     values = coupled_values(motion, beta_per_s)
     out = np.zeros((len(values), SIZE, SIZE))
     out[:, ROWS, COLUMNS] = values
@@ -202,19 +225,21 @@ def run_coupled(differences: Differences, noise: InsNoise, settings: InertialSet
     Position and velocity error may be anything at the start (a log may begin in flight) and after a reset of the INS;
     a filter that has rejected GNSS for :data:`filter.PATIENCE_S` is opened in the same way, tilt and drift kept.
     """
-    epochs = differences.epochs
+    epochs = only_used(differences.epochs, settings)
     n = len(epochs)
     interval = np.diff(epochs.time_s, prepend=epochs.time_s[:1])
     values = np.zeros((n, len(PATTERN)))
-    values[1:] = coupled_values(CraftMotion.between(differences, epochs.time_s), noise.beta_per_s)
-    covariance, densities = _noise_of(noise, differences)
+    motion = CraftMotion.between(differences, epochs.time_s, is_strapdown=noise.is_strapdown)
+    values[1:] = coupled_values(motion, noise.beta_per_s)
+    covariance, densities = _noise_of(noise, differences, epochs, float(motion.heading_rad[0]) if n > 1 else 0.0)
     opened = np.zeros(SIZE)
     opened[CHANNELS[:, [POSITION, VELOCITY]]] = _opened_variances(noise, epochs)
     patience = [max(1, round(PATIENCE_S / interval_s)) for interval_s in epochs.gnss_intervals_s]
     gate = kalman.Gate(settings.gate_sigmas, patience, opened)
     lines, z = _lines(epochs, noise), np.stack([epochs.position_m, epochs.velocity_mps], axis=1).reshape(-1, 4)
     parts, start = [], kalman.Start(np.zeros(SIZE), covariance)
-    for begin in range(0, n, AT_ONCE):
+    begins = range(0, n, AT_ONCE)
+    for begin in begins:
         use = slice(begin, min(begin + AT_ONCE, n))
         count = np.maximum(1, np.ceil(interval[use] / LONGEST_STEP_S - 1e-9)).astype(np.int64)
         transition = RATES.transition(values[use], interval[use] / count, densities)
@@ -233,7 +258,8 @@ def run_coupled(differences: Differences, noise: InsNoise, settings: InertialSet
         for name in ("judged_innovation", "judged_variance", "mark")
     )
     reopened = sum(run.reopened for run, _ in parts)
-    return CoupledRun(differences, noise, x, np.sqrt(np.maximum(variance, 0.0)), y, S, used, reopened)
+    P = np.concatenate([run.P[last[-first % EVERY :: EVERY]] for (run, last), first in zip(parts, begins, strict=True)])
+    return CoupledRun(differences, noise, x, np.sqrt(np.maximum(variance, 0.0)), y, S, used, P, reopened)
 
 
 def _at_epochs(run: kalman.FilterRun, last: Int64Array) -> tuple[FloatArray, FloatArray]:
@@ -270,19 +296,57 @@ def hindcast_coupled(run: CoupledRun, at: Int64Array, lead_s: FloatArray, settin
     out = np.zeros((len(at), len(lead_s), 2))
     if not len(lead_s):
         return out
-    every = max(1, round(float(lead_s[0]) / min(settings.forecast_step_s, LONGEST_STEP_S)))
-    step_s = float(lead_s[0]) / every
-    elapsed = np.arange(every * len(lead_s) + 1) * step_s
+    every, step_s, elapsed = _steps(lead_s, min(settings.forecast_step_s, LONGEST_STEP_S))
     measured = run.epochs.position_m[at]
     is_known = np.isfinite(measured) & (run.used[at, POSITION] != REJECTED)
     known = np.where(is_known, measured, run.x[at][:, CHANNELS[:, POSITION]])
     for index, epoch in enumerate(at):
-        motion = CraftMotion.between(run.differences, run.epochs.time_s[epoch] + elapsed)
-        values = coupled_values(motion, run.noise.beta_per_s)
+        values = _values_along(run, float(run.epochs.time_s[epoch]), elapsed)
         start = run.x[epoch].copy()
         start[CHANNELS[:, POSITION]] = known[index]
         out[index] = RATES.carried(values, step_s, every, start)[:, CHANNELS[:, POSITION]] - known[index]
     return out
+
+
+def coupled_variance(run: CoupledRun, at: Int64Array, lead_s: FloatArray) -> FloatArray:
+    """Variance of what :func:`hindcast_coupled` forecasts by the model, m^2, shape (s, l, 2).
+
+    That of the states at the start (at most nine epochs before it), their position known, and of the noise since.
+    """
+    out = np.zeros((len(at), len(lead_s), 2))
+    if not len(lead_s):
+        return out
+    every, step_s, elapsed = _steps(lead_s, VARIANCE_STEP_S)
+    _, densities = _noise_of(run.noise, run.differences, run.epochs, 0.0)
+    seconds, nothing = np.full(len(elapsed) - 1, step_s), _lines(run.epochs, run.noise)
+    unseen = kalman.Measurements(np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0, np.int64), nothing)
+    kept = kalman.Kept(states=False, covariances=False, gains=False, variances=True)
+    for index, epoch in enumerate(at):
+        values = _values_along(run, float(run.epochs.time_s[epoch]), elapsed)
+        start = np.array(run.P[epoch // EVERY])
+        start[CHANNELS[:, POSITION]] = start[:, CHANNELS[:, POSITION]] = 0.0
+        carried = kalman.run_filter(
+            RATES.transition(values, seconds, densities),
+            np.arange(len(seconds)),
+            unseen,
+            kalman.Start(np.zeros((SIZE, 0)), start),
+            kept=kept,
+        )
+        out[index] = carried.record.variance[every - 1 :: every][:, CHANNELS[:, POSITION]]
+    return out
+
+
+def _steps(lead_s: FloatArray, longest_s: float) -> tuple[int, float, FloatArray]:
+    """Steps from one lead to the next, their length, and the times since the start, from zero."""
+    every = max(1, round(float(lead_s[0]) / longest_s))
+    step_s = float(lead_s[0]) / every
+    return every, step_s, step_s * np.arange(every * len(lead_s) + 1, dtype=np.float64)
+
+
+def _values_along(run: CoupledRun, start_s: float, elapsed_s: FloatArray) -> FloatArray:
+    """Entries of A over steps since a start, along the INS's own motion."""
+    motion = CraftMotion.between(run.differences, start_s + elapsed_s, is_strapdown=run.noise.is_strapdown)
+    return coupled_values(motion, run.noise.beta_per_s)
 
 
 def coupled_rows(
@@ -321,8 +385,10 @@ def coupled_rows(
     return tuple(rows)
 
 
-def _noise_of(noise: InsNoise, differences: Differences) -> tuple[FloatArray, FloatArray]:
-    """Covariance at the start, shape (14, 14), and densities (14,).
+def _noise_of(
+    noise: InsNoise, differences: Differences, epochs: Epochs, heading_rad: float
+) -> tuple[FloatArray, FloatArray]:
+    """Covariance at the start, shape (16, 16), and densities (16,).
 
     Alignment on the ground turns the azimuth until the north channel feels no drift (gyrocompassing): it is the sum of
     north drift and azimuth x Earth rate that has the class's drift sigma, not the drift alone.
@@ -330,15 +396,17 @@ def _noise_of(noise: InsNoise, differences: Differences) -> tuple[FloatArray, Fl
     Source: Titterton and Weston 2004, section 10.3.
     """
     initial, density = noise.initial_variances(), noise.densities()
-    initial[: VELOCITY + 1] = _opened_variances(noise, differences.epochs)
+    initial[: VELOCITY + 1] = _opened_variances(noise, epochs)
     azimuth = np.deg2rad(noise.azimuth_deg) ** 2
     drift, walk = (initial[3], density[2]) if azimuth > 0.0 else (0.0, 0.0)
     balance = np.eye(SIZE)
     latitude = differences.latitude_deg[np.isfinite(differences.latitude_deg)]
     if latitude.size:
-        balance[_DN, AZIMUTH] = -EARTH_RATE_RADPS * np.cos(np.deg2rad(latitude[0]))
-    covariance = balance @ np.diag([*initial, *initial, azimuth, drift]) @ balance.T
-    return covariance, np.array([*density, *density, walk, 0.0])
+        felt = EARTH_RATE_RADPS * np.cos(np.deg2rad(latitude[0]))
+        balance[[_DN, _DE], AZIMUTH] = -felt * np.cos(heading_rad), felt * np.sin(heading_rad)
+    bias = (noise.accelerometer_ug * MPS2_PER_UG) ** 2
+    covariance = balance @ np.diag([*initial, *initial, azimuth, drift, bias, bias]) @ balance.T
+    return covariance, np.array([*density, *density, walk, 0.0, 0.0, 0.0])
 
 
 def _opened_variances(noise: InsNoise, epochs: Epochs) -> FloatArray:

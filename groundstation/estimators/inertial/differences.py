@@ -1,6 +1,7 @@
 """From the tables of a flight to what the filter is given: INS minus GNSS, with what could not be believed left out."""
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -9,18 +10,19 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.base.geodesy import curvature_radii_m, on_earth
 from groundstation.base.records import BoolArray, Int64Array, frozen
-from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.inertial import screening
 from groundstation.estimators.inertial.filter import Epochs
 from groundstation.estimators.inertial.model import FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.tables.resample import join
+from groundstation.tables.sources import is_joined, sources_of_kind
 from groundstation.tables.table import Flight, Table
 
 POSITION_FIELDS = ("latitude_deg", "longitude_deg")
 VELOCITY_FIELDS = ("velocity_north_mps", "velocity_east_mps")
 UNUSED_MODES = ("align", "attitude")
+TRACK_MPS = 20.0  # slower, and the track is not the heading
 LONGEST_STEP_S = 10.0  # between samples for a topic to count as there
 LONGEST_FLIGHT_S = 4.0e6  # 46 days: a clock that jumps by years must not fill the memory
 
@@ -41,6 +43,8 @@ class Differences:
         Share of the INS samples whose mode says that GNSS corrects them.
     findings : tuple of Finding
         What was left out, with place and count.
+    heading_deg : ndarray, shape (n,), optional
+        True heading of the INS, NaN where unknown.
     """
 
     ins_topic: str
@@ -52,6 +56,7 @@ class Differences:
     velocity_mps: FloatArray
     aided_share: float
     findings: tuple[Finding, ...]
+    heading_deg: FloatArray | None = None
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -59,9 +64,28 @@ class Differences:
             if isinstance(value, np.ndarray):
                 object.__setattr__(self, item.name, frozen(value))
 
+    @cached_property
+    def unwrapped_heading_rad(self) -> FloatArray:
+        """Heading at every epoch without steps of a turn, shape (n,): of the INS, of its track where that is unknown.
+
+        Held where the INS tells neither and the aircraft is slower than :data:`TRACK_MPS`; zero if it never moved.
+        """
+        north, east = self.velocity_mps.T
+        track = np.where(np.hypot(north, east) > TRACK_MPS, np.arctan2(east, north), np.nan)
+        heading = track
+        if self.heading_deg is not None:
+            told = np.deg2rad(self.heading_deg)
+            heading = np.where(np.isfinite(told), told, track)
+        known = np.flatnonzero(np.isfinite(heading))
+        if not len(known):
+            return np.zeros(len(heading))
+        return np.interp(np.arange(len(heading)), known, np.unwrap(heading[known]))
+
 
 def choose_pair(flight: Flight) -> tuple[str, str]:
     """The INS and GNSS topics to compare: of each kind the one whose positions cover the longest time.
+
+    Of a flight of several logs the better source (:func:`groundstation.tables.sources.sources_of_kind`).
 
     Raises
     ------
@@ -70,10 +94,13 @@ def choose_pair(flight: Flight) -> tuple[str, str]:
     """
     found: dict[str, str] = {}
     for kind, title in (("ins", "INS"), ("gnss", "GNSS")):
-        covered = {name: _covered_s(flight[name]) for name in topics_of_kind(kind, flight.topics())}
+        covered = {name: _covered_s(flight[name]) for name in sources_of_kind(flight, kind)}
         covered = {name: seconds for name, seconds in covered.items() if flight[name].has(*POSITION_FIELDS)}
         if not covered:
             raise NotAssessableError("inertial", f"no {title} position in the log")
+        if is_joined(flight):
+            found[kind] = next(iter(covered))
+            continue
         found[kind] = max(covered, key=lambda name: (round(covered[name] / 60.0), -list(covered).index(name)))
     return found["ins"], found["gnss"]
 
@@ -142,6 +169,7 @@ def differences(
         *(ins_topic, gnss_topic, epochs, latitude, longitude, _altitude(at), ins_velocity),
         aided_share=_aided_share(ins),
         findings=tuple(findings),
+        heading_deg=at.values("true_heading_deg") if at.has("true_heading_deg") else None,
     )
 
 

@@ -11,6 +11,7 @@ from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.estimators.inertial import figures
 from groundstation.estimators.inertial.azimuth import estimate_azimuth
+from groundstation.estimators.inertial.coupled import CoupledRun
 from groundstation.estimators.inertial.differences import Differences, differences, only_used, seconds_covered
 from groundstation.estimators.inertial.filter import (
     PATIENCE_S,
@@ -48,7 +49,7 @@ class Estimation:
     """Everything system 2 knows of a flight before any forecast is replayed.
 
     ``corrected_error_m`` (n, 2) is the position error taken off the INS: estimated where GNSS was, forecast by the
-    default method where it was not.
+    default method where it was not. ``coupled`` is the coupled run, where that forecast needed one.
     """
 
     compared: Differences
@@ -58,6 +59,7 @@ class Estimation:
     corrected_error_m: FloatArray
     result: InertialResult
     findings: tuple[Finding, ...]
+    coupled: CoupledRun | None = None
 
 
 def estimate_ins_errors(
@@ -115,7 +117,7 @@ def estimate_compared(
     smoothed, bridged = smooth(run), bridge_outages(flight, compared, run, settings)
     result = _result(flight, compared, run, smoothed, bridged, settings, origin, kind)
     findings = (*compared.findings, *_findings(compared, run, result))
-    return Estimation(compared, noise, run, smoothed, bridged.error_m, result, findings)
+    return Estimation(compared, noise, run, smoothed, bridged.error_m, result, findings, bridged.coupled)
 
 
 def _mean_place(compared: Differences) -> tuple[float, float]:

@@ -102,7 +102,7 @@ def _track_figure(columns: dict[str, FloatArray]) -> FigureData:
 def _tracks(compared: Differences, rows: Int64Array, errors_m: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     columns: dict[str, FloatArray] = {"time_s": compared.epochs.time_s[rows]}
     for name, error_m in errors_m.items():
-        latitude, longitude = _moved(compared, error_m)
+        latitude, longitude = moved(compared, error_m)
         columns |= {f"{name}_latitude_deg": latitude[rows], f"{name}_longitude_deg": longitude[rows]}
     return columns
 
@@ -129,7 +129,7 @@ def own_innovations_figure(flight: Flight, own: OwnInnovations) -> FigureData:
     return FigureData("inertial_own_innovations", columns, DIGITS)
 
 
-def _moved(compared: Differences, error_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+def moved(compared: Differences, error_m: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Position of the INS minus an error in metres."""
     meridian, prime_vertical = curvature_radii_m(np.nan_to_num(compared.latitude_deg))
     height = np.nan_to_num(compared.altitude_m)

@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.inertial import figures
 from groundstation.estimators.inertial.bank import NoiseBank, run_bank
-from groundstation.estimators.inertial.coupled import CoupledRun, coupled_rows, hindcast_coupled, run_coupled
+from groundstation.estimators.inertial.coupled import (
+    CoupledRun,
+    coupled_rows,
+    coupled_variance,
+    hindcast_coupled,
+    run_coupled,
+)
 from groundstation.estimators.inertial.estimate import Estimation
 from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.gaps import gap_rows
@@ -63,11 +69,11 @@ def assess_forecast(
     if not plan.horizons_min:
         minutes = float(np.ptp(run.epochs.time_s)) / 60.0
         raise NotAssessableError("forecast", f"{minutes:.0f} min of flight are too short for a replayed outage")
-    coupled = run_coupled(estimation.compared, estimation.noise, settings)
+    coupled = estimation.coupled or run_coupled(estimation.compared, estimation.noise, settings)
     bank = run_bank(run, settings)
     separate = hindcast(run, plan.at, plan.lead_s, tuple(METHODS), settings, bank)
     since = slice(int(np.searchsorted(separate.start_s, plan.first_start_s - 1e-6)), None)
-    replay = _of_model(separate, coupled, settings)
+    replay = _with_own_variance(_of_model(separate, coupled, settings), coupled, settings)
     claimed = {method: claimed_sigma(method, run, replay, settings) for method in METHODS}
     skill = skill_rows(replay, claimed, plan.horizons_min, plan.first_start_s)
     best = {
@@ -103,11 +109,19 @@ def assess_forecast(
 
 
 def _of_model(replay: Hindcast, coupled: CoupledRun, settings: InertialSettings) -> Hindcast:
-    """The replay with the last estimate of the model that the settings choose; its sigma stays the channels'."""
+    """The replay with the last estimate of the model that the settings choose."""
     if settings.model == "separate" or "last_estimate" not in replay.forecast_m:
         return replay
     forecast = hindcast_coupled(coupled, replay.at, replay.lead_s, settings)
     return replace(replay, forecast_m=replay.forecast_m | {"last_estimate": forecast})
+
+
+def _with_own_variance(replay: Hindcast, coupled: CoupledRun, settings: InertialSettings) -> Hindcast:
+    """The replay with the variance of the coupled last estimate, where the settings choose that model."""
+    if settings.model == "separate":
+        return replay
+    own = {"last_estimate": coupled_variance(coupled, replay.at, replay.lead_s)}
+    return replace(replay, variance_m2=replay.variance_m2 | own)
 
 
 def _lengths_that_fit(plan: Plan) -> tuple[float, ...]:

@@ -1,12 +1,12 @@
 """Replayed gaps with GNSS on both sides: how far a forecast from the near side, and a smoother from both, go wrong."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.records import BoolArray, Int64Array
-from groundstation.estimators.inertial.differences import only_used
+from groundstation.estimators.inertial.coarse import Coarse
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, Initial, run_filter, smooth
 from groundstation.estimators.inertial.model import POSITION, FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
@@ -41,12 +41,15 @@ def gap_rows(
 
     Notes
     -----
-    ``forward`` is the filter's own forecast, ``rts`` the smoother with :data:`AFTER_S` of data behind the gap.
+    ``forward`` is the filter's own forecast, ``rts`` the smoother with :data:`AFTER_S` of data behind the gap, over the
+    coarse epochs of :class:`coarse.Coarse`; both are judged at every epoch.
     """
-    rows, chosen = [], at[:: max(1, -(-len(at) // MOST_STARTS))]
+    rows, chosen, coarse = [], at[:: max(1, -(-len(at) // MOST_STARTS))], Coarse.of(run)
     for length in lengths_min:
         replayed = [
-            part for part in (_replay(run, int(epoch), length * 60.0, settings) for epoch in chosen) if part is not None
+            part
+            for part in (_replay(run, coarse, int(epoch), length * 60.0, settings) for epoch in chosen)
+            if part is not None
         ]
         for method in ("forward", "rts"):
             largest = [np.nanmax(part.radial_m[method]) for part in replayed]
@@ -64,51 +67,42 @@ def gap_rows(
     return tuple(rows)
 
 
-def _replay(run: FilterRun, epoch: int, length_s: float, settings: InertialSettings) -> _Replayed | None:
+def _replay(
+    run: FilterRun, coarse: Coarse, epoch: int, length_s: float, settings: InertialSettings
+) -> _Replayed | None:
     """None where the gap does not fit the flight or GNSS was not there to judge it."""
     time_s = run.epochs.time_s
-    end_s = time_s[epoch] + length_s
+    begin_s, end_s = float(time_s[epoch]), float(time_s[epoch]) + length_s
     behind = int(np.searchsorted(time_s, end_s + AFTER_S))
-    first_after = int(np.searchsorted(time_s, end_s))
-    if first_after >= behind or time_s[behind - 1] - end_s < LEAST_AFTER_S:
+    inside = slice(epoch + 1, int(np.searchsorted(time_s, end_s)))
+    if inside.stop >= behind or time_s[behind - 1] - end_s < LEAST_AFTER_S:
         return None
-    span, inside = slice(epoch, behind), slice(1, first_after - epoch)
-    measured = run.measured(0)[span][inside]
-    if run.epochs.is_reset[epoch + 1 : behind].any():
+    measured = run.measured(0)[inside]
+    if run.epochs.is_reset[epoch + 1 : behind].any() or not np.isfinite(measured).all(axis=1).any():
         return None
-    if not np.isfinite(measured).all(axis=1).any():
-        return None
-    cut = only_used(_without(run.epochs, span, first_after - epoch), settings)
-    gate = settings.gate_sigmas**2
-    forward = run_filter(cut, run.model, run.noise, gate=gate, initial=_at(run, epoch))
-    smoothed = smooth(forward)
-    sigmas = np.stack([forward.sigma(channel)[inside, POSITION] for channel in range(measured.shape[1])], axis=1)
-    lead_s = time_s[span][inside] - time_s[epoch]
-    near_s = np.minimum(lead_s, np.maximum(end_s - time_s[span][inside], 0.0))
+    cut = coarse.blinded(epoch, begin_s, end_s, end_s + AFTER_S)
+    noise, gate = coarse.noise(run.noise), settings.gate_sigmas**2
+    forward = run_filter(cut, run.model, noise, gate=gate, initial=Initial(run.x[epoch], run.P[:, epoch]))
+    smoothed, channels = smooth(forward), range(measured.shape[1])
+    lead_s = time_s[inside] - begin_s
+    near_s = np.minimum(lead_s, np.maximum(end_s - time_s[inside], 0.0))
     calibration, gnss = run.noise.calibration, run.noise.gnss
-    noise = gnss.position_white_m**2 + gnss.position_correlated_m**2
+    judge_m2 = gnss.position_white_m**2 + gnss.position_correlated_m**2
+    own_m2 = np.stack([forward.covariance(channel)[:, POSITION, POSITION] for channel in channels], axis=1)
     claims = {
-        "forward": (forward.x[inside, POSITION], sigmas, calibration.at(lead_s)),
-        "rts": (smoothed.x[inside, POSITION], np.sqrt(smoothed.variance[inside, POSITION]), calibration.at(near_s)),
+        "forward": (forward.x[:, POSITION], own_m2, calibration.at(lead_s)),
+        "rts": (smoothed.x[:, POSITION], smoothed.variance[:, POSITION], calibration.at(near_s)),
     }
     radial, covered = {}, {}
-    for method, (estimate, sigma, scale) in claims.items():
+    for method, (estimates, variances, scale) in claims.items():
+        estimate, variance = (_at(time_s[inside], cut, values) for values in (estimates, variances))
         error = estimate - measured
-        band = QUANTILES[95] * np.sqrt(np.square(sigma * scale[:, None]) + noise)
+        band = QUANTILES[95] * np.sqrt(variance * np.square(scale)[:, None] + judge_m2)
         radial[method] = np.sqrt(np.sum(np.square(error), axis=1))
         covered[method] = (np.abs(error) <= band)[np.isfinite(error)]
     return _Replayed(radial, covered)
 
 
-def _at(run: FilterRun, epoch: int) -> Initial:
-    return Initial(run.x[epoch], run.P[:, epoch])
-
-
-def _without(epochs: Epochs, span: slice, gap: int) -> Epochs:
-    """A stretch of epochs whose first ``gap`` have no GNSS."""
-    position, velocity = np.array(epochs.position_m[span]), np.array(epochs.velocity_mps[span])
-    position[:gap], velocity[:gap] = np.nan, np.nan
-    cut = Epochs(epochs.time_s[span], position, velocity, epochs.drag_per_s[span], epochs.is_reset[span])
-    is_reset = np.array(cut.is_reset)
-    is_reset[:1] = False
-    return replace(cut, is_reset=is_reset)
+def _at(time_s: FloatArray, epochs: Epochs, values: FloatArray) -> FloatArray:
+    """Columns of values at the epochs, (n, c), between them."""
+    return np.stack([np.interp(time_s, epochs.time_s, column) for column in values.T], axis=1)

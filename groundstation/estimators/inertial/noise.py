@@ -17,7 +17,7 @@ RADPS_PER_DPH = math.pi / 180.0 / 3600.0
 RADPS2_PER_DPHPH = RADPS_PER_DPH / 3600.0
 S_PER_H = 3600.0
 DEFAULT_CLASS = "navigation"
-ScaleName = Literal["separate", "bank"]
+ScaleName = Literal["separate", "bank", "coupled"]
 _CLASSES = ShippedToml("groundstation.estimators.inertial", "classes", "ins_class")
 
 
@@ -73,18 +73,23 @@ def _variance(white: float, correlated: float, correlation_s: float, interval_s:
 class Calibration:
     """What the filter's forecast sigma must be multiplied by at each horizon, and how sure that is.
 
-    ``scale`` belongs to ``horizon_min``; found on simulated flights of the class; ``bank_scale`` is that of the bank's
-    mixture. ``weight`` is what it counts against the outages replayed in the past of the flight at hand: so many
-    independent ones.
+    ``scale`` belongs to ``horizon_min``; found on simulated flights of the class. ``bank_scale`` is that of the bank's
+    mixture, ``coupled_scale`` that of the coupled model. ``weight`` is what it counts against the outages replayed in
+    the past of the flight at hand: so many independent ones.
     """
 
     horizon_min: tuple[float, ...] = (1.0, 5.0, 10.0, 30.0, 60.0, 90.0, 120.0)
     scale: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
     bank_scale: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+    coupled_scale: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
     weight: float = number(5.0, 0.1, 1000.0)
 
     def __post_init__(self) -> None:
-        for name, scale in (("scale", self.scale), ("bank_scale", self.bank_scale)):
+        for name, scale in (
+            ("scale", self.scale),
+            ("bank_scale", self.bank_scale),
+            ("coupled_scale", self.coupled_scale),
+        ):
             if len(scale) != len(self.horizon_min) or not scale:
                 expected = f"one for each of {len(self.horizon_min)} horizons"
                 raise SettingsError(name, f"{len(scale)} numbers", expected)
@@ -95,7 +100,7 @@ class Calibration:
 
     def at(self, lead_s: FloatArray, of: ScaleName = "separate") -> FloatArray:
         """Scale at other lead times (linear in the logarithm of the lead, held beyond the ends)."""
-        scale = {"separate": self.scale, "bank": self.bank_scale}[of]
+        scale = {"separate": self.scale, "bank": self.bank_scale, "coupled": self.coupled_scale}[of]
         lead_min = np.maximum(np.asarray(lead_s, dtype=np.float64) / 60.0, 1e-3)
         return np.asarray(np.interp(np.log(lead_min), np.log(self.horizon_min), scale))
 
@@ -136,7 +141,8 @@ class InsNoise:
     """Noise parameters of an INS class. Initial sigmas, then what the white noises add per square root of time.
 
     ``random_drift_dph`` and ``random_drift_correlation_s`` are the stationary sigma and correlation time (1 / beta) of
-    the random drift. ``azimuth_deg`` is the initial azimuth sigma of the coupled model.
+    the random drift. Of the coupled model alone: ``azimuth_deg`` is the initial sigma of the azimuth,
+    ``accelerometer_ug`` that of accelerometer biases, which turn with the body where ``is_strapdown``.
     """
 
     name: str = DEFAULT_CLASS
@@ -149,6 +155,8 @@ class InsNoise:
     random_drift_dph: float = number(0.003, 0.0, 1e5)
     random_drift_correlation_s: float = number(3600.0, 1.0, 1e9)
     azimuth_deg: float = number(0.1, 0.0, 180.0)
+    accelerometer_ug: float = number(50.0, 0.0, 1e6)
+    is_strapdown: bool = True
     velocity_walk_mps_per_sqrt_s: float = number(3e-3, 0.0, 100.0)
     tilt_walk_deg_per_sqrt_h: float = number(0.002, 0.0, 100.0)
     drift_walk_dph_per_sqrt_h: float = number(0.0, 0.0, 1e5)

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.inertial.coupled import CoupledRun, hindcast_coupled, run_coupled
+from groundstation.estimators.inertial.coupled import CoupledRun, coupled_variance, hindcast_coupled, run_coupled
 from groundstation.estimators.inertial.differences import Differences
 from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.hindcast import hindcast
@@ -24,10 +24,14 @@ PRESENT_SHARE = 0.5  # of the seconds of an outage in which a source has samples
 
 @dataclass(frozen=True)
 class Bridged:
-    """The outages, and the position error to take off the INS at every epoch, shape (n, c), forecast through them."""
+    """The outages, and the position error to take off the INS at every epoch, shape (n, c), forecast through them.
+
+    With the coupled run, where one was made for it.
+    """
 
     outages: tuple[RealOutage, ...]
     error_m: FloatArray
+    coupled: CoupledRun | None = None
 
 
 def bridge_outages(flight: Flight, compared: Differences, run: FilterRun, settings: InertialSettings) -> Bridged:
@@ -58,7 +62,7 @@ def bridge_outages(flight: Flight, compared: Differences, run: FilterRun, settin
         found.append(outage)
     if epochs.time_s[-1] - epochs.time_s[seen[-1]] > limit_s:
         found.append(_empty(flight, compared, float(epochs.time_s[seen[-1]]), float(epochs.time_s[-1])))
-    return Bridged(tuple(found), error_m)
+    return Bridged(tuple(found), error_m, coupled)
 
 
 def _grown(
@@ -75,6 +79,7 @@ def _grown(
     own_m2 = None
     if coupled is not None:
         built = hindcast_coupled(coupled, at, lead_s, settings)[0]
+        own_m2 = coupled_variance(coupled, at, elapsed[-1:])[0, 0]
     else:
         replay = hindcast(run, at, lead_s, (method,), settings)
         built = replay.forecast_m[method][0]
@@ -98,7 +103,7 @@ def _sigma(
     if method not in WITH_SIGMA:
         return None
     lead_s = np.array([length_s])
-    growth, scale = lead_growth(run, lead_s), float(run.noise.calibration.at(lead_s, scale_of(method))[0])
+    growth, scale = lead_growth(run, lead_s), float(run.noise.calibration.at(lead_s, scale_of(method, settings))[0])
     total = 0.0
     for channel in range(run.x.shape[2]):
         if own_m2 is None:

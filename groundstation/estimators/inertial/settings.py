@@ -18,7 +18,7 @@ class InertialSettings:
     # What is compared
     ins_class: str = "auto"  # name of a shipped class, or a file; auto: the aircraft file's, else navigation
     transition: Literal["exact", "first_order"] = "exact"
-    model: Literal["separate", "coupled"] = "separate"  # whose last estimate is forecast
+    model: Literal["separate", "coupled"] = "coupled"  # whose last estimate is forecast
     epoch_interval_s: float = number(1.0, 0.01, 60.0)  # differences are averaged over such intervals
     ins_gap_max_s: float = number(1.5, 0.0)  # INS is interpolated over no longer gap
     use_position: bool = True

@@ -48,13 +48,18 @@ class Claimed:
 def claimed_sigma(method: str, run: FilterRun, replay: Hindcast, settings: InertialSettings) -> Claimed | None:
     """Sigma of a method's forecast, None for a method that has none.
 
+    That of ``replay`` itself where it holds one: of the bank, and of the last estimate of the coupled model.
+
     The scale of a start comes from the class (so many flights' worth) and from those replayed outages that were over
     before the start: nothing later is used.
     """
     if method not in WITH_SIGMA:
         return None
     channels = replay.actual_m.shape[2]
-    growth, of_class = lead_growth(run, replay.lead_s), run.noise.calibration.at(replay.lead_s, scale_of(method))
+    growth, of_class = (
+        lead_growth(run, replay.lead_s),
+        run.noise.calibration.at(replay.lead_s, scale_of(method, settings)),
+    )
     if method in replay.variance_m2:
         ins = replay.variance_m2[method]
     else:
@@ -69,9 +74,11 @@ def claimed_sigma(method: str, run: FilterRun, replay: Hindcast, settings: Inert
     return Claimed(np.sqrt(ins + judge), expected * own[:, :, None], own * of_class[None, :])
 
 
-def scale_of(method: str) -> ScaleName:
+def scale_of(method: str, settings: InertialSettings) -> ScaleName:
     """Which scale of its class a method's sigma is multiplied by."""
-    return "bank" if method == "noise_bank" else "separate"
+    if method == "noise_bank":
+        return "bank"
+    return "coupled" if method == "last_estimate" and settings.model == "coupled" else "separate"
 
 
 def _own_scale(ratio: FloatArray, replay: Hindcast, run: FilterRun) -> FloatArray:

@@ -84,7 +84,7 @@ def _beacons_heard(flight: "Flight", site: SiteData) -> tuple[Runway, tuple[Beac
     """
     heard = [topic for topic in flight.topics() if topic.startswith(PREFIX) and flight[topic].has(BEARING)]
     if not heard:
-        raise NotAssessableError(NAME, "no bearings of an automatic direction finder in the log (adf.<beacon>)")
+        raise NotAssessableError(NAME, "no bearings of locators in the log (adf.<beacon>)")
     if not site.runways or not site.beacons:
         raise NotAssessableError(NAME, "no [[runways]] with [[beacons]] in the site file")
     name = next((one.runway for one in site.beacons if one.runway), site.runways[0].name)

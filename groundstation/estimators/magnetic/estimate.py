@@ -12,11 +12,12 @@ from groundstation.base.records import BoolArray
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.alignment import S_PER_H, align
+from groundstation.estimators.magnetic.apply import corrected_by_table
 from groundstation.estimators.magnetic.before_lift_off import HeadingBasis, find_ground_runs, gyros_at_standstill
 from groundstation.estimators.magnetic.compass_table import CompassTable, build_table
 from groundstation.estimators.magnetic.earth import earth_field
 from groundstation.estimators.magnetic.figures import draw, parts_of
-from groundstation.estimators.magnetic.held_out import find_unseen, hold_out, is_level
+from groundstation.estimators.magnetic.held_out import Unseen, advantage, find_unseen, hold_out, is_level
 from groundstation.estimators.magnetic.iron import bank_bias, heading_errors, parameters_of
 from groundstation.estimators.magnetic.manoeuvre import Figure, FoundTurn, find_figures, find_turns, widest_gap_deg
 from groundstation.estimators.magnetic.methods import (
@@ -27,7 +28,7 @@ from groundstation.estimators.magnetic.methods import (
     method_rows,
     recommend,
 )
-from groundstation.estimators.magnetic.poisson import IronFit
+from groundstation.estimators.magnetic.poisson import IronFit, corrected_heading_deg
 from groundstation.estimators.magnetic.readings import ANALYSIS, Readings, choose_topics, gather, why_not_independent
 from groundstation.estimators.magnetic.remarks import remarks_on
 from groundstation.estimators.magnetic.settings import MagneticSettings
@@ -138,22 +139,26 @@ def _answer(
     rows = np.sort(np.concatenate(branches))
     along, declination, earth = earth_field(flight, readings, rows, settings)
     table = build_table(readings.magnetic_heading_deg, readings.compass_error_deg, branches[0], branches[1])
-    fits = fit_all(readings.take(rows), table, earth, settings)
-    deviation = -wrap_180(table.average_deg + declination.value_deg)
     unseen, held_out = hold_out(readings, along, is_airborne, figures, alignment, settings) or (None, None)
+    fits = fit_all(readings.take(rows), table, earth, unseen, settings)
+    deviation = -wrap_180(table.average_deg + declination.value_deg)
     judged = find_unseen(readings, is_airborne, figures, settings) & is_level(readings, settings) & bool(unseen)
     part = parts_of(is_airborne, judged, figures)
     a_sigma = math.hypot(alignment.sigma_deg, declination.sigma_deg)
     methods = method_rows(fits, unseen, deviation, declination.value_deg, a_sigma)
     biases = _biases(fits)
     flown = next((bias for bias in biases if bias.is_flown), None)
-    method, recommendation = recommend(methods, flown.rms_deg if flown else 0.0, fits.bank_deg, settings)
+    gain, bias_rms = _gain_of_iron(unseen, fits, deviation), flown.rms_deg if flown else 0.0
+    method, recommendation = recommend(methods, gain, bias_rms, fits.bank_deg, settings)
     chosen = next(row for row in methods if row.name == method)
     residual = _residual(chosen)
     coverage = _coverage(figures, table)
     swings = compare_swings(readings, declination.value_deg, figures)
     used = [one.turn for one in turns if one.turn.state == "used"]
-    gates = build_gates(used, swings, coverage, alignment, residual, flown, method, settings)
+    shift = fits.attitude.dip_shift if not fits.attitude.reason else None
+    gates = build_gates(
+        used, swings, coverage, alignment, residual, flown, method, shift.sigmas if shift else None, settings
+    )
     verdict, reason = decide(gates)
     card = deviation if method == "compass_table" else -_level_errors(fits)
     return MagneticResult(
@@ -182,9 +187,19 @@ def _answer(
         poisson=_parameters(fits.attitude, a_sigma),
         modulus=_parameters(fits.modulus, a_sigma),
         table_fit_rms_deg=table.fit_rms_deg,
+        attitude_wander_deg=fits.attitude_wander_deg,
         settings={name: value for name, value in asdict(settings).items() if value is not None},
         figures=draw(readings, along, part, figures, fits, deviation, methods, (method, card)),
     )
+
+
+def _gain_of_iron(unseen: Unseen | None, fits: Fits, deviation_deg: FloatArray) -> float:
+    """By how many sigma the iron leaves less than the table on level flight; 0 where that cannot be told."""
+    if unseen is None or fits.attitude.reason:
+        return 0.0
+    by_table = corrected_by_table(unseen.readings.magnetic_heading_deg, deviation_deg)
+    by_iron = corrected_heading_deg(fits.attitude.iron, unseen.readings)
+    return advantage(unseen, unseen.error_deg(by_table), unseen.error_deg(by_iron))
 
 
 def _residual(row: Method) -> Residual | None:
@@ -249,6 +264,7 @@ def _a_parts(fits: Fits, alignment: Alignment, declination_sigma_deg: float) -> 
         SigmaPart("alignment", aligned),
         SigmaPart("INS drift until the figure", math.sqrt(alignment.sigma_deg**2 - aligned**2)),
         SigmaPart("declination", declination_sigma_deg),
+        SigmaPart("wander of roll and pitch", math.sqrt(float(fits.wander[0, 0]))),
         SigmaPart("bank bias", math.hypot(float(bias[0]), math.sqrt(float(bias_covariance[0, 0])))),
     )
 

@@ -69,7 +69,7 @@ def _samples(
         "time_s": shown.time_s,
         "part": drawn,
         "bank_deg": shown.roll_deg,
-        "magnetic_heading_deg": heading,
+        "uncorrected_magnetic_heading_deg": heading,
         "compass_error_deg": shown.compass_error_deg,
         "error_before_deg": wrap_180(heading - expected),
         "error_compass_table_deg": wrap_180(corrected_by_table(heading, deviation_deg) - expected),
@@ -84,7 +84,7 @@ def _samples(
 def _table(fits: Fits, deviation_deg: FloatArray) -> FigureData:
     table = fits.table
     columns = {
-        "magnetic_heading_deg": CENTRES_DEG,
+        "uncorrected_magnetic_heading_deg": CENTRES_DEG,
         "right_turn_deg": table.right_deg,
         "left_turn_deg": table.left_deg,
         "compass_error_deg": table.average_deg,
@@ -101,7 +101,7 @@ def _curves(methods: Sequence[Method], recommended: MethodName, recommended_deg:
 
     The modulus is drawn without A.
     """
-    columns = {"magnetic_heading_deg": CENTRES_DEG}
+    columns = {"uncorrected_magnetic_heading_deg": CENTRES_DEG}
     design = harmonics.design(CENTRES_DEG)
     for row in methods:
         values, sigma = (
@@ -111,8 +111,8 @@ def _curves(methods: Sequence[Method], recommended: MethodName, recommended_deg:
         columns[f"deviation_{row.name}_deg"] = -(design @ values)
         columns[f"sigma_{row.name}_deg"] = np.sqrt(design**2 @ sigma**2)
     columns |= {
-        "deviation_recommended_deg": recommended_deg,
-        "sigma_recommended_deg": columns[f"sigma_{recommended}_deg"],
+        "deviation_to_add_deg": recommended_deg,
+        "deviation_sigma_deg": columns[f"sigma_{recommended}_deg"],
     }
     return FigureData("magnetic_curves", columns, dict.fromkeys(columns, 4))
 

@@ -21,6 +21,7 @@ from groundstation.results.magnetic import Alignment, HeldOut
 SECTOR_DEG = 30.0
 LARGEST = 5000  # readings judged: of more, every k-th
 LONGEST_STEP_S = 2.0  # counted as flown
+STRETCH_S, SHORTEST_S = 30.0, 10.0  # level flight is compared by means over stretches
 
 
 @dataclass(frozen=True)
@@ -117,6 +118,37 @@ def left_by_iron(unseen: Unseen, fit: IronFit, azimuth_sigma_deg: float) -> Left
     through_azimuth = azimuth_sigma_deg * (float(slopes[0] @ fit.per_azimuth_deg) - 1.0)
     variance = float(slopes[0] @ fit.covariance @ slopes[0]) + through_azimuth**2
     return _left(unseen, corrected_heading_deg(fit.iron, unseen.readings), variance)
+
+
+def seen_wander(unseen: Unseen, fit: IronFit) -> tuple[float, int]:
+    """Sigma by which what the iron leaves differs from stretch to stretch, deg, and the degrees of freedom of that.
+
+    It is what roll and pitch of the INS wander by times Z / H, or whatever else changes as slowly: the field along the
+    way, a load that is switched.
+    """
+    left = _of_stretches(unseen, unseen.error_deg(corrected_heading_deg(fit.iron, unseen.readings)))
+    return (float(np.std(left, ddof=1)), len(left) - 1) if len(left) > 1 else (0.0, 0)
+
+
+def advantage(unseen: Unseen, of_first_deg: FloatArray, of_second_deg: FloatArray) -> float:
+    """By how many sigma the mean square of a second error is smaller than that of a first, stretch by stretch.
+
+    0 where fewer than three stretches tell.
+    """
+    gain = _of_stretches(unseen, of_first_deg**2 - of_second_deg**2)
+    spread = float(np.std(gain, ddof=1)) if len(gain) > 2 else 0.0
+    return float(np.mean(gain)) / spread * float(np.sqrt(len(gain))) if spread > 0.0 else 0.0
+
+
+def _of_stretches(unseen: Unseen, values: FloatArray) -> FloatArray:
+    """Means of values (n,) over stretches of level flight, each ``STRETCH_S`` long or what there is of it."""
+    time_s = unseen.readings.time_s
+    is_first = np.diff(time_s, prepend=-np.inf) > LONGEST_STEP_S
+    since_s = time_s - time_s[is_first][np.cumsum(is_first) - 1]
+    number = np.cumsum(is_first | (np.diff(since_s // STRETCH_S, prepend=0.0) > 0.0)) - 1
+    count = np.bincount(number)
+    seconds = np.bincount(number, np.minimum(np.diff(time_s, prepend=time_s[0]), LONGEST_STEP_S))
+    return np.asarray((np.bincount(number, values) / np.maximum(count, 1))[seconds >= SHORTEST_S])
 
 
 def _left(unseen: Unseen, heading_deg: FloatArray, variance: float) -> Left:

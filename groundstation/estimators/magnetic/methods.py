@@ -9,11 +9,13 @@ from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.compass_table import CENTRES_DEG, CompassTable
 from groundstation.estimators.magnetic.held_out import (
+    LONGEST_STEP_S,
     Left,
     Unseen,
     left_by_iron,
     left_by_nothing,
     left_by_table,
+    seen_wander,
 )
 from groundstation.estimators.magnetic.iron import Iron, bank_bias, derivatives, level_coefficients
 from groundstation.estimators.magnetic.modulus import PARAMETERS, fit_modulus
@@ -26,6 +28,10 @@ NO_CIRCULAR = (
     "cannot see the constant deviation A, for no heading is used; soft iron along the vertical is taken for none: "
     "no sigma here covers that"
 )
+WANDER_IN_A_TO_E = np.array([0.3, 1.0, 1.0, 0.3, 0.3])  # what wanders with the turn rate goes into A, D, E
+WANDER_FREEDOM = 4.0  # what the settings say of the wander counts as so many stretches
+WANDER_S = 500.0  # twice a correlation time: in a figure that lasts longer the wander averages out as its inverse
+TELLING_SIGMAS = 2.0  # held-out errors that differ by less may do so by chance
 FORECAST_BANKS_DEG = (10.0, 20.0, 30.0)
 
 
@@ -33,8 +39,8 @@ FORECAST_BANKS_DEG = (10.0, 20.0, 30.0)
 class Fits:
     """The table with its forecast bank bias, shape (360,), and two irons; ``pitch_deg`` is the mean of the figure.
 
-    ``wander`` (5, 5) is what roll and pitch of the INS that wander as slowly as the figure lasts add to the covariance
-    of A to E: no residual shows it.
+    ``attitude_wander_deg`` is what roll and pitch of the INS are wrong by in the mean of the figure as they wander,
+    ``wander`` (5, 5) what that adds to the covariance of A to E: no residual of the figure shows it.
     """
 
     table: CompassTable
@@ -43,6 +49,7 @@ class Fits:
     modulus: IronFit
     pitch_deg: float
     bank_deg: float
+    attitude_wander_deg: float
     wander: FloatArray
 
     @property
@@ -51,7 +58,9 @@ class Fits:
         return None if self.attitude.reason else self.attitude
 
 
-def fit_all(figure: Readings, table: CompassTable, earth: EarthField, settings: MagneticSettings) -> Fits:
+def fit_all(
+    figure: Readings, table: CompassTable, earth: EarthField, unseen: Unseen | None, settings: MagneticSettings
+) -> Fits:
     """Fit both irons to the readings of the figures and forecast the bank bias of the table."""
     attitude = fit_iron(figure, earth, settings)
     found = attitude.earth
@@ -63,13 +72,28 @@ def fit_all(figure: Readings, table: CompassTable, earth: EarthField, settings: 
             reason = f"heading error known to {sigma:.2g} deg rms, at most {settings.modulus_sigma_max_deg:g}"
             modulus = replace(modulus, reason=f"{reason}: condition number {modulus.condition_number:.3g}")
     bias = np.zeros(360) if attitude.reason else bank_bias(attitude.iron, *_strengths(found), bank, pitch)
-    return Fits(table, bias, attitude, modulus, pitch, bank, _wander(found, settings.attitude_wander_deg))
+    seconds = float(np.sum(np.minimum(np.diff(figure.time_s), LONGEST_STEP_S)))
+    wander_deg = _wander_deg(attitude, unseen, settings) * math.sqrt(min(1.0, WANDER_S / max(seconds, 1.0)))
+    wander = np.diag((wander_deg * _per_attitude(found) * WANDER_IN_A_TO_E) ** 2)
+    return Fits(table, bias, attitude, modulus, pitch, bank, wander_deg, wander)
 
 
-def _wander(earth: EarthField, wander_deg: float) -> FloatArray:
+def _per_attitude(earth: EarthField) -> float:
     """A small error of roll turns the vertical field Z into the horizontal: angle x Z / H in C; one of pitch in B."""
-    dip = abs(earth.down_nt) / earth.horizontal_nt if earth.horizontal_nt > 0.0 else 0.0
-    return np.diag((wander_deg * dip) ** 2 * np.array([0.0, 1.0, 1.0, 0.0, 0.0]))
+    return abs(earth.down_nt) / earth.horizontal_nt if earth.horizontal_nt > 0.0 else 0.0
+
+
+def _wander_deg(fit: IronFit, unseen: Unseen | None, settings: MagneticSettings) -> float:
+    """Wander of roll and pitch over minutes: the settings' and what level flight beside the figure shows, by weight.
+
+    Source: Gelman et al., Bayesian Data Analysis, 3rd ed. 2013, section 2.6 (scaled inverse chi-square).
+    """
+    per_attitude, known = _per_attitude(fit.earth), settings.attitude_wander_deg
+    if fit.reason or unseen is None or per_attitude <= 0.0:
+        return known
+    spread_deg, freedom = seen_wander(unseen, fit)
+    seen_deg = spread_deg / per_attitude
+    return math.sqrt((WANDER_FREEDOM * known**2 + freedom * seen_deg**2) / (WANDER_FREEDOM + freedom))
 
 
 def method_rows(
@@ -114,17 +138,30 @@ def bias_coefficients(fits: Fits, azimuth_sigma_deg: float) -> tuple[FloatArray,
 
 
 def recommend(
-    rows: tuple[Method, ...], bias_rms_deg: float, bank_deg: float, settings: MagneticSettings
+    rows: tuple[Method, ...],
+    gain_sigmas: float,
+    bias_rms_deg: float,
+    bank_deg: float,
+    settings: MagneticSettings,
 ) -> tuple[MethodName, str]:
-    """The method whose curve is known best, B to E, and why; never one branch, never the modulus alone."""
+    """The method to correct by, and why; never one branch, never the modulus alone.
+
+    Where what is left on level flight differs beyond chance, the smaller; else the curve B to E that is known best.
+    ``gain_sigmas``: by how many sigma the iron leaves less than the table.
+    """
     table, attitude, limit_deg = rows[0], rows[1], settings.bank_bias_max_deg
     if attitude.state == "refused":
         return "compass_table", f"the fit of the iron is refused: {attitude.reason}"
-    sigmas = [_rms_of(row.coefficients_sigma_deg) for row in (table, attitude)]
     text = f"the average of branches has a bias of {bias_rms_deg:.2f} deg rms at {bank_deg:.0f} deg of bank"
     if bias_rms_deg > limit_deg > 0.0:
         best = bank_deg * math.sqrt(limit_deg / bias_rms_deg)
         text += f" (it grows as bank squared: {limit_deg:g} deg at {best:.0f} deg of bank)"
+    if abs(gain_sigmas) >= TELLING_SIGMAS and attitude.held_out_after_deg is not None:
+        left = f"{attitude.held_out_after_deg:.2f} against {table.held_out_after_deg:.2f} deg rms"
+        better = "less" if gain_sigmas > 0.0 else "more"
+        chosen: MethodName = "poisson_attitude" if gain_sigmas > 0.0 else "compass_table"
+        return chosen, f"{text}; on level flight that no fit has seen the iron leaves {better}: {left}"
+    sigmas = [_rms_of(row.coefficients_sigma_deg) for row in (table, attitude)]
     if sigmas[1] <= sigmas[0]:
         return "poisson_attitude", f"{text}; the iron fitted with the INS attitude has none"
     return "compass_table", f"{text}; the iron is known less well ({sigmas[1]:.2f} against {sigmas[0]:.2f} deg)"

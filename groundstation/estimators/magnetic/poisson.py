@@ -41,6 +41,10 @@ class DipShift:
     down_nt: float
     sigma_nt: float
 
+    @property
+    def sigmas(self) -> float:
+        return abs(self.down_nt) / self.sigma_nt
+
 
 @dataclass(frozen=True)
 class IronFit:

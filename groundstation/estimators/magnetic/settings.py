@@ -14,9 +14,9 @@ class MagneticSettings:
     states, where that is larger) turns the track by no more than ``track_error_max_deg``, and with
     ``uses_slower_taxi`` on taxi as system 1 takes it. ``alignment_event`` and ``release_event`` are names of events
     between which the alignment looks; empty: not used. ``declination_deg`` with its sigma replaces the model's, for a
-    log without date or place. ``attitude_wander_deg`` is how far roll and pitch of the INS wander while a figure is
-    flown. ``trusts_aided_heading`` states that an INS corrected by GNSS does not take its heading
-    from a magnetometer.
+    log without date or place. ``attitude_wander_deg`` is how far roll and pitch of the INS wander over minutes, as
+    known beforehand: level flight beside the figure tells more. ``trusts_aided_heading`` states that an INS corrected
+    by GNSS does not take its heading from a magnetometer.
     """
 
     rate_max_hz: float = number(10.0, 0.5, 1000.0)  # faster magnetometers are thinned
@@ -32,7 +32,7 @@ class MagneticSettings:
     release_event: str = ""
     declination_deg: float | None = number(None, -180.0, 180.0)
     declination_sigma_deg: float = number(0.5, 0.0, 180.0)
-    attitude_wander_deg: float = number(0.03, 0.0, 10.0)
+    attitude_wander_deg: float = number(0.04, 0.0, 10.0)
     trusts_aided_heading: bool = False
 
     bank_min_deg: float = number(8.0, 1.0, 80.0)
@@ -62,6 +62,7 @@ class MagneticSettings:
     held_out_rms_max_deg: float = number(1.0, 0.0, 180.0)
     alignment_sigma_max_deg: float = number(0.5, 0.0, 180.0)
     bank_bias_max_deg: float = number(0.3, 0.0, 180.0)
+    dip_sigmas_max: float = number(3.0, 0.0, 1000.0)
     repeat_rms_max_deg: float = number(0.5, 0.0, 180.0)
     card_step_deg: int = number(30, 1, 180)
 

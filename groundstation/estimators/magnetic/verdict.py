@@ -22,9 +22,13 @@ def build_gates(
     residual: Residual | None,
     bias: BankBias | None,
     method: MethodName,
+    dip_sigmas: float | None,
     settings: MagneticSettings,
 ) -> tuple[Gate, ...]:
-    """Every gate with its figure. ``turns`` are those used, ``bias`` is that of the bank flown."""
+    """Every gate with its figure. ``turns`` are those used, ``bias`` is that of the bank flown.
+
+    ``dip_sigmas``: by how many sigma the vertical field of the readings differs from the model's.
+    """
     altitude = min((turn.altitude_m for turn in turns if turn.altitude_m is not None), default=None)
     unequal = max(abs(abs(swing.right_bank_deg) - abs(swing.left_bank_deg)) for swing in swings)
     repeat = max((swing.difference_rms_deg for swing in swings if swing.difference_rms_deg is not None), default=None)
@@ -57,6 +61,14 @@ def build_gates(
             "deg",
             is_required=method == "compass_table",
             reason="no iron fitted to forecast it from",
+        ),
+        _gate(
+            "dip",
+            "dip of the field in the readings off the model's, in sigmas",
+            dip_sigmas,
+            settings.dip_sigmas_max,
+            is_required=dip_sigmas is not None,
+            reason="no model of the field, or no iron fitted",
         ),
         _gate(
             "altitude",

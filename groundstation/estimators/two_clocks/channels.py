@@ -26,6 +26,7 @@ UNITS: Mapping[str, str] = {
     "altitude": "m",
 }
 LEAST_ROWS = 10
+LEAST_WEIGHT = 1  # altitudes alone
 
 
 @dataclass(frozen=True)
@@ -60,14 +61,17 @@ class Pair:
     other: Side
 
 
-def pair_of(first: Flight, other: Flight, longest_s: float) -> Pair | None:
+def pair_of(
+    first: Flight, other: Flight, longest_s: float, *, is_late: tuple[bool, bool] = (False, False)
+) -> Pair | None:
     """The pair of topics that shows most of the motion, with the signals that both have; None where there is none.
 
     Velocities say more than speed, an INS more than GNSS (it is stamped when it is measured), fast topics more than
-    slow ones. A topic slower than one sample in ``longest_s`` says nothing.
+    slow ones. A topic slower than one sample in ``longest_s`` says nothing. ``is_late``: GNSS messages of a log came to
+    its recorder late; they are used where nothing else shows the motion.
     """
     sides = [[_channels(flight, topic) for topic in _topics(flight)] for flight in (first, other)]
-    best, rank = None, (0, 0, 0.0)
+    best, rank = None, (False, -2, 0, 0, 0.0)
     for a in sides[0]:
         for b in sides[1]:
             names = _common(a, b)
@@ -80,10 +84,21 @@ def pair_of(first: Flight, other: Flight, longest_s: float) -> Pair | None:
             if not 0.0 < slower <= longest_s:
                 continue
             inertial = sum(topic.startswith("ins") for topic in (a.topic, b.topic))
-            of_pair = (sum(WEIGHT[name] for name in names), inertial, -slower)
+            late = sum(side.topic.startswith("gnss") and stamps for side, stamps in zip((a, b), is_late, strict=True))
+            weight = sum(WEIGHT[name] for name in names)
+            of_pair = (weight > LEAST_WEIGHT, -late, weight, inertial, -slower)
             if of_pair > rank:
                 best, rank = pair, of_pair
     return best
+
+
+def side_of(flight: Flight, topic: str, names: tuple[str, ...]) -> Side | None:
+    """Some signals of a topic; None where it lacks one or has hardly any sample."""
+    found = _channels(flight, topic)
+    if any(name not in found.values for name in names):
+        return None
+    side = found.side(names)
+    return side if len(side.time_s) >= LEAST_ROWS else None
 
 
 def _topics(flight: Flight) -> list[str]:
@@ -135,7 +150,7 @@ def _channels(flight: Flight, topic: str) -> _Channels:
         found["heading"] = unwrap(found["heading"])
     found["turn"] = _turn(table, time_s, found["heading"])
     most = max(int(np.count_nonzero(np.isfinite(values))) for values in found.values())
-    known = {name: values for name, values in found.items() if np.count_nonzero(np.isfinite(values)) > most // 2}
+    known = {name: values for name, values in found.items() if _tells(values, most // 2)}
     if ("north" in known) != ("east" in known):
         known = {name: values for name, values in known.items() if name not in ("north", "east")}
     attitude_deg = None
@@ -143,6 +158,12 @@ def _channels(flight: Flight, topic: str) -> _Channels:
         tilt = [np.nan_to_num(table.values(name)) for name in ("roll_deg", "pitch_deg")]
         attitude_deg = np.column_stack([*tilt, known["heading"]])
     return _Channels(topic, time_s, known, attitude_deg)
+
+
+def _tells(values: FloatArray, more_than: int) -> bool:
+    """Whether there are enough values, and not all are the same."""
+    finite = values[np.isfinite(values)]
+    return len(finite) > more_than and float(np.ptp(finite)) > 0.0
 
 
 def _usable(table: Table) -> Table:
@@ -184,3 +205,19 @@ def averaged(side: Side, step_s: float) -> Side:
         np.add.reduceat(side.values, starts, axis=0) / count[:, None],
         None if attitude is None else np.add.reduceat(attitude, starts, axis=0) / count[:, None],
     )
+
+
+def running_mean(side: Side, nodes: int) -> Side:
+    """Means over an odd number of samples, two in that length; those at the ends are left out."""
+    if len(side.time_s) <= nodes:
+        return side
+    half = nodes // 2
+    step = max(nodes // 2, 1)
+    rows = slice(half, len(side.time_s) - half, step)
+
+    def means(values: FloatArray) -> FloatArray:
+        sums = np.cumsum(np.concatenate([np.zeros((1, *values.shape[1:])), values]), axis=0)
+        return np.asarray((sums[nodes:] - sums[:-nodes])[::step] / nodes)
+
+    attitude = None if side.attitude_deg is None else means(side.attitude_deg)
+    return Side(side.topic, side.time_s[rows], means(side.values), attitude)

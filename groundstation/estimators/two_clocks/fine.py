@@ -11,10 +11,11 @@ from groundstation.estimators.latency.fit import DelayFit, fit_delay
 from groundstation.estimators.latency.settings import LatencySettings
 from groundstation.estimators.latency.signals import SLOW_MPS, rotation_n_from_b
 from groundstation.estimators.latency.windows import Series, Windows, cut_windows
-from groundstation.estimators.two_clocks.channels import Pair, Side, averaged
+from groundstation.estimators.two_clocks.channels import Pair, Side, averaged, running_mean
 from groundstation.estimators.two_clocks.settings import TwoClocksSettings
 
 REFERENCE_STEP_S, OTHER_STEP_S, SLOW_S = 0.1, 0.4, 0.35
+NOISY_WIDTH_S = 1.0  # means over so long where both are GNSS: else the noise draws the fit to where it is least
 SMOOTHED_NODES = 3
 LOOSE_PPM = 1000.0  # the fit itself knows nothing of drifts
 TURNS = 2  # the second begins with the drift that the first found
@@ -69,18 +70,22 @@ def fit_motion(
         return "hardly any sample in common"
     other = pair.other.take(inside)
     middle_s, drift, fit = float(np.mean(span_s)), 0.0, None
+    is_reference = _is_reference(pair.first, other)
     for _turn in range(TURNS):
         moved_s = other.time_s + lag_s - drift * (other.time_s - middle_s)
         moved = replace(other, time_s=moved_s)
-        found = _fit(pair.names, pair.first, moved, middle_s + lag_s, settings)
+        sides = (pair.first, moved) if is_reference else (moved, pair.first)
+        found = _fit(pair.names, *sides, middle_s + lag_s, settings)
         if isinstance(found, str):
             return found
-        fit, sense, middle = found
+        fit, middle = found
+        sense = -1.0 if is_reference else 1.0
         # The middle moves to where the motion is; about it lag and drift are nearly uncorrelated.
         own = middle - lag_s
         lag_s, middle_s = lag_s - drift * (own - middle_s) + sense * fit.delay_s, own
         drift += -sense * 1e-6 * fit.nuisance
     assert fit is not None
+    hidden_s = float(np.hypot(hidden_s, _hidden_by_arm_s(pair, other, settings)))
     half_s = student_quantile(0.975, fit.freedom) * float(np.hypot(fit.sigma_s, hidden_s))
     slow_s = settings.slow_reference_share * _slow(min(pair.first.interval_s, pair.other.interval_s))
     half_s = float(np.hypot(half_s, NORMAL_95 * slow_s))
@@ -96,18 +101,51 @@ def fit_motion(
     return MotionFit(middle_s, lag_s, half_s / NORMAL_95, drift, drift_sigma, fit.explained, fit.windows)
 
 
+def _hidden_by_arm_s(pair: Pair, other: Side, settings: TwoClocksSettings) -> float:
+    """One sigma of what an arm between two antennas hides where no attitude tells it apart: its length over the speed.
+
+    In a turn of one radius an antenna that stands ahead looks as one that is early.
+    """
+    if "north" not in pair.names or any(side.attitude_deg is not None for side in (pair.first, other)):
+        return 0.0
+    speed_mps = float(np.quantile(np.hypot(other.values[:, 0], other.values[:, 1]), 0.9))
+    return settings.arm_sigma_m / max(speed_mps, SLOW_MPS)
+
+
 def _slow(interval_s: float) -> float:
     return interval_s if interval_s > SLOW_S else 0.0
 
 
+def _is_reference(first: Side, other: Side) -> bool:
+    """Whether the first is to be the reference: an INS before GNSS, whose noise would draw the fit to its samples.
+
+    Else the faster one.
+    """
+    first_is_ins, other_is_ins = _is_quiet(first), _is_quiet(other)
+    return first_is_ins > other_is_ins or (first_is_ins == other_is_ins and first.interval_s <= other.interval_s)
+
+
+def _is_quiet(side: Side) -> bool:
+    """Whether the noise of single samples is small: that of a fast INS."""
+    return side.topic.startswith("ins") and side.interval_s <= SLOW_S
+
+
+def _nodes(width_s: float, interval_s: float) -> int:
+    """Odd number of samples, three or more, that are as long as a width."""
+    return max(SMOOTHED_NODES, 2 * round(0.5 * width_s / interval_s) + 1)
+
+
 def _fit(
-    names: tuple[str, ...], first: Side, other: Side, middle_s: float, settings: TwoClocksSettings
-) -> tuple[DelayFit, float, float] | str:
-    """Fit the slower against the faster, both on the first's seconds; sense is -1 where the other is the slower."""
-    is_first_faster = first.interval_s <= other.interval_s
-    fast, slow = (first, other) if is_first_faster else (other, first)
+    names: tuple[str, ...], fast: Side, slow: Side, middle_s: float, settings: TwoClocksSettings
+) -> tuple[DelayFit, float] | str:
+    """Fit one side (``slow``) against the reference (``fast``), both on the first's seconds; and the middle used."""
     reference = averaged(fast, REFERENCE_STEP_S)
-    sensor = averaged(slow, OTHER_STEP_S)
+    if _is_quiet(fast):
+        sensor = averaged(slow, OTHER_STEP_S)
+        width_s = OTHER_STEP_S if sensor is not slow else 0.0
+    else:
+        width_s = max(NOISY_WIDTH_S, 3.0 * max(fast.interval_s, slow.interval_s))
+        sensor = running_mean(slow, _nodes(width_s, slow.interval_s))
     fine = LatencySettings(
         search_s=settings.search_s,
         window_s=settings.window_s,
@@ -115,16 +153,17 @@ def _fit(
         gap_max_s=max(0.6, 2.2 * reference.interval_s),
     )
     size = _noise(names, reference, sensor)
-    reference = Side(reference.topic, reference.time_s, reference.values / size)
-    width_s = OTHER_STEP_S if sensor is not slow else 0.0
+    reference = replace(reference, values=reference.values / size)
+    if reference.attitude_deg is None and sensor.attitude_deg is not None:
+        turned = [np.interp(reference.time_s, sensor.time_s, angle) for angle in sensor.attitude_deg.T]
+        reference = replace(reference, attitude_deg=np.column_stack(turned))
     series, _priors, _drift = _series(names, reference, size, middle_s, width_s, settings, fine)
-    values = sensor.values / size
-    windows = cut_windows(series, sensor.time_s, values, fine)
+    windows = cut_windows(series, sensor.time_s, sensor.values / size, fine)
     if windows is None:
         return f"fewer than two stretches of {settings.window_s:g} s in which both are logged without a gap"
     middle_s = _middle(series, windows)
     series, priors, drift = _series(names, reference, size, middle_s, width_s, settings, fine)
-    return fit_delay(series, windows, priors, fine, wanted=drift), -1.0 if is_first_faster else 1.0, middle_s
+    return fit_delay(series, windows, priors, fine, wanted=drift), middle_s
 
 
 def _noise(names: tuple[str, ...], reference: Side, sensor: Side) -> FloatArray:
@@ -139,7 +178,7 @@ def _noise(names: tuple[str, ...], reference: Side, sensor: Side) -> FloatArray:
     if len(left) < 3:
         return np.ones(left.shape[1])
     scatter = 1.4826 * np.median(np.abs(np.diff(left, n=2, axis=0)), axis=0) / 6.0**0.5
-    most = np.maximum(np.std(sensor.values, axis=0), 1e-9)
+    most = np.maximum(np.std(sensor.values, axis=0), 1e-6)
     size = np.clip(scatter, 1e-3 * most, most)
     if "north" in names:
         size[:2] = np.mean(size[:2])  # they turn into each other
@@ -180,8 +219,7 @@ def _series(
     sigma = [LOOSE_PPM, *(SCALE_SIGMA.get(name, USUAL_SCALE_SIGMA) for name in names)]
     sigma += [AZIMUTH_SIGMA_RAD, *[settings.arm_sigma_m] * 3] if turns else []
     series = Series(side.time_s, base, build, fine.gap_max_s)
-    nodes = max(SMOOTHED_NODES, 2 * round(0.5 * width_s / side.interval_s) + 1) if side.interval_s <= SLOW_S else 1
-    return series.smoothed(nodes), np.array(sigma), 0
+    return series.smoothed(_nodes(width_s, side.interval_s)), np.array(sigma), 0
 
 
 def _arms(names: tuple[str, ...], side: Side, size: FloatArray) -> FloatArray:

@@ -16,6 +16,7 @@ from groundstation.estimators.two_clocks.settings import TwoClocksSettings
 LEAPS_S = range(13, 21)  # GPS time less UTC
 NEAR_WHOLE_S = 0.35
 LEAST_DRIFT_SIGMA = 1e-9
+FILES_APART_S = 1.0
 
 
 def relate(first: TimedLog, other: TimedLog, *, settings: TwoClocksSettings | None = None) -> LogRelation:
@@ -48,12 +49,17 @@ def relate(first: TimedLog, other: TimedLog, *, settings: TwoClocksSettings | No
     files_lag_s = (other.flight.start_ns - first.flight.start_ns) / NS_PER_S if _both_utc(first, other) else None
     if by_gnss:
         _require_overlap(first, other, by_gnss)
-    pair = pair_of(first.flight, other.flight, settings.interval_max_s)
+    is_late = _stamps_late(first), _stamps_late(other)
+    pair = pair_of(first.flight, other.flight, settings.interval_max_s, is_late=is_late)
     place, why = _placed(pair, by_gnss, settings)
     base = LogRelation(first.flight.start_ns, other.flight.start_ns, ())
     if pair is not None:
         base = replace(base, first_topic=pair.first.topic, other_topic=pair.other.topic, signals=pair.names)
-    if place is None or pair is None:
+    found = None
+    if place is not None and pair is not None:
+        moving = replace(base, correlation=place.correlation)
+        found, why = _by_motion(moving, pair, place, by_gnss, (first, other), settings)
+    if found is None:
         prior = by_gnss or _by_file_time(files_lag_s)
         if not prior:
             names = f"{first.name} and {other.name}"
@@ -61,13 +67,10 @@ def relate(first: TimedLog, other: TimedLog, *, settings: TwoClocksSettings | No
         found = replace(base, stretches=prior, reason=f"{_SAYS[prior[0].method]}; {why}")
         if pair is not None:
             _require_no_contradiction(first, other, pair, found, settings)
-    else:
-        found = _by_motion(replace(base, correlation=place.correlation), pair, place, by_gnss, (first, other), settings)
-        if files_lag_s is not None and not by_gnss and abs(files_lag_s - found.stretches[0].lag_s) > 1.0:
-            text = (
-                f"their own times differ by {files_lag_s - found.stretches[0].lag_s:+.1f} s from what the motion says"
-            )
-            found = replace(found, remarks=(*found.remarks, text))
+    elif files_lag_s is not None and not by_gnss and abs(files_lag_s - found.stretches[0].lag_s) > FILES_APART_S:
+        gap_s = files_lag_s - found.stretches[0].lag_s
+        text = f"their own times differ by {gap_s:+.1f} s from what the motion says: the motion is believed"
+        found = replace(found, remarks=(*found.remarks, text))
     _require_overlap(first, other, found.stretches)
     _require_near(first, other, found, settings)
     return found
@@ -99,7 +102,7 @@ def _by_gnss_time(first: TimedLog, other: TimedLog, settings: TwoClocksSettings)
         settings.arrival_sigma_s * float(sum(not told.is_own for told in (first.gnss_time, other.gnss_time))) ** 0.5
     )
     start_ns, end_ns = other.flight.start_ns, other.end_ns
-    inside = [one.begin_ns for one in (*other.gnss_time.stretches, *first.gnss_time.stretches)]
+    inside = [one.begin_ns for one in (*other.gnss_time.stretches[1:], *first.gnss_time.stretches[1:])]
     begins_ns = sorted({start_ns, *(begin for begin in inside if start_ns < begin < end_ns)})
     stretches = []
     for begin_ns, until_ns in zip(begins_ns, [*begins_ns[1:], end_ns], strict=True):
@@ -155,15 +158,18 @@ def _by_motion(
     by_gnss: tuple[Stretch, ...],
     logs: tuple[TimedLog, TimedLog],
     settings: TwoClocksSettings,
-) -> LogRelation:
-    """The relation with the motion fitted in each stretch, weighed with GNSS time where that tells."""
+) -> tuple[LogRelation | None, str]:
+    """The relation with the motion fitted in each stretch, weighed with GNSS time where that tells.
+
+    None, and why, where no stretch can be fitted and GNSS time does not tell.
+    """
     first, other = logs
-    hidden_s = settings.aided_sigma_s if _is_aided(first, pair.first) or _is_aided(other, pair.other) else 0.0
+    hidden_s = _hidden_s((first, pair.first), (other, pair.other), settings=settings)
     begins = [(one.begin_s, one.lag_s) for one in by_gnss]
     if len(begins) < 2:
         begins = steps_of(grids_of(pair, settings), place, settings)
     ends = [*(begin for begin, _lag in begins[1:]), other.flight.duration_s]
-    stretches, remarks, gaps = [], list(found.remarks), []
+    stretches, remarks, gaps, fitted = [], list(found.remarks), [], 0
     for number, ((begin_s, lag_s), end_s) in enumerate(zip(begins, ends, strict=True)):
         prior = by_gnss[min(number, len(by_gnss) - 1)] if by_gnss else None
         span_s = (max(begin_s, 0.0), end_s)
@@ -172,6 +178,7 @@ def _by_motion(
             stretches.append(_unfitted(prior, begin_s, span_s, lag_s, settings))
             remarks.append(f"from {span_s[0]:.0f} to {span_s[1]:.0f} s of {other.name} the motion does not tell: {fit}")
             continue
+        fitted += 1
         stretch, gap = _settled(begin_s, fit, prior, settings)
         stretches.append(stretch)
         if gap is not None:
@@ -179,6 +186,8 @@ def _by_motion(
             if stretch.method == "motion":
                 text = f"GNSS time and motion contradict each other by {gap[0]:+.3f} s{_named(gap[0])}"
                 remarks.append(f"{text}: the motion is believed")
+    if not by_gnss and not fitted:
+        return None, remarks[-1]
     if len(begins) > 1:
         steps = ", ".join(f"{begin:.0f} s" for begin, _lag in begins[1:])
         remarks.append(f"one of the clocks was set at {steps} of {other.name}")
@@ -186,7 +195,7 @@ def _by_motion(
     if gaps:
         found = replace(found, gnss_less_motion_s=gaps[0][0], gnss_less_motion_sigma_s=gaps[0][1])
     what = f"{', '.join(pair.names)} of {pair.first.topic} and {pair.other.topic}"
-    return replace(found, reason=f"{_SAYS[found.method]} ({what})")
+    return replace(found, reason=f"{_SAYS[found.method]} ({what})"), ""
 
 
 def _settled(
@@ -202,6 +211,22 @@ def _settled(
     return moving if is_wrong else _weighed(moving, prior), (gap_s, sigma_s)
 
 
+def _stamps_late(log: TimedLog) -> bool:
+    """Whether a log has GNSS messages that came to a recorder of something else, too, by whose clock they are stamped.
+
+    Of a log of GNSS alone no other clock matters than that of its own stamps.
+    """
+    is_own = log.gnss_time is not None and log.gnss_time.is_own
+    return not is_own and any(topic.startswith("ins") for topic in log.flight.topics())
+
+
+def _hidden_s(*sides: tuple[TimedLog, Side], settings: TwoClocksSettings) -> float:
+    """One sigma of what the motion does not show: filters of INS that GNSS corrects, GNSS messages that came late."""
+    hidden = [settings.aided_sigma_s for log, side in sides if _is_aided(log, side)]
+    hidden += [settings.arrival_sigma_s for log, side in sides if side.topic.startswith("gnss") and _stamps_late(log)]
+    return float(np.linalg.norm(hidden)) if hidden else 0.0
+
+
 def _is_aided(log: TimedLog, side: Side) -> bool:
     if log.flight.metadata.get("ins_kind", "").lower() == "gnss_aided" and side.topic.startswith("ins"):
         return True
@@ -212,11 +237,11 @@ def _is_aided(log: TimedLog, side: Side) -> bool:
 def _unfitted(
     prior: Stretch | None, begin_s: float, span_s: tuple[float, float], lag_s: float, settings: TwoClocksSettings
 ) -> Stretch:
-    """A stretch that the first search alone placed, to the step of its grid; by GNSS time where that tells."""
+    """A stretch that the first search alone placed, which is rough; by GNSS time where that tells."""
     if prior is not None:
         return replace(prior, begin_s=begin_s)
     sigma = 1e-6 * settings.drift_sigma_ppm
-    return Stretch(begin_s, 0.5 * sum(span_s), lag_s, settings.grid_s, 0.0, sigma, "motion")
+    return Stretch(begin_s, 0.5 * sum(span_s), lag_s, settings.search_s, 0.0, sigma, "motion")
 
 
 def _weighed(motion: Stretch, prior: Stretch) -> Stretch:

@@ -28,10 +28,10 @@ class TwoClocksSettings:
     window_s: float = number(30.0, 5.0, 600.0)
     windows_max: int = number(60, 2, 10_000)
     interval_max_s: float = number(1.5, 0.01, 10.0)  # slower sources do not show the motion
-    half_width_max_s: float = number(0.3, 0.0, 10.0)  # a wider 95 % interval is no observation
+    half_width_max_s: float = number(1.0, 0.0, 10.0)  # a wider 95 % interval is no observation
     explained_min: float = number(0.5, 0.0, 1.0)
     drift_sigma_ppm: float = number(50.0, 0.0, 10_000.0)  # of two crystals, before anything is known
-    arm_sigma_m: float = number(3.0, 0.0, 100.0)  # between two antennas, or an antenna and an INS, along each axis
+    arm_sigma_m: float = number(4.0, 0.0, 100.0)  # between two antennas, or an antenna and an INS, along each axis
     slow_reference_share: float = number(0.02, 0.0, 1.0)  # of the interval of a slow reference, for interpolation
     aided_sigma_s: float = number(0.01, 0.0, 1.0)  # what the filter of an INS that GNSS corrects may hide
     arrival_sigma_s: float = number(0.1, 0.0, 5.0)

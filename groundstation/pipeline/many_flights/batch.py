@@ -93,6 +93,47 @@ def run_many(
     return _run_here(near, asked, crew, force, listen)
 
 
+def run_together(
+    paths: Sequence[Path | str],
+    out: Path | str,
+    configuration: Configuration,
+    *,
+    force: bool = False,
+    fail_on: str = "none",
+    with_pdf: bool = True,
+    listen: Listener = silent,
+) -> tuple[Outcome, ...]:
+    """Run several logs of one flight as that flight; see :func:`groundstation.pipeline.one_flight.join.join_logs`.
+
+    The logs are read and joined each time; parameters as of :func:`run_many`.
+
+    Raises
+    ------
+    UsageError
+        As :func:`run_many`; when fewer than two logs are named, one of them twice, or one is a folder or elsewhere.
+    """
+    from groundstation.pipeline.one_flight.join import join_files
+
+    if any(is_remote(str(place)) for place in (out, *paths)):
+        raise UsageError("--together", "logs or results elsewhere", "local ones")
+    named = " + ".join(PurePath(path).name for path in paths)
+    refuse_foreign(Path(out), force)
+    listen(Event("begin", total=1))
+    with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
+        try:
+            mcap = Path(folder) / "joined.mcap"
+            join_files([Path(path) for path in paths], mcap, configuration, listen)
+        except UsageError:
+            raise
+        except Exception as error:
+            reason, trace = reason_of(named, error)
+            listen(Event("end", named, reason))
+            return (Outcome(named, "failed", reason, trace=trace),)
+        job = Job(mcap, Path(out), configuration, fail_on, with_pdf=with_pdf, url=named)
+        asked = Asked(Path(out), configuration, None, fail_on, with_pdf, redo=True)
+        return _run_here([job], asked, partial(in_turn, listen=listen), force, listen)
+
+
 def _run_here(work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen: Listener) -> tuple[Outcome, ...]:
     out = asked.out
     refuse_foreign(out, force)
@@ -273,7 +314,9 @@ def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configu
     """Logs by path or URL, in a stable order, each with whether the user named it."""
     near = [Path(path) for path in paths if not is_remote(str(path))]
     found = {log: named for path in paths if is_remote(str(path)) for log, named in far_logs(str(path))}
-    found |= {str(one.path): one.is_named for one in collect(near, None if is_remote(str(out)) else Path(out))}
+    judges = {path.resolve() for path in configuration.references.paths}  # in a folder they are no logs to run
+    listed = collect(near, None if is_remote(str(out)) else Path(out))
+    found |= {str(one.path): one.is_named for one in listed if one.is_named or one.path.resolve() not in judges}
     if not found:
         hint = "what groundstation made is no input" if any(path.is_dir() and is_ours(path) for path in near) else ""
         raise UsageError(", ".join(map(str, paths)), "no log in it", "", hint)

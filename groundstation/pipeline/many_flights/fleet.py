@@ -155,8 +155,7 @@ def _add(collected: _Collected, folder: Path, store: SampleStore | None) -> None
         if store is not None:
             store.put(row, samples)
     for check in checks_of(saved):
-        z = check.residual_deg / check.sigma_deg
-        told = (row["verdict"], check.residual_deg, check.sigma_deg, z, check.is_inside)
+        told = (check.verdict, check.residual_deg, check.sigma_deg, check.z, check.is_inside)
         collected.checks.append((check.quantity, *names, *told))
     shipped, skill = skill_of(saved)
     start = np.datetime64("NaT", "ns") if row["start_utc"] is None else np.datetime64(row["start_utc"], "ns")

@@ -26,6 +26,7 @@ from groundstation.results.files import SavedFlight, utf8_text
 from groundstation.results.fleet import SessionRow
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.heading import HeadingResult
+from groundstation.results.reference import ReferenceResult
 
 FloatArray = NDArray[np.float64]
 NORMAL_95 = 1.959964
@@ -35,12 +36,17 @@ LATEST_NS = 7_000_000_000_000_000_000  # 2191: times of samples must fit beside 
 
 @dataclass(frozen=True)
 class Check:
-    """Something independent of the estimate beside it: residual, the sigma claimed for it, inside 95 % or not."""
+    """Something independent of the estimate beside it: residual, the sigma claimed for it, inside 95 % or not.
+
+    ``z`` is the residual over the sigma. ``verdict`` is that on the estimate; empty where it was not judged.
+    """
 
     quantity: str
-    residual_deg: float
-    sigma_deg: float
+    z: float
     is_inside: bool
+    residual_deg: float = math.nan
+    sigma_deg: float = math.nan
+    verdict: str = ""
 
 
 @dataclass(frozen=True)
@@ -160,29 +166,52 @@ def session_row(saved: SavedFlight) -> SessionRow:
 
 
 def checks_of(saved: SavedFlight) -> list[Check]:
-    """Everything independent that the flight's heading was compared with."""
-    heading = saved.results.answer(HeadingResult)
-    if heading is None:
-        return []
+    """Everything independent that the flight's answers were compared with."""
+    heading, reference = saved.results.answer(HeadingResult), saved.results.answer(ReferenceResult)
+    found = [] if heading is None else _heading_checks(saved, heading)
+    if reference is not None and reference.is_judge:
+        verdict = "" if heading is None else heading.verdict
+        found += [_check("truth_heading", one.difference_deg, one.sigma_deg, verdict) for one in reference.headings]
+        found += _position_checks(saved.figure("reference_checks"))
+    return [check for check in found if check is not None]
+
+
+def _heading_checks(saved: SavedFlight, heading: HeadingResult) -> list[Check | None]:
+    verdict = heading.verdict
     found = [_reference_check(heading, saved.results.metadata)]
-    found += [_check("runway", runway.difference_deg, runway.sigma_deg) for runway in heading.runway]
+    found += [_check("runway", runway.difference_deg, runway.sigma_deg, verdict) for runway in heading.runway]
     if heading.onboard is not None:
         # Steady sideslip and mounting are the same in both.
-        found.append(_check("onboard", heading.onboard.difference_error_deg, heading.measured_sigma_deg))
-    return [check for check in found if check is not None]
+        difference = heading.onboard.difference_error_deg
+        found.append(_check("onboard", difference, heading.measured_sigma_deg, verdict))
+    return found
+
+
+def _position_checks(figure: FigureData | None) -> list[Check | None]:
+    """The independent samples of the horizontal positions that claimed something."""
+    if figure is None:
+        return []
+    columns = (texts(figure, "subject"), texts(figure, "quantity"), texts(figure, "axis"))
+    rows = zip(*(one.tolist() for one in columns), numbers(figure, "z"), flags(figure, "is_inside"), strict=True)
+    return [
+        Check(f"truth_{subject}", float(z), bool(is_inside))
+        for subject, quantity, axis, z, is_inside in rows
+        if (quantity, axis) == ("position", "horizontal") and math.isfinite(z)
+    ]
 
 
 def _reference_check(heading: HeadingResult, metadata: Mapping[str, str]) -> Check | None:
     reference, residual = logged_reference(metadata), heading.reference_residual_arcmin
     sigma = math.hypot(to_number(heading.parking_sigma_deg), reference.sigma_deg if reference else REFERENCE_SIGMA_DEG)
-    return _check("reference", None if residual is None else residual / ARCMIN_PER_DEG, sigma)
+    return _check("reference", None if residual is None else residual / ARCMIN_PER_DEG, sigma, heading.verdict)
 
 
-def _check(quantity: str, residual: float | None, sigma: float) -> Check | None:
+def _check(quantity: str, residual: float | None, sigma: float, verdict: str) -> Check | None:
     residual_deg, sigma_deg = to_number(residual), to_number(sigma)
     if math.isnan(residual_deg) or not sigma_deg > 0.0:
         return None
-    return Check(quantity, residual_deg, sigma_deg, abs(residual_deg) <= NORMAL_95 * sigma_deg)
+    is_inside = abs(residual_deg) <= NORMAL_95 * sigma_deg
+    return Check(quantity, residual_deg / sigma_deg, is_inside, residual_deg, sigma_deg, verdict)
 
 
 def skill_of(saved: SavedFlight) -> tuple[str, list[SkillOfFlight]]:

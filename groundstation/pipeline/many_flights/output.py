@@ -16,7 +16,10 @@ from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports.flight_report import PDF, REPORT
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY
 
-FLEET_ARRAYS = ("heading_samples.parquet",)  # of a flight's arrays, what the fleet is made from
+FLEET_ARRAYS = (
+    "heading_samples.parquet",
+    "reference_checks.parquet",
+)  # of a flight's arrays, what the fleet is made from
 
 
 class Output(Protocol):

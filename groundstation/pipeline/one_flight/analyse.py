@@ -1,7 +1,7 @@
 """Tables of one flight in, all its answers out: everything the data allows, and the reason for what it does not."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -13,6 +13,7 @@ from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.gaps import Gaps
 from groundstation.base.ledger import Ledger
+from groundstation.base.signals import topics_of_kind
 from groundstation.estimators import overview
 from groundstation.estimators.analyses import FLIGHT_ANALYSES
 from groundstation.estimators.analysis import Analysis, in_order_of_need
@@ -33,6 +34,7 @@ from groundstation.tables.table import Flight
 
 INFO: Severity = "info"
 WARN: Severity = "warn"
+TRUTH = "truth"
 
 
 @dataclass(frozen=True)
@@ -51,14 +53,25 @@ class Given:
 class Answered:
     """What the analyses of a flight gave: answers and findings by analysis, and why some gave nothing.
 
-    ``reasons`` has an entry for every analysis without an answer; ``not_assessable`` leaves out those that only lack
-    the answer of another.
+    ``reasons`` has an entry for every analysis that applies and has no answer; ``not_assessable`` leaves out those that
+    only lack the answer of another.
     """
 
     answers: Answers
     findings: Mapping[str, tuple[Finding, ...]]
     reasons: Mapping[str, str]
     not_assessable: tuple[NotAssessable, ...]
+    workings: Mapping[str, Any] = field(default_factory=dict)
+
+    def joined(self, later: "Answered") -> "Answered":
+        """What these analyses gave, and others after them."""
+        return Answered(
+            {**self.answers, **later.answers},
+            {**self.findings, **later.findings},
+            {**self.reasons, **later.reasons},
+            (*self.not_assessable, *later.not_assessable),
+            {**self.workings, **later.workings},
+        )
 
 
 def analyse(flight: Flight, given: Given, configuration: Configuration) -> FlightResults:
@@ -71,8 +84,8 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     """
     if configuration.settings.aircraft.always_on_ground:
         flight = replace(flight, metadata=MappingProxyType({**flight.metadata, ALWAYS_ON_GROUND: "true"}))
-    known = known_of(flight, configuration)
-    found = run_analyses(FLIGHT_ANALYSES, flight, known)
+    found, known = answers_of(flight, configuration)
+    flight = flight.without(TRUTH)
     thresholds = configuration.thresholds
     gaps = {name: gaps_of(name, flight[name].time_ns, thresholds=thresholds) for name in flight.topics()}
     findings = list(given.findings)
@@ -100,6 +113,18 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     )
 
 
+def answers_of(flight: Flight, configuration: Configuration) -> tuple[Answered, Known]:
+    """Run all analyses on a flight; the truth is seen by those alone that judge by it, and by them after all others."""
+    seen = flight.without(TRUTH)
+    known = known_of(seen, configuration)
+    found = run_analyses(tuple(one for one in FLIGHT_ANALYSES if not one.judges), seen, known)
+    so_far = replace(known, answers=found.answers, workings=found.workings)
+    judged = run_analyses(tuple(one for one in FLIGHT_ANALYSES if one.judges), flight, so_far)
+    if not topics_of_kind(TRUTH, flight.topics()):
+        judged = replace(judged, not_assessable=())  # nobody asked for it
+    return found.joined(judged), known
+
+
 def known_of(flight: Flight, configuration: Configuration) -> Known:
     """What the analyses may use besides the tables of a flight: phases, and all that the user says of it."""
     settings = configuration.settings
@@ -124,13 +149,16 @@ def run_analyses(analyses: tuple[Analysis, ...], data: Any, known: Any) -> Answe
     data : Flight
         What they analyse; for analyses of a session, the session.
     known : Known
-        ``answers`` and ``workings`` are filled as the analyses run.
+        ``answers`` and ``workings`` are filled as the analyses run; it may come with those
+        of analyses that ran before.
     """
     answers: dict[str, Any] = dict(known.answers)
-    workings: dict[str, Any] = {}
+    workings: dict[str, Any] = dict(known.workings)
     findings: dict[str, tuple[Finding, ...]] = {}
     reasons: dict[str, NotAssessable] = {}
     for analysis in in_order_of_need(analyses):
+        if not analysis.applies(data, known):
+            continue
         missing = next((name for name in analysis.requires if name not in answers), None)
         if missing is not None:
             reasons[analysis.name] = reasons.get(missing) or NotAssessable(missing, f"{missing} did not run")
@@ -156,6 +184,7 @@ def run_analyses(analyses: tuple[Analysis, ...], data: Any, known: Any) -> Answe
         findings,
         {name: reasons[name].reason for name in names if name in reasons},
         tuple(reasons[name] for name in names if name in reasons and reasons[name].analysis == name),
+        workings,
     )
 
 

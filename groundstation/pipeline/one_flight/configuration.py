@@ -74,6 +74,17 @@ class UserSettings:
 
 
 @dataclass(frozen=True)
+class References:
+    """Files that may judge flights; ``is_expected``: it is an error when none is of the time of the one log named."""
+
+    paths: tuple[Path, ...] = ()
+    is_expected: bool = False
+
+
+NO_REFERENCES = References()
+
+
+@dataclass(frozen=True)
 class Configuration:
     """Everything a user may set for a run. Parsed once, when it is made; worker processes get the values.
 
@@ -90,6 +101,8 @@ class Configuration:
         The file that a table was read from, for messages.
     apply : Apply, optional
         The deviation to add to the magnetic heading.
+    references : References
+        Files of which the one of the log's time judges the answers.
 
     Raises
     ------
@@ -104,6 +117,7 @@ class Configuration:
     icds: tuple[str, ...] = ()
     files: Mapping[str, str] = field(default_factory=dict)
     apply: "Apply | None" = None
+    references: References = NO_REFERENCES
 
     def __post_init__(self) -> None:
         self.thresholds  # noqa: B018 -- a slip is told now
@@ -157,6 +171,8 @@ class Configuration:
             document["icds"] = [Path(one).name for one in self.icds]
         if self.apply:
             document["apply"] = self.apply.to_dict()
+        if self.references.paths:
+            document["references"] = [path.name for path in self.references.paths]
         return document
 
 

@@ -1,21 +1,28 @@
 """A log becomes an MCAP: its clock is repaired, its ledger is kept beside the data."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from importlib import metadata as installed
+from itertools import chain
 from pathlib import Path
 
-from groundstation.base.errors import UnreadableLogError
+from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.findings import Finding, Severity
-from groundstation.base.ledger import TopicEntry
-from groundstation.base.records import Damage, RecordBatch, Remark
+from groundstation.base.ledger import Ledger, TopicEntry
+from groundstation.base.records import HEADING_IS_TRACK, Damage, Item, RecordBatch, Remark
+from groundstation.base.signals import kind_of
+from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.version import __version__
 from groundstation.integrity.ledger import damage_entry
 from groundstation.integrity.ledger_findings import TOPIC_CODES, topic_findings
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.integrity.survey import Census
+from groundstation.pipeline.one_flight.configuration import NO_REFERENCES, References
 from groundstation.pipeline.one_flight.log import Log
+from groundstation.pipeline.one_flight.reference import FACTS, TRUTH, Laid, laid_beside
 from groundstation.store.info import StoreInfo
 
+OWN_TRUTH = ("a truth of its own", "a log without one", "leave --reference out")
 COUNTED_CAUSES = ("dropout", "stuck", "out_of_range", "sequence")  # of spans: counted again with the topics
 
 
@@ -31,7 +38,9 @@ class Converted:
     has_lost_data: bool
 
 
-def convert_log(log: Log, target: Path, thresholds: Thresholds | None = None) -> Converted:
+def convert_log(
+    log: Log, target: Path, thresholds: Thresholds | None = None, references: References = NO_REFERENCES
+) -> Converted:
     """Write a log's MCAP, under a temporary name until it is whole.
 
     Parameters
@@ -40,17 +49,23 @@ def convert_log(log: Log, target: Path, thresholds: Thresholds | None = None) ->
     target : Path
     thresholds : Thresholds, optional
         Limits of the ledger; the shipped ones when left out.
+    references : References, optional
+        Files of which the one of the log's time is kept beside it as ``truth``.
 
     Raises
     ------
     UnreadableLogError
         When the log holds no record at all.
+    GroundstationError
+        When there is no reference for it, or several.
     """
     limits = thresholds or shipped()
-    return _copy_store(log, target, limits) if log.is_store else _convert_recorded(log, target, limits)
+    if log.is_store:
+        return _copy_store(log, target, limits, references)
+    return _convert_recorded(log, target, limits, references)
 
 
-def _convert_recorded(log: Log, target: Path, limits: Thresholds) -> Converted:
+def _convert_recorded(log: Log, target: Path, limits: Thresholds, references: References) -> Converted:
     from groundstation.integrity.ledger_findings import ledger_findings
     from groundstation.integrity.ordering import corrected
     from groundstation.integrity.survey import survey
@@ -60,48 +75,70 @@ def _convert_recorded(log: Log, target: Path, limits: Thresholds) -> Converted:
     found = survey(items, thresholds=limits)
     if not found.ledger.topics:
         raise UnreadableLogError(log.path.name, "no record that could be read", "", "`info` tells what the file is")
-    findings = ledger_findings(found.ledger)
+    topics = found.ledger.topics
+    if references.paths and any(kind_of(one.topic) == TRUTH for one in topics):
+        raise GroundstationError(log.path.name, *OWN_TRUTH)
+    span_ns = min(one.first_ns for one in topics), max(one.last_ns for one in topics)
+    laid = laid_beside(log.path.name, span_ns, found.clock.is_absolute, references)
+    findings = (*ledger_findings(found.ledger), *laid.findings)
     info = StoreInfo(
         source_name=log.source.name,
         source_sha256=log.source.sha256,
         reader=found.header.reader,
         versions={"groundstation": __version__, "mcap": installed.version("mcap")},
-        metadata={**found.header.metadata, **_derivations(found.remarks)},
+        metadata={**found.header.metadata, **_told_of_fields(found.remarks), **laid.facts},
         has_utc=found.clock.is_absolute,
-        start_ns=min(topic.first_ns for topic in found.ledger.topics),
+        start_ns=span_ns[0],
         clock=found.clock.document(),
-        ledger=found.ledger.document(),
+        ledger=_with_truth(found.ledger.document(), laid, limits),
         findings=findings,
         remarks=[asdict(remark) for remark in found.remarks],
         damages=[asdict(damage) for damage in found.damages],
     )
     with StoreWriter(target, info) as writer:
-        for batch in corrected(items, found.clock):
+        for batch in chain(corrected(items, found.clock), laid.batches):
             writer.write(batch)
     return Converted(info, findings, any(damage.loses_data for damage in found.damages))
 
 
-def _derivations(remarks: tuple[Remark, ...]) -> dict[str, str]:
-    """What each derived field was derived from, ``derived.<topic>.<field>``: it stays with the flight."""
-    derived = (remark for remark in remarks if remark.code == "derived")
+def _with_truth(ledger: Ledger, laid: Laid, limits: Thresholds) -> Ledger:
+    """A ledger with the topic that a reference became."""
+    if not laid.batches:
+        return ledger
+    census = Census(True, limits)
+    for batch in laid.batches:
+        census.add(batch)
+    counted = census.ledger().document().topics
+    return replace(ledger, topics=dict(sorted({**ledger.topics, **counted}.items())))
+
+
+def _told_of_fields(remarks: tuple[Remark, ...]) -> dict[str, str]:
+    """What the analyses must know of a field: it stays with the flight.
+
+    ``derived.<topic>.<field>``: what it was derived from; ``heading_is_track.<topic>.<field>``: in words.
+    """
     origin = " derived from "
     return {
-        f"derived.{remark.topic}.{field}": remark.text.rpartition(origin)[2]
-        for remark in derived
+        f"{remark.code}.{remark.topic}.{field}": remark.text.rpartition(origin)[2]
+        for remark in remarks
+        if remark.code in ("derived", HEADING_IS_TRACK)
         for field in remark.fields
     }
 
 
-def _copy_store(log: Log, target: Path, limits: Thresholds) -> Converted:
+def _copy_store(log: Log, target: Path, limits: Thresholds, references: References) -> Converted:
     """Write the intact content of a groundstation MCAP again; an undamaged one comes out equal in content."""
     from groundstation.store.reader import read_info
     from groundstation.store.writer import StoreWriter
 
     info = read_info(log.path)
+    laid = _laid_beside_store(log, info, references)
+    if laid.batches:
+        info = _with_another_truth(info, laid, limits)
     damages: list[Damage] = []
     census = census_of(info, limits)
     with StoreWriter(target, info) as writer:
-        for item in log.items():
+        for item in chain(_without_truth(log.items(), laid), laid.batches):
             if isinstance(item, RecordBatch):
                 writer.write(item)
                 census.add(item)
@@ -112,6 +149,35 @@ def _copy_store(log: Log, target: Path, limits: Thresholds) -> Converted:
         if damages or has_other_limits(info, limits):
             info = writer.info = recounted(info, damages, census)
     return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages))
+
+
+def _laid_beside_store(log: Log, info: StoreInfo, references: References) -> Laid:
+    """The reference of an MCAP, in place of that of an earlier run; a truth that came with the log stays its own."""
+    has_truth = any(kind_of(topic) == TRUTH for topic in info.ledger.topics)
+    if not references.paths:
+        return Laid()
+    if has_truth and f"{FACTS}source_name" not in info.metadata:
+        raise GroundstationError(log.path.name, *OWN_TRUTH)
+    ends = [iso_to_utc_ns(end)[0] for topic in info.ledger.topics.values() for end in (topic.first, topic.last)]
+    start_ns = min(ends, default=0) if info.start_ns is None else info.start_ns
+    return laid_beside(log.path.name, (start_ns, max(ends, default=0)), info.has_utc, references)
+
+
+def _without_truth(items: Iterable[Item], laid: Laid) -> Iterator[Item]:
+    """Items of a log, without the truth where another takes its place."""
+    return (item for item in items if not (laid.batches and isinstance(item, RecordBatch) and item.topic == TRUTH))
+
+
+def _with_another_truth(info: StoreInfo, laid: Laid, limits: Thresholds) -> StoreInfo:
+    """Facts of a store file whose truth is another one."""
+    metadata = {name: value for name, value in info.metadata.items() if not name.startswith(FACTS)}
+    findings = tuple(finding for finding in info.findings if not finding.code.startswith("reference."))
+    return replace(
+        info,
+        metadata={**metadata, **laid.facts},
+        ledger=_with_truth(info.ledger, laid, limits),
+        findings=(*findings, *laid.findings),
+    )
 
 
 def census_of(info: StoreInfo, limits: Thresholds) -> Census:

@@ -144,7 +144,7 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         converted = _taken_over(job.finished.mcap, mcap)
     else:
         with watch.stage("converting"):
-            converted = convert_log(log, mcap, job.configuration.thresholds)
+            converted = convert_log(log, mcap, job.configuration.thresholds, job.configuration.references)
         _require_unchanged(log, version)
     with watch.stage("reading the MCAP"):
         flight = read_flight(mcap, converted)

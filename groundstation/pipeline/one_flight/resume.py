@@ -129,9 +129,10 @@ def _digest(*parts: Any) -> str:
 
 
 def _layouts_of(configuration: Configuration) -> list[str]:
-    """The content of the profile and the ICDs; the name of a shipped one."""
+    """The content of the profile, the ICDs and the references; the name of a shipped ICD."""
     profile = [_content_of(configuration.profile)] if configuration.profile else []
-    return profile + [_content_of(one) if Path(one).is_file() else one for one in configuration.icds]
+    icds = [_content_of(one) if Path(one).is_file() else one for one in configuration.icds]
+    return [*profile, *icds, *(_content_of(str(path)) for path in configuration.references.paths)]
 
 
 def _content_of(file: str) -> str:

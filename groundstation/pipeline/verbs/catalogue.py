@@ -60,7 +60,7 @@ def _of_a_session(folder: Path) -> list[dict[str, Any]]:
 def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
     """The analyses, each with whether it would run on a log and the reason why not."""
     from groundstation.base.errors import UsageError
-    from groundstation.pipeline.one_flight.analyse import known_of, run_analyses
+    from groundstation.pipeline.one_flight.analyse import answers_of
     from groundstation.pipeline.one_flight.configuration import Configuration
     from groundstation.pipeline.one_flight.convert import convert_log
     from groundstation.pipeline.one_flight.flight import read_flight
@@ -72,10 +72,11 @@ def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
     with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
         mcap = Path(folder) / "flight.mcap"
         flight = read_flight(mcap, convert_log(open_log(path, profile), mcap))
-    found = run_analyses(FLIGHT_ANALYSES, flight, known_of(flight, Configuration()))
+    found, _known = answers_of(flight, Configuration())
     return [
         {**entry, "would_run": entry["name"] in found.answers, "reason": found.reasons.get(entry["name"], "")}
         for entry in _analyses()
+        if entry["name"] in {*found.answers, *found.reasons}  # what does not apply to such a log is left out
     ]
 
 

@@ -26,7 +26,7 @@ def convert_many(
     """Convert logs to MCAP: one to the file ``output``, several into the folder ``output``.
 
     A file ``*.ch10`` is written as Chapter 10, with the ICD of its buses beside it. Of the configuration, the profile,
-    the ICDs and the thresholds of the ledger count.
+    the ICDs, the thresholds of the ledger and the references count.
 
     Raises
     ------
@@ -59,19 +59,58 @@ def convert_many(
     return tuple(outcomes)
 
 
+def convert_together(
+    logs: Sequence[Path],
+    output: Path,
+    *,
+    configuration: Configuration | None = None,
+    force: bool = False,
+    listen: Listener = silent,
+) -> tuple[Outcome, ...]:
+    """Convert several logs of one flight to one MCAP, on one clock.
+
+    Raises
+    ------
+    UsageError
+        When a log is missing or given twice, there is but one, or the target exists and ``force`` is not given.
+    """
+    from groundstation.pipeline.one_flight.join import join_files
+
+    named = " + ".join(log.name for log in logs)
+    if output.suffix == ".ch10" or output.is_dir():
+        raise UsageError(str(output), "Chapter 10 or a folder", "an MCAP for logs that are joined")
+    if output.exists() and (not force or output.resolve() in {log.resolve() for log in logs}):
+        raise UsageError(str(output), "a file that exists", "a new name", "-f overwrites it")
+    listen(Event("begin", total=1))
+    try:
+        converted = join_files(logs, output, configuration or Configuration(), listen)
+    except UsageError:
+        raise
+    except GroundstationError as error:
+        outcome = Outcome(named, "failed", str(error))
+    else:
+        outcome = _converted(named, converted, output)
+    listen(Event("end", output.name, outcome.text))
+    return (outcome,)
+
+
 def _convert_one(path: Path, target: Path, configuration: Configuration) -> Outcome:
-    told, thresholds = "", configuration.thresholds
+    told, thresholds, references = "", configuration.thresholds, configuration.references
     try:
         log = open_log(path, configuration.profile_path, configuration.icds)
         if target.suffix == ".ch10":
             converted, told = _to_chapter10(log, target, thresholds)
         else:
-            converted = convert_log(log, target, thresholds)
+            converted = convert_log(log, target, thresholds, references)
     except GroundstationError as error:
         return Outcome(str(path), "failed", str(error))
+    return _converted(str(path), converted, target, told)
+
+
+def _converted(source: str, converted: Converted, target: Path, told: str = "") -> Outcome:
     grave = [finding.text for finding in converted.findings if finding.severity != "info"]
     text = f"-> {target}{told}" + (f" ({'; '.join(grave)})" if grave else "")
-    return Outcome(str(path), "data_lost" if converted.has_lost_data else "done", text, folder=str(target))
+    return Outcome(source, "data_lost" if converted.has_lost_data else "done", text, folder=str(target))
 
 
 def _to_chapter10(log: Log, target: Path, thresholds: Thresholds) -> tuple[Converted, str]:

@@ -110,11 +110,21 @@ def _session_to(name: str, folder: Path, seed: int | None, *, force: bool) -> li
 
 
 def study_to(
-    name: str, folder: Path, *, runs: int, seed: int, force: bool, listen: Listener, recorded: Path | None = None
+    name: str,
+    folder: Path,
+    *,
+    runs: int,
+    seed: int,
+    force: bool,
+    listen: Listener,
+    recorded: Path | None = None,
+    minutes: float | None = None,
 ) -> str:
     """Run a study into a folder: ``<name>.md`` and tables/*.csv; returns the page's text.
 
-    With ``recorded``, a folder with sets of recorded robots, the cooperative study runs on these instead.
+    With ``recorded``, a folder with sets of recorded robots, the cooperative study runs on these instead. The study of
+    the heading keeps its runs in ``runs/``: the same command goes on with them, ``minutes`` ends it before all are
+    made; ``force`` makes them afresh.
 
     Raises
     ------
@@ -126,8 +136,13 @@ def study_to(
     study = _study(name) if recorded is None else _study_of(name, recorded)
 
     page = folder / f"{name}.md"
-    if page.exists() and not force:
+    kept = folder / "runs"
+    if page.exists() and not force and not kept.is_dir():
         raise UsageError(str(page), "a file that exists", "a new folder", "-f overwrites it")
+    if name == "heading":
+        study = _resumed(study, kept, minutes, afresh=force)
+    elif minutes is not None:
+        raise UsageError("study", f"--minutes with {name}", "heading")
     (folder / "tables").mkdir(parents=True, exist_ok=True)
     listen(Event("begin", total=1))
     result = study(runs=runs, seed=seed, progress=lambda text: listen(Event("stage", name, text)))
@@ -137,6 +152,21 @@ def study_to(
     (folder / STUDY_MARK).touch()
     listen(Event("end", name, str(page)))
     return result.markdown
+
+
+def _resumed(
+    study: "Callable[..., StudyResult]", folder: Path, minutes: float | None, *, afresh: bool
+) -> "Callable[..., StudyResult]":
+    """The study of the heading with the runs kept in a folder."""
+    from functools import partial
+    from shutil import rmtree
+
+    from groundstation.pipeline.verbs.kept_runs import KeptRuns
+    from groundstation.studies.heading_family import RunOutcome
+
+    if afresh and folder.is_dir():
+        rmtree(folder)
+    return partial(study, kept=KeptRuns(folder, RunOutcome), minutes=minutes)
 
 
 def _study_of(name: str, recorded: Path) -> "Callable[..., StudyResult]":

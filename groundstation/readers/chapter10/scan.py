@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.base.compile import compiled
+from groundstation.base.compile import in_place
 
 HEADER_BYTES, SECONDARY_BYTES, SYNC = 24, 12, 0xEB25
 MOST_BYTES, MOST_COMPUTER_BYTES = 524_288, 134_217_728  # of a packet, by the standard
@@ -27,22 +27,22 @@ POSITION, COUNT, SPANS, SKIP_START, FILLER, CHECKED, STATE_SIZE = range(7)
 NOWHERE = -1
 
 
-@compiled
+@in_place
 def _u16(data: Any, at: int) -> int:
     return int(data[at]) | int(data[at + 1]) << 8
 
 
-@compiled
+@in_place
 def _u32(data: Any, at: int) -> int:
     return _u16(data, at) | _u16(data, at + 2) << 16
 
 
-@compiled
+@in_place
 def _u48(data: Any, at: int) -> int:
     return _u32(data, at) | _u16(data, at + 4) << 32
 
 
-@compiled
+@in_place
 def _sum16(data: Any, at: int, words: int) -> int:
     total = 0
     for k in range(words):
@@ -50,7 +50,7 @@ def _sum16(data: Any, at: int, words: int) -> int:
     return total & 0xFFFF
 
 
-@compiled
+@in_place
 def _is_header(data: Any, at: int, size: int) -> bool:
     """Whether a packet may begin at a place: sync, checksum, lengths that fit each other."""
     if at + HEADER_BYTES > size or data[at] != 0x25 or data[at + 1] != 0xEB:
@@ -67,7 +67,7 @@ def _is_header(data: Any, at: int, size: int) -> bool:
     return header + content <= length <= most
 
 
-@compiled
+@in_place
 def _header_inside(data: Any, syncs: Any, start: int, end: int, size: int) -> int:
     """Where a header begins between two places; NOWHERE when none does."""
     number = np.searchsorted(syncs, start)
@@ -78,7 +78,7 @@ def _header_inside(data: Any, syncs: Any, start: int, end: int, size: int) -> in
     return NOWHERE
 
 
-@compiled
+@in_place
 def _checksum_is_right(data: Any, halves: Any, words: Any, at: int, start: int, end: int) -> bool:
     """Whether the data checksum at the end of a packet is the sum of what precedes it, filler among it."""
     kind = int(data[at + 14]) & 3
@@ -104,7 +104,7 @@ def _checksum_is_right(data: Any, halves: Any, words: Any, at: int, start: int, 
     return total & 0xFFFFFFFF == _u32(data, end - 4)
 
 
-@compiled
+@in_place
 def scan(
     data: Any, halves: Any, words: Any, syncs: Any, size: int, is_last: bool, packets: Any, spans: Any, state: Any
 ) -> None:
@@ -170,7 +170,7 @@ def scan(
     state[POSITION], state[COUNT], state[SKIP_START] = at, count, skip
 
 
-@compiled
+@in_place
 def _stamp(data: Any, at: int, packet: Any) -> int:
     """Time of a message in counts of 100 ns: its own counter, or the packet's and how much later it is."""
     flags = packet[FLAGS]
@@ -183,7 +183,7 @@ def _stamp(data: Any, at: int, packet: Any) -> int:
     return int(packet[RTC])
 
 
-@compiled
+@in_place
 def messages_1553(data: Any, packets: Any, places: Any, times: Any, heads: Any, words: Any, lost: Any) -> int:
     """Messages of MIL-STD-1553 packets; how many there are.
 
@@ -222,7 +222,7 @@ def messages_1553(data: Any, packets: Any, places: Any, times: Any, heads: Any, 
     return count
 
 
-@compiled
+@in_place
 def see_1553(data: Any, packets: Any, seen: Any) -> None:
     """Mark the command words of all messages in ``seen``, ndarray of bool of shape (65536,): see messages_1553."""
     for k in range(len(packets)):
@@ -235,7 +235,7 @@ def see_1553(data: Any, packets: Any, seen: Any) -> None:
             at += 14 + length + length % 2
 
 
-@compiled
+@in_place
 def see_429(data: Any, packets: Any, seen: Any) -> None:
     """Mark bus (from 0) and label byte of all words in ``seen``, ndarray of bool of shape (65536,)."""
     for k in range(len(packets)):
@@ -243,7 +243,7 @@ def see_429(data: Any, packets: Any, seen: Any) -> None:
             seen[int(data[at + 3]) << 8 | int(data[at + 4])] = True
 
 
-@compiled
+@in_place
 def words_429(data: Any, packets: Any, places: Any, times: Any, heads: Any, words: Any, lost: Any) -> int:
     """Words of ARINC-429 packets; how many there are.
 
@@ -265,7 +265,7 @@ def words_429(data: Any, packets: Any, places: Any, times: Any, heads: Any, word
     return count
 
 
-@compiled
+@in_place
 def messages_stamped(
     data: Any,
     packets: Any,
@@ -304,7 +304,7 @@ def messages_stamped(
     return count
 
 
-@compiled
+@in_place
 def samples(time_ns: Any, fields: Any, span_ns: int, sample: Any) -> int:
     """Which words are of one sample; how many samples there are.
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.compile import compiled
+from groundstation.base.compile import in_place
 
 LOOKAHEAD = 1_024  # bytes that must follow the record that is judged: itself and two more, at most 255 each
 NEAR_US = 10_000_000  # a record whose time is within 10 s of the last good one is believed
@@ -40,7 +40,7 @@ def magic_places(data: NDArray[np.uint8], magic: int = MAGIC_BYTES) -> NDArray[n
     return places
 
 
-@compiled
+@in_place
 def _length_at(data: Any, at: int, lengths: Any) -> int:
     """Length of the record that begins at a place, 0 when none does."""
     if at + 3 > len(data) or data[at] != 0xA3 or data[at + 1] != 0x95:
@@ -48,7 +48,7 @@ def _length_at(data: Any, at: int, lengths: Any) -> int:
     return int(lengths[data[at + 2]])
 
 
-@compiled
+@in_place
 def _time_us(data: Any, at: int, time_kind: Any) -> int:
     """The record's time in microseconds, -1 when it has none."""
     kind = time_kind[data[at + 2]]
@@ -61,21 +61,21 @@ def _time_us(data: Any, at: int, time_kind: Any) -> int:
     return value * 1000 if kind == TIME_MS else value
 
 
-@compiled
+@in_place
 def _has_time(data: Any, at: int, time_kind: Any) -> Any:
     """Whether the record has a time, which is not negative."""
     kind = time_kind[data[at + 2]]
     return kind != NO_TIME and (kind != TIME_US_8 or data[at + 10] < 128)
 
 
-@compiled
+@in_place
 def _is_near(data: Any, at: int, time_kind: Any, last_us: int) -> bool:
     """Whether the record at a place has a time near that of the last good one."""
     time = _time_us(data, at, time_kind)
     return time >= 0 and last_us >= 0 and abs(time - last_us) <= NEAR_US
 
 
-@compiled
+@in_place
 def _is_header(data: Any, at: int, lengths: Any) -> bool:
     """Whether three bytes begin a record of a known type, or would with one bit flipped back."""
     if at + 3 > len(data):
@@ -90,7 +90,7 @@ def _is_header(data: Any, at: int, lengths: Any) -> bool:
     return flipped & (flipped - 1) == 0 and int(lengths[type_id]) > 0
 
 
-@compiled
+@in_place
 def _is_credible(data: Any, at: int, lengths: Any, time_kind: Any, last_us: int) -> bool:
     """Whether a record that begins at a place among doubtful bytes is one: see the module's first lines."""
     length = _length_at(data, at, lengths)
@@ -101,7 +101,7 @@ def _is_credible(data: Any, at: int, lengths: Any, time_kind: Any, last_us: int)
     return _is_near(data, at, time_kind, last_us)
 
 
-@compiled
+@in_place
 def _is_swallowed(data: Any, at: int, end: int, lengths: Any, time_kind: Any, last_us: int) -> bool:
     """Whether a record with a near time begins inside another, and it or those after it end where that ends."""
     length = _length_at(data, at, lengths)
@@ -113,7 +113,7 @@ def _is_swallowed(data: Any, at: int, end: int, lengths: Any, time_kind: Any, la
     return length > 0 and at + length == end
 
 
-@compiled
+@in_place
 def _is_false(data: Any, at: int, length: int, lengths: Any, time_kind: Any, last_us: int) -> bool:
     """Whether a record is false, its id being damaged: another record begins inside it.
 
@@ -131,7 +131,7 @@ def _is_false(data: Any, at: int, length: int, lengths: Any, time_kind: Any, las
     return False
 
 
-@compiled
+@in_place
 def _is_cut(data: Any, at: int, length: int, lengths: Any, time_kind: Any, last_us: int) -> bool:
     """Whether what is left of the file is the beginning of one record (and no other begins inside it)."""
     left = len(data) - at
@@ -143,7 +143,7 @@ def _is_cut(data: Any, at: int, length: int, lengths: Any, time_kind: Any, last_
     return True
 
 
-@compiled
+@in_place
 def scan(
     data: Any,
     magic: Any,

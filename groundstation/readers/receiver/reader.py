@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 
 from groundstation.base.errors import UnreadableLogError
-from groundstation.base.records import Column, Damage, Item, LogHeader, RecordBatch, Remark
+from groundstation.base.records import HEADING_IS_TRACK, Column, Damage, Item, LogHeader, RecordBatch, Remark
 from groundstation.readers.receiver import nmea, novatel, scan, ubx, ubx_canonical
 from groundstation.readers.receiver.messages import Block, bounded, raw_batches, text_batches
 from groundstation.readers.receiver.novatel_messages import INS_SOURCES
@@ -60,7 +60,7 @@ class _Told:
                 f"{ubx_canonical.MOVING_MPS:g} m/s: the receiver lets the nose point along the motion, so its heading "
                 "is no second measurement"
             )
-            yield Remark("heading_is_track", text, "ins", ("true_heading_deg",))
+            yield Remark(HEADING_IS_TRACK, text, "ins", ("true_heading_deg",))
         if self.astray:
             text = (
                 f"geoid and ellipsoid are said to be over {nmea.MOST_SEPARATION_M:.0f} m apart in {self.astray} rows, "

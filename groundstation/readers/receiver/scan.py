@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.compile import compiled, inlined
+from groundstation.base.compile import in_place, inlined
 
 UBX, NMEA, RTCM, NOVATEL, NOVATEL_SHORT, BARE_NMEA = 1, 2, 3, 4, 5, 6
 UBX_EXTRA, RTCM_EXTRA, CRC_BYTES = 8, 6, 4
@@ -55,7 +55,7 @@ def _hexadecimal(byte: int) -> int:
     return byte - 87 if 97 <= byte <= 102 else -1
 
 
-@compiled
+@in_place
 def _ubx(data: Any, at: int) -> int:
     """Length of the UBX frame at a place if its checksum is right."""
     length = data[at + 4] + 256 * data[at + 5] + UBX_EXTRA
@@ -68,7 +68,7 @@ def _ubx(data: Any, at: int) -> int:
     return length if data[at + length - 2] == first and data[at + length - 1] == second else NO_FRAME
 
 
-@compiled
+@in_place
 def _sentence(data: Any, at: int) -> int:
     """Length of the NMEA sentence at a place, to the end of its checksum."""
     total, end = 0, min(at + LONGEST_SENTENCE, len(data))
@@ -86,7 +86,7 @@ def _sentence(data: Any, at: int) -> int:
     return PENDING if end == len(data) else NO_FRAME
 
 
-@compiled
+@in_place
 def _bare_sentence(data: Any, at: int) -> int:
     """Length of the sentence without a checksum at a place: to the end of its line."""
     for k in range(at + 1, min(at + LONGEST_SENTENCE, len(data))):
@@ -98,7 +98,7 @@ def _bare_sentence(data: Any, at: int) -> int:
     return PENDING if at + LONGEST_SENTENCE > len(data) else NO_FRAME
 
 
-@compiled
+@in_place
 def _is_address(data: Any, at: int) -> bool:
     """Whether two capital letters or more and a comma stand behind the first character of a sentence."""
     for k in range(at + 1, min(at + 10, len(data))):
@@ -110,7 +110,7 @@ def _is_address(data: Any, at: int) -> bool:
     return False
 
 
-@compiled
+@in_place
 def _rtcm(data: Any, at: int, table: Any) -> int:
     """Length of the RTCM 3 frame at a place if its checksum is right."""
     length = ((data[at + 1] & 3) << 8 | data[at + 2]) + RTCM_EXTRA
@@ -125,7 +125,7 @@ def _rtcm(data: Any, at: int, table: Any) -> int:
     return length if crc == data[end - 3] << 16 | data[end - 2] << 8 | data[end - 1] else NO_FRAME
 
 
-@compiled
+@in_place
 def _novatel(data: Any, at: int, table: Any) -> int:
     """Length of the NovAtel frame at a place (long or short header) if its checksum is right."""
     if data[at + 2] == 0x12:
@@ -142,7 +142,7 @@ def _novatel(data: Any, at: int, table: Any) -> int:
     return length if crc == told else NO_FRAME
 
 
-@compiled
+@in_place
 def _declared(data: Any, at: int) -> int:
     """Length that a binary frame at a place says it has, 0 where none begins."""
     left, byte = len(data) - at, data[at]
@@ -155,7 +155,7 @@ def _declared(data: Any, at: int) -> int:
     return 0
 
 
-@compiled
+@in_place
 def _frame(data: Any, at: int, bare: bool, rtcm: Any, novatel: Any) -> tuple[int, int]:
     """Protocol and length of the frame at a place; length NO_FRAME, or PENDING where the data end inside it."""
     left, byte = len(data) - at, data[at]
@@ -173,16 +173,18 @@ def _frame(data: Any, at: int, bare: bool, rtcm: Any, novatel: Any) -> tuple[int
     return 0, NO_FRAME
 
 
-@compiled
+@in_place
 def is_cut(data: Any, at: int) -> bool:
     """Whether a frame begins at a place that the end of the data cuts off."""
     if data[at] == DOLLAR or data[at] == BANG:
-        text = data[at + 1 :]
-        return bool(np.all((text >= 32) & (text <= 126)))
+        is_text = True
+        for k in range(at + 1, len(data)):
+            is_text &= 32 <= data[k] <= 126
+        return is_text
     return _declared(data, at) > len(data) - at
 
 
-@compiled
+@in_place
 def scan(
     data: Any,
     is_last: bool,

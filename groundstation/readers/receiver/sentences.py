@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.compile import compiled, inlined
+from groundstation.base.compile import in_place, inlined
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.receiver import scan
@@ -55,7 +55,7 @@ TIMED = ("GGA", "GNS", "RMC", "GLL", "ZDA", "GST", "PASHR")
 _SATELLITE_FIELDS, _BEFORE_SATELLITES, _NO_FIELD = 4, 3, -1
 
 
-@compiled
+@in_place
 def _split(data: Any, offsets: Any, ends: Any, starts: Any, counts: Any) -> None:
     """Where the fields of sentences begin, one row a field; one more start stands behind the last field's end."""
     most = len(starts) - 1
@@ -98,7 +98,7 @@ def _number(data: Any, at: int, end: int) -> tuple[int, int, int]:
     return (-value if is_negative else value), behind, 1
 
 
-@compiled
+@in_place
 def _numbers(data: Any, starts: Any, counts: Any, field: int, value: Any, behind: Any, state: Any) -> None:
     """Numbers of one field of all sentences."""
     begins, ends = starts[field], starts[field + 1]
@@ -107,7 +107,7 @@ def _numbers(data: Any, starts: Any, counts: Any, field: int, value: Any, behind
             value[row], behind[row], state[row] = _number(data, begins[row], ends[row] - 1)
 
 
-@compiled
+@in_place
 def _times_of_day(value: Any, behind: Any, day_ns: Any, sound: Any) -> None:
     """Nanoseconds of the day of times written as ``hhmmss`` and digits behind the point."""
     for row in range(len(value)):
@@ -122,7 +122,7 @@ def _times_of_day(value: Any, behind: Any, day_ns: Any, sound: Any) -> None:
             day_ns[row] = ((hour * 60 + minute) * 60 + second) * NS_PER_S + fraction_ns
 
 
-@compiled
+@in_place
 def _addresses(data: Any, offsets: Any, keys: Any) -> None:
     """Addresses as numbers: their letters are the bytes, the first the highest."""
     for row in range(len(offsets)):

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.compile import compiled
+from groundstation.base.compile import in_place
 
 HEADER = 3
 MAX_MESSAGE = HEADER + 0xFFFF
@@ -41,12 +41,12 @@ def new_state() -> NDArray[np.int64]:
     return state
 
 
-@compiled
+@in_place
 def _u16(data: Any, at: int) -> Any:
     return np.int64(data[at]) | np.int64(data[at + 1]) << 8
 
 
-@compiled
+@in_place
 def _is_text(data: Any, start: int, end: int, is_name: bool) -> bool:
     """Whether bytes are text: a name (letters, digits and ``_-/``), or anything but control characters."""
     for at in range(start, end):
@@ -60,7 +60,7 @@ def _is_text(data: Any, start: int, end: int, is_name: bool) -> bool:
     return True
 
 
-@compiled
+@in_place
 def _value_bytes(data: Any, start: Any, stop: Any) -> Any:
     """Size of the value of a key ``type[count] name``, by the letters and digits that tell the types apart."""
     first = data[start]
@@ -78,7 +78,7 @@ def _value_bytes(data: Any, start: Any, stop: Any) -> Any:
     return width * count if is_array else width
 
 
-@compiled
+@in_place
 def _keyed_strength(data: Any, start: int, end: int) -> int:
     """How much speaks for a body that is a length, a key ``type name`` of that length, and a value of that type."""
     if start >= end:
@@ -100,7 +100,7 @@ def _keyed_strength(data: Any, start: int, end: int) -> int:
     return STRONG if _value_bytes(data, start + 1, stop) == end - stop else WEAK
 
 
-@compiled
+@in_place
 def _format_strength(data: Any, start: int, end: int) -> int:
     """How much speaks for a name that is not empty, a colon, and printable characters, a semicolon the last of them."""
     colons = 0
@@ -114,7 +114,7 @@ def _format_strength(data: Any, start: int, end: int) -> int:
     return STRONG if data[end - 1] == 0x3B else WEAK
 
 
-@compiled
+@in_place
 def _text_strength(data: Any, start: int, end: int, time_at: int) -> int:
     """How much speaks for a level (a digit), a time (at ``time_at``) with nothing in its highest byte, and a text."""
     if time_at + 8 > end or data[start] < 0x30 or data[start] > 0x37 or data[time_at + 7] != 0:
@@ -125,7 +125,7 @@ def _text_strength(data: Any, start: int, end: int, time_at: int) -> int:
     return STRONG if end <= looked_at else WEAK
 
 
-@compiled
+@in_place
 def _is_sync(data: Any, start: int) -> Any:
     return (
         data[start] == 0x2F
@@ -139,7 +139,7 @@ def _is_sync(data: Any, start: int) -> Any:
     )
 
 
-@compiled
+@in_place
 def _strength(data: Any, at: int, end: int, least: Any, most: Any) -> int:
     """How much speaks for a whole message at a place: NONE, WEAK or STRONG."""
     if at + 3 > end:
@@ -175,7 +175,7 @@ def _strength(data: Any, at: int, end: int, least: Any, most: Any) -> int:
     return WEAK if 0x21 <= kind <= 0x7E else NONE  # a type that a later version may define
 
 
-@compiled
+@in_place
 def _swallows(data: Any, at: int, stop: int, least: Any, most: Any) -> bool:
     """Whether a definition or information, or two strong messages one behind the other, stand inside a stretch."""
     while at + 3 <= stop:
@@ -192,12 +192,12 @@ def _swallows(data: Any, at: int, stop: int, least: Any, most: Any) -> bool:
     return False
 
 
-@compiled
+@in_place
 def _is_known_type(kind: Any) -> bool:
     return kind in (0x41, 0x42, 0x43, 0x44, 0x46, 0x49, 0x4C, 0x4D, 0x4F, 0x50, 0x51, 0x52, 0x53)
 
 
-@compiled
+@in_place
 def _is_cut(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
     """Whether a data message begins at a place and is cut by the end."""
     if at + 5 > end or data[at + 2] != 0x44:
@@ -207,7 +207,7 @@ def _is_cut(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
     return at + 3 + size > end and least[message_id] <= size - 2 <= most[message_id]
 
 
-@compiled
+@in_place
 def leads_on(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
     """Whether a strong message begins at a place, or behind at most three weak ones; the end of the data is as good."""
     for _ in range(4):
@@ -225,7 +225,7 @@ def leads_on(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
     return False
 
 
-@compiled
+@in_place
 def _find(data: Any, at: int, limit: int, end: int, least: Any, most: Any) -> int:
     """First place from ``at`` up to ``limit`` where a believable message begins; ``limit`` when there is none."""
     while at < limit and at + 3 <= end:
@@ -241,7 +241,7 @@ def _find(data: Any, at: int, limit: int, end: int, least: Any, most: Any) -> in
     return limit
 
 
-@compiled
+@in_place
 def _is_data(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
     """Whether the header of a data message of a known id and size stands at a place."""
     if at + 5 > end or data[at + 2] != 0x44:
@@ -250,14 +250,14 @@ def _is_data(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
     return least[message_id] <= _u16(data, at) - 2 <= most[message_id]
 
 
-@compiled
+@in_place
 def _has_one_size(data: Any, at: int, least: Any, most: Any) -> Any:
     """Whether the data of a message's id has one size only: no padding at its end that may be left out."""
     message_id = _u16(data, at + 3)
     return least[message_id] == most[message_id]
 
 
-@compiled
+@in_place
 def _is_believed(data: Any, at: int, end: int, least: Any, most: Any, is_next: bool) -> Any:
     """Whether a message at a place is one; ``end`` is that of the data, ``is_next`` that another ends right before."""
     strength = _strength(data, at, end, least, most)
@@ -276,7 +276,7 @@ def _is_believed(data: Any, at: int, end: int, least: Any, most: Any, is_next: b
     return strength == STRONG and _find(data, at + 3, stop, end, least, most) == stop
 
 
-@compiled
+@in_place
 def _next_inside(data: Any, last: int, at: int, end: int, least: Any, most: Any) -> Any:
     """Where a message begins inside the data message ``last``, which ends at ``at``, and leads on; else ``at``.
 
@@ -292,7 +292,7 @@ def _next_inside(data: Any, last: int, at: int, end: int, least: Any, most: Any)
     return at
 
 
-@compiled
+@in_place
 def scan(
     data: Any, ahead: int, least: Any, most: Any, topic: Any, out_at: Any, out_topic: Any, spans: Any, state: Any
 ) -> int:
@@ -370,7 +370,7 @@ def scan(
     return reason
 
 
-@compiled
+@in_place
 def _is_cut_off(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
     """Whether a message of any type begins at a place, is cut by the end, and no other begins inside what is there."""
     if at + 3 <= end:

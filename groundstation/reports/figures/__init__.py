@@ -22,7 +22,9 @@ from groundstation.reports.figures import (
     overview,
     placement,
     quality,
+    reference,
     standstill,
+    together,
 )
 from groundstation.results.flight import FlightResults
 
@@ -54,6 +56,7 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "landing_ranges.accuracy": landing_ranges.accuracy,
     "landing_ranges.trials": landing_ranges.trials,
     "latency.search": latency.search,
+    "together.motion": together.motion,
     "magnetic.deviation": magnetic.deviation,
     "magnetic.held_out": magnetic.held_out,
     "magnetic.track": magnetic.track,
@@ -68,6 +71,9 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
     "overview.attitude": overview.attitude,
     "overview.states": overview.states,
     "quality.gaps": quality.gaps,
+    "reference.errors": reference.errors,
+    "reference.track": reference.track,
+    "reference.claims": reference.claims,
     "cooperative.map": cooperative.session_map,
     "cooperative.errors": cooperative.errors,
     "cooperative.geometry": cooperative.geometry,

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.normal import NORMAL_95
-from groundstation.chapters.wording import clock, interval, is_number, number
+from groundstation.chapters.wording import clock, is_number, number
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -276,11 +276,10 @@ def forest(results: FlightResults) -> Drawing | None:
         axes.set_xlabel("heading error, °")
 
     more = f" The first {len(shown)} of {len(segments)} segments." if len(shown) < len(segments) else ""
-    whole = interval(answer.confidence95_deg, 3, "°")
     blue = "; blue: directions of travel" if answer.directions else ""
     caption = (
-        f"Bar: ± 1.96 σ. Green: straight segments{blue}; black: the whole run, 95 % interval {whole}, thick what this "
-        f"taxi shows by itself. Opposite directions that disagree point to side-slip or mounting.{more}"
+        f"Bars: ± 1.96 σ. Green: straight segments{blue}; black: the whole run, thick: by this taxi alone. Opposite "
+        f"directions that disagree point to side-slip or mounting.{more}"
     )
     alt = "Forest plot of the heading error by segment and by direction."
     return Drawing("Estimates by segment and direction", caption, alt, d.draw("forest", height, paint))

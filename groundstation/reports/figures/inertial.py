@@ -45,8 +45,8 @@ def state(results: FlightResults, name: str) -> Drawing | None:
         layout.legend_above(upper)
 
     caption = (
-        "Grey: INS − GNSS as measured; green: estimate of the filter; black: smoothed with the data on both sides "
-        "(RTS); shaded: estimate ± 1.96 σ. Yellow ground: nothing to compare, the filter forecasts."
+        "Grey: INS − GNSS; green: estimate, shaded ± 1.96 σ; black: smoothed with data on both sides (RTS). Yellow "
+        "ground: nothing to compare, the filter forecasts."
     )
     alt = f"North and east {name} error over flight time with the estimate and its band."
     svg = d.draw(f"inertial-{name}", 106, paint)
@@ -147,8 +147,8 @@ def radial(results: FlightResults) -> Drawing | None:
         layout.legend_above(axes)
 
     caption = (
-        "Distance from the GNSS position. While GNSS is there the corrected track follows it as far as the filter "
-        "trusts it; on yellow ground nothing was there to compare with."
+        "Distance from GNSS. While it is there the corrected track follows it as far as the filter trusts it; on "
+        "yellow ground there was nothing to compare with."
     )
     alt = "Radial position error of the INS and of the corrected track over flight time, logarithmic axis."
     svg = d.draw("inertial-radial", 66, paint)

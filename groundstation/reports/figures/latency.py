@@ -41,8 +41,7 @@ def search(results: FlightResults) -> Drawing | None:
         layout.legend_above(axes, 4)
 
     caption = (
-        "RMS of what is left between sensor and INS, over the smallest, against the latency tried; a sharp valley is "
-        "motion that tells. Shaded: the 95 % interval of what is observed."
+        "RMS left between sensor and INS by latency tried: a sharp valley is motion that tells. Shaded: 95 % interval."
         + (f" The first {MOST_PAIRS} pairs." if len(known) > MOST_PAIRS else "")
     )
     alt = "Residual between sensors and INS against the latency tried, one line for each pair."

@@ -31,12 +31,12 @@ def deviation(results: FlightResults) -> Drawing | None:
     curves, table = results.figure_with_rows("magnetic_curves"), results.figure_with_rows("magnetic_table")
     if curves is None:
         return None
-    heading = numbers(curves, "magnetic_heading_deg")
+    heading = numbers(curves, "uncorrected_magnetic_heading_deg")
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 16, 12, 174, 74)
         if table is not None:
-            bins, values = numbers(table, "magnetic_heading_deg"), numbers(table, "deviation_deg")
+            bins, values = numbers(table, "uncorrected_magnetic_heading_deg"), numbers(table, "deviation_deg")
             d.dots(axes, bins, values, d.UNUSED, 3.0, label="table, bins of 1°")
         for name, title in METHOD_TITLES.items():
             value, half = numbers(curves, f"deviation_{name}_deg"), NORMAL_95 * numbers(curves, f"sigma_{name}_deg")
@@ -64,7 +64,7 @@ def held_out(results: FlightResults) -> Drawing | None:
     if answer is None or data is None or not (mine := texts(data, "part") == "held out").any():
         return None
     method = answer.recommended_method
-    time, heading = numbers(data, "time_s")[mine], numbers(data, "magnetic_heading_deg")[mine]
+    time, heading = numbers(data, "time_s")[mine], numbers(data, "uncorrected_magnetic_heading_deg")[mine]
     before, after = numbers(data, "error_before_deg")[mine], numbers(data, f"error_{method}_deg")[mine]
     shown = ((before, d.UNUSED, "before"), (after, METHOD_COLOURS[method], "after"))
 
@@ -135,8 +135,8 @@ def branches(results: FlightResults) -> Drawing | None:
     samples, table = results.figure_with_rows("magnetic_samples"), results.figure_with_rows("magnetic_table")
     if samples is None or table is None:
         return None
-    part, heading = texts(samples, "part"), numbers(samples, "magnetic_heading_deg")
-    error, bins = numbers(samples, "compass_error_deg"), numbers(table, "magnetic_heading_deg")
+    part, heading = texts(samples, "part"), numbers(samples, "uncorrected_magnetic_heading_deg")
+    error, bins = numbers(samples, "compass_error_deg"), numbers(table, "uncorrected_magnetic_heading_deg")
     average, filled = numbers(table, "compass_error_deg"), flags(table, "is_interpolated")
 
     def paint(figure: Any) -> None:

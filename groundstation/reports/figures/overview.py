@@ -50,8 +50,8 @@ def track_map(results: FlightResults) -> Drawing | None:
     larger = 1 if corrected is None else corrected.larger(_extent(north, east))
 
     def paint(figure: Any) -> None:
-        right = 86.0 if zoom else 174.0
-        axes = layout.place(figure, 16, 12, right, 84)
+        right, top = (86.0, 84.0) if zoom else (174.0, 90.0)
+        axes = layout.place(figure, 16, 12, right, top)
         if corrected is not None:
             _ellipses(axes, corrected, origin, larger, _scale(north, east)[0])
         _map(axes, time, north, east, used, "Whole flight" if zoom else "")

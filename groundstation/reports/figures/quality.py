@@ -43,7 +43,7 @@ def gaps(results: FlightResults) -> Drawing | None:
         layout.time_axis(axes, low, high)
 
     count = 0 if holes is None else len(holes)
-    caption = f"Blue: data present; red: gaps, n = {number(count, 0)}, drawn at least wide enough to be seen."
+    caption = f"Blue: data; red: gaps, n = {number(count, 0)}{', widened to be seen' if count else ''}."
     caption += f" {len(order)} of {len(topic)} topics." if len(order) < len(topic) else ""
     names = ("ledger",) if holes is None else ("ledger", "gaps")
     return Drawing(

@@ -51,9 +51,8 @@ def components(results: FlightResults) -> Drawing | None:
         _plane(layout.place(figure, 121, 12, 174, 65), north[inside], east[inside], reach, still)
 
     caption = (
-        f"The aircraft stands: whatever velocity GNSS reports is its error. n = {number(count, 0)} in the interval. "
-        f"Right: the same samples in the plane; circle: {RAW_LIMIT_MPS} m/s (2 σ stated for GLONASS and GPS); "
-        "cross: mean."
+        f"The aircraft stands: what GNSS reports is its error. n = {number(count, 0)}. "
+        f"Right: in the plane; circle: {RAW_LIMIT_MPS} m/s (2 σ stated for GLONASS and GPS); cross: mean."
     )
     alt = "North and east velocity at standstill over time, and scattered in the plane around zero."
     return Drawing(
@@ -104,8 +103,8 @@ def mean_speed(results: FlightResults) -> Drawing | None:
         layout.legend_above(axes)
 
     caption = (
-        "Mean speed over overlapping intervals of this flight's standstill. Longer averaging moves the density below "
-        "the limit; an interval of 10 s that fails asks for more time, not for rejection."
+        "Mean speed over overlapping intervals. Longer averaging moves the density below the limit: 10 s that fail ask "
+        "for more time, not for rejection."
     )
     alt = "Densities of the mean speed for two interval lengths against the limit of 0.01 m/s."
     return Drawing(

@@ -1,4 +1,4 @@
-"""Chapter: whether the stated sigmas of the heading error are honest, by independent checks over all flights."""
+"""Chapter: whether stated sigmas are honest, by independent checks over all flights."""
 
 from typing import Any
 
@@ -12,6 +12,17 @@ from groundstation.reports.drawing import Drawing
 from groundstation.reports.fleet.common import name_axis, plural
 from groundstation.results.fleet import FleetCalibration, FleetResults
 
+PANELS, PANELS_MM = 3, 50.0  # histograms side by side, and the height of a row of them
+SHORT = {
+    "reference": "Parking reference",
+    "runway": "Runway",
+    "onboard": "Found on board",
+    "truth_heading": "Heading, by a reference",
+    "truth_gnss": "GNSS position",
+    "truth_ins": "INS position",
+    "truth_corrected": "INS, filtered",
+    "truth_smoothed": "INS, smoothed",
+}
 LEAD = "Are the stated intervals honest? Of something known independently, 95 % should lie inside."
 
 
@@ -19,7 +30,7 @@ def build(fleet: FleetResults) -> Section:
     """Build the chapter."""
     title = "Calibration"
     if not fleet.calibration:
-        text = "No flight has anything independent to check the heading error by."
+        text = "No flight has anything independent to check its answers by."
         return Section("calibration", title, LEAD, (Note(text, "unknown"),))
     return Section("calibration", title, LEAD, (_figure(fleet), _table(fleet)))
 
@@ -34,10 +45,11 @@ def judged(row: FleetCalibration) -> Mark:
 
 def _figure(fleet: FleetResults) -> Drawing:
     rows = fleet.calibration
-    height = 64.0 + 8.0 * len(rows)
+    below = PANELS_MM * (-(-len(rows) // PANELS))  # of the histograms
+    height = 14.0 + below + 8.0 * len(rows)
 
     def paint(figure: Any) -> None:
-        axes = layout.place(figure, 62, 62, 174, height - 2.0)
+        axes = layout.place(figure, 62, 12.0 + below, 174, height - 2.0)
         for place, row in enumerate(rows):
             bar = 100.0 * np.array([row.confidence95])
             d.bars(axes, bar[:, 0], bar[:, 1], place, d.USED, 2.4)
@@ -48,8 +60,9 @@ def _figure(fleet: FleetResults) -> Drawing:
         axes.set_xlim(max(100.0 * low - 5.0, -2.0), 102.0)
         axes.set_xlabel("inside the stated 95 % interval, %")
         for place, row in enumerate(rows):
-            left = 16.0 + 56.0 * place
-            panel = layout.place(figure, left, 12, left + 46.0, 42)
+            left, line = 16.0 + 56.0 * (place % PANELS), place // PANELS
+            bottom = 12.0 + below - PANELS_MM * (line + 1)
+            panel = layout.place(figure, left, bottom, left + 46.0, bottom + 30.0)
             panel.stairs(
                 row.pit, np.linspace(0.0, 1.0, len(row.pit) + 1), fill=True, facecolor=d.FILL, edgecolor=d.USED
             )
@@ -57,7 +70,7 @@ def _figure(fleet: FleetResults) -> Drawing:
             panel.set_title(_short(row))
             panel.set_xlim(0.0, 1.0)
             panel.set_xlabel("probability integral transform")
-            if place == 0:
+            if place % PANELS == 0:
                 panel.set_ylabel("checks")
 
     caption = (
@@ -70,9 +83,7 @@ def _figure(fleet: FleetResults) -> Drawing:
 
 
 def _short(row: FleetCalibration) -> str:
-    return {"reference": "Parking reference", "runway": "Runway", "onboard": "Found on board"}.get(
-        row.quantity, d.label(row.quantity, 20)
-    )
+    return SHORT.get(row.quantity) or d.label(row.quantity, 20)
 
 
 def _table(fleet: FleetResults) -> Grid:
@@ -89,7 +100,8 @@ def _table(fleet: FleetResults) -> Grid:
         for row in fleet.calibration
     ]
     caption = (
-        "z: residual over its stated sigma, honest are 0 and 1. Flights with the verdict reject are left out. What was "
-        "found on board rests on the samples we use too: more than 95 % inside is what to expect of it."
+        "z: residual over its stated sigma, honest are 0 and 1. For the heading, flights with the verdict reject are "
+        "left out. What was found on board rests on the samples we use too: more than 95 % inside is what to expect of "
+        "it. Positions by a reference: of every flight as many samples as are independent."
     )
     return Grid("Checks", heads, rows, caption)

@@ -11,8 +11,11 @@
   const LEFT_PX = 66, NAMES_PX = 124, BESIDE_PX = 46; // room for the vertical axis: of a row's first panel, of the others
   const timed = []; // plots over flight time: their axes move together
   const colourOf = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const INKS = { "#1c2530": "--ink", "#6b7683": "--faint" };
-  const shown = (colour) => (INKS[colour] ? colourOf(INKS[colour]) : colour);
+  const INKS = { "#1c2530": "--ink", "#6b7683": "--faint", "#cfe5dd": "--fill" };
+  const shown = (colour) => {
+    const name = INKS[colour.length === 9 && colour.endsWith("ff") ? colour.slice(0, 7) : colour];
+    return name ? colourOf(name) : colour;
+  };
 
   const clock = (seconds) => {
     const whole = Math.round(Math.abs(seconds)), two = (number) => String(number).padStart(2, "0");
@@ -247,12 +250,13 @@
       const tell = readout(box, row, isFirst);
       const line = box.appendChild(document.createElement("div"));
       line.className = "live-row";
+      const lefts = row.map((panel, at) => (at && !isNarrow ? (panel.titles[2] ? LEFT_PX : BESIDE_PX) : first));
       const sum = row.reduce((total, panel) => total + panel.place[2], 0);
-      const spare = room - first - BESIDE_PX * (row.length - 1);
+      const spare = room - lefts.reduce((total, left) => total + left, 0);
       row.forEach((panel, at) => {
         const cell = line.appendChild(document.createElement("div"));
         if (panel.titles[0]) cell.append(Object.assign(document.createElement("div"), { className: "panel-title", textContent: panel.titles[0] }));
-        const left = at && !isNarrow ? BESIDE_PX : first;
+        const left = lefts[at];
         const width = isNarrow ? room : left + (spare * panel.place[2]) / sum;
         const height = Math.round(panel.place[3] * PX_PER_MM) + (hasTimes ? 34 : 14) + (panel.titles[1] ? TITLED_PX : 0);
         draw(cell, panel, Math.floor(width), height, left, hasTimes, tell);

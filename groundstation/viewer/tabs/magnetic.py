@@ -69,7 +69,7 @@ def _chart(
 
 def _deviation(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Deviation to be added, by each method, with its filled 95 % band."""
-    figure = figure_of(results, "magnetic_curves", "magnetic_heading_deg")
+    figure = figure_of(results, "magnetic_curves", "uncorrected_magnetic_heading_deg")
     if figure is None:
         return []
     curves, bands = [], []
@@ -82,7 +82,7 @@ def _deviation(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
             shade = SHADES[name]
             bands.append((value - NORMAL_95 * sigma, value + NORMAL_95 * sigma, shade))
             curves.append((value, Line(title, shade, BOLD)))
-    heading = numbers(figure, "magnetic_heading_deg")
+    heading = numbers(figure, "uncorrected_magnetic_heading_deg")
     title = "Deviation to be added and 95 %, deg"
     return _chart(recorder, "magnetic/deviation", title, heading, curves, bands)
 
@@ -90,7 +90,7 @@ def _deviation(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
 def _branches(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Magnetic minus true heading on right and left turns and in the average."""
     columns = ("right_turn_deg", "left_turn_deg", "compass_error_deg")
-    figure = figure_of(results, "magnetic_table", "magnetic_heading_deg", *columns)
+    figure = figure_of(results, "magnetic_table", "uncorrected_magnetic_heading_deg", *columns)
     if figure is None:
         return []
     lines = (
@@ -99,7 +99,7 @@ def _branches(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
         Line("average", colours.LIGHT, BOLD),
     )
     curves = [(numbers(figure, column), line) for column, line in zip(columns, lines, strict=True)]
-    heading = numbers(figure, "magnetic_heading_deg")
+    heading = numbers(figure, "uncorrected_magnetic_heading_deg")
     return _chart(recorder, "magnetic/branches", "Magnetic minus true heading, deg", heading, curves)
 
 

@@ -1,0 +1,266 @@
+"""Compiled loops kept as machine code, so that a process that needs one loads it without loading its compiler.
+
+numba itself takes half a second to start and as long again for its first function, though both were compiled before.
+What is kept here is an object file of this processor and the name of its entry, which takes plain C values: a
+pointer and a shape for each array. llvmlite, which numba brings, links it in some milliseconds.
+"""
+
+import ctypes
+import hashlib
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache
+from itertools import count
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+
+INTEGER, NUMBER = "integer", "number"
+ARRAY_DTYPES = frozenset(
+    ("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64", "bool")
+)
+ENTRY = "groundstation_entry"
+_RESULTS: dict[Any, type] = {int: ctypes.c_int64, bool: ctypes.c_int64, float: ctypes.c_double, None: ctypes.c_int64}
+_NUMBERS = count()  # every library has a name of its own
+_HARMLESS = frozenset(("memset", "memcpy", "memmove", "memcmp", "sqrt", "sin", "cos", "exp", "log", "pow", "atan2"))
+
+
+@dataclass(frozen=True)
+class Group:
+    """Form of a tuple: its class, the names of its parts where it has any, and their forms."""
+
+    kind: type
+    names: tuple[str, ...]
+    parts: "tuple[Form, ...]"
+
+
+Form = str | tuple[str, int] | Group  # of an argument: INTEGER, NUMBER, dtype and dimensions of an array, a tuple
+
+
+def forms_of(arguments: Sequence[Any]) -> tuple[Form, ...] | None:
+    """Forms of what a loop is handed; None where it is more than numbers, arrays without gaps, and tuples of those.
+
+    Examples
+    --------
+    >>> forms_of((np.zeros(3, np.uint8), True, 2.5))
+    (('uint8', 1), 'integer', 'number')
+    """
+    forms: list[Form] = []
+    for one in arguments:
+        if isinstance(one, np.ndarray):
+            is_plain = one.ndim > 0 and one.flags.c_contiguous and one.flags.aligned
+            if not is_plain or one.dtype.name not in ARRAY_DTYPES:
+                return None
+            forms.append((one.dtype.name, one.ndim))
+        elif isinstance(one, int | np.integer | np.bool_):
+            forms.append(INTEGER)
+        elif isinstance(one, float | np.floating):
+            forms.append(NUMBER)
+        elif isinstance(one, tuple):
+            parts = forms_of(one)
+            if parts is None:
+                return None
+            forms.append(Group(type(one), getattr(one, "_fields", ()), parts))
+        else:
+            return None
+    return tuple(forms)
+
+
+def can_answer(function: Callable[..., Any]) -> bool:
+    """Whether a loop answers with a number or nothing, by its annotation."""
+    return _annotation(function) in _RESULTS
+
+
+def answers_with_integer(function: Callable[..., Any]) -> bool:
+    """Whether what :func:`entry_source` leaves is an integer, else a float64."""
+    return _RESULTS[_annotation(function)] is ctypes.c_int64
+
+
+def _annotation(function: Callable[..., Any]) -> Any:
+    return function.__annotations__.get("return", ...)
+
+
+def entry_source(function: Callable[..., Any], forms: Sequence[Form]) -> tuple[str, dict[str, type]]:
+    """Source of the entry of a loop, to be compiled beside ``kernel`` and ``array``, and the tuples that it names.
+
+    Examples
+    --------
+    >>> def total(table, first) -> int: ...
+    >>> print(entry_source(total, (("int64", 2), "integer"))[0])
+    def entry(result, a0, a0_0, a0_1, a1):
+        result[0] = kernel(array(a0, (a0_0, a0_1,)), a1)
+    """
+    taken, kinds = ["result"], dict[str, type]()
+
+    def handed(form: Form, name: str) -> str:
+        if isinstance(form, Group):
+            parts = ", ".join(handed(part, f"{name}_{at}") for at, part in enumerate(form.parts))
+            if not form.names:
+                return f"({parts},)" if parts else "()"
+            kinds[f"Of_{name}"] = form.kind
+            return f"Of_{name}({parts})"
+        lengths = [] if isinstance(form, str) else [f"{name}_{axis}" for axis in range(form[1])]
+        taken.extend((name, *lengths))
+        return f"array({name}, ({', '.join(lengths)},))" if lengths else name
+
+    call = f"kernel({', '.join(handed(form, f'a{at}') for at, form in enumerate(forms))})"
+    answer = "" if _annotation(function) is None else "result[0] = "
+    return f"def entry({', '.join(taken)}):\n    {answer}{call}", kinds
+
+
+def plain_forms(forms: Sequence[Form]) -> Iterator[str | tuple[str, int]]:
+    """Forms of numbers and arrays, those in tuples in their place."""
+    for form in forms:
+        if isinstance(form, Group):
+            yield from plain_forms(form.parts)
+        else:
+            yield form
+
+
+def digest_of(function: Callable[..., Any], forms: Sequence[Form]) -> bytes:
+    """Digest of all that the machine code of a loop depends on: its code and constants, and of all that it calls."""
+    from importlib.metadata import version
+
+    from llvmlite import __version__, binding
+
+    told = hashlib.sha256(repr((forms, version("numba"), __version__)).encode())
+    told.update(f"{binding.get_host_cpu_name()} {binding.get_host_cpu_features().flatten()}".encode())
+    told.update(binding.get_process_triple().encode())
+    seen: set[int] = set()
+
+    def tell(one: Any) -> None:
+        code = one.__code__
+        constants = [constant for constant in code.co_consts if not hasattr(constant, "co_code")]
+        told.update(repr((one.__qualname__, code.co_code, constants, code.co_names, code.co_varnames)).encode())
+        for name in code.co_names:
+            value = one.__globals__.get(name)
+            called = getattr(value, "py_func", None)
+            if isinstance(called, FunctionType):
+                if id(called) not in seen:
+                    seen.add(id(called))
+                    tell(called)
+            elif isinstance(value, bool | int | float | str | tuple):
+                told.update(repr((name, value)).encode())
+
+    tell(function)
+    return told.digest()
+
+
+class KeptCode:
+    """Machine code of one loop for arguments of one form, in a file of the folder of compiled code."""
+
+    def __init__(self, folder: Path, function: Callable[..., Any], forms: Sequence[Form]) -> None:
+        short = hashlib.sha256(repr(forms).encode()).hexdigest()[:8]
+        self._path = folder / f"{function.__module__}.{function.__qualname__}-{short}.machine_code"
+        self._digest = digest_of(function, forms)
+
+    def read(self) -> bytes | None:
+        """The object file; None where there is none, or one of other code or of another processor."""
+        try:
+            content = self._path.read_bytes()
+        except OSError:
+            return None
+        head, code = content[: len(self._head(b""))], content[len(self._head(b"")) :]
+        return code if head == self._head(code) else None
+
+    def write(self, code: bytes) -> None:
+        """Keep an object file; a folder that cannot be written keeps none."""
+        with suppress(OSError):
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            partial = self._path.with_name(f"{self._path.name}.{os.getpid()}")
+            partial.write_bytes(self._head(code) + code)
+            partial.replace(self._path)
+
+    def _head(self, code: bytes) -> bytes:
+        return self._digest + hashlib.sha256(code).digest()
+
+
+@cache
+def _linker() -> Any:
+    from llvmlite import binding
+
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    return binding.create_lljit_compiler()
+
+
+def object_file(ir: str, entry: str) -> bytes | None:
+    """Object file of a module in LLVM's assembly; None where its entry may call what only numba's process has."""
+    from llvmlite import binding
+
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    module = binding.parse_assembly(ir.replace(entry, ENTRY))
+    if _calls_out(module):
+        return None
+    machine = binding.Target.from_default_triple().create_target_machine(
+        cpu=binding.get_host_cpu_name(), features=binding.get_host_cpu_features().flatten(), opt=3, reloc="pic"
+    )
+    code: bytes = machine.emit_object(module)
+    return code
+
+
+def _calls_out(module: Any) -> bool:
+    """Whether the entry, or what it calls, calls a function that is no part of the module, of LLVM or of C."""
+    functions = {one.name: one for one in module.functions}
+    waiting, seen = [ENTRY], {ENTRY}
+    while waiting:
+        for block in functions[waiting.pop()].blocks:
+            for instruction in block.instructions:
+                for operand in instruction.operands:
+                    name = operand.name
+                    if name in functions and name not in seen:
+                        seen.add(name)
+                        waiting.append(name)
+    outside = {name for name in seen if functions[name].is_declaration and not name.startswith("llvm.")}
+    return bool(outside - _HARMLESS)
+
+
+def linked(code: bytes, function: Callable[..., Any], forms: Sequence[Form]) -> "Linked | None":
+    """Machine code ready to be called; None where it cannot be linked in this process."""
+    from llvmlite import binding
+
+    library = binding.JITLibraryBuilder().add_object_img(code).export_symbol(ENTRY).add_current_process()
+    try:
+        return Linked(library.link(_linker(), f"{ENTRY}_{next(_NUMBERS)}"), function, forms)
+    except RuntimeError:
+        return None
+
+
+class Linked:
+    """Machine code that can be called with what the loop takes."""
+
+    def __init__(self, library: Any, function: Callable[..., Any], forms: Sequence[Form]) -> None:
+        self._library = library  # the code lives as long as this
+        kinds: list[Any] = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]
+        for form in plain_forms(forms):
+            if isinstance(form, str):
+                kinds.append(ctypes.c_int64 if form == INTEGER else ctypes.c_double)
+            else:
+                kinds += [ctypes.c_void_p, *[ctypes.c_int64] * form[1]]
+        self._entry = ctypes.CFUNCTYPE(ctypes.c_int32, *kinds)(self._library[ENTRY])
+        self._result_type, self._annotation = _RESULTS[_annotation(function)], _annotation(function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run the loop."""
+        result, nothing, error = self._result_type(), ctypes.c_void_p(), ctypes.c_void_p()
+        values: list[Any] = [ctypes.byref(nothing), ctypes.byref(error), ctypes.byref(result)]
+        _put(arguments, values)
+        if self._entry(*values):
+            raise RuntimeError("a compiled loop has failed")
+        return None if self._annotation is None else self._annotation(result.value)
+
+
+def _put(arguments: Sequence[Any], values: list[Any]) -> None:
+    """Append the C values of arguments."""
+    for one in arguments:
+        if isinstance(one, np.ndarray):
+            values += (one.ctypes.data, *one.shape)
+        elif isinstance(one, tuple):
+            _put(one, values)
+        else:
+            values.append(one)

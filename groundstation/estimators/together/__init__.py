@@ -1,0 +1,1 @@
+"""Several logs of one flight: how they were joined, how well their motions agree, which sources are used."""

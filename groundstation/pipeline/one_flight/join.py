@@ -1,0 +1,364 @@
+"""Several logs of one flight become one MCAP: each is converted, put on one clock, and its topics get names apart."""
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from groundstation.base.errors import GroundstationError, UnreadableLogError, UsageError
+from groundstation.base.findings import Finding
+from groundstation.base.ledger import DamagedSpan, Ledger
+from groundstation.base.normal import NORMAL_95
+from groundstation.base.records import Int64Array, RecordBatch
+from groundstation.base.serial import to_json_exactly
+from groundstation.base.source_units import PREFIX as UNITS
+from groundstation.base.units import NS_PER_S
+from groundstation.estimators.two_clocks.gnss_time import gnss_time_of
+from groundstation.estimators.two_clocks.relate import relate
+from groundstation.estimators.two_clocks.relation import LogRelation, TimedLog
+from groundstation.estimators.two_clocks.settings import TwoClocksSettings
+from groundstation.integrity.clock import ClockModel
+from groundstation.integrity.limits import Thresholds, shipped
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.convert import Converted, census_of, convert_log, recounted
+from groundstation.pipeline.one_flight.flight import read_flight
+from groundstation.pipeline.one_flight.log import Log, as_log, open_log
+from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.results.together import LABELS, JoinedLog, JoinedStretch, Joining
+from groundstation.store.info import StoreInfo
+from groundstation.tables.sources import TOGETHER
+
+DERIVED = "derived."
+OF_THE_AIRCRAFT = ("aircraft", "flight", "start_utc")  # taken from another log where the first lacks them
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One log, converted: its MCAP, its tables, and how its clock stands to that of the flight (None: it is that)."""
+
+    label: str
+    log: Log
+    mcap: Path
+    converted: Converted
+    timed: TimedLog
+    relation: LogRelation | None = None
+
+    def name(self, topic: str) -> str:
+        """Name of one of its topics in the flight."""
+        return f"{topic}.{self.label}" if self.label and topic else topic
+
+    def time_ns(self, own_ns: Int64Array) -> Int64Array:
+        """Its times on the clock of the flight."""
+        return own_ns if self.relation is None else self.relation.first_time_ns(own_ns)
+
+    @property
+    def start_ns(self) -> int:
+        """Its first sample on the clock of the flight."""
+        return int(self.time_ns(np.array([self.timed.flight.start_ns]))[0])
+
+
+def joined_name(logs: Sequence[Log]) -> str:
+    """Name of a flight of several logs."""
+    return " + ".join(log.source.name for log in logs)
+
+
+def join_files(
+    paths: Sequence[Path], target: Path, configuration: Configuration, listen: Listener = silent
+) -> Converted:
+    """Write one MCAP of several logs of one flight, by their paths; see :func:`join_logs`.
+
+    Raises
+    ------
+    UsageError
+        When a path is missing or a folder, and as :func:`join_logs`, as is all else.
+    """
+    for path in paths:
+        if not path.exists():
+            raise UsageError(str(path), "no such file")
+        if as_log(path).is_dir():
+            raise UsageError(str(path), "a folder", "the logs of one flight by name", "--together takes files")
+    logs = [open_log(path, configuration.profile_path, configuration.icds) for path in paths]
+    listen(Event("stage", joined_name(logs), "joining"))
+    target.parent.mkdir(parents=True, exist_ok=True)
+    return join_logs(logs, target, configuration.thresholds, settings=configuration.settings.of(TwoClocksSettings))
+
+
+def join_logs(
+    logs: Sequence[Log],
+    target: Path,
+    thresholds: Thresholds | None = None,
+    *,
+    settings: TwoClocksSettings | None = None,
+) -> Converted:
+    """Write one MCAP of several logs of one flight.
+
+    The flight has the clock of the first log that GNSS tells the time, else of the first with UTC, else of the first.
+    Topics of the first log keep their names; those of the second end in ``.b``, of the third in ``.c``. A log that
+    cannot be read is left out with a finding, as long as another is left.
+
+    Raises
+    ------
+    UsageError
+        When fewer than two logs are given, or one of them twice.
+    NotOneFlightError
+        When two of them cannot be put on one clock.
+    UnreadableLogError
+        When none can be read.
+    """
+    limits = thresholds or shipped()
+    _require_different(logs)
+    with TemporaryDirectory(prefix="groundstation-") as folder:
+        parts, left_out = _converted(logs, Path(folder), limits)
+        clock_of = next((one for one in parts if one.timed.gnss_time), None)
+        clock_of = clock_of or next((one for one in parts if one.timed.flight.has_utc), parts[0])
+        parts = [_related(one, clock_of, settings) for one in parts]
+        info = _written(parts, clock_of, target, limits, left_out)
+    has_lost = bool(left_out) or any(one.converted.has_lost_data for one in parts)
+    return Converted(info, info.findings, has_lost)
+
+
+def _related(part: _Part, clock_of: _Part, settings: TwoClocksSettings | None) -> _Part:
+    if part is clock_of:
+        return part
+    return replace(part, relation=relate(clock_of.timed, part.timed, settings=settings))
+
+
+def _require_different(logs: Sequence[Log]) -> None:
+    if not 2 <= len(logs) <= len(LABELS) + 1:
+        raise UsageError("--together", f"{len(logs)} log" + "s" * (len(logs) != 1), f"2 to {len(LABELS) + 1} logs")
+    first: dict[str, str] = {}
+    for log in logs:
+        if log.source.sha256 in first:
+            raise UsageError(
+                log.path.name, f"the same content as {first[log.source.sha256]}", "another log of the flight"
+            )
+        first[log.source.sha256] = log.path.name
+
+
+def _converted(logs: Sequence[Log], folder: Path, limits: Thresholds) -> tuple[list[_Part], list[Finding]]:
+    """The logs that can be read, and a finding for each of the others; the first keeps its place without a label."""
+    parts: list[_Part] = []
+    left_out: list[Finding] = []
+    error: GroundstationError | None = None
+    for label, log in zip(("", *LABELS), logs, strict=False):
+        mcap = folder / f"{label or 'a'}.mcap"
+        try:
+            converted = convert_log(log, mcap, limits)
+            flight = read_flight(mcap, converted)
+        except GroundstationError as reason:
+            error = reason
+            left_out.append(Finding("fail", "together.unreadable", f"{log.source.name} is left out: {reason}"))
+            continue
+        timed = TimedLog(flight, gnss_time_of(converted.info.clock, converted.info.reader))
+        parts.append(_Part(label, log, mcap, converted, timed))
+    if not parts:
+        raise error or UnreadableLogError("--together", "no log")
+    return parts, left_out
+
+
+def _written(
+    parts: Sequence[_Part], clock_of: _Part, target: Path, limits: Thresholds, left_out: Sequence[Finding]
+) -> StoreInfo:
+    from groundstation.store.writer import StoreWriter
+
+    start_ns = min(one.start_ns for one in parts)
+    of_clock = clock_of.converted.info
+    blank = replace(of_clock, start_ns=start_ns)
+    infos, joined = [], []
+    with StoreWriter(target, blank) as writer:
+        for part in parts:
+            info = _renamed(part, of_clock, start_ns)
+            census, mover = census_of(info, limits), _Mover(part)
+            for batch in mover.batches():
+                writer.write(batch)
+                census.add(batch)
+            if part is not clock_of:  # its times are others now
+                info = recounted(info, [], census)
+            infos.append(info)
+            joined.append(_told(part, census.rows, mover.reordered, start_ns))
+        writer.info = _merged(parts, infos, Joining(tuple(joined)), of_clock, [*left_out, *_findings(joined)])
+    return replace(writer.info, start_ns=start_ns)
+
+
+class _Mover:
+    """Yields the batches of a log with their times on the flight's clock and their topics' names in it."""
+
+    def __init__(self, part: _Part) -> None:
+        self._part = part
+        self._last: dict[str, int] = {}
+        self.reordered = 0
+
+    def batches(self) -> Iterator[RecordBatch]:
+        """Times of a topic never decrease: where a stretch begins with a step back, records wait for those before."""
+        from groundstation.store.reader import read
+
+        part = self._part
+        for item in read(part.mcap):
+            if not isinstance(item, RecordBatch) or item.time_ns is None or not len(item):
+                continue
+            time_ns = part.time_ns(item.time_ns)
+            floor = self._last.get(item.topic, int(time_ns[0]))
+            ordered = np.maximum.accumulate(np.maximum(time_ns, floor))
+            self.reordered += int(np.count_nonzero(ordered != time_ns))
+            self._last[item.topic] = int(ordered[-1])
+            validity_ns = None if item.validity_time_ns is None else part.time_ns(item.validity_time_ns)
+            yield replace(item, topic=part.name(item.topic), time_ns=ordered, validity_time_ns=validity_ns)
+
+
+def _renamed(part: _Part, of_clock: StoreInfo, start_ns: int) -> StoreInfo:
+    """Facts of a log with its topics' names in the flight, and places in time by the flight's clock."""
+    info = part.converted.info
+    shift_s = (part.start_ns - start_ns) / NS_PER_S
+    clock, log = ClockModel(is_absolute=of_clock.has_utc), part.log.source.name
+
+    def moved(span: DamagedSpan) -> DamagedSpan:
+        start_s = round(span.start_s + shift_s, 3)
+        start = span.start
+        if part.relation is not None:
+            start = clock.text(start_ns + round(start_s * NS_PER_S))
+        return replace(span, topic=part.name(span.topic), start_s=start_s, start=start)
+
+    def of(place: str) -> str:
+        return f"{log}, {place}" if place else log
+
+    before = info.ledger
+    ledger = replace(
+        before,
+        topics={part.name(topic): entry for topic, entry in before.topics.items()},
+        spans=tuple(moved(span) for span in before.spans),
+        damages=tuple(replace(one, topic=part.name(one.topic), place=of(one.place)) for one in before.damages),
+        remarks=tuple(
+            replace(one, topic=part.name(one.topic), text=f"{log}: {one.text}" if part.label else one.text)
+            for one in before.remarks
+        ),
+        truncated=None if before.truncated is None else replace(before.truncated, place=of(before.truncated.place)),
+    )
+    findings = tuple(
+        replace(one, topic=part.name(one.topic), text=f"{log}: {one.text}" if part.label else one.text)
+        for one in info.findings
+    )
+    return replace(info, has_utc=of_clock.has_utc, ledger=ledger, findings=findings)
+
+
+def _merged(
+    parts: Sequence[_Part], infos: Sequence[StoreInfo], joining: Joining, of_clock: StoreInfo, more: Sequence[Finding]
+) -> StoreInfo:
+    ledgers = [one.ledger for one in infos]
+    spans = sorted((span for one in ledgers for span in one.spans), key=lambda span: span.start_s)
+    ledger: Ledger = replace(
+        ledgers[0],
+        topics=dict(sorted(item for one in ledgers for item in one.topics.items())),
+        spans=tuple(spans),
+        spans_more=sum(one.spans_more for one in ledgers),
+        damages=tuple(damage for one in ledgers for damage in one.damages),
+        remarks=tuple(remark for one in ledgers for remark in one.remarks),
+        bytes_skipped=sum(one.bytes_skipped for one in ledgers),
+        skipped_spans=ledgers[0].skipped_spans,
+        truncated=next((one.truncated for one in ledgers if one.truncated is not None), None),
+        dropouts=replace(
+            ledgers[0].dropouts,
+            count=sum(one.dropouts.count for one in ledgers),
+            total_s=round(sum(one.dropouts.total_s for one in ledgers), 3),
+        ),
+    )
+    shas = [part.log.source.sha256 for part in parts]
+    return replace(
+        of_clock,
+        source_name=joined_name([part.log for part in parts]),
+        source_sha256=hashlib.sha256("".join(shas).encode()).hexdigest(),
+        reader=" + ".join(info.reader for info in infos),
+        metadata=_metadata(parts, joining),
+        start_ns=min(part.start_ns for part in parts),
+        ledger=ledger,
+        findings=(*more, *(finding for info in infos for finding in info.findings)),
+        remarks=tuple(remark for info in infos for remark in info.remarks),
+        damages=tuple(damage for info in infos for damage in info.damages),
+    )
+
+
+def _metadata(parts: Sequence[_Part], joining: Joining) -> dict[str, str]:
+    """What the first log says, what the others say under their labels, and how they were joined."""
+    found = dict(parts[0].converted.info.metadata)
+    for part in parts[1:]:
+        for key, value in part.converted.info.metadata.items():
+            if key.startswith(DERIVED):
+                topic, _, field = key.removeprefix(DERIVED).rpartition(".")
+                found[f"{DERIVED}{part.name(topic)}.{field}"] = value
+            elif key.startswith(UNITS):
+                found[part.name(key)] = value
+            else:
+                found[f"{part.label}.{key}"] = value
+        for key in OF_THE_AIRCRAFT:
+            found.setdefault(key, part.converted.info.metadata.get(key, ""))
+    text = json.dumps(to_json_exactly(joining), sort_keys=True)
+    return {key: value for key, value in {**found, TOGETHER: text}.items() if value}
+
+
+def _told(part: _Part, rows: int, reordered: int, start_ns: int) -> JoinedLog:
+    source, relation = part.log.source, part.relation
+    own = JoinedLog(part.label, source.name, source.sha256, source.reader, rows, "own_clock", reordered=reordered)
+    if relation is None:
+        return replace(own, reason="the flight has its clock")
+    gap_sigma = relation.gnss_less_motion_sigma_s
+    return replace(
+        own,
+        method=relation.method,
+        reason=relation.reason,
+        remarks=relation.remarks,
+        signals=relation.signals,
+        reference_topic=relation.first_topic,
+        topic=part.name(relation.other_topic),
+        correlation=relation.correlation,
+        gnss_less_motion_s=relation.gnss_less_motion_s,
+        gnss_less_motion_half_width95_s=None if gap_sigma is None else NORMAL_95 * gap_sigma,
+        stretches=tuple(_stretches(part, relation, start_ns)),
+    )
+
+
+def _stretches(part: _Part, relation: LogRelation, start_ns: int) -> Iterator[JoinedStretch]:
+    flight = part.timed.flight
+    ends_s = [*(one.begin_s for one in relation.stretches[1:]), flight.duration_s]
+    base_s = (relation.first_start_ns - relation.other_start_ns) / NS_PER_S
+    to_flight_s = (relation.first_start_ns - start_ns) / NS_PER_S
+    for one, end_s in zip(relation.stretches, ends_s, strict=True):
+        begin_s = max(one.begin_s, 0.0)
+        at_s = np.array([begin_s, 0.5 * (begin_s + end_s), end_s])
+        half_s = NORMAL_95 * one.sigma_at(at_s)
+        is_known = bool(np.isfinite(half_s).all())
+        yield JoinedStretch(
+            start_s=float(begin_s + one.lag_at(begin_s)) + to_flight_s,
+            end_s=float(end_s + one.lag_at(end_s)) + to_flight_s,
+            method=one.method,
+            offset_s=base_s + float(one.lag_at(at_s[1])),
+            half_width95_s=float(half_s[1]) if is_known else None,
+            largest_half_width95_s=float(half_s.max()) if is_known else None,
+            drift_ppm=1e6 * one.drift if is_known else None,
+            drift_half_width95_ppm=1e6 * NORMAL_95 * one.drift_sigma if is_known else None,
+        )
+
+
+def _findings(joined: Sequence[JoinedLog]) -> Iterator[Finding]:
+    for log in joined:
+        if log.method == "own_clock":
+            continue
+        yield Finding("warn" if log.method == "file_time" else "info", "together.joined", joined_text(log))
+        for remark in log.remarks:
+            yield Finding("warn", "together.remark", f"{log.source_name}: {remark}")
+
+
+def joined_text(log: JoinedLog) -> str:
+    """How a log was joined, in one line."""
+    longest = max(log.stretches, key=lambda one: one.end_s - one.start_s)
+    if longest.half_width95_s is None:
+        return f"{log.source_name} is joined by {log.reason}"
+    drift = ""
+    if longest.drift_ppm is not None and longest.drift_half_width95_ppm is not None:
+        drift = f", drift {longest.drift_ppm:+.1f} ppm (95 %: +- {longest.drift_half_width95_ppm:.1f})"
+    return (
+        f"{log.source_name} is joined with an offset of {longest.offset_s:+.3f} s (95 %: +- "
+        f"{longest.half_width95_s:.3f} s){drift} by {log.reason}"
+    )

@@ -1,0 +1,232 @@
+"""A reference beside a log: any file that a reader knows, put on the flight's clock by UTC and kept as ``truth``."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from groundstation.base.errors import GroundstationError, UnreadableLogError
+from groundstation.base.findings import Finding
+from groundstation.base.records import MAX_BATCH_ROWS, Damage, Int64Array, RecordBatch
+from groundstation.base.signals import TOPICS, kind_of, topics_of_kind
+from groundstation.base.timescales import GPS_EPOCH_NS, gps_week_to_utc_ns, leap_seconds_at, utc_ns_to_iso
+from groundstation.base.units import NS_PER_S
+from groundstation.pipeline.one_flight.configuration import References
+from groundstation.pipeline.one_flight.log import Log, open_log
+from groundstation.tables.assemble import batches_from_flight
+from groundstation.tables.table import Flight, Table
+
+TRUTH = "truth"
+FACTS = "truth."  # how the facts about a reference begin in the metadata of a flight
+WEEK_NS = 604_800 * NS_PER_S
+NS_PER_MS = 1_000_000
+POSITION = ("latitude_deg", "longitude_deg")
+ANGLES = ("true_heading_deg", "roll_deg")
+_FIELDS = frozenset(one.name for one in TOPICS[TRUTH])
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A file that may judge a flight: its best topic, on UTC or on seconds of a GPS week that the flight must tell.
+
+    ``damages`` are what its reader could not read.
+    """
+
+    name: str
+    sha256: str
+    reader: str
+    table: Table
+    is_weekly: bool
+    damages: tuple[Damage, ...] = ()
+
+    @property
+    def facts(self) -> Mapping[str, str]:
+        """What is kept of it in the metadata of a flight."""
+        told = {"source_name": self.name, "sha256": self.sha256, "reader": self.reader, "topic": self.table.topic}
+        return {FACTS + name: value for name, value in told.items()}
+
+
+@dataclass(frozen=True)
+class Laid:
+    """A reference on the clock of a flight: batches of ``truth``, facts for the metadata, findings."""
+
+    batches: tuple[RecordBatch, ...] = ()
+    facts: Mapping[str, str] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+
+
+def laid_beside(log_name: str, span_ns: tuple[int, int], has_utc: bool, references: References) -> Laid:
+    """Find the reference of a flight and put it on its clock; nothing where no file is given.
+
+    Parameters
+    ----------
+    log_name : str
+    span_ns : (int, int)
+        Corrected times of the log's first and last record.
+    has_utc : bool
+        Whether those are UTC.
+    references : References
+
+    Raises
+    ------
+    GroundstationError
+        When the log has no UTC, a file cannot be read, none overlaps though one is expected, or several do.
+    """
+    if not references.paths:
+        return Laid()
+    if not has_utc:
+        raise GroundstationError(log_name, "a log without UTC", "UTC, by which a reference is put on its clock")
+    found = []
+    for path in references.paths:
+        reference = load_reference(path)
+        table = _cropped(_on_utc(reference, span_ns), span_ns)
+        if len(table):
+            found.append((reference, table))
+    if len(found) > 1:
+        names = ", ".join(reference.name for reference, _ in found)
+        raise GroundstationError(
+            log_name, f"several references at its time: {names}", "one", "name the one to judge by"
+        )
+    if not found:
+        return _nothing(log_name, span_ns, references)
+    reference, table = found[0]
+    truth = Flight({TRUTH: replace(table, topic=TRUTH)}, {}, int(table.time_ns[0]), True)
+    return Laid(tuple(batches_from_flight(truth, MAX_BATCH_ROWS)), reference.facts, tuple(_findings(reference, table)))
+
+
+def _nothing(log_name: str, span_ns: tuple[int, int], references: References) -> Laid:
+    if references.is_expected:
+        names, theirs = (", ".join(map(tell, references.paths)) for tell in (_name_of, _span_text))
+        when = " to ".join(utc_ns_to_iso(one, 0) for one in span_ns)
+        raise GroundstationError(names, f"a reference of {theirs}", f"one of the time of {log_name}, {when}")
+    text = f"none of {len(references.paths)} references is of the time of this log"
+    return Laid(findings=(Finding("info", "reference.none", text),))
+
+
+def _name_of(path: Path) -> str:
+    return load_reference(path).name
+
+
+def _span_text(path: Path) -> str:
+    reference = load_reference(path)
+    if reference.is_weekly:
+        first, last = (one / NS_PER_S for one in (reference.table.time_ns[0], reference.table.time_ns[-1]))
+        return f"seconds {first:.0f} to {last:.0f} of a GPS week"
+    return " to ".join(utc_ns_to_iso(int(one), 0) for one in (reference.table.time_ns[0], reference.table.time_ns[-1]))
+
+
+def _findings(reference: Reference, table: Table) -> list[Finding]:
+    name = reference.name
+    text = f"{name} ({reference.reader}, {reference.table.topic}) judges this flight: {len(table)} samples as truth"
+    found = [Finding("info", "reference.laid", text, TRUTH)]
+    if reference.is_weekly:
+        text = f"{name} tells seconds of a GPS week and no date: the week is that of the log"
+        found.append(Finding("info", "reference.week", text, TRUTH))
+    lost = [damage for damage in reference.damages if damage.loses_data]
+    if lost:
+        text = f"{name}: {lost[0].what}: {lost[0].count} ({lost[0].place})"
+        more = f", and {len(lost) - 1} more places" if len(lost) > 1 else ""
+        found.append(Finding("warn", "reference.damaged", text + more, TRUTH, lost[0].place, len(lost)))
+    return found
+
+
+def load_reference(path: Path) -> Reference:
+    """Read a reference; the last few stay in memory.
+
+    Raises
+    ------
+    UnreadableLogError
+        When no reader claims it, or it holds neither positions, velocities nor attitude.
+    """
+    try:
+        status = path.stat()
+    except OSError as error:
+        raise UnreadableLogError(str(path), error.strerror or "cannot be opened", "a reference") from error
+    return _load(path, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=4)
+def _load(path: Path, _time_ns: int, _size: int) -> Reference:
+    log = open_log(path)
+    flight, damages, has_utc = _read(log)
+    topic = best_topic(flight)
+    if not topic:
+        raise UnreadableLogError(path.name, "no position, velocity or attitude", "a reference")
+    table = flight[topic]
+    table = replace(table, columns={name: one for name, one in table.columns.items() if name in _FIELDS})
+    is_weekly = not has_utc and log.source.reader.startswith("sbet")
+    if not has_utc and not is_weekly:
+        raise UnreadableLogError(path.name, "no UTC", "a reference with absolute time")
+    if is_weekly:
+        table = replace(table, time_ns=np.asarray(table.device_time_ns.values, dtype=np.int64))
+    return Reference(log.source.name, log.source.sha256, log.source.reader, table, is_weekly, damages)
+
+
+def _read(log: Log) -> tuple[Flight, tuple[Damage, ...], bool]:
+    """Tables of the canonical topics of a log, what of it is damaged, whether its times are UTC."""
+    from groundstation.integrity.ordering import corrected
+    from groundstation.integrity.survey import survey
+    from groundstation.store.reader import read_info
+    from groundstation.tables.assemble import flight_from_batches
+
+    def tables(batches: Sequence[RecordBatch], metadata: Mapping[str, str], has_utc: bool) -> Flight:
+        return flight_from_batches(batches, metadata=metadata, has_utc=has_utc, source_name=log.source.name)
+
+    kinds = (TRUTH, "ins", "gnss")
+    if log.is_store:
+        info, items = read_info(log.path), list(log.items())
+        kept = [one for one in items if isinstance(one, RecordBatch) and kind_of(one.topic) in kinds]
+        damages = tuple(one for one in items if isinstance(one, Damage))
+        return tables(kept, info.metadata, info.has_utc), damages, info.has_utc
+    replay = log.replay()
+    found = survey(replay)
+    kept = [one for one in corrected(replay, found.clock) if kind_of(one.topic) in kinds]
+    return tables(kept, found.header.metadata, found.clock.is_absolute), found.damages, found.clock.is_absolute
+
+
+def best_topic(flight: Flight) -> str:
+    """The topic of a log that judges best: its truth, an INS that GNSS corrects, GNSS, then what there is.
+
+    An INS left alone drifts; with GNSS in the same file GNSS is the reference.
+    """
+    topics = [topic for topic in flight.topics() if len(flight[topic])]
+    with_place = [topic for topic in topics if flight[topic].has(*POSITION)]
+    aided = [topic for topic in topics_of_kind("ins", with_place) if _is_aided(flight, topic)]
+    listed = (
+        *topics_of_kind(TRUTH, topics),
+        *aided,
+        *sorted(topics_of_kind("gnss", with_place), key=lambda topic: not flight[topic].has("horizontal_sigma_m")),
+        *topics_of_kind("ins", with_place),
+        *(topic for topic in topics if flight[topic].has("velocity_north_mps") or flight[topic].has(*ANGLES)),
+    )
+    return next(iter(listed), "")
+
+
+def _is_aided(flight: Flight, topic: str) -> bool:
+    modes = flight[topic].text("mode")
+    return flight.metadata.get("ins_kind") == "gnss_aided" or bool(np.mean(modes == "gnss_aided") > 0.5)
+
+
+def _on_utc(reference: Reference, span_ns: tuple[int, int]) -> Table:
+    """The table on UTC; of seconds of a week, in the week in which it overlaps the log most."""
+    if not reference.is_weekly:
+        return reference.table
+    middle_ns = (span_ns[0] + span_ns[1]) // 2
+    week = (middle_ns + leap_seconds_at(middle_ns) * NS_PER_S - GPS_EPOCH_NS) // WEEK_NS
+    tables = [
+        replace(reference.table, time_ns=_utc_of_week(one, reference.table.time_ns))
+        for one in (week, week - 1, week + 1)
+    ]
+    return max(tables, key=lambda table: len(_cropped(table, span_ns)))
+
+
+def _utc_of_week(week: int, week_ns: Int64Array) -> Int64Array:
+    whole_ms, rest_ns = np.divmod(week_ns, NS_PER_MS)
+    return np.asarray(gps_week_to_utc_ns(int(week), whole_ms) + rest_ns)
+
+
+def _cropped(table: Table, span_ns: tuple[int, int]) -> Table:
+    """What of a reference is of the time of the log: the flight begins and ends with what was recorded."""
+    return table.take((table.time_ns >= span_ns[0]) & (table.time_ns <= span_ns[1]))

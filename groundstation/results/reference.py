@@ -1,0 +1,242 @@
+"""Answer of the comparison with a reference: errors of what was recorded and estimated, and claimed against seen."""
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+from groundstation.results.answer import Answer
+from groundstation.results.figures import FigureData
+
+Quantity = Literal["position", "velocity", "attitude"]
+ClaimState = Literal["consistent", "too_sure", "too_careful", "too_few", "reference_too_coarse"]
+Observed = Literal["observed", "stated", "not_observable"]
+Alignment = Literal["none", "shift", "shift_and_yaw"]
+
+# What is judged, in the order it is shown; a second receiver or INS is "gnss.2", "ins.2".
+SUBJECTS: dict[str, str] = {
+    "gnss": "GNSS",
+    "ins": "INS",
+    "corrected": "INS, filtered",
+    "smoothed": "INS, smoothed",
+    "heading": "INS less the error found",
+}
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Statistics of one error. Intervals are 95 % ones by ``effective_samples``; None where those are too few.
+
+    Parameters
+    ----------
+    effective_samples : float
+        How many independent errors would know the mean as well as these correlated ones do.
+    mean, std, rmse, median, smallest, largest : float
+        Of the error with its sign; ``largest`` of a length (axis ``horizontal``) is the worst.
+    """
+
+    samples: int
+    effective_samples: float
+    mean: float
+    std: float
+    rmse: float
+    median: float
+    smallest: float
+    largest: float
+    mean95: tuple[float, float] | None = None
+    std95: tuple[float, float] | None = None
+    rmse95: tuple[float, float] | None = None
+    median95: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class ErrorRow:
+    """Errors of one subject along one axis, error = subject - reference.
+
+    ``axis`` is ``along`` and ``cross`` of the reference's motion, ``vertical`` (up positive), ``horizontal`` (a
+    length), ``roll``, ``pitch`` or ``heading``. ``reference_sigma`` is what the reference claims of itself (RMS),
+    None where it claims nothing; ``is_coarse``: it is so large that most of the error may be the reference's own.
+    """
+
+    subject: str
+    quantity: Quantity
+    axis: str
+    unit: str
+    spread: Spread
+    reference_sigma: float | None
+    is_coarse: bool = False
+
+
+@dataclass(frozen=True)
+class ClaimRow:
+    """Claimed against seen: the share of the errors inside the 95 % region that subject and reference claim together.
+
+    ``claimed_sigma`` and ``reference_sigma`` are RMS, of a horizontal length those of north and east together;
+    ``confidence95`` is of the share, by the effective number of samples.
+    """
+
+    subject: str
+    quantity: Quantity
+    axis: str
+    unit: str
+    samples: int
+    effective_samples: float
+    claimed_sigma: float
+    reference_sigma: float | None
+    share_inside95: float
+    confidence95: tuple[float, float]
+    state: ClaimState
+
+
+@dataclass(frozen=True)
+class PathRow:
+    """Absolute trajectory error: RMS of the horizontal position error after an alignment; yaw in degrees."""
+
+    subject: str
+    alignment: Alignment
+    rmse_m: float
+    yaw_deg: float | None = None
+
+
+@dataclass(frozen=True)
+class RelativeRow:
+    """Relative error: how much the horizontal position error changes over a time or a way.
+
+    ``length`` is in ``unit`` (s or m), errors in metres; ``effective_pairs`` of the overlapping ``pairs`` are
+    independent. ``share_of_way`` is the RMS over the mean way between the two ends.
+    """
+
+    subject: str
+    length: float
+    unit: str = field(metadata={"one_of": ("s", "m")})
+    pairs: int
+    effective_pairs: float
+    rmse_m: float
+    rmse95_m: tuple[float, float] | None
+    median_m: float
+    largest_m: float
+    share_of_way: float | None
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Where a subject stands against the reference's point, and whose clock is late, from position in turns and motion.
+
+    Parameters
+    ----------
+    arm_state, clock_state : str
+        ``observed``, ``stated`` (by the settings) or ``not_observable``: then it stays in the errors.
+    arm_forward_m, arm_right_m : float, optional
+        From the reference's point to the subject's, body axes.
+    arm_half_width_m : float, optional
+        Of the 95 % interval of an observed arm, the wider of the two.
+    clock_offset_s : float, optional
+        Positive: the subject shows a position later, by its time stamps, than the reference.
+    rmse_with_arm_m, rmse_m : float
+        Horizontal RMS of the errors with the arm in them, and as they are judged.
+    """
+
+    subject: str
+    arm_state: Observed
+    clock_state: Observed
+    reason: str
+    arm_forward_m: float | None
+    arm_right_m: float | None
+    arm_half_width_m: float | None
+    clock_offset_s: float | None
+    clock_offset95_s: tuple[float, float] | None
+    rmse_with_arm_m: float
+    rmse_m: float
+    is_arm_taken_out: bool = False
+
+
+@dataclass(frozen=True)
+class HeadingCheck:
+    """The heading error that was found and its interval, against INS minus reference at the same samples.
+
+    ``seen95_deg`` allows for errors correlated in time; ``is_inside``: the difference is within the 95 % that both
+    claim together.
+    """
+
+    ins_topic: str
+    claimed_deg: float
+    claimed95_deg: tuple[float, float]
+    seen_deg: float
+    seen95_deg: tuple[float, float]
+    difference_deg: float
+    sigma_deg: float
+    samples: int
+    is_inside: bool
+
+
+@dataclass(frozen=True)
+class ForecastCheck:
+    """The replayed forecast of the position error against what it became by the reference, at one horizon."""
+
+    method: str
+    horizon_min: float
+    starts: int
+    rmse_m: float
+    raw_rmse_m: float
+    share_inside95: float | None
+    confidence95: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class ReferenceResult(Answer):
+    """What a flight's recordings and estimates are worth by a reference that none of them has seen.
+
+    Parameters
+    ----------
+    reference : str
+        Name of the file, or "the log's own truth".
+    is_judge : bool
+        False: the reference judges nothing, ``reason`` says why, and the errors are told for what they are.
+    interval_s, covered_share, longest_gap_s
+        Of the reference: median time between samples, the share of the flight that it covers, its longest gap.
+    placed : tuple of Placed
+    errors, claims, paths, relative : tuples of rows
+    headings : tuple of HeadingCheck
+    forecasts : tuple of ForecastCheck
+    figures : tuple of FigureData
+        ``reference_errors``: errors with claimed sigmas over time, by subject; ``reference_track``: plan view in
+        metres; ``reference_checks``: one independent sample of every claim after the other.
+    """
+
+    analysis: ClassVar[str] = "reference"
+
+    reference: str
+    is_judge: bool
+    reason: str
+    interval_s: float
+    covered_share: float
+    longest_gap_s: float
+    placed: tuple[Placed, ...]
+    errors: tuple[ErrorRow, ...]
+    claims: tuple[ClaimRow, ...] = ()
+    paths: tuple[PathRow, ...] = ()
+    relative: tuple[RelativeRow, ...] = ()
+    headings: tuple[HeadingCheck, ...] = ()
+    forecasts: tuple[ForecastCheck, ...] = ()
+    settings: dict[str, Any] = field(default_factory=dict)
+    figures: tuple[FigureData, ...] = ()
+
+    def error(self, subject: str, quantity: str, axis: str) -> ErrorRow | None:
+        """The row of a subject and axis, None where it was not compared."""
+        wanted = (subject, quantity, axis)
+        return next((row for row in self.errors if (row.subject, row.quantity, row.axis) == wanted), None)
+
+    def claim(self, subject: str, quantity: str, axis: str) -> ClaimRow | None:
+        """The claim of a subject along an axis, None where it made none."""
+        wanted = (subject, quantity, axis)
+        return next((row for row in self.claims if (row.subject, row.quantity, row.axis) == wanted), None)
+
+
+def title_of(subject: str) -> str:
+    """A subject for people.
+
+    Examples
+    --------
+    >>> title_of("gnss"), title_of("ins.2")
+    ('GNSS', 'INS 2')
+    """
+    kind, _, instance = subject.partition(".")
+    return f"{SUBJECTS.get(kind, kind)} {instance}".strip()

@@ -1,0 +1,14 @@
+"""Several logs of one flight: the motions of both over each other, the difference, and what the chapter says."""
+
+import rerun.blueprint as rrb
+
+from groundstation.results.flight import FlightResults
+from groundstation.results.together import Together
+from groundstation.viewer.recorder import Recorder
+from groundstation.viewer.tabs.generic import generic_tab
+
+
+def together(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
+    """Log the tab; None for a flight of one log."""
+    answer = results.answer(Together)
+    return None if answer is None else generic_tab(recorder, results, answer)

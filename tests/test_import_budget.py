@@ -1,0 +1,54 @@
+"""What each verb loads: modules that it does not need cost every user their time. No time is measured here."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.dataflash_writer import flight_log
+from tests.ulog_writer import small_flight
+
+SAMPLE = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv"
+NOT_NEEDED = (  # to look at a log, check or convert it
+    *("numba", "scipy", "pandas", "matplotlib", "jinja2", "typst", "rerun", "pydantic", "h5py", "distributed"),
+    *("groundstation.estimators", "groundstation.tables.phases", "groundstation.reports", "groundstation.viewer"),
+    *("groundstation.simulation", "groundstation.chapters.by_answer", "groundstation.pipeline.many_flights.batch"),
+)
+BY_VERB = """
+import os, sys
+from groundstation.cli.main import main
+try: main({arguments!r})
+except SystemExit as stop: assert not stop.code, stop.code
+"""
+BY_OPEN = "import sys, groundstation\ngroundstation.open({arguments[0]!r})\n"
+TELL = "print('LOADED', *[name for name in {names!r} if name in sys.modules])"
+
+
+def loaded(program: str, *arguments: str, names: tuple[str, ...] = NOT_NEEDED) -> list[str]:
+    """Which of the names a new process has loaded when it has done its work."""
+    code = program.format(arguments=list(arguments)) + TELL.format(names=names)
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("COV_", "NUMBA_DISABLE"))}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()[-1].split()[1:]
+
+
+@pytest.mark.parametrize("verb", ["info", "check", "convert"])
+def test_a_table_is_read_without_what_it_does_not_need(verb: str, tmp_path: Path) -> None:
+    target = ["-o", str(tmp_path / "out.mcap")] if verb == "convert" else []
+    assert loaded(BY_VERB, verb, str(SAMPLE), *target) == []
+
+
+def test_a_log_is_opened_without_what_it_does_not_need() -> None:
+    assert loaded(BY_OPEN, str(SAMPLE), names=(*NOT_NEEDED, "pyarrow.csv", "typer")) == []
+
+
+@pytest.mark.parametrize("suffix", ["ulg", "BIN"])
+def test_compiled_loops_are_found_again_without_their_compiler(suffix: str, tmp_path: Path) -> None:
+    log = tmp_path / f"flight.{suffix}"
+    log.write_bytes(small_flight().data if suffix == "ulg" else flight_log().content)
+    convert = ["convert", str(log), "-q", "--force", "-o", str(tmp_path / "out.mcap")]
+    loaded(BY_VERB, *convert)  # compiles, where that was not done before
+    assert loaded(BY_VERB, *convert, names=(*NOT_NEEDED, "pyarrow")) == []

@@ -1,0 +1,171 @@
+"""Several logs of one flight in one MCAP: names, clocks, ledgers, refusals, sources, pages."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from groundstation.base.errors import UsageError
+from groundstation.base.records import Column
+from groundstation.base.units import NS_PER_S
+from groundstation.chapters.together import together as chapter
+from groundstation.estimators.analyses import ANSWER_TYPES
+from groundstation.estimators.two_clocks.relation import NotOneFlightError
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.convert import Converted
+from groundstation.pipeline.one_flight.flight import read_flight
+from groundstation.pipeline.one_flight.join import join_logs
+from groundstation.pipeline.one_flight.log import open_log
+from groundstation.results.files import load
+from groundstation.results.together import Together
+from groundstation.tables.sources import TOGETHER, ranked, sources_of_kind, why_first
+from groundstation.tables.table import Flight, Table
+from tests.test_formats_agree import as_dataflash, as_ubx, as_ulog
+from tests.test_verbs import groundstation
+
+WITHIN_S = 0.02
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("logs")
+    as_ulog(folder / "a.ulg")
+    as_ubx(folder / "b.ubx")
+    as_dataflash(folder / "c.bin")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def joined(logs: Path) -> tuple[Converted, Flight]:
+    target = logs / "joined.mcap"
+    converted = join_logs([open_log(logs / name) for name in ("a.ulg", "b.ubx", "c.bin")], target)
+    return converted, read_flight(target, converted)
+
+
+def test_topics_of_later_logs_end_in_their_letter_and_nothing_is_lost(joined: tuple[Converted, Flight]) -> None:
+    converted, flight = joined
+    assert {"ins", "gnss", "gnss.b", "ins.b", "gnss.c", "ins.c"} <= set(flight.topics())
+    assert len(flight["gnss"]) == len(flight["gnss.b"]) == len(flight["gnss.c"])
+    assert set(converted.info.ledger.topics) == set(flight.topics())
+    assert converted.info.source_name == "a.ulg + b.ubx + c.bin"
+    assert "derived.ins.c.true_heading_deg" in flight.metadata
+
+
+def test_logs_of_three_formats_are_joined_to_20_ms(joined: tuple[Converted, Flight]) -> None:
+    _converted, flight = joined
+    for label in "bc":
+        error_s = (flight[f"gnss.{label}"].time_ns - flight["gnss"].time_ns) / NS_PER_S
+        (log,) = (one for one in json.loads(flight.metadata[TOGETHER])["logs"] if one["label"] == label)
+        half_s = max(one["largest_half_width95_s"] for one in log["stretches"])
+        assert np.max(np.abs(error_s)) <= min(half_s, WITHIN_S)
+
+
+def test_the_first_logs_times_and_values_are_as_without_the_others(
+    joined: tuple[Converted, Flight], logs: Path
+) -> None:
+    from groundstation.pipeline.one_flight.convert import convert_log
+
+    alone = read_flight(logs / "alone.mcap", convert_log(open_log(logs / "a.ulg"), logs / "alone.mcap"))
+    for topic in alone.topics():
+        np.testing.assert_array_equal(joined[1][topic].time_ns, alone[topic].time_ns)
+        for name, column in alone[topic].columns.items():
+            np.testing.assert_array_equal(joined[1][topic].columns[name].values, column.values)
+
+
+def test_damage_of_one_log_is_told_with_its_name_and_keeps_the_other(logs: Path, tmp_path: Path) -> None:
+    cut = tmp_path / "cut.ubx"
+    cut.write_bytes((logs / "b.ubx").read_bytes()[:-31])
+    found = join_logs([open_log(logs / "a.ulg"), open_log(cut)], tmp_path / "joined.mcap")
+    assert found.has_lost_data
+    assert any(damage.place.startswith("cut.ubx, ") for damage in found.info.ledger.damages)
+    assert found.info.ledger.topics["gnss.b"].rows > 3_000
+
+
+def test_the_same_log_twice_is_refused(logs: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"a\.ulg: found the same content as a\.ulg"):
+        join_logs([open_log(logs / "a.ulg")] * 2, tmp_path / "x.mcap")
+
+
+def test_logs_of_two_days_are_refused_in_a_line(logs: Path, tmp_path: Path) -> None:
+    text = "\n".join(f"{second / 10},{second % 7 / 10},0,55.0,37.0" for second in range(600))
+    names = "time_s,gnss.velocity_north_mps,gnss.velocity_east_mps,gnss.latitude_deg,gnss.longitude_deg"
+    other = tmp_path / "other.csv"
+    other.write_text(f"# start_utc: 2026-05-06T06:00:00Z\n{names}\n{text}\n", encoding="utf-8")
+    with pytest.raises(NotOneFlightError, match="no time in common"):
+        join_logs([open_log(logs / "a.ulg"), open_log(other)], tmp_path / "x.mcap")
+    code, _out, _told = groundstation(
+        "convert", str(logs / "a.ulg"), str(other), "--together", "-o", str(tmp_path / "y.mcap")
+    )
+    assert code == 1
+    assert not (tmp_path / "y.mcap").exists()
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_run_together_gives_one_flight_that_says_how(logs: Path, tmp_path: Path) -> None:
+    paths = [str(logs / name) for name in ("a.ulg", "b.ubx")]
+    code, out, _err = groundstation("run", *paths, "--together", "-o", str(tmp_path / "out"), "--no-pdf")
+    assert code == 0
+    assert "2 logs on one clock" in out
+    (folder,) = (path for path in (tmp_path / "out").iterdir() if (path / "summary.json").exists())
+    results = load(folder, ANSWER_TYPES).results
+    answer = results.answer(Together)
+    assert answer is not None
+    assert [log.source_name for log in answer.logs] == ["a.ulg", "b.ubx"]
+    assert [one.topic for one in answer.sources] == ["ins", "gnss"]
+    section = chapter(results)
+    assert section is not None and section.claim is not None
+    assert {figure.name for figure in results.figures} >= {"together_b_motion", "together_b_difference"}
+
+
+def test_one_log_is_not_together(logs: Path, tmp_path: Path) -> None:
+    code, _out, told = groundstation("run", str(logs / "a.ulg"), "--together", "-o", str(tmp_path / "out"))
+    assert code == 2
+    assert "2 to " in told
+
+
+def table(topic: str, rate_hz: float, seconds: float = 100.0, **columns: np.ndarray | float | str) -> Table:
+    time_ns = np.arange(0, round(seconds * NS_PER_S), round(NS_PER_S / rate_hz), dtype=np.int64)
+    values = {name: Column(np.full(len(time_ns), value)) for name, value in columns.items()}
+    return Table(topic, time_ns, values, np.arange(len(time_ns)), Column(time_ns))
+
+
+def of_two_logs(*tables: Table) -> Flight:
+    return Flight({one.topic: one for one in tables}, metadata={TOGETHER: "{}"})
+
+
+VELOCITY = {"velocity_north_mps": 1.0, "velocity_east_mps": 1.0}
+ATTITUDE = {"roll_deg": 0.0, "pitch_deg": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("kind", "first", "second", "best", "why"),
+    [
+        ("gnss", table("gnss", 1, **VELOCITY), table("gnss.b", 5, **VELOCITY), "gnss.b", "5 Hz"),
+        ("gnss", table("gnss", 5, latitude_deg=1.0), table("gnss.b", 1, **VELOCITY), "gnss.b", "no velocity"),
+        ("gnss", table("gnss", 5, **VELOCITY), table("gnss.b", 10, 20.0, **VELOCITY), "gnss", "20 s of gnss.b"),
+        (
+            *("gnss", table("gnss", 5, velocity_sigma_mps=0.3, **VELOCITY)),
+            *(table("gnss.b", 5, velocity_sigma_mps=0.03, **VELOCITY), "gnss.b", "0.03 m/s"),
+        ),
+        (
+            "ins",
+            table("ins", 50, mode="gnss_aided", **ATTITUDE),
+            table("ins.b", 20, **ATTITUDE),
+            "ins.b",
+            "corrects ins",
+        ),
+        ("ins", table("ins", 20, **ATTITUDE), table("ins.b", 20, **ATTITUDE), "ins", "earlier log"),
+    ],
+)
+def test_the_better_source_is_used(kind: str, first: Table, second: Table, best: str, why: str) -> None:
+    flight = of_two_logs(first, second)
+    assert sources_of_kind(flight, kind)[0] == best
+    assert why in why_first(kind, ranked(flight, kind))
+    assert sources_of_kind(replace(flight, metadata={}), kind) == (first.topic, second.topic)
+
+
+def test_a_configuration_may_set_the_limits() -> None:
+    settings = Configuration({"together": {"arm_sigma_m": 0.5}}).settings.analyses["together"]
+    assert settings.arm_sigma_m == 0.5
