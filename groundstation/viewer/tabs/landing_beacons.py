@@ -23,7 +23,9 @@ MOST_APPROACHES = 6
 def landing_beacons(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the tab; None without an answer."""
     answer, section = results.answer(BeaconLanding), chapter(results)
-    data = figure_of(results, "landing_beacons_path", "time_s", "lateral_m", "glide_path_m", "before_threshold_m")
+    data = figure_of(
+        results, "landing_beacons_path", "time_s", "lateral_m", "glide_path_m", "straight_before_threshold_m"
+    )
     if answer is None or section is None or data is None:
         return None
     recorder.document("landing_beacons/answer", markdown(section))
@@ -34,10 +36,13 @@ def landing_beacons(recorder: Recorder, results: FlightResults) -> rrb.Container
 
 
 def _approach(recorder: Recorder, one: BeaconApproachRow, data: FigureData) -> rrb.Container:
-    """Deviations of one approach and its distance, from its start to its end; what lies beyond the axes is cut."""
-    mine = np.flatnonzero(numbers(data, "approach") == one.approach)
+    """Deviations of one approach and its distance, from 6 km on to its end; what lies beyond the axes is cut."""
+    is_mine = numbers(data, "approach") == one.approach
+    near = is_mine & (numbers(data, "straight_before_threshold_m") < FARTHEST_M)
+    mine = np.flatnonzero(near if near.sum() > 1 else is_mine)
     column = {name: numbers(data, name)[mine] for name in data.columns}
-    run, time_s, path = Run(one.start_s, one.end_s), column["time_s"], f"landing_beacons/{one.approach}"
+    time_s, path = column["time_s"], f"landing_beacons/{one.approach}"
+    run = Run(float(time_s[0]), float(time_s[-1]))
     band, dots = Line("95 % of one place", colours.HONEST, BOLD), Line("deviation", colours.ANSWER, SMALL)
     views: list[rrb.View] = []
     for name, title, most in DEVIATIONS:
