@@ -12,14 +12,18 @@ from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
 from groundstation.chapters.together import together as chapter
 from groundstation.estimators.analyses import ANSWER_TYPES
+from groundstation.estimators.latency.signals import pairs_of
+from groundstation.estimators.overview import overview
 from groundstation.estimators.two_clocks.relation import NotOneFlightError
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted
 from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.join import join_logs
 from groundstation.pipeline.one_flight.log import open_log
+from groundstation.results.figures import numbers
 from groundstation.results.files import load
 from groundstation.results.together import Together
+from groundstation.tables.motion import motion_of
 from groundstation.tables.sources import TOGETHER, ranked, sources_of_kind, why_first
 from groundstation.tables.table import Flight, Table
 from tests.test_formats_agree import as_dataflash, as_ubx, as_ulog
@@ -174,6 +178,17 @@ def test_the_better_source_is_used(kind: str, first: Table, second: Table, best:
     assert sources_of_kind(flight, kind)[0] == best
     assert why in why_first(kind, ranked(flight, kind))
     assert sources_of_kind(replace(flight, metadata={}), kind) == (first.topic, second.topic)
+
+
+def test_motion_overview_and_latency_take_the_long_log_though_the_first_is_short() -> None:
+    position = {"latitude_deg": 40.0, "longitude_deg": -84.0}
+    short = (table("ins", 10, 20.0, **VELOCITY, **ATTITUDE), table("gnss", 1, 20.0, **VELOCITY, **position))
+    long = (table("ins.b", 10, **VELOCITY, **ATTITUDE), table("gnss.b", 1, **VELOCITY, **position))
+    flight = of_two_logs(*short, *long)
+    assert np.isfinite(motion_of(flight).speed_mps).mean() > 0.95
+    shown = overview(flight, None, None)
+    assert shown is not None and numbers(shown, "time_s")[-1] == 99.0
+    assert pairs_of(flight)[0] == ("ins.b", "gnss.b", "velocity")
 
 
 def test_a_configuration_may_set_the_limits() -> None:

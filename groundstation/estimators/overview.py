@@ -12,6 +12,7 @@ from groundstation.base.records import Int64Array
 from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
 from groundstation.results.figures import FigureData
 from groundstation.tables.phases import Phases
+from groundstation.tables.sources import sources_of_kind
 from groundstation.tables.table import Flight, Table
 from groundstation.tables.wheels import contact_of
 
@@ -34,8 +35,7 @@ MODE = "mode "  # what the names of events that change the flight mode begin wit
 
 def first_of_kind(flight: Flight, kind: str, *fields: str) -> str | None:
     """First topic of a kind that has all the fields, None when there is none."""
-    found = topics_of_kind(kind, flight.topics())
-    return next((topic for topic in found if flight[topic].has(*fields)), None)
+    return next((topic for topic in sources_of_kind(flight, kind) if flight[topic].has(*fields)), None)
 
 
 def runs_of(states: NDArray[np.str_], time_s: NDArray[np.float64], end_s: float) -> FigureData:

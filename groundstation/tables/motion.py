@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from groundstation.base.angles import FloatArray, unwrap
 from groundstation.base.geodesy import north_east_m
 from groundstation.base.records import BoolArray
-from groundstation.base.signals import topics_of_kind
+from groundstation.tables.sources import sources_of_kind
 from groundstation.tables.table import Flight, Table
 
 RATE_HZ = 5.0
@@ -100,8 +100,8 @@ def motion_of(flight: Flight) -> Motion:
 
 
 def first_of_kind(flight: Flight, kind: str) -> Table:
-    """The first instance of a topic that has samples; an empty table when there is none."""
-    topics = [topic for topic in topics_of_kind(kind, flight.topics()) if len(flight[topic])]
+    """The instance of a topic to use first that has samples; an empty table when there is none."""
+    topics = [topic for topic in sources_of_kind(flight, kind) if len(flight[topic])]
     return flight[topics[0]] if topics else Table.empty(kind)
 
 

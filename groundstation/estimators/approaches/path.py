@@ -9,11 +9,11 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.geodesy import north_east_m
 from groundstation.base.records import Int64Array
-from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.approaches.settings import LandingSettings
 from groundstation.tables.motion import runs
 from groundstation.tables.resample import values_at
+from groundstation.tables.sources import sources_of_kind
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight
@@ -117,7 +117,7 @@ def position_topics(flight: "Flight") -> tuple[str, ...]:
 
 
 def _topics(flight: "Flight", kind: str, *names: str) -> tuple[str, ...]:
-    return tuple(topic for topic in topics_of_kind(kind, flight.topics()) if flight[topic].has(*names))
+    return tuple(topic for topic in sources_of_kind(flight, kind) if flight[topic].has(*names))
 
 
 def _at(flight: "Flight", topic: str, name: str, time_ns: Int64Array) -> FloatArray:

@@ -28,6 +28,7 @@ from groundstation.results.answer import Answers, answer_of
 from groundstation.results.columns import AnswerColumn
 from groundstation.results.landing_beacons import BeaconLanding, DeviationRow
 from groundstation.tables.resample import values_at
+from groundstation.tables.sources import sources_of_kind
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight
@@ -114,7 +115,7 @@ def _sampled(flight: "Flight", known: Known, beacons: tuple[Beacon, ...], settin
 
     def of_kind(kind: str, *names: str) -> FloatArray:
         """The first of the fields that an instance of the kind has."""
-        for topic in topics_of_kind(kind, flight.topics()):
+        for topic in sources_of_kind(flight, kind):
             for name in names:
                 if flight[topic].has(name):
                     return values_at(flight[topic], name, time_ns, largest_gap_s=settings.largest_gap_s)

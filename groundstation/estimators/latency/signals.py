@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import direction_of, unwrap
 from groundstation.base.records import BoolArray
-from groundstation.base.signals import topics_of_kind
 from groundstation.estimators.heading.samples import distinct_epochs
 from groundstation.estimators.latency.settings import LatencySettings
 from groundstation.estimators.latency.windows import Series
 from groundstation.results.latency import Quantity
+from groundstation.tables.sources import sources_of_kind
 from groundstation.tables.table import Flight, Table
 
 FloatArray = NDArray[np.float64]
@@ -45,10 +45,10 @@ class NotComparableError(Exception):
 
 def pairs_of(flight: Flight) -> list[tuple[str, str, Quantity]]:
     """Topics and quantities that may be compared: the first INS that has the signal against every other sensor."""
-    units = [topic for topic in topics_of_kind("ins", flight.topics()) if len(flight[topic])]
+    units = [topic for topic in sources_of_kind(flight, "ins") if len(flight[topic])]
 
     def others(kind: str, *fields: str) -> list[str]:
-        return [topic for topic in topics_of_kind(kind, flight.topics()) if flight[topic].has(*fields)]
+        return [topic for topic in sources_of_kind(flight, kind) if flight[topic].has(*fields)]
 
     def first(*fields: str) -> str:
         return next((topic for topic in units if flight[topic].has(*fields)), "")

@@ -30,6 +30,7 @@ from groundstation.tables.declination import declination_along
 from groundstation.tables.headings import FARTHEST_POSITION_S
 from groundstation.tables.phases import ground_mask
 from groundstation.tables.resample import join
+from groundstation.tables.sources import sources_of_kind
 from groundstation.tables.table import Flight
 
 ANALYSIS = "magnetic_ground"
@@ -75,7 +76,7 @@ def choose_topics(flight: Flight, ins_topic: str = "", gnss_topic: str = "") -> 
         (ins_topic, "ins", ("magnetic_heading_deg",), "magnetic heading"),
         (gnss_topic, "gnss", VELOCITIES, "GNSS velocity"),
     ):
-        having = [topic for topic in topics_of_kind(kind, flight.topics()) if flight[topic].has(*names)]
+        having = [topic for topic in sources_of_kind(flight, kind) if flight[topic].has(*names)]
         if not having or (wanted and wanted not in having):
             raise NotAssessableError(ANALYSIS, f"no {what} in {wanted}" if wanted else f"no {what} in the log")
         found.append(wanted or having[0])

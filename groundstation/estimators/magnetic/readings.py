@@ -16,6 +16,7 @@ from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.latency import Latencies
 from groundstation.tables.headings import FARTHEST_POSITION_S
 from groundstation.tables.resample import join, values_at
+from groundstation.tables.sources import sources_of_kind
 from groundstation.tables.table import Flight, Table
 
 FIELD = ("field_forward_nt", "field_right_nt", "field_down_nt")
@@ -69,8 +70,8 @@ def choose_topics(flight: Flight, ins_topic: str = "", magnetometer_topic: str =
     NotAssessableError
         When the log has none.
     """
-    compasses = [topic for topic in topics_of_kind("magnetometer", flight.topics()) if flight[topic].has(*FIELD)]
-    units = [topic for topic in topics_of_kind("ins", flight.topics()) if flight[topic].has(*ATTITUDE)]
+    compasses = [topic for topic in sources_of_kind(flight, "magnetometer") if flight[topic].has(*FIELD)]
+    units = [topic for topic in sources_of_kind(flight, "ins") if flight[topic].has(*ATTITUDE)]
     for wanted, found, what in (
         (magnetometer_topic, compasses, "no three-axis magnetometer in the log"),
         (ins_topic, units, "no INS with roll, pitch and true heading in the log"),
