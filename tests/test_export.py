@@ -109,6 +109,13 @@ def test_the_corrected_track_has_its_interval() -> None:
     assert np.allclose(track.column(HALF_WIDTH), math.sqrt(-2.0 * math.log(0.05)) * np.array([4.0, 3.0, 4.0]))
 
 
+def test_the_smoothed_track_is_not_called_as_the_reference_that_judges_is() -> None:
+    place = {"reference_latitude_deg": np.array([1.0, 2.0]), "reference_longitude_deg": np.array([3.0, 4.0])}
+    figures = {"inertial_track": FigureData("inertial_track", {"time_s": np.array([0.0, 5.0]), **place}, {})}
+    (track,) = (one for one in tracks_of(flight(), figures) if one.name == "smoothed")
+    assert track.latitude_deg.tolist() == [1.0, 2.0]
+
+
 def test_sentences_are_what_another_program_reads(tmp_path: Path) -> None:
     track = track_of("gnss")
     write_nmea(tmp_path / "a.nmea", track)

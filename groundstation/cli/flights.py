@@ -85,7 +85,7 @@ def export(
         list[str] | None,
         typer.Option(
             "--track",
-            help="Topic of the log (gnss, ins ...), or corrected and reference of a flight folder; may be repeated. "
+            help="Topic of the log (gnss, ins ...), or corrected and smoothed of a flight folder; may be repeated. "
             "Left out: all, or the first that the format can hold.",
             metavar="NAME",
         ),

@@ -21,7 +21,11 @@ DIRECTIONS = ("track_deg", "true_heading_deg")
 OF_THE_FIX = ("hdop", "satellites_used")
 BRIDGED_S = 0.25  # attitude and velocity of other rows are interpolated over at most so long
 SPEED, HALF_WIDTH = "ground_speed_mps", "horizontal95_m"
-MADE = {"corrected": "INS less its estimated error", "reference": "INS less its smoothed error"}
+# Tracks of the estimator: what begins their columns, and what they are.
+MADE = {
+    "corrected": ("corrected", "INS less its estimated error"),
+    "smoothed": ("reference", "INS less its smoothed error"),
+}
 NORTH_SIGMA, EAST_SIGMA = "north_sigma_m", "east_sigma_m"
 
 
@@ -32,7 +36,7 @@ class Track:
     Parameters
     ----------
     name : str
-        Topic of the log, or ``corrected`` and ``reference`` of the estimator.
+        Topic of the log, or ``corrected`` and ``smoothed`` of the estimator.
     title : str
         For people.
     time_ns : ndarray of int64, shape (n,)
@@ -108,9 +112,10 @@ def _bridged(at_s: FloatArray, time_s: FloatArray, values: FloatArray, *, is_dir
 def _made(flight: Flight, figures: Mapping[str, FigureData], name: str) -> Track | None:
     """A track of the estimator, at the times its figures have; half of the 95 % ellipse's major axis is its width."""
     data, states = figures.get("inertial_track"), figures.get("inertial_states")
-    if data is None or f"{name}_latitude_deg" not in data.columns:
+    prefix, text = MADE[name]
+    if data is None or f"{prefix}_latitude_deg" not in data.columns:
         return None
-    latitude, longitude = (np.asarray(data[f"{name}_{axis}"], dtype=np.float64) for axis in POSITION)
+    latitude, longitude = (np.asarray(data[f"{prefix}_{axis}"], dtype=np.float64) for axis in POSITION)
     known = np.isfinite(latitude) & np.isfinite(longitude)
     time_s = np.asarray(data["time_s"], dtype=np.float64)[known]
     columns: dict[str, FloatArray] = {}
@@ -124,4 +129,4 @@ def _made(flight: Flight, figures: Mapping[str, FigureData], name: str) -> Track
         columns = {NORTH_SIGMA: north, EAST_SIGMA: east, HALF_WIDTH: ELLIPSE_95 * major}
     time_ns = flight.start_ns + np.rint(time_s * NS_PER_S).astype(np.int64)
     place = (latitude[known], longitude[known])
-    return Track(name, MADE[name], time_ns, flight.start_ns, flight.has_utc, *place, columns)
+    return Track(name, text, time_ns, flight.start_ns, flight.has_utc, *place, columns)

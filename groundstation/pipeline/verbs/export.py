@@ -31,7 +31,7 @@ def export(
     path : Path
         A flight folder, an MCAP or a log. The tracks of the estimator are in a folder alone.
     names : sequence of str
-        Tracks wanted: topics, ``corrected``, ``reference``; none: all, or the first that the format can hold.
+        Tracks wanted: topics, ``corrected``, ``smoothed``; none: all, or the first that the format can hold.
 
     Raises
     ------
