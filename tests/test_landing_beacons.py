@@ -11,7 +11,9 @@ from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.estimators.analysis import Found
 from groundstation.estimators.known import Beacon, Ground, Runway, SiteData
 from groundstation.estimators.landing_beacons.analysis import LANDING_BEACONS
+from groundstation.estimators.landing_beacons.approach import Deviations, over_known_ground
 from groundstation.estimators.landing_beacons.geometry import (
+    BearingFix,
     distance_from_bearing_m,
     distance_sigma_m,
     relative_bearings,
@@ -182,6 +184,16 @@ def test_over_rising_ground_there_is_no_deviation_from_the_glide_path(found: Fou
     data = rising.answer.figures[0]
     far = data["straight_before_threshold_m"] > 1000.0
     assert not np.isfinite(data["glide_path_m"][far]).any()
+
+
+@pytest.mark.parametrize(("rise_m", "kept"), [([0.0, 9.0, np.nan], [True, False, False]), ([np.nan] * 3, [True] * 3)])
+def test_ground_whose_rise_is_unknown_is_kept_only_where_no_altitude_tells_any(
+    rise_m: list[float], kept: list[bool]
+) -> None:
+    every = np.zeros(3)
+    fix = BearingFix(every, every, every, np.zeros((3, 2, 2)))
+    found = over_known_ground(Deviations(fix, every, every, every, every), np.array(rise_m), 5.0)
+    assert np.isfinite(found.glide_path_m).tolist() == kept
 
 
 def test_a_profile_of_the_ground_gives_the_glide_path_back() -> None:

@@ -144,7 +144,8 @@ def _coefficients(answer: MagneticResult) -> Grid:
     )
     if is_number(answer.attitude_wander_deg):
         wander = number(answer.attitude_wander_deg, 3, "°")
-        caption += f" Roll and pitch of the INS are taken to be wrong by {wander} in the mean of the figure."
+        caption += f" Roll and pitch of the INS are taken to be wrong by {wander} in the mean of the figure: "
+        caption += "whatever else changes over minutes counts as that."
     return Grid("Coefficients", heads, rows, caption)
 
 

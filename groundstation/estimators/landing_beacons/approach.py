@@ -142,8 +142,12 @@ def unknown_rise_m(sampled: Sampled, told: "Belief", runway: Runway) -> FloatArr
 
 
 def over_known_ground(found: Deviations, rise_m: FloatArray, most_m: float) -> Deviations:
-    """Deviations without those from the glide path over ground that rises or falls by more than so much."""
-    return replace(found, glide_path_m=np.where(np.abs(rise_m) > most_m, np.nan, found.glide_path_m))
+    """Deviations without those from the glide path over ground that rises or falls by more than so much.
+
+    Nor those whose rise is unknown, beyond the ends of the profile, where an altitude tells it for the rest.
+    """
+    is_kept = (np.abs(rise_m) <= most_m) | ~np.isfinite(rise_m).any()
+    return replace(found, glide_path_m=np.where(is_kept, found.glide_path_m, np.nan))
 
 
 @dataclass(frozen=True)
