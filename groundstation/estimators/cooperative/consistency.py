@@ -60,13 +60,19 @@ def judge(track: Track, vehicle: DeadReckoning | Odometry, time_s: FloatArray, p
 
 
 def _in_gap(at_s: FloatArray, time_s: FloatArray) -> BoolArray:
-    """Where times lie between two samples that are too far apart."""
+    """Where times lie between two samples that are too far apart.
+
+    Examples
+    --------
+    >>> _in_gap(np.array([0.0, 5.0, 10.0, 10.5]), np.array([0.0, 10.0, 11.0, 12.0])).tolist()
+    [False, True, False, False]
+    """
     if len(time_s) < 2:
         return np.zeros(len(at_s), dtype=bool)
     steps = np.diff(time_s)
     is_long = steps > max(LONGEST_GAP_S, 2.0 * float(np.median(steps)))
     after = np.clip(np.searchsorted(time_s, at_s), 1, len(steps))
-    return np.asarray(is_long[after - 1] & (at_s != time_s[after]))
+    return np.asarray(is_long[after - 1] & (at_s != time_s[after]) & (at_s != time_s[after - 1]))
 
 
 def normalised(error: FloatArray, covariance: FloatArray) -> FloatArray:
