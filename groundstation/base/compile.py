@@ -54,7 +54,10 @@ def _cache_folder() -> Path | None:
     beside = Path(__file__).parent / "__pycache__"
     if _is_writable(beside):
         return beside
-    user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "groundstation" / "numba"
+    try:
+        user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "groundstation" / "numba"
+    except RuntimeError:  # a user whom the machine does not know, as in many containers, has no home
+        return None
     if _is_writable(user_cache):
         os.environ["NUMBA_CACHE_DIR"] = str(user_cache)
         return user_cache
