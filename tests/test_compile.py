@@ -98,11 +98,11 @@ def test_tuples_are_handed_on_by_name(kept_here: Path) -> None:
     assert inside(values, Limits(2.0, values + 1.0, (3, 0))) == 3  # of 0, 3, 6, 9
     assert inside(values, Limits(3.0, np.full(10, 9.0), (3, 0))) == 1
     assert len(list(kept_here.glob("*.machine_code"))) == 1
-    assert not compiling.is_first_run()
+    assert not compiling.keeps_nothing()
 
 
 def test_a_folder_without_compiled_code_is_that_of_a_first_run(kept_here: Path) -> None:
-    assert compiling.is_first_run()
+    assert compiling.keeps_nothing()
 
 
 def test_a_user_without_a_home_keeps_no_compiled_code(monkeypatch: pytest.MonkeyPatch) -> None:

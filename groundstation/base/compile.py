@@ -64,8 +64,8 @@ def _cache_folder() -> Path | None:
     return None
 
 
-def is_first_run() -> bool:
-    """Whether nothing that was compiled is kept yet: what a log needs takes some seconds more, once."""
+def keeps_nothing() -> bool:
+    """Whether nothing compiled is kept: what a log needs of it (a flat CSV needs nothing) takes some seconds more."""
     folder = _cache_folder()
     return folder is None or not any(folder.glob(f"*{SUFFIX}"))
 

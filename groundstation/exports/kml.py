@@ -66,6 +66,7 @@ def _timed(place: ET.Element, track: Track) -> None:
 
 def _line(place: ET.Element, track: Track) -> None:
     shape = _sub(place, "LineString")
+    _sub(shape, "tessellate", "1")  # on the ground it follows the terrain
     _sub(shape, "altitudeMode", "absolute" if _altitude(track) else "clampToGround")
     _sub(shape, "coordinates", " ".join(",".join(spot) for spot in _spots(track)))
 
