@@ -229,7 +229,7 @@ def test_a_flight_becomes_a_table(tmp_path: Path) -> None:
         "latitude_deg"
     ).tolist()
     assert rows[0]["time_utc"].startswith("2026-05-04T06:00:0")
-    export(log, tmp_path / "a.parquet", names=["gnss"])
+    export(log, tmp_path / "a.parquet", names=["gnss", "gnss"])
     assert pq.read_table(tmp_path / "a.parquet").num_rows == len(gnss)
 
 

@@ -98,7 +98,7 @@ def _wanted(tracks: tuple[Track, ...], names: Sequence[str], source: str) -> tup
     for name in names:
         if name not in by_name:
             raise UsageError(f"track {name}", f"not in {source}", f"one of {', '.join(by_name)}")
-    return tuple(by_name[name] for name in names) if names else tracks
+    return tuple(by_name[name] for name in dict.fromkeys(names)) if names else tracks
 
 
 def _written_alone(write: Callable[[Path, Track], int], target: Path, tracks: tuple[Track, ...], is_named: bool) -> str:
