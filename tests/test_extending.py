@@ -138,7 +138,7 @@ def test_its_columns_stand_in_the_tables_of_flights(scratch: Scratch) -> None:
     assert row["gnss_noise_speed_rms_mps"] == answer["speed_rms_mps"]
     names = list(row)
     place = names.index("gnss_noise_start_s")
-    assert names[place : place + 3] == ["gnss_noise_start_s", "gnss_noise_speed_rms_mps", "findings_fail"]
+    assert names[place + 1] == "gnss_noise_speed_rms_mps" and place < names.index("findings_fail")
     table = pq.read_table(scratch.folder / "out" / "fleet.parquet")
     assert table["gnss_noise_start_s"].to_pylist() == [answer["start_s"]]
     assert json.loads(table.schema.metadata[b"columns"])["gnss_noise_speed_rms_mps"] == "speed shown in it"

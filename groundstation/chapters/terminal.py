@@ -8,22 +8,21 @@ from groundstation.chapters.wording import clean
 def terminal(section: Section) -> str:
     """A section as plain text, headed by its headline or its title.
 
-        The parts set small are left out, and figures, but for what stands in their place.
+    The parts set small are left out, and figures, but for what stands in their place.
 
-        Examples
-        --------
-        >>> from groundstation.base.text_columns import columns
-    from groundstation.chapters.parts import Head
-        >>> heads, rows = (Head("Gate"), Head("Figure", True)), [("Precision e", "0.022°"), ("Quality", "0.1°")]
-        >>> print(terminal(Section("heading", "Heading", "", (Note("Enter it.", "good"), Grid("Gates", heads, rows)))))
-        Heading
-        <BLANKLINE>
-        ✓ Enter it.
-        <BLANKLINE>
-        Gates
-        Gate         Figure
-        Precision e  0.022°
-        Quality        0.1°
+    Examples
+    --------
+    >>> from groundstation.chapters.parts import Head
+    >>> heads, rows = (Head("Gate"), Head("Figure", True)), [("Precision e", "0.022°"), ("Quality", "0.1°")]
+    >>> print(terminal(Section("heading", "Heading", "", (Note("Enter it.", "good"), Grid("Gates", heads, rows)))))
+    Heading
+    <BLANKLINE>
+    ✓ Enter it.
+    <BLANKLINE>
+    Gates
+    Gate         Figure
+    Precision e  0.022°
+    Quality        0.1°
     """
     told = (part_text(part) for part in (*section.above, *section.parts))
     return "\n\n".join(filter(None, (clean(section.headline or section.title), *told)))

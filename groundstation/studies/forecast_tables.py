@@ -210,12 +210,10 @@ def honesty_table(outcomes: dict[str, tuple[Outcome, ...]], flights_at_least: in
 
 def _flights_within(known: Sequence[Honesty]) -> FloatArray:
     """Share of the flights whose NEES lies within its 95 % limits, shape (methods, h)."""
-    from scipy.stats import chi2
-
     inside = []
     for honesty in known:
         freedom = 2.0 * honesty.independent
-        low, high = (chi2.ppf(part, freedom) / freedom for part in (TAIL, 1.0 - TAIL))
+        low, high = (chi_square_quantile(part, freedom) / freedom for part in (TAIL, 1.0 - TAIL))
         inside.append((honesty.nees >= low) & (honesty.nees <= high))
     return np.asarray(np.mean(inside, axis=0))
 
