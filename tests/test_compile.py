@@ -41,12 +41,23 @@ def is_above(values: np.ndarray, limit: float) -> bool:
     return False
 
 
+@in_place
+def sign(value: int) -> float:
+    """Sign of a number."""
+    return 1.0 if value > 0 else -1.0
+
+
 class Limits(NamedTuple):
     """What :func:`inside` is handed."""
 
     low: float
     highs: np.ndarray
     steps: tuple[int, ...]
+
+
+@in_place
+def _narrow(low: float) -> float:
+    return Limits(low, np.zeros(1), (1,)).low
 
 
 @in_place
@@ -68,7 +79,7 @@ def mean(values: np.ndarray) -> float:
 def kept_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of compiled code of its own, and loops that have found nothing yet."""
     monkeypatch.setattr(compiling, "_cache_folder", lambda: tmp_path)
-    for loop in (total, is_above, inside):
+    for loop in (total, is_above, inside, sign):
         monkeypatch.setattr(loop, "_linked", {})
     return tmp_path
 
@@ -87,17 +98,37 @@ def test_tuples_are_handed_on_by_name(kept_here: Path) -> None:
     assert inside(values, Limits(2.0, values + 1.0, (3, 0))) == 3  # of 0, 3, 6, 9
     assert inside(values, Limits(3.0, np.full(10, 9.0), (3, 0))) == 1
     assert len(list(kept_here.glob("*.machine_code"))) == 1
-    assert not compiling.is_first_run()
+    assert not compiling.keeps_nothing()
 
 
 def test_a_folder_without_compiled_code_is_that_of_a_first_run(kept_here: Path) -> None:
-    assert compiling.is_first_run()
+    assert compiling.keeps_nothing()
+
+
+def test_a_user_without_a_home_keeps_no_compiled_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_home(_path: Path) -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(compiling, "_is_writable", lambda _folder: False)
+    monkeypatch.setattr(Path, "expanduser", no_home)
+    assert compiling._cache_folder.__wrapped__() is None
+    monkeypatch.setattr(compiling, "_cache_folder", lambda: None)
+    monkeypatch.setattr(is_above, "_linked", {})
+    assert is_above(np.array([1.0, 2.0]), 1.5)
 
 
 def test_arrays_with_gaps_are_left_to_numba(kept_here: Path) -> None:
     table = np.arange(24).reshape(4, 6)
     assert total(table[:, ::2], 0, np.zeros(4)) == WEIGHT * table[:, ::2].sum()
     assert mean(np.array([1.0, 3.0])) == 2.0
+    assert not list(kept_here.glob("*.machine_code"))
+
+
+def test_numbers_that_the_machine_code_does_not_take_are_never_misread(kept_here: Path) -> None:
+    assert sign(2**63) == 1.0 and sign(np.uint64(2**64 - 1)) == 1.0 and sign(np.bool_(True)) == 1.0
+    assert forms_of((np.zeros(3).astype(np.dtype("f8").newbyteorder()),)) is None
     assert not list(kept_here.glob("*.machine_code"))
 
 
@@ -133,3 +164,6 @@ def test_what_a_loop_calls_and_its_constants_tell_its_code_apart(monkeypatch: py
     of_another_weight = digest_of(total.py_func, ())
     monkeypatch.setitem(globals(), "_weighted", Loop(lambda value: value, {"_nrt": False}))
     assert len({before, of_another_weight, digest_of(total.py_func, ())}) == 3
+    before = digest_of(_narrow.py_func, ())
+    monkeypatch.setitem(globals(), "Limits", NamedTuple("Limits", [("highs", float), ("low", float)]))
+    assert digest_of(_narrow.py_func, ()) != before

@@ -2,6 +2,7 @@
 
 import csv
 import math
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -16,7 +17,7 @@ from groundstation.base.records import Column, frozen
 from groundstation.exports.nmea import write_nmea
 from groundstation.exports.sbet import write_sbet
 from groundstation.exports.tracks import HALF_WIDTH, MSL, Track, tracks_of
-from groundstation.pipeline.verbs.export import export
+from groundstation.pipeline.verbs.export import WRITERS_OF_ONE, _written_alone, export
 from groundstation.results.figures import FigureData
 from groundstation.tables.table import Flight, Table
 
@@ -141,6 +142,50 @@ def test_our_reader_reads_the_trajectory_back(tmp_path: Path) -> None:
     assert np.allclose(read.values("latitude_deg"), track.latitude_deg, atol=1e-9)
 
 
+def test_leap_seconds_and_the_end_of_a_week_are_read_back(tmp_path: Path) -> None:
+    track = track_of("ins")
+    for name, before in (("sbet_20161231.out", "2016-12-31T23:59:56"), ("sbet_20170107.out", "2017-01-07T23:59:38")):
+        start_ns = int(np.datetime64(before, "ns").astype(np.int64))
+        moved = replace(track, time_ns=track.time_ns - START_NS + start_ns, start_ns=start_ns)
+        write_sbet(tmp_path / name, moved)
+        read = groundstation.open(tmp_path / name).flight["ins"]
+        assert np.abs(read.time_ns - moved.time_ns).max() < 1000, name
+
+
+def test_the_number_of_positions_that_sbet_leaves_out_is_told(tmp_path: Path) -> None:
+    track = track_of("ins")
+    lacking = {**track.columns, "roll_deg": np.where(np.arange(len(track)) < 3, math.nan, track.column("roll_deg"))}
+    told = _written_alone(WRITERS_OF_ONE[".out"], tmp_path / "a.out", (replace(track, columns=lacking),), False)
+    assert told == f"ins ({len(track) - 3}, 3 left out that lack what the format needs)"
+    assert (tmp_path / "a.out").stat().st_size == (len(track) - 3) * 136
+
+
+def test_moments_of_sentences_are_rounded(tmp_path: Path) -> None:
+    track = track_of("gnss")
+    write_nmea(tmp_path / "a.nmea", replace(track, time_ns=track.time_ns - 1))
+    (first, *_) = (tmp_path / "a.nmea").read_text(encoding="ascii").splitlines()
+    assert first.startswith("$GPGGA,060000.000,")
+
+
+def test_places_off_the_earth_and_heights_that_lack(tmp_path: Path) -> None:
+    from groundstation.exports.kml import write_kml
+
+    log = table(
+        "gnss",
+        np.arange(6.0),
+        latitude_deg=np.array([10.0, 912.0, 10.0, 10.0, 10.0, math.inf]),
+        longitude_deg=np.array([190.0, 10.0, 180.0, -180.0, 359.0, 0.0]),
+        altitude_msl_m=np.array([math.nan, 1.0, 100.0, math.nan, math.nan, 1.0]),
+        altitude_ellipsoid_m=np.array([math.nan, 1.0, 120.0, math.nan, 140.0, 1.0]),
+    )
+    (track,) = tracks_of(Flight({"gnss": log}, {}, START_NS, True, "b.csv"), {})
+    assert track.longitude_deg.tolist() == [-170.0, 180.0, -180.0, -1.0] and np.all(track.latitude_deg == 10.0)
+    write_kml(tmp_path / "a.kml", "b", [track])
+    root = ET.parse(tmp_path / "a.kml").getroot()
+    assert "above the ellipsoid" in str(root.findtext(f".//{KML}description"))
+    assert [str(one.text).split()[2] for one in root.iter(f"{GX}coord")] == ["120", "120", "130", "140"]
+
+
 def test_what_a_format_needs_and_the_flight_lacks_is_told(tmp_path: Path) -> None:
     (gnss, ins) = tracks_of(flight(altitude_ellipsoid_m=None), {})
     with pytest.raises(NotAssessableError, match="ins: found no position with altitude above the ellipsoid"):
@@ -191,7 +236,7 @@ def test_a_flight_becomes_a_table(tmp_path: Path) -> None:
         "latitude_deg"
     ).tolist()
     assert rows[0]["time_utc"].startswith("2026-05-04T06:00:0")
-    export(log, tmp_path / "a.parquet", names=["gnss"])
+    export(log, tmp_path / "a.parquet", names=["gnss", "gnss"])
     assert pq.read_table(tmp_path / "a.parquet").num_rows == len(gnss)
 
 

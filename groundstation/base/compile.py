@@ -54,15 +54,18 @@ def _cache_folder() -> Path | None:
     beside = Path(__file__).parent / "__pycache__"
     if _is_writable(beside):
         return beside
-    user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "groundstation" / "numba"
+    try:
+        user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "groundstation" / "numba"
+    except RuntimeError:  # a user whom the machine does not know, as in many containers, has no home
+        return None
     if _is_writable(user_cache):
         os.environ["NUMBA_CACHE_DIR"] = str(user_cache)
         return user_cache
     return None
 
 
-def is_first_run() -> bool:
-    """Whether nothing that was compiled is kept yet: what a log needs takes some seconds more, once."""
+def keeps_nothing() -> bool:
+    """Whether nothing compiled is kept: what a log needs of it (a flat CSV needs nothing) takes some seconds more."""
     folder = _cache_folder()
     return folder is None or not any(folder.glob(f"*{SUFFIX}"))
 

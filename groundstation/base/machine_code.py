@@ -42,7 +42,10 @@ Form = str | tuple[str, int] | Group  # of an argument: INTEGER, NUMBER, dtype a
 
 
 def forms_of(arguments: Sequence[Any]) -> tuple[Form, ...] | None:
-    """Forms of what a loop is handed; None where it is more than numbers, arrays without gaps, and tuples of those.
+    """Forms of what a loop is handed; None where it is more than numbers of 64 bits, arrays without gaps in the byte
+    order of this machine, and tuples of those.
+
+    Whether an array is read-only does not matter: a loop that writes to one that is would do it.
 
     Examples
     --------
@@ -53,10 +56,12 @@ def forms_of(arguments: Sequence[Any]) -> tuple[Form, ...] | None:
     for one in arguments:
         if isinstance(one, np.ndarray):
             is_plain = one.ndim > 0 and one.flags.c_contiguous and one.flags.aligned
-            if not is_plain or one.dtype.name not in ARRAY_DTYPES:
+            if not is_plain or not one.dtype.isnative or one.dtype.name not in ARRAY_DTYPES:
                 return None
             forms.append((one.dtype.name, one.ndim))
-        elif isinstance(one, int | np.integer | np.bool_):
+        elif isinstance(one, int | np.integer):
+            if not -(2**63) <= one < 2**63:
+                return None
             forms.append(INTEGER)
         elif isinstance(one, float | np.floating):
             forms.append(NUMBER)
@@ -127,7 +132,7 @@ def digest_of(function: Callable[..., Any], forms: Sequence[Form]) -> bytes:
 
     from llvmlite import __version__, binding
 
-    told = hashlib.sha256(repr((forms, version("numba"), __version__)).encode())
+    told = hashlib.sha256(repr((forms, entry_source(function, forms)[0], version("numba"), __version__)).encode())
     told.update(f"{binding.get_host_cpu_name()} {binding.get_host_cpu_features().flatten()}".encode())
     told.update(binding.get_process_triple().encode())
     seen: set[int] = set()
@@ -145,6 +150,8 @@ def digest_of(function: Callable[..., Any], forms: Sequence[Form]) -> bytes:
                     tell(called)
             elif isinstance(value, bool | int | float | str | tuple):
                 told.update(repr((name, value)).encode())
+            elif isinstance(value, type):
+                told.update(repr((name, getattr(value, "_fields", ()))).encode())
 
     tell(function)
     return told.digest()

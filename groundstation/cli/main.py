@@ -216,9 +216,8 @@ def run(
         planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)
         return DONE
-    run_logs = partial(run_many, jobs=jobs, scheduler=scheduler, redo=redo, stations=stations)
-    if together:
-        run_logs = partial(run_together)
+    run_apart = partial(run_many, jobs=jobs, scheduler=scheduler, redo=redo, stations=stations)
+    run_logs = run_together if together else run_apart  # logs are joined anew at every run, in this process
     try:
         with listener("none" if quiet else progress) as listen:
             outcomes = run_logs(

@@ -15,19 +15,19 @@ def listener(mode: Literal["auto", "none", "json"]) -> Iterator[Listener]:
     if mode == "json":
         yield _as_json
     elif mode == "auto" and sys.stderr.isatty():
-        _tell_first_run()
+        _tell_of_compiling()
         with _bar() as listen:
             yield listen
     else:
         yield silent
 
 
-def _tell_first_run() -> None:
-    """Say why the first log of a format takes long, where nothing is compiled yet."""
-    from groundstation.base.compile import is_first_run
+def _tell_of_compiling() -> None:
+    """Say why the first log of a format takes long, where nothing is compiled yet or nothing can be kept."""
+    from groundstation.base.compile import keeps_nothing
 
-    if is_first_run():
-        sys.stderr.write("first run on this machine: loops over the bytes of a log are compiled once, some seconds\n")
+    if keeps_nothing():
+        sys.stderr.write("no compiled code is kept here yet: what a log needs of it is compiled first, some seconds\n")
 
 
 def _as_json(event: Event) -> None:

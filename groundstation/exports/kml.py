@@ -20,7 +20,8 @@ def write_kml(path: Path, title: str, tracks: Sequence[Track]) -> None:
     """Write a folder with a placemark for each track; what is known of every position goes with it.
 
     With UTC a track moves with the time slider; without, it is a line. KML knows altitudes above sea level alone; where
-    a track has none another is written, and the description says which.
+    it is known of fewer positions another is written, and the description says which. KML has no mark for an altitude
+    that is missing: between two that are known it is interpolated, before and behind them they are held.
     """
     ET.register_namespace("", KML)
     ET.register_namespace("gx", GX)
@@ -65,18 +66,23 @@ def _timed(place: ET.Element, track: Track) -> None:
 
 def _line(place: ET.Element, track: Track) -> None:
     shape = _sub(place, "LineString")
+    _sub(shape, "tessellate", "1")  # on the ground it follows the terrain
     _sub(shape, "altitudeMode", "absolute" if _altitude(track) else "clampToGround")
     _sub(shape, "coordinates", " ".join(",".join(spot) for spot in _spots(track)))
 
 
 def _altitude(track: Track) -> str:
-    """Column of the best altitude, empty where there is none."""
-    return next((name for name in ALTITUDES if np.isfinite(track.column(name)).any()), "")
+    """Column of the altitude that most positions have, the best of several; empty where there is none."""
+    known = {name: np.count_nonzero(np.isfinite(track.column(name))) for name in ALTITUDES}
+    best = max(ALTITUDES, key=lambda name: known[name])  # the first of equals
+    return best if known[best] else ""
 
 
 def _spots(track: Track) -> list[tuple[str, str, str]]:
-    altitude = np.nan_to_num(track.column(_altitude(track))).tolist()
-    both = zip(coordinates(track.longitude_deg), coordinates(track.latitude_deg), altitude, strict=True)
+    altitude, time_s = track.column(_altitude(track)), track.time_s
+    known = np.isfinite(altitude)
+    altitude = np.interp(time_s, time_s[known], altitude[known]) if known.any() else np.zeros(len(track))
+    both = zip(coordinates(track.longitude_deg), coordinates(track.latitude_deg), altitude.tolist(), strict=True)
     return [(longitude, latitude, number(height, 3)) for longitude, latitude, height in both]
 
 

@@ -12,6 +12,7 @@ from groundstation.exports.tracks import MSL, SPEED, Track
 
 KNOT_MPS = 1852.0 / 3600.0
 AUTONOMOUS = 1  # quality of GGA: a fix, its kind is not said
+NS_PER_MS = 1_000_000
 MINUTE_DIGITS = 7  # 0.2 mm
 
 
@@ -31,7 +32,7 @@ def write_nmea(path: Path, track: Track) -> None:
 
 
 def _bodies(track: Track, row: int) -> list[str]:
-    moment = np.datetime64(int(track.time_ns[row]), "ns").astype("datetime64[ms]").item()
+    moment = np.datetime64((int(track.time_ns[row]) + NS_PER_MS // 2) // NS_PER_MS, "ms").item()
     clock = f"{moment:%H%M%S}.{moment.microsecond // 1000:03d}"
     place = f"{_angle(float(track.latitude_deg[row]), 2, 'NS')},{_angle(float(track.longitude_deg[row]), 3, 'EW')}"
     satellites, hdop = (float(track.column(name)[row]) for name in ("satellites_used", "hdop"))
@@ -40,7 +41,7 @@ def _bodies(track: Track, row: int) -> list[str]:
     gga = f"GPGGA,{clock},{place},{AUTONOMOUS},{used},{number(hdop, 2)},{height},{'M' if height else ''},,,,"
     speed = number(float(track.column(SPEED)[row]) / KNOT_MPS, 4)
     rmc = f"GPRMC,{clock},A,{place},{speed},{_course(track, row)},{moment:%d%m%y},,,A"
-    heading = number(float(track.column("true_heading_deg")[row]), 4)
+    heading = _direction(float(track.column("true_heading_deg")[row]))
     return [gga, rmc, *([f"GPHDT,{heading},T"] if heading else [])]
 
 
@@ -48,8 +49,19 @@ def _course(track: Track, row: int) -> str:
     course = float(track.column("track_deg")[row])
     if not math.isfinite(course):
         north, east = (float(track.column(f"velocity_{axis}_mps")[row]) for axis in ("north", "east"))
-        course = float(wrap_360(direction_of(north, east)))
-    return number(course, 4)
+        course = float(direction_of(north, east))
+    return _direction(course)
+
+
+def _direction(value_deg: float) -> str:
+    """Degrees from 0 to less than 360, as they are written.
+
+    Examples
+    --------
+    >>> _direction(359.99999), _direction(-90.0), _direction(math.nan)
+    ('0', '270', '')
+    """
+    return number(float(wrap_360(round(value_deg, 4))), 4)
 
 
 def _angle(value_deg: float, digits: int, signs: str) -> str:

@@ -11,6 +11,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.exports.tracks import ELLIPSOID, Track
 from groundstation.readers.sbet import RECORD, S_PER_WEEK
 
+NS_PER_DAY = 86_400 * NS_PER_S
 NEEDED = (
     ELLIPSOID,
     "velocity_north_mps",
@@ -42,7 +43,8 @@ def write_sbet(path: Path, track: Track) -> int:
             track.name, "no position with altitude above the ellipsoid, velocity and attitude", "an INS with them"
         )
     records = np.zeros(int(np.count_nonzero(known)), RECORD)
-    leap_s = leap_seconds_at(int(track.time_ns[0]))
+    days, day = np.unique(track.time_ns[known] // NS_PER_DAY, return_inverse=True)
+    leap_s = np.array([leap_seconds_at(int(one) * NS_PER_DAY) for one in days])[day]  # they come at midnight
     gps_ns = track.time_ns[known] - GPS_EPOCH_NS + leap_s * NS_PER_S
     week_ns = gps_ns[0] // (S_PER_WEEK * NS_PER_S) * S_PER_WEEK * NS_PER_S
     records["time"] = (gps_ns - week_ns) / NS_PER_S

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from groundstation.base.angles import FloatArray, interpolate_heading
+from groundstation.base.angles import FloatArray, interpolate_heading, wrap_180
 from groundstation.base.ellipse import ELLIPSE_95, principal_axes
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
@@ -16,10 +16,11 @@ from groundstation.tables.table import Flight, Table
 
 POSITION = ("latitude_deg", "longitude_deg")
 MSL, ELLIPSOID, PRESSURE = "altitude_msl_m", "altitude_ellipsoid_m", "pressure_altitude_m"
+ALTITUDES = (MSL, ELLIPSOID, PRESSURE)
 MOVES = ("velocity_north_mps", "velocity_east_mps", "velocity_down_mps", "roll_deg", "pitch_deg")
 DIRECTIONS = ("track_deg", "true_heading_deg")
 OF_THE_FIX = ("hdop", "satellites_used")
-BRIDGED_S = 0.25  # attitude and velocity of other rows are interpolated over at most so long
+BRIDGED_S = 0.25  # altitude, attitude and velocity of other rows are interpolated over at most so long
 SPEED, HALF_WIDTH = "ground_speed_mps", "horizontal95_m"
 # Tracks of the estimator: what begins their columns, and what they are.
 MADE = {
@@ -79,18 +80,19 @@ def tracks_of(flight: Flight, figures: Mapping[str, FigureData]) -> tuple[Track,
 
 
 def _logged(flight: Flight, table: Table) -> Track | None:
-    known = np.isfinite(table.values(POSITION[0])) & np.isfinite(table.values(POSITION[1]))
-    known &= table.values("integrity_ok") != 0.0
-    placed = table.take(known)
+    table = table.take(table.values("integrity_ok") != 0.0)
+    # A latitude beyond the poles is no place on Earth; a longitude may count from 0 to 360.
+    placed = table.take((np.abs(table.values(POSITION[0])) <= 90.0) & np.isfinite(table.values(POSITION[1])))
     time_s, at_s = flight.seconds(table.time_ns), flight.seconds(placed.time_ns)
-    columns = {name: placed.values(name) for name in (MSL, ELLIPSOID, PRESSURE, *OF_THE_FIX) if placed.has(name)}
-    for name in (*MOVES, *DIRECTIONS):
+    columns = {name: placed.values(name) for name in OF_THE_FIX if placed.has(name)}
+    for name in (*ALTITUDES, *MOVES, *DIRECTIONS):
         if table.has(name):
             columns[name] = _bridged(at_s, time_s, table.values(name), is_direction=name in DIRECTIONS)
     speed = horizontal_speed_mps(table)
     if np.isfinite(speed).any():
         columns[SPEED] = _bridged(at_s, time_s, speed)
-    place = (placed.values(POSITION[0]), placed.values(POSITION[1]))
+    longitude = placed.values(POSITION[1])
+    place = (placed.values(POSITION[0]), np.where(np.abs(longitude) > 180.0, wrap_180(longitude), longitude))
     return Track(
         table.topic, f"{table.topic} as logged", placed.time_ns, flight.start_ns, flight.has_utc, *place, columns
     )

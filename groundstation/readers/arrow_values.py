@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray
 
+_FLOATS = {"float": "float32", "double": "float64"}  # to numpy "float" is one of 64 bits
 NO_TEXT = pa.nulls(1, pa.string())[0]
 
 
@@ -70,8 +71,10 @@ def values(array: Any, filler: float | int) -> NDArray[Any]:
     --------
     >>> values(pc.cast(texts(["1.5", "2"]), pa.float64()), 0.0).tolist()
     [1.5, 2.0]
+    >>> values(pc.cast(texts(["1.5", "2"]), pa.float32())[1:], 0.0).tolist()
+    [2.0]
     """
-    dtype = np.dtype(str(array.type).replace("double", "float64"))
+    dtype = np.dtype(_FLOATS.get(str(array.type), str(array.type)))
     if not len(array):
         return np.zeros(0, dtype)
     numbers = np.frombuffer(array.buffers()[1], dtype, count=len(array), offset=array.offset * dtype.itemsize)

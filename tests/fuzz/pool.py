@@ -91,7 +91,7 @@ def run_all(cases: Iterable[Case], limit_s: float = LIMIT_S) -> Iterator[tuple[C
                 break
             code, child = child.end(), None
         if found is None:
-            how = f"over {limit_s} s" if code is None else f"the process ended with {code}"
+            how = f"no answer in {WALL * limit_s:.0f} s" if code is None else f"the process ended with {code}"
             found = {"came_to": "hang" if code is None else "death", "fault": how, "seconds": limit_s, "growth_mb": 0.0}
         elif found["seconds"] > limit_s and not found["fault"]:
             found |= {"came_to": "hang", "fault": f"{found['seconds']:.1f} s of processor time, limit {limit_s} s"}

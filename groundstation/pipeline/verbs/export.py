@@ -54,9 +54,9 @@ def export(
         target.parent.mkdir(parents=True, exist_ok=True)
         if suffix in WRITERS:
             WRITERS[suffix](target, flight.source_name, tracks)
+            told = ", ".join(f"{track.name} ({len(track)})" for track in tracks)
         else:
-            tracks = (_written_alone(WRITERS_OF_ONE[suffix], target, tracks, bool(names)),)
-    told = ", ".join(f"{track.name} ({len(track)})" for track in tracks)
+            told = _written_alone(WRITERS_OF_ONE[suffix], target, tracks, bool(names))
     return Outcome(str(path), "data_lost" if has_lost else "done", f"-> {target}: {told}", folder=str(target))
 
 
@@ -98,20 +98,19 @@ def _wanted(tracks: tuple[Track, ...], names: Sequence[str], source: str) -> tup
     for name in names:
         if name not in by_name:
             raise UsageError(f"track {name}", f"not in {source}", f"one of {', '.join(by_name)}")
-    return tuple(by_name[name] for name in names) if names else tracks
+    return tuple(by_name[name] for name in dict.fromkeys(names)) if names else tracks
 
 
-def _written_alone(
-    write: Callable[[Path, Track], object], target: Path, tracks: tuple[Track, ...], is_named: bool
-) -> Track:
-    """Write the one track of a format: the one named, else the first that has what the format needs."""
+def _written_alone(write: Callable[[Path, Track], int], target: Path, tracks: tuple[Track, ...], is_named: bool) -> str:
+    """Write the one track of a format: the one named, else the first that has what the format needs. Tells of it."""
     if is_named and len(tracks) > 1:
         raise UsageError(str(target), f"{len(tracks)} tracks", "one", "name one --track")
     reasons = []
     for track in tracks:
         try:
-            write(target, track)
-            return track
+            left_out = write(target, track)
+            lacking = f", {left_out} left out that lack what the format needs" if left_out else ""
+            return f"{track.name} ({len(track) - left_out}{lacking})"
         except NotAssessableError as error:
             reasons.append(error)
     raise reasons[-1]
@@ -141,16 +140,17 @@ def _parquet(path: Path, _title: str, tracks: Sequence[Track]) -> None:
     write_parquet(path, tracks)
 
 
-def _nmea(path: Path, track: Track) -> None:
+def _nmea(path: Path, track: Track) -> int:
     from groundstation.exports.nmea import write_nmea
 
     write_nmea(path, track)
+    return 0
 
 
-def _sbet(path: Path, track: Track) -> None:
+def _sbet(path: Path, track: Track) -> int:
     from groundstation.exports.sbet import write_sbet
 
-    write_sbet(path, track)
+    return write_sbet(path, track)
 
 
 WRITERS: Mapping[str, Callable[[Path, str, Sequence[Track]], None]] = {
@@ -159,4 +159,4 @@ WRITERS: Mapping[str, Callable[[Path, str, Sequence[Track]], None]] = {
     ".csv": _csv,
     ".parquet": _parquet,
 }
-WRITERS_OF_ONE: Mapping[str, Callable[[Path, Track], None]] = {".nmea": _nmea, ".sbet": _sbet, ".out": _sbet}
+WRITERS_OF_ONE: Mapping[str, Callable[[Path, Track], int]] = {".nmea": _nmea, ".sbet": _sbet, ".out": _sbet}
