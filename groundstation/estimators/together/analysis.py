@@ -110,9 +110,9 @@ def _sentence(answers: Answers) -> str:
         return ""
     parts = []
     for log in answer.logs:
-        known = [one.half_width95_s for one in log.stretches if one.half_width95_s is not None]
+        known = [one.largest_half_width95_s for one in log.stretches if one.largest_half_width95_s is not None]
         if log.method != "own_clock":
-            parts.append(f"{log.source_name} to +- {min(known):.3f} s" if known else f"{log.source_name} by file time")
+            parts.append(f"{log.source_name} to +- {max(known):.3f} s" if known else f"{log.source_name} by file time")
     return f"{len(answer.logs)} logs on one clock ({', '.join(parts)})"
 
 
