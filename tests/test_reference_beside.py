@@ -152,7 +152,11 @@ def test_what_cannot_judge_is_refused_in_one_line(folder: Path, flown: Flight, t
         with pytest.raises(GroundstationError, match=told) as raised:
             converted(used, tmp_path / "x.mcap", *references)
         assert "\n" not in str(raised.value)
-    for used in (log, no_time):
+    stored = tmp_path / "notime.mcap"
+    converted(no_time, stored)
+    with pytest.raises(GroundstationError, match="a log without UTC"):
+        converted(stored, tmp_path / "x.mcap", good)
+    for used in (log, no_time, stored):
         made, flight = converted(used, tmp_path / "x.mcap", other_day, is_expected=False)
         assert "truth" not in flight
         assert "reference.none" in {finding.code for finding in made.findings}
