@@ -283,6 +283,9 @@ def test_another_place_datum_and_a_coarse_reference_are_told() -> None:
     far = judged(ride(np.array([5_000.0, 0.0])))
     assert not far.is_judge
     assert "5.0 km away" in far.reason
+    flight = ride(np.array([5_000.0, 0.0]))
+    later = replace(flight, tables={"truth": flight["truth"], "gnss.b": replace(flight["gnss"], topic="gnss.b")})
+    assert "5.0 km away" in judged(later).reason
     assert "datum" in codes(ride(np.array([90.0, 70.0])))["reference.constant_offset"]
     rng = np.random.default_rng(14)
     flight = ride(rng.normal(0.0, 1.0, (3_000, 2)), horizontal_sigma_m=1.4)

@@ -30,10 +30,12 @@ def standing_of(
     listed: Sequence[Errors], rows: Sequence[ErrorRow], gross_s: float, settings: ReferenceSettings
 ) -> Standing:
     """Find what takes from a reference the right to judge."""
+    subjects = [errors.subject for errors in listed]
+    first = [next((one for one in subjects if kind_of(one) == kind), "") for kind in ("gnss", "ins")]
     for errors in listed:
         distance = errors.horizontal_m[np.isfinite(errors.horizontal_m)]
         farthest = settings.far_m * (1.0 if kind_of(errors.subject) == "gnss" else INS_FARTHER)
-        if distance.size and float(np.median(distance)) > farthest and errors.subject in ("gnss", "ins"):
+        if distance.size and float(np.median(distance)) > farthest and errors.subject in first:
             return Standing(False, f"it is {np.median(distance) / 1000.0:.1f} km away: another vehicle or place")
     if gross_s:
         return Standing(False, f"its clock is {abs(gross_s):.1f} s {'fast' if gross_s < 0 else 'slow'} by motion")
