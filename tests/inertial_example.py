@@ -295,7 +295,7 @@ def forecast_result(duration_s: float = LONG_S, **changes: Any) -> ForecastResul
             for method, share, nees in (("drift_windows", 0.94, 1.1), ("windows", 0.81, 2.3))
             for h in (10, 30, 60, 90, 120)
         ),
-        coupled=tuple(CoupledRow(float(h), 0.3 * RAW_M[h], 0.02) for h in (10, 30, 60, 90, 120)),
+        coupled=tuple(CoupledRow(float(h), 0.98 * FACTORS["last_estimate"] * RAW_M[h], 0.02) for h in HORIZONS_MIN),
         best_method={str(horizon): "drift_windows" for horizon in HORIZONS_MIN},
         figures=forecast_figures(duration_s),
     )

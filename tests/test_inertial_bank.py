@@ -1,6 +1,7 @@
 """The bank of noise sets: coarse epochs, weights from finished outages alone, a mixture that says how far it is off."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -155,3 +156,12 @@ def test_the_white_part_of_gnss_falls_with_the_samples_averaged() -> None:
     noise = GnssNoise(4.0, 3.0, 300.0, 0.2, 0.1, 60.0).averaged(16.0)
     assert (noise.position_white_m, noise.position_correlated_m) == (1.0, 3.0)
     assert (noise.velocity_white_mps, noise.velocity_correlated_mps) == (0.05, 0.1)
+
+
+def test_a_class_file_may_leave_the_scales_of_other_models_out(tmp_path: Path) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text("[calibration]\nhorizon_min = [10.0, 60.0]\nscale = [1.2, 1.5]\n", encoding="utf-8")
+    calibration = load_class(str(file)).calibration
+    lead_s = np.array([600.0, 3600.0])
+    assert calibration.at(lead_s).tolist() == pytest.approx([1.2, 1.5])
+    assert calibration.at(lead_s, "coupled").tolist() == calibration.at(lead_s, "bank").tolist() == [1.0, 1.0]

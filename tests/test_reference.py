@@ -246,6 +246,22 @@ def test_a_turned_path_is_turned_back() -> None:
     assert rows["shift_and_yaw"].yaw_deg == pytest.approx(-2.0)
 
 
+def test_the_corrected_heading_is_interpolated_across_north(answered: Answered) -> None:
+    time_s, place, _velocity, heading = motion()
+    nose_deg = np.unwrap(heading, period=360.0) + 40.0
+    between_s = time_s[:-2:3] + 0.1  # a reference with other, fewer samples
+    middle = np.stack([np.interp(between_s, time_s, axis) for axis in place.T], axis=1)
+    true_deg = np.interp(between_s, time_s, nose_deg) % 360.0
+    true = table("truth", between_s, middle, true_heading_deg=true_deg)
+    ins = table("ins", time_s, place, true_heading_deg=(nose_deg + 3.0) % 360.0)
+    flight = Flight({"truth": true, "ins": ins}, {}, START_NS, True)
+    found = replace(answered.answers["heading"], ins_topic="ins", error_deg=3.0)
+    known = Known(flight_phases(flight.without("truth")), answers={"heading": found})
+    row = REFERENCE.run(flight, known, ReferenceSettings()).answer.error("heading", "attitude", "heading")
+    assert row is not None
+    assert max(abs(row.spread.smallest), abs(row.spread.largest)) < 1e-6
+
+
 def test_a_clock_off_by_leap_seconds_judges_nothing_until_it_is_shifted() -> None:
     flight = ride(np.array([2.0, 0.0]))
     truth = flight["truth"]
@@ -254,7 +270,9 @@ def test_a_clock_off_by_leap_seconds_judges_nothing_until_it_is_shifted() -> Non
     assert not answer.is_judge
     assert "clock" in answer.reason
     told = codes(late)["reference.clock"]
+    assert "the log shows the motion 18.00 s earlier" in told
     assert "leap seconds" in told
+    assert judged(late).reason == "its clock is 18.0 s fast by motion"
     assert "clock_offset_s = -18.00" in told
     mended = judged(late, clock_offset_s=-18.0)
     assert mended.is_judge
@@ -265,6 +283,9 @@ def test_another_place_datum_and_a_coarse_reference_are_told() -> None:
     far = judged(ride(np.array([5_000.0, 0.0])))
     assert not far.is_judge
     assert "5.0 km away" in far.reason
+    flight = ride(np.array([5_000.0, 0.0]))
+    later = replace(flight, tables={"truth": flight["truth"], "gnss.b": replace(flight["gnss"], topic="gnss.b")})
+    assert "5.0 km away" in judged(later).reason
     assert "datum" in codes(ride(np.array([90.0, 70.0])))["reference.constant_offset"]
     rng = np.random.default_rng(14)
     flight = ride(rng.normal(0.0, 1.0, (3_000, 2)), horizontal_sigma_m=1.4)

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.base.records import Column
 from groundstation.base.timescales import GPS_EPOCH_NS, leap_seconds_at
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.references import judged_by
+from groundstation.pipeline.one_flight import reference as beside
 from groundstation.pipeline.one_flight.analyse import analyse
 from groundstation.pipeline.one_flight.configuration import NO_REFERENCES, Configuration, References
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
@@ -150,7 +152,11 @@ def test_what_cannot_judge_is_refused_in_one_line(folder: Path, flown: Flight, t
         with pytest.raises(GroundstationError, match=told) as raised:
             converted(used, tmp_path / "x.mcap", *references)
         assert "\n" not in str(raised.value)
-    for used in (log, no_time):
+    stored = tmp_path / "notime.mcap"
+    converted(no_time, stored)
+    with pytest.raises(GroundstationError, match="a log without UTC"):
+        converted(stored, tmp_path / "x.mcap", good)
+    for used in (log, no_time, stored):
         made, flight = converted(used, tmp_path / "x.mcap", other_day, is_expected=False)
         assert "truth" not in flight
         assert "reference.none" in {finding.code for finding in made.findings}
@@ -183,6 +189,36 @@ def test_folders_of_references(folder: Path, tmp_path: Path) -> None:
     configuration = judged_by(Configuration(), [folder / "references"], is_one_log=True)
     (outcome,) = convert_many([folder / "flight.csv"], tmp_path / "a.mcap", configuration=configuration)
     assert outcome.state == "done"
+
+
+def test_of_a_folder_a_flight_takes_the_file_of_its_time(
+    folder: Path, flown: Flight, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What cannot be read is told; a file of another time is read once, however many flights are judged."""
+    references = [tmp_path / f"sbet_2020010{day}.out" for day in range(1, 7)]
+    for path in references:
+        path.write_bytes((folder / "references" / "sbet.out").read_bytes())
+    no_time = tmp_path / "notime.csv"
+    no_time.write_text("time_s,ins.latitude_deg,ins.longitude_deg\n0,1,1\n1,1,1\n", encoding="utf-8")
+    own_time = folder / "references" / "sbet.out"
+    opened: list[Path] = []
+    monkeypatch.setattr(beside, "open_log", lambda path: opened.append(path) or open_log(path))
+    for number in range(2):
+        paths = (*references, no_time, own_time)
+        made, flight = converted(folder / "flight.csv", tmp_path / f"{number}.mcap", *paths, is_expected=False)
+        assert len(flight["truth"]) == len(flown["truth"].unique_times())
+        assert [one.severity for one in made.findings if one.code == "reference.unreadable"] == ["warn"]
+    assert [opened.count(path) for path in references] == [1] * 6
+
+
+def test_what_a_reference_does_not_trust_is_no_truth(folder: Path, flown: Flight, tmp_path: Path) -> None:
+    true = replace(flown["truth"], topic="ins")
+    modes = np.where(np.arange(len(true)) < 50, "align", "nav")
+    other = tmp_path / "other.csv"
+    marked = replace(true, columns={**true.columns, "mode": Column(modes)})
+    write_flat_csv(other, replace(flown, tables={"ins": marked}))
+    _made, flight = converted(folder / "flight.csv", tmp_path / "a.mcap", other)
+    assert len(flight["truth"]) == len(true) - 50
 
 
 def test_gps_time_of_a_recorded_solution_becomes_utc(tmp_path: Path) -> None:

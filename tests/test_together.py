@@ -8,23 +8,27 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import UsageError
-from groundstation.base.records import Column
+from groundstation.base.records import Column, RecordBatch
 from groundstation.base.units import NS_PER_S
 from groundstation.chapters.together import together as chapter
 from groundstation.estimators.analyses import ANSWER_TYPES
+from groundstation.estimators.heading.samples import choose_topics
+from groundstation.estimators.heading.settings import HeadingRequest
 from groundstation.estimators.latency.signals import pairs_of
 from groundstation.estimators.overview import overview
 from groundstation.estimators.two_clocks.relation import NotOneFlightError
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.convert import Converted
+from groundstation.pipeline.one_flight.convert import Converted, convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.join import join_logs
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.results.figures import numbers
 from groundstation.results.files import load
 from groundstation.results.together import Together
+from groundstation.store.reader import read
+from groundstation.store.writer import StoreWriter
 from groundstation.tables.motion import motion_of
-from groundstation.tables.sources import TOGETHER, ranked, sources_of_kind, why_first
+from groundstation.tables.sources import TOGETHER, ranked, said_of, sources_of_kind, why_first
 from groundstation.tables.table import Flight, Table
 from tests.test_formats_agree import as_dataflash, as_ubx, as_ulog
 from tests.test_verbs import groundstation
@@ -55,6 +59,8 @@ def test_topics_of_later_logs_end_in_their_letter_and_nothing_is_lost(joined: tu
     assert set(converted.info.ledger.topics) == set(flight.topics())
     assert converted.info.source_name == "a.ulg + b.ubx + c.bin"
     assert "derived.ins.c.true_heading_deg" in flight.metadata
+    assert said_of(flight, "ins.b", "ins_kind") == "gnss_aided"
+    assert not said_of(flight, "ins", "ins_kind")
 
 
 def test_logs_of_three_formats_are_joined_to_20_ms(joined: tuple[Converted, Flight]) -> None:
@@ -66,11 +72,27 @@ def test_logs_of_three_formats_are_joined_to_20_ms(joined: tuple[Converted, Flig
         assert np.max(np.abs(error_s)) <= min(half_s, WITHIN_S)
 
 
+def test_a_receivers_track_in_a_later_log_is_no_heading(logs: Path, tmp_path: Path) -> None:
+    """What a reader says of a field goes with it under its new name; an INS of another log is used instead."""
+    receiver = tmp_path / "receiver.mcap"
+    info = convert_log(open_log(logs / "b.ubx"), receiver).info
+    told = {**info.metadata, "heading_is_track.ins.true_heading_deg": "same in 9 of 9"}
+    marked = tmp_path / "marked.mcap"
+    with StoreWriter(marked, replace(info, metadata=told)) as writer:
+        for item in read(receiver):
+            if isinstance(item, RecordBatch):
+                writer.write(item)
+    for names in (("a.ulg", marked), (marked, "a.ulg")):
+        target = tmp_path / "joined.mcap"
+        flight = read_flight(target, join_logs([open_log(logs / name) for name in names], target))
+        ins, other = ("ins", "ins.b") if names[0] == "a.ulg" else ("ins.b", "ins")
+        assert f"heading_is_track.{other}.true_heading_deg" in flight.metadata
+        assert choose_topics(flight, HeadingRequest())[0] == ins
+
+
 def test_the_first_logs_times_and_values_are_as_without_the_others(
     joined: tuple[Converted, Flight], logs: Path
 ) -> None:
-    from groundstation.pipeline.one_flight.convert import convert_log
-
     alone = read_flight(logs / "alone.mcap", convert_log(open_log(logs / "a.ulg"), logs / "alone.mcap"))
     for topic in alone.topics():
         np.testing.assert_array_equal(joined[1][topic].time_ns, alone[topic].time_ns)

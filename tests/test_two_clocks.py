@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from groundstation.base.clock import Clock, RelationEntry, SegmentEntry
+from groundstation.base.normal import NORMAL_95
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.two_clocks.gnss_time import GnssStretch, GnssTime, gnss_time_of
 from groundstation.estimators.two_clocks.relate import relate
-from groundstation.estimators.two_clocks.relation import NotOneFlightError, TimedLog
+from groundstation.estimators.two_clocks.relation import LogRelation, NotOneFlightError, Stretch, TimedLog
 from groundstation.tables.table import Flight
 from tests.two_clocks_example import RECEIVER_TIME, UTC_NS, Twice, recorded_twice, retimed, with_gnss_time
 
@@ -51,6 +52,14 @@ def test_motion_alone_places_a_log_on_a_clock_of_its_own(twice: Twice) -> None:
     assert found.method == "motion"
     assert (np.abs(error_s) <= half_s).all()
     assert abs(error_s[1]) <= LIVELY_S
+
+
+def test_a_clock_that_was_set_many_times_has_as_many_stretches() -> None:
+    stretches = tuple(Stretch(10.0 * n, 10.0 * n, float(n), 0.5 * n, 0.0, 0.0, "gnss_time") for n in range(100))
+    found = LogRelation(0, 0, (replace(stretches[0], begin_s=-np.inf), *stretches[1:]))
+    own_ns = np.array([5, 15, 995]) * NS_PER_S
+    assert found.first_time_ns(own_ns).tolist() == [5 * NS_PER_S, 16 * NS_PER_S, 1094 * NS_PER_S]
+    assert found.half_width95_s(own_ns) == pytest.approx(NORMAL_95 * np.array([0.0, 0.5, 49.5]))
 
 
 def test_either_log_may_be_the_first(twice: Twice) -> None:

@@ -100,12 +100,12 @@ def _too_few(answer: ForecastResult) -> set[float]:
 
 
 def _windows(answer: ForecastResult) -> Note | None:
-    """Whether the windows of Neusypin 2003 help on this flight."""
-    windows, last = rows_of(answer, "windows"), rows_of(answer, "last_estimate")
+    """Whether the windows of Neusypin 2003 help on this flight: beside the last estimate of their own model."""
+    windows, last = rows_of(answer, "windows"), _separate_last(answer)
     shared = sorted(set(windows) & set(last))
     if not shared:
         return None
-    pairs = {lead: (windows[lead].rms_m, last[lead].rms_m) for lead in shared}
+    pairs = {lead: (windows[lead].rms_m, last[lead]) for lead in shared}
     helped = [lead for lead, (ours, theirs) in pairs.items() if ours < (1.0 - SAME) * theirs]
     hurt = [lead for lead, (ours, theirs) in pairs.items() if ours > (1.0 + SAME) * theirs]
     told = [_at(verb, leads, pairs) for verb, leads in (("help", helped), ("hurt", hurt)) if leads]
@@ -115,9 +115,16 @@ def _windows(answer: ForecastResult) -> Note | None:
     return Note(f"{sentence}. One flight decides nothing: starts overlap.", "plain")
 
 
+def _separate_last(answer: ForecastResult) -> dict[float, float]:
+    """RMS of the last estimate of two separate channels by horizon, whichever model the settings forecast by."""
+    found = {float(row.horizon_min): row.rms_m / (1.0 - row.gain) for row in answer.coupled if row.gain < 1.0}
+    return found or {lead: row.rms_m for lead, row in rows_of(answer, "last_estimate").items()}
+
+
 def _at(verb: str, leads: Sequence[float], pairs: Mapping[float, tuple[float, float]]) -> str:
     windows, last = pairs[leads[-1]]
-    example = f"at {leads[-1]:g} min {number(windows, 0, 'm')} against {number(last, 0, 'm')} of the last estimate"
+    sizes = f"{number(windows, 0, 'm')} against {number(last, 0, 'm')}"
+    example = f"at {leads[-1]:g} min {sizes} of the separate model's last estimate"
     return f"{verb} {_where(leads, list(pairs))} ({example})"
 
 

@@ -33,6 +33,15 @@ def is_joined(flight: Flight) -> bool:
     return TOGETHER in flight.metadata
 
 
+def said_of(flight: Flight, topic: str, key: str) -> str:
+    """What the head of the log that a topic is of says under a key; empty where it says nothing.
+
+    Of a flight of several logs each speaks for its own topics: those of the second end in ``.b``, as its keys begin.
+    """
+    label = topic.rpartition(".")[2] if is_joined(flight) else ""
+    return flight.metadata.get(f"{label}.{key}" if len(label) == 1 and label.isalpha() else key, "")
+
+
 def sources_of_kind(flight: Flight, kind: str) -> tuple[str, ...]:
     """Topics of a kind, the one to use first.
 
@@ -48,7 +57,11 @@ def sources_of_kind(flight: Flight, kind: str) -> tuple[str, ...]:
 
 def ranked(flight: Flight, kind: str) -> list[Ranked]:
     """Sources of a kind, the best first."""
-    found = [_ranked(flight[topic], kind) for topic in topics_of_kind(kind, flight.topics()) if len(flight[topic])]
+    found = [
+        _ranked(flight[topic], kind, said_of(flight, topic, "ins_kind"))
+        for topic in topics_of_kind(kind, flight.topics())
+        if len(flight[topic])
+    ]
     longest_s = max((one.covered_s for one in found), default=0.0)
     known = [one.sigma_mps for one in found if np.isfinite(one.sigma_mps)]
     least_mps = min(known, default=np.nan)
@@ -80,7 +93,8 @@ def why_first(kind: str, order: list[Ranked]) -> str:
     return f"as good as {second.topic}, and of the earlier log"
 
 
-def _ranked(table: Table, kind: str) -> Ranked:
+def _ranked(table: Table, kind: str, said: str) -> Ranked:
+    """``said``: what its log says of the INS in it, where its samples say nothing."""
     needed = NEEDS.get(kind, ())
     known = table.take(table.valid(*needed)) if table.has(*needed) else table
     time_s = known.time_ns / NS_PER_S
@@ -95,7 +109,7 @@ def _ranked(table: Table, kind: str) -> Ranked:
         table.topic,
         table.has(*needed),
         float(np.sum(steps_s[steps_s <= 5.0 * usual_s])),
-        bool(stated.size and np.mean(stated == AIDED) > HALF),
+        bool(np.mean(stated == AIDED) > HALF) if stated.size else kind == "ins" and said.strip().lower() == AIDED,
         float(np.median(sigma)) if sigma.size else np.nan,
         1.0 / usual_s,
     )

@@ -24,6 +24,7 @@ from groundstation.estimators.heading.verdict import Figures, build_gates, decid
 from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import HeadingResult, Standstill
+from groundstation.tables.sources import said_of
 from groundstation.tables.table import Flight
 
 
@@ -95,7 +96,7 @@ def build_answer(
         settings=_settings_of(settings, aircraft),
         figures=_figures_of(solution, standstill, settings, error.common_sigma_deg),
     )
-    drift_prior_deg_per_h = drift_prior(aircraft.ins_class, flight.metadata.get("ins_class", ""))
+    drift_prior_deg_per_h = drift_prior(aircraft.ins_class, said_of(flight, topics[0], "ins_class"))
     with_arm = _with_arm(plain, solution)
     return _with_references(with_arm, flight, solution, standstill, settings, site, drift_prior_deg_per_h)
 

@@ -141,15 +141,14 @@ def choose_topics(flight: Flight, request: HeadingRequest) -> tuple[str, str]:
     NotAssessableError
         When there is no pair.
     """
-    ins = request.ins_topic or next(
-        (
-            topic
-            for field in ("true_heading_deg", "magnetic_heading_deg")
-            for topic in sources_of_kind(flight, "ins")
-            if flight[topic].has(field)
-        ),
-        "",
-    )
+    with_heading = [
+        topic
+        for field in ("true_heading_deg", "magnetic_heading_deg")
+        for topic in sources_of_kind(flight, "ins")
+        if flight[topic].has(field)
+    ]
+    independent = [topic for topic in with_heading if not _is_track(flight, topic)]
+    ins = request.ins_topic or next(iter(independent or with_heading), "")
     velocities = ("velocity_north_mps", "velocity_east_mps")
     gnss = request.gnss_topic or next(
         (topic for topic in sources_of_kind(flight, "gnss") if flight[topic].has(*velocities)), ""
@@ -158,10 +157,15 @@ def choose_topics(flight: Flight, request: HeadingRequest) -> tuple[str, str]:
         raise NotAssessableError("heading", f"no topic {ins}" if ins else "no INS heading in the log")
     if gnss not in flight:
         raise NotAssessableError("heading", f"no topic {gnss}" if gnss else "no GNSS velocity in the log")
-    if f"{HEADING_IS_TRACK}.{ins}.true_heading_deg" in flight.metadata:
+    if _is_track(flight, ins):
         text = f"the heading of {ins} is the receiver's own track: their difference is zero whatever the nose does"
         raise NotAssessableError("heading", text)
     return ins, gnss
+
+
+def _is_track(flight: Flight, topic: str) -> bool:
+    """Whether its heading is a receiver's own track: no measurement of where the nose points."""
+    return f"{HEADING_IS_TRACK}.{topic}.true_heading_deg" in flight.metadata
 
 
 def logged_heading(flight: Flight, ins_topic: str) -> HeadingValues:

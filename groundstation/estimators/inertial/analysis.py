@@ -14,6 +14,7 @@ from groundstation.results.answer import Answers, answer_of
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.inertial import InertialResult
 from groundstation.tables.phases import Phases
+from groundstation.tables.sources import said_of
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight
@@ -34,7 +35,8 @@ def _run(flight: "Flight", known: Known, settings: InertialSettings) -> Found[In
     from groundstation.estimators.inertial.kind import UNAIDED, kind_of, stated_kind
 
     compared = differences(flight, settings=settings, excluded_s=known.excluded_s)
-    kind = kind_of(compared, settings, stated_kind(known.aircraft.ins_kind, flight.metadata))
+    said = said_of(flight, compared.ins_topic, "ins_kind")
+    kind = kind_of(compared, settings, stated_kind(known.aircraft.ins_kind, {"ins_kind": said}))
     if kind[0] != UNAIDED:
         return Found(*compare_aided(flight, kind, settings=settings, excluded_s=known.excluded_s))
     found = estimate_compared(flight, compared, kind, settings=settings, aircraft_class=known.aircraft.ins_class)

@@ -29,6 +29,7 @@ from groundstation.estimators.inertial.outages import Bridged, bridge_outages
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import QUANTILES
 from groundstation.results.inertial import ChannelResult, InertialResult, StateEstimate
+from groundstation.tables.sources import said_of
 from groundstation.tables.table import Flight
 
 TITLES = {
@@ -109,7 +110,7 @@ def estimate_compared(
     aircraft_class: str = "",
 ) -> Estimation:
     """Estimate the errors of an INS that is compared with GNSS already; ``kind`` and the reason for it are known."""
-    noise, origin = choose_class(settings, aircraft_class, flight.metadata.get("ins_class", ""))
+    noise, origin = choose_class(settings, aircraft_class, said_of(flight, compared.ins_topic, "ins_class"))
     model = ChannelModel.at(*_mean_place(compared), noise.beta_per_s, settings.transition)
     used = only_used(compared.epochs, settings)
     run = run_filter(used, model, noise, gate=settings.gate_sigmas**2, initial=initial_of(used, noise))

@@ -74,17 +74,19 @@ class Calibration:
     """What the filter's forecast sigma must be multiplied by at each horizon, and how sure that is.
 
     ``scale`` belongs to ``horizon_min``; found on simulated flights of the class. ``bank_scale`` is that of the bank's
-    mixture, ``coupled_scale`` that of the coupled model. ``weight`` is what it counts against the outages replayed in
-    the past of the flight at hand: so many independent ones.
+    mixture, ``coupled_scale`` that of the coupled model; left out, they are one. ``weight`` is what it counts against
+    the outages replayed in the past of the flight at hand: so many independent ones.
     """
 
     horizon_min: tuple[float, ...] = (1.0, 5.0, 10.0, 30.0, 60.0, 90.0, 120.0)
     scale: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
-    bank_scale: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
-    coupled_scale: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+    bank_scale: tuple[float, ...] = ()
+    coupled_scale: tuple[float, ...] = ()
     weight: float = number(5.0, 0.1, 1000.0)
 
     def __post_init__(self) -> None:
+        for name in ("bank_scale", "coupled_scale"):
+            object.__setattr__(self, name, getattr(self, name) or (1.0,) * len(self.horizon_min))
         for name, scale in (
             ("scale", self.scale),
             ("bank_scale", self.bank_scale),

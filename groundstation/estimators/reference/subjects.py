@@ -39,7 +39,7 @@ def subjects_of(flight: Flight, known: Known) -> Iterator[tuple[str, Table]]:
         corrected = wrap_360(_true_heading(flight, heading.ins_topic) - heading.error_deg)
         sigma = np.full(len(corrected), heading.standard_error_deg)
         columns = {"true_heading_deg": corrected, "true_heading_sigma_deg": sigma}
-        yield "heading", _table("heading", flight[heading.ins_topic].time_ns, columns)
+        yield "heading", _table(flight[heading.ins_topic].time_ns, columns)
 
 
 def _ins(flight: Flight, topic: str) -> Table:
@@ -80,11 +80,12 @@ def _corrected(estimation: Estimation, start_ns: int) -> Iterator[tuple[str, Tab
             "horizontal_sigma_m": horizontal,
             "velocity_sigma_mps": np.sqrt(np.sum(variances[:, VELOCITY], axis=1)),
         }
-        yield name, _table(name, time_ns, columns)
+        yield name, _table(time_ns, columns)
 
 
-def _table(topic: str, time_ns: Int64Array, columns: Mapping[str, FloatArray]) -> Table:
+def _table(time_ns: Int64Array, columns: Mapping[str, FloatArray]) -> Table:
+    """Fields of an INS, by whose names angles are known as such where they are interpolated."""
     order = np.argsort(time_ns, kind="stable")
     found = {name: Column(values[order], np.isfinite(values[order])) for name, values in columns.items()}
     index = np.arange(len(time_ns), dtype=np.int64)
-    return Table(topic, time_ns[order], found, index, Column(time_ns[order]))
+    return Table("ins", time_ns[order], found, index, Column(time_ns[order]))

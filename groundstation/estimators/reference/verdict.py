@@ -30,13 +30,15 @@ def standing_of(
     listed: Sequence[Errors], rows: Sequence[ErrorRow], gross_s: float, settings: ReferenceSettings
 ) -> Standing:
     """Find what takes from a reference the right to judge."""
+    subjects = [errors.subject for errors in listed]
+    first = [next((one for one in subjects if kind_of(one) == kind), "") for kind in ("gnss", "ins")]
     for errors in listed:
         distance = errors.horizontal_m[np.isfinite(errors.horizontal_m)]
         farthest = settings.far_m * (1.0 if kind_of(errors.subject) == "gnss" else INS_FARTHER)
-        if distance.size and float(np.median(distance)) > farthest and errors.subject in ("gnss", "ins"):
+        if distance.size and float(np.median(distance)) > farthest and errors.subject in first:
             return Standing(False, f"it is {np.median(distance) / 1000.0:.1f} km away: another vehicle or place")
     if gross_s:
-        return Standing(False, f"its clock is {abs(gross_s):.1f} s {'slow' if gross_s < 0 else 'fast'} by motion")
+        return Standing(False, f"its clock is {abs(gross_s):.1f} s {'fast' if gross_s < 0 else 'slow'} by motion")
     twin = next((row for row in rows if _is_own_solution(row)), None)
     if twin is not None:
         away = f"{1000.0 * twin.spread.rmse:.1f} mm RMS from it"
@@ -66,7 +68,7 @@ def _of_reference(answer: ReferenceResult, gross_s: float, interval_s: float) ->
     if gross_s:
         guess = " (leap seconds: GPS time taken for UTC?)" if round(abs(gross_s)) in LEAP_SECONDS else ""
         text = (
-            f"the log shows the motion {gross_s:+.2f} s later than the reference{guess}; "
+            f"the log shows the motion {abs(gross_s):.2f} s {_sense(gross_s)} than the reference{guess}; "
             f"[reference] clock_offset_s = {gross_s:.2f} shifts it"
         )
         yield Finding("warn", "reference.clock", text, "truth")
@@ -75,14 +77,18 @@ def _of_reference(answer: ReferenceResult, gross_s: float, interval_s: float) ->
         if row.clock_offset95_s is not None and row.clock_offset_s is not None:
             low, high = row.clock_offset95_s
             if low > interval_s or high < -interval_s:
-                sense = "later" if row.clock_offset_s > 0.0 else "earlier"
                 text = (
-                    f"{row.subject} shows its positions {abs(row.clock_offset_s):.3f} s {sense} than the reference "
+                    f"{row.subject} shows its positions {abs(row.clock_offset_s):.3f} s {_sense(row.clock_offset_s)} "
+                    "than the reference "
                     f"(95 %: {low:+.3f} to {high:+.3f} s), which has a sample in {interval_s:.3g} s: a latency, or a "
                     "clock that is off; it stays in the errors"
                 )
                 yield Finding("warn", "reference.clock", text, row.subject)
     yield from _datum(answer)
+
+
+def _sense(offset_s: float) -> str:
+    return "later" if offset_s > 0.0 else "earlier"
 
 
 def _datum(answer: ReferenceResult) -> Iterator[Finding]:

@@ -99,7 +99,7 @@ class LogRelation:
 
     @property
     def method(self) -> Method:
-        """What the longest stretch rests on."""
+        """What the first stretch rests on; each says it of itself."""
         return self.stretches[0].method
 
     def seconds(self, other_ns: Int64Array) -> FloatArray:
@@ -115,7 +115,7 @@ class LogRelation:
         """Times of the other log on the clock of the first, shape as given."""
         other_s = self.seconds(other_ns)
         number = self.stretch_of(other_s)
-        lag_s = np.choose(number, [one.lag_at(other_s) for one in self.stretches])
+        lag_s = self._of_stretch(number, [one.lag_at(other_s) for one in self.stretches])
         base_ns = self.first_start_ns - self.other_start_ns
         return np.asarray(other_ns + base_ns + np.rint(lag_s * NS_PER_S).astype(np.int64), dtype=np.int64)
 
@@ -123,4 +123,9 @@ class LogRelation:
         """Half of the 95 % interval of :meth:`first_time_ns`, seconds; infinite where nothing tells it."""
         other_s = self.seconds(other_ns)
         number = self.stretch_of(other_s)
-        return np.asarray(NORMAL_95 * np.choose(number, [one.sigma_at(other_s) for one in self.stretches]))
+        return NORMAL_95 * self._of_stretch(number, [one.sigma_at(other_s) for one in self.stretches])
+
+    @staticmethod
+    def _of_stretch(number: Int64Array, values: list[FloatArray]) -> FloatArray:
+        """Of values by every stretch those of the stretch that each time is in; any number of stretches."""
+        return np.asarray(np.take_along_axis(np.stack(values), np.asarray(number)[None], axis=0)[0])

@@ -80,6 +80,11 @@ class References:
     paths: tuple[Path, ...] = ()
     is_expected: bool = False
 
+    def besides(self, log: Path) -> "References":
+        """Those of several files that are not the log itself: it judges nothing."""
+        others = tuple(path for path in self.paths if path.resolve() != log.resolve())
+        return replace(self, paths=others or self.paths)
+
 
 NO_REFERENCES = References()
 

@@ -79,7 +79,7 @@ def _convert_recorded(log: Log, target: Path, limits: Thresholds, references: Re
     if references.paths and any(kind_of(one.topic) == TRUTH for one in topics):
         raise GroundstationError(log.path.name, *OWN_TRUTH)
     span_ns = min(one.first_ns for one in topics), max(one.last_ns for one in topics)
-    laid = laid_beside(log.path.name, span_ns, found.clock.is_absolute, references)
+    laid = laid_beside(log.path.name, span_ns, found.clock.is_absolute, references.besides(log.path))
     findings = (*ledger_findings(found.ledger), *laid.findings)
     info = StoreInfo(
         source_name=log.source.name,
@@ -135,6 +135,8 @@ def _copy_store(log: Log, target: Path, limits: Thresholds, references: Referenc
     laid = _laid_beside_store(log, info, references)
     if laid.batches:
         info = _with_another_truth(info, laid, limits)
+    elif laid.findings:  # why there is none
+        info = replace(info, findings=(*info.findings, *laid.findings))
     damages: list[Damage] = []
     census = census_of(info, limits)
     with StoreWriter(target, info) as writer:
@@ -158,9 +160,11 @@ def _laid_beside_store(log: Log, info: StoreInfo, references: References) -> Lai
         return Laid()
     if has_truth and f"{FACTS}source_name" not in info.metadata:
         raise GroundstationError(log.path.name, *OWN_TRUTH)
+    if not info.has_utc:  # its times are no dates
+        return laid_beside(log.path.name, (0, 0), info.has_utc, references.besides(log.path))
     ends = [iso_to_utc_ns(end)[0] for topic in info.ledger.topics.values() for end in (topic.first, topic.last)]
     start_ns = min(ends, default=0) if info.start_ns is None else info.start_ns
-    return laid_beside(log.path.name, (start_ns, max(ends, default=0)), info.has_utc, references)
+    return laid_beside(log.path.name, (start_ns, max(ends, default=0)), info.has_utc, references.besides(log.path))
 
 
 def _without_truth(items: Iterable[Item], laid: Laid) -> Iterator[Item]:

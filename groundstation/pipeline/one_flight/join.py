@@ -13,7 +13,7 @@ from groundstation.base.errors import GroundstationError, UnreadableLogError, Us
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import DamagedSpan, Ledger
 from groundstation.base.normal import NORMAL_95
-from groundstation.base.records import Damage, Int64Array, RecordBatch
+from groundstation.base.records import HEADING_IS_TRACK, Damage, Int64Array, RecordBatch
 from groundstation.base.serial import to_json_exactly
 from groundstation.base.source_units import PREFIX as UNITS
 from groundstation.base.units import NS_PER_S
@@ -33,7 +33,7 @@ from groundstation.results.together import LABELS, JoinedLog, JoinedStretch, Joi
 from groundstation.store.info import StoreInfo
 from groundstation.tables.sources import TOGETHER
 
-DERIVED = "derived."
+OF_FIELDS = ("derived.", f"{HEADING_IS_TRACK}.")  # keys about a field, <topic>.<field> behind them
 OF_THE_AIRCRAFT = ("aircraft", "flight", "start_utc")  # taken from another log where the first lacks them
 
 
@@ -113,7 +113,7 @@ def join_logs(
     limits = thresholds or shipped()
     _require_different(logs)
     with TemporaryDirectory(prefix="groundstation-") as folder:
-        parts, left_out = _converted(logs, Path(folder), limits)
+        parts, left_out = _converted(logs, Path(folder), limits, settings)
         clock_of = next((one for one in parts if one.timed.gnss_time), None)
         clock_of = clock_of or next((one for one in parts if one.timed.flight.has_utc), parts[0])
         parts = [_related(one, clock_of, settings) for one in parts]
@@ -140,7 +140,9 @@ def _require_different(logs: Sequence[Log]) -> None:
         first[log.source.sha256] = log.path.name
 
 
-def _converted(logs: Sequence[Log], folder: Path, limits: Thresholds) -> tuple[list[_Part], list[Damage]]:
+def _converted(
+    logs: Sequence[Log], folder: Path, limits: Thresholds, settings: TwoClocksSettings | None
+) -> tuple[list[_Part], list[Damage]]:
     """The logs that can be read, and a damage for each of the others; the first keeps its place without a label."""
     parts: list[_Part] = []
     left_out: list[Damage] = []
@@ -154,7 +156,7 @@ def _converted(logs: Sequence[Log], folder: Path, limits: Thresholds) -> tuple[l
             error = reason
             left_out.append(Damage("unreadable_log", log.source.name, 1, f"log that is left out ({reason})"))
             continue
-        timed = TimedLog(flight, gnss_time_of(converted.info.clock, converted.info.reader))
+        timed = TimedLog(flight, gnss_time_of(converted.info.clock, converted.info.reader, settings))
         parts.append(_Part(label, log, mcap, converted, timed))
     if not parts:
         raise error or UnreadableLogError("--together", "no log")
@@ -294,9 +296,10 @@ def _metadata(parts: Sequence[_Part], joining: Joining) -> dict[str, str]:
     found = dict(parts[0].converted.info.metadata)
     for part in parts[1:]:
         for key, value in part.converted.info.metadata.items():
-            if key.startswith(DERIVED):
-                topic, _, field = key.removeprefix(DERIVED).rpartition(".")
-                found[f"{DERIVED}{part.name(topic)}.{field}"] = value
+            if key.startswith(OF_FIELDS):
+                code, _, about = key.partition(".")
+                topic, _, field = about.rpartition(".")
+                found[f"{code}.{part.name(topic)}.{field}"] = value
             elif key.startswith(UNITS):
                 found[part.name(key)] = value
             else:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.findings import Finding
-from groundstation.base.records import MAX_BATCH_ROWS, Damage, Int64Array, RecordBatch
+from groundstation.base.records import HEADING_IS_TRACK, MAX_BATCH_ROWS, Damage, Int64Array, RecordBatch
 from groundstation.base.signals import TOPICS, kind_of, topics_of_kind
 from groundstation.base.timescales import GPS_EPOCH_NS, gps_week_to_utc_ns, leap_seconds_at, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
@@ -25,7 +25,8 @@ FACTS = "truth."  # how the facts about a reference begin in the metadata of a f
 WEEK_NS = 604_800 * NS_PER_S
 NS_PER_MS = 1_000_000
 POSITION = ("latitude_deg", "longitude_deg")
-ANGLES = ("true_heading_deg", "roll_deg")
+HEADING = "true_heading_deg"
+ANGLES = (HEADING, "roll_deg")
 _FIELDS = frozenset(one.name for one in TOPICS[TRUTH])
 
 
@@ -86,22 +87,38 @@ def laid_beside(log_name: str, span_ns: tuple[int, int], has_utc: bool, referenc
     if not has_utc:
         text = "no reference: the log has no UTC, by which one is put on its clock"
         return Laid(findings=(Finding("info", "reference.none", text),))
-    found = []
+    found, unread = [], []
     for path in references.paths:
-        reference = load_reference(path)
-        table = _cropped(_on_utc(reference, span_ns), span_ns)
-        if len(table):
-            found.append((reference, table))
+        try:
+            table = _of_its_time(path, span_ns)
+        except GroundstationError as error:
+            if len(references.paths) == 1:
+                raise
+            unread.append(Finding("warn", "reference.unreadable", str(error), TRUTH))
+            continue
+        if table is not None and len(table):
+            found.append((load_reference(path), table))
     if len(found) > 1:
         names = ", ".join(reference.name for reference, _ in found)
         raise GroundstationError(
             log_name, f"several references at its time: {names}", "one", "name the one to judge by"
         )
     if not found:
-        return _nothing(log_name, span_ns, references)
+        nothing = _nothing(log_name, span_ns, references)
+        return replace(nothing, findings=(*unread, *nothing.findings))
     reference, table = found[0]
     truth = Flight({TRUTH: replace(table, topic=TRUTH)}, {}, int(table.time_ns[0]), True)
-    return Laid(tuple(batches_from_flight(truth, MAX_BATCH_ROWS)), reference.facts, tuple(_findings(reference, table)))
+    findings = (*unread, *_findings(reference, table))
+    return Laid(tuple(batches_from_flight(truth, MAX_BATCH_ROWS)), reference.facts, findings)
+
+
+def _of_its_time(path: Path, span_ns: tuple[int, int]) -> "Table | None":
+    """What a file has of the time of a log, on UTC; a file of another time is not read again for it."""
+    ends_ns, is_weekly = _ends_of(*_as_it_stands(path))
+    spans = [_utc_of_week(week, ends_ns) for week in _weeks_about(span_ns)] if is_weekly else [ends_ns]
+    if not any(first <= span_ns[1] and last >= span_ns[0] for first, last in spans):
+        return None
+    return _cropped(_on_utc(load_reference(path), span_ns), span_ns)
 
 
 def _nothing(log_name: str, span_ns: tuple[int, int], references: References) -> Laid:
@@ -148,11 +165,24 @@ def load_reference(path: Path) -> Reference:
     UnreadableLogError
         When no reader claims it, or it holds neither positions, velocities nor attitude.
     """
+    return _load(*_as_it_stands(path))
+
+
+def _as_it_stands(path: Path) -> tuple[Path, int, int]:
+    """A file with the time of its last change and its size."""
     try:
         status = path.stat()
     except OSError as error:
         raise UnreadableLogError(str(path), error.strerror or "cannot be opened", "a reference") from error
-    return _load(path, status.st_mtime_ns, status.st_size)
+    return path, status.st_mtime_ns, status.st_size
+
+
+@cache
+def _ends_of(path: Path, time_ns: int, size: int) -> tuple[Int64Array, bool]:
+    """First and last time of a file, shape (2,), and whether they are of a GPS week."""
+    reference = _load(path, time_ns, size)
+    times_ns = reference.table.time_ns
+    return np.array([times_ns.min(), times_ns.max()]), reference.is_weekly
 
 
 @lru_cache(maxsize=4)
@@ -162,7 +192,11 @@ def _load(path: Path, _time_ns: int, _size: int) -> Reference:
     topic = best_topic(flight)
     if not topic:
         raise UnreadableLogError(path.name, "no position, velocity or attitude", "a reference")
-    table = flight[topic]
+    table = _trusted(flight[topic])
+    if not len(table):
+        raise UnreadableLogError(path.name, f"no sample of {topic} that its source trusts", "a reference")
+    if f"{HEADING_IS_TRACK}.{topic}.true_heading_deg" in flight.metadata:  # it says nothing of the nose
+        table = replace(table, columns={name: one for name, one in table.columns.items() if name != HEADING})
     table = replace(table, columns={name: one for name, one in table.columns.items() if name in _FIELDS})
     is_weekly = not has_utc and log.source.reader.startswith("sbet")
     if not has_utc and not is_weekly:
@@ -170,6 +204,12 @@ def _load(path: Path, _time_ns: int, _size: int) -> Reference:
     if is_weekly:
         table = replace(table, time_ns=np.asarray(table.device_time_ns.values, dtype=np.int64))
     return Reference(log.source.name, log.source.sha256, log.source.reader, table, is_weekly, damages)
+
+
+def _trusted(table: "Table") -> "Table":
+    """Rows that the source itself trusts, alignment left out."""
+    bad = (table.values("valid") == 0.0) | (table.values("integrity_ok") == 0.0) | (table.text("mode") == "align")
+    return table.take(~bad)
 
 
 def _read(log: Log) -> "tuple[Flight, tuple[Damage, ...], bool]":
@@ -191,7 +231,12 @@ def _read(log: Log) -> "tuple[Flight, tuple[Damage, ...], bool]":
     replay = log.replay()
     found = survey(replay)
     kept = [one for one in corrected(replay, found.clock) if kind_of(one.topic) in kinds]
-    return tables(kept, found.header.metadata, found.clock.is_absolute), found.damages, found.clock.is_absolute
+    told = {f"{one.code}.{one.topic}.{name}": one.text for one in found.remarks for name in one.fields}
+    return (
+        tables(kept, {**found.header.metadata, **told}, found.clock.is_absolute),
+        found.damages,
+        found.clock.is_absolute,
+    )
 
 
 def best_topic(flight: "Flight") -> str:
@@ -221,13 +266,17 @@ def _on_utc(reference: Reference, span_ns: tuple[int, int]) -> "Table":
     """The table on UTC; of seconds of a week, in the week in which it overlaps the log most."""
     if not reference.is_weekly:
         return reference.table
-    middle_ns = (span_ns[0] + span_ns[1]) // 2
-    week = (middle_ns + leap_seconds_at(middle_ns) * NS_PER_S - GPS_EPOCH_NS) // WEEK_NS
     tables = [
-        replace(reference.table, time_ns=_utc_of_week(one, reference.table.time_ns))
-        for one in (week, week - 1, week + 1)
+        replace(reference.table, time_ns=_utc_of_week(one, reference.table.time_ns)) for one in _weeks_about(span_ns)
     ]
     return max(tables, key=lambda table: len(_cropped(table, span_ns)))
+
+
+def _weeks_about(span_ns: tuple[int, int]) -> tuple[int, ...]:
+    """GPS weeks in which a log may lie: that of its middle, and those beside it."""
+    middle_ns = (span_ns[0] + span_ns[1]) // 2
+    week = (middle_ns + leap_seconds_at(middle_ns) * NS_PER_S - GPS_EPOCH_NS) // WEEK_NS
+    return week, week - 1, week + 1
 
 
 def _utc_of_week(week: int, week_ns: Int64Array) -> Int64Array:
