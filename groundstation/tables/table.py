@@ -133,6 +133,12 @@ class Table:
             device_time_ns=self.device_time_ns.take(index),
         )
 
+    def trusted(self) -> Self:
+        """The rows that the source itself trusts: called valid, of whole integrity, alignment left out; unsaid counts
+        as trusted."""
+        bad = (self.values("valid") == 0.0) | (self.values("integrity_ok") == 0.0) | (self.text("mode") == "align")
+        return self.take(~bad) if bad.any() else self
+
     def unique_times(self) -> Self:
         """The table without repeated times: of several samples of one time the first present value of each field.
 

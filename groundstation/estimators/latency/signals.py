@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import direction_of, unwrap
-from groundstation.base.records import BoolArray
 from groundstation.estimators.heading.samples import distinct_epochs
 from groundstation.estimators.latency.settings import LatencySettings
 from groundstation.estimators.latency.windows import Series
@@ -80,10 +79,10 @@ def compare(flight: Flight, pair: tuple[str, str, Quantity], settings: LatencySe
         When rates or time stamps do not allow it.
     """
     reference, other, quantity = pair
-    unit, sensor = _usable(flight[reference]), flight[other]
+    unit, sensor = _compared_part(flight[reference]), flight[other]
     shown, seen = _columns(unit, sensor, quantity)
     unit = unit.take(unit.valid(*shown))
-    sensor = _usable(sensor) if quantity == "attitude" else sensor.take(~(sensor.values("integrity_ok") == 0.0))
+    sensor = _compared_part(sensor) if quantity == "attitude" else sensor.trusted()
     sensor = sensor.take(sensor.valid(*seen))
     for topic, table in ((reference, unit), (other, sensor)):
         _check_stamps(topic, table, settings)
@@ -197,12 +196,11 @@ def _attitude(flight: Flight, unit: Table, sensor: Table, settings: LatencySetti
     return Comparison(reference, at_s, values, np.zeros(0), "deg")
 
 
-def _usable(unit: Table) -> Table:
-    """Rows of an INS that it calls valid, alignment left out; only what is compared."""
-    bad: BoolArray = (unit.values("valid") == 0.0) | (unit.text("mode") == "align")
+def _compared_part(unit: Table) -> Table:
+    """Rows of an INS that it trusts itself; of its columns what is compared."""
     names = (*VELOCITY, "velocity_down_mps", *ALTITUDES, *ATTITUDE, *HEADINGS)
-    unit = replace(unit, columns={name: unit.columns[name] for name in names if name in unit})
-    return unit.take(~bad) if bad.any() else unit
+    unit = unit.trusted()
+    return replace(unit, columns={name: unit.columns[name] for name in names if name in unit})
 
 
 def _heading_of(table: Table) -> str:

@@ -18,7 +18,6 @@ from groundstation.estimators.magnetic.estimate import IN_THE_AIR
 from groundstation.estimators.magnetic.readings import (
     ANALYSIS,
     FIELD,
-    aligned_part,
     altitude_at,
     current_at,
     latency_of,
@@ -155,7 +154,7 @@ def _levelled(
     settings: MagneticSettings,
     latencies: Latencies | None,
 ) -> CorrectedHeading:
-    unit, table = aligned_part(flight[topics[0]]), flight[topics[1]]
+    unit, table = flight[topics[0]].trusted(), flight[topics[1]]
     at_ns = table.time_ns - round(latency_of(topics, latencies) * NS_PER_S)
     roll, pitch = (values_at(unit, name, at_ns, largest_gap_s=settings.gap_max_s) for name in LEVELS)
     field = np.stack([table.values(name) for name in FIELD], axis=-1)
@@ -240,7 +239,7 @@ def judge(
     unit = corrected.ins_topic
     if not flight[unit].has("true_heading_deg") or why_not_independent(flight, unit, kinds, settings):
         return None
-    true = values_at(aligned_part(flight[unit]), "true_heading_deg", corrected.at_ns, largest_gap_s=settings.gap_max_s)
+    true = values_at(flight[unit].trusted(), "true_heading_deg", corrected.at_ns, largest_gap_s=settings.gap_max_s)
     mounting = aircraft.mounting_deg if aircraft else 0.0
     expected = true - mounting - ins_error_deg - corrected.declination_deg
     is_airborne = np.isin(phases.at(flight.seconds(corrected.at_ns)), IN_THE_AIR)

@@ -113,7 +113,7 @@ def gather(
     """
     unit, sensor = flight[topics[0]], flight[topics[1]]
     sensor = _thinned(sensor.take(sensor.valid(*FIELD)).unique_times(), settings.rate_max_hz)
-    unit = aligned_part(unit)
+    unit = unit.trusted()
     latency_s = latency_of(topics, latencies)
     at_ns = sensor.time_ns - round(latency_s * NS_PER_S)
     attitude = join(unit, at_ns, ATTITUDE, largest_gap_s=settings.gap_max_s)
@@ -141,12 +141,6 @@ def latency_of(topics: tuple[str, str], latencies: Latencies | None) -> float:
     """Latency of a magnetometer against an INS where it is observed, else 0, seconds."""
     row = latencies.observed(*topics) if latencies is not None else None
     return row.latency_s if row is not None and row.latency_s is not None else 0.0
-
-
-def aligned_part(unit: Table) -> Table:
-    """The samples of an INS that calls its output valid and does not align."""
-    bad = (unit.values("valid") == 0.0) | (unit.text("mode") == "align")
-    return unit.take(~bad)
 
 
 def _thinned(table: Table, rate_max_hz: float) -> Table:

@@ -19,14 +19,11 @@ from groundstation.results.heading import HeadingResult
 from groundstation.tables.headings import true_heading
 from groundstation.tables.table import Flight, Table
 
-UNUSED_MODES = ("align",)
-
 
 def subjects_of(flight: Flight, known: Known) -> Iterator[tuple[str, Table]]:
     """Name and table of everything that may be judged, in the order it is shown."""
     for topic in topics_of_kind("gnss", flight.topics()):
-        table = flight[topic]
-        table = table.take(~(table.values("integrity_ok") == 0.0))
+        table = flight[topic].trusted()
         moving = distinct_epochs(table)
         yield topic, moving if len(moving) >= 2 else table
     for topic in topics_of_kind("ins", flight.topics()):
@@ -47,8 +44,7 @@ def _ins(flight: Flight, topic: str) -> Table:
     table = flight[topic]
     heading = _true_heading(flight, topic)
     columns = {**table.columns, "true_heading_deg": Column(heading, np.isfinite(heading))}
-    good = ~np.isin(table.text("mode"), UNUSED_MODES) & ~(table.values("valid") == 0.0)
-    return replace(table, columns=columns).take(good)
+    return replace(table, columns=columns).trusted()
 
 
 def _true_heading(flight: Flight, topic: str) -> FloatArray:

@@ -136,7 +136,7 @@ def _common(a: _Channels, b: _Channels) -> tuple[str, ...]:
 
 
 def _channels(flight: Flight, topic: str) -> _Channels:
-    table = _usable(flight[topic].unique_times())
+    table = flight[topic].unique_times().trusted()
     time_s = flight.seconds(table.time_ns)
     found = {
         "north": table.values("velocity_north_mps"),
@@ -164,12 +164,6 @@ def _tells(values: FloatArray, more_than: int) -> bool:
     """Whether there are enough values, and not all are the same."""
     finite = values[np.isfinite(values)]
     return len(finite) > more_than and float(np.ptp(finite)) > 0.0
-
-
-def _usable(table: Table) -> Table:
-    """Rows that the source itself trusts, alignment left out."""
-    bad = (table.values("valid") == 0.0) | (table.values("integrity_ok") == 0.0) | (table.text("mode") == "align")
-    return table.take(~bad) if bad.any() else table
 
 
 def _speed(table: Table) -> FloatArray:

@@ -228,22 +228,19 @@ def _renamed(part: _Part, of_clock: StoreInfo, start_ns: int) -> StoreInfo:
     def of(place: str) -> str:
         return f"{log}, {place}" if place else log
 
+    def said(text: str) -> str:
+        return f"{log}: {text}" if part.label else text
+
     before = info.ledger
     ledger = replace(
         before,
         topics={part.name(topic): entry for topic, entry in before.topics.items()},
         spans=tuple(moved(span) for span in before.spans),
         damages=tuple(replace(one, topic=part.name(one.topic), place=of(one.place)) for one in before.damages),
-        remarks=tuple(
-            replace(one, topic=part.name(one.topic), text=f"{log}: {one.text}" if part.label else one.text)
-            for one in before.remarks
-        ),
+        remarks=tuple(replace(one, topic=part.name(one.topic), text=said(one.text)) for one in before.remarks),
         truncated=None if before.truncated is None else replace(before.truncated, place=of(before.truncated.place)),
     )
-    findings = tuple(
-        replace(one, topic=part.name(one.topic), text=f"{log}: {one.text}" if part.label else one.text)
-        for one in info.findings
-    )
+    findings = tuple(replace(one, topic=part.name(one.topic), text=said(one.text)) for one in info.findings)
     return replace(info, has_utc=of_clock.has_utc, ledger=ledger, findings=findings)
 
 

@@ -192,7 +192,7 @@ def _load(path: Path, _time_ns: int, _size: int) -> Reference:
     topic = best_topic(flight)
     if not topic:
         raise UnreadableLogError(path.name, "no position, velocity or attitude", "a reference")
-    table = _trusted(flight[topic])
+    table = flight[topic].trusted()
     if not len(table):
         raise UnreadableLogError(path.name, f"no sample of {topic} that its source trusts", "a reference")
     if f"{HEADING_IS_TRACK}.{topic}.true_heading_deg" in flight.metadata:  # it says nothing of the nose
@@ -204,12 +204,6 @@ def _load(path: Path, _time_ns: int, _size: int) -> Reference:
     if is_weekly:
         table = replace(table, time_ns=np.asarray(table.device_time_ns.values, dtype=np.int64))
     return Reference(log.source.name, log.source.sha256, log.source.reader, table, is_weekly, damages)
-
-
-def _trusted(table: "Table") -> "Table":
-    """Rows that the source itself trusts, alignment left out."""
-    bad = (table.values("valid") == 0.0) | (table.values("integrity_ok") == 0.0) | (table.text("mode") == "align")
-    return table.take(~bad)
 
 
 def _read(log: Log) -> "tuple[Flight, tuple[Damage, ...], bool]":

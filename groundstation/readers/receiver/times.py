@@ -17,7 +17,6 @@ WEEK_MS = 604_800_000
 DAY_NS = 86_400 * NS_PER_S
 NS_PER_MS = 1_000_000
 BEFORE_FIRST_NS = 3_600 * NS_PER_S  # a time so long before the first full one is a counter that was not set yet
-_MOST_LEAPS_MS = 60_000
 
 
 @dataclass(frozen=True, eq=False)
