@@ -27,7 +27,7 @@ VERBS = (
 
 EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "info": ("info flight3.ulg",),
-    "check": ("check flight3.ulg", "check logs/a.csv logs/b.csv --fail-on warn"),
+    "check": ("check flight3.ulg", "check flight3.ulg --for heading", "check logs/a.csv logs/b.csv --fail-on warn"),
     "convert": ("convert flight3.ulg -o flight3.mcap",),
     "run": (
         "run flight3.ulg -o out",
