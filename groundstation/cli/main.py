@@ -41,6 +41,9 @@ from groundstation.cli.application import (
 __all__ = ["app", "fleets", "flights", "main", "plans"]  # the modules hold more verbs
 
 
+PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have an ``examine``; a test compares them
+
+
 def _version(is_asked: bool) -> None:
     if is_asked:
         typer.echo(f"groundstation {__version__}")
@@ -85,6 +88,17 @@ def info(
 @answers_with_exit_code
 def check(
     logs: Annotated[list[Path], typer.Argument(help="Recorded logs or MCAPs.", metavar="LOG", readable=False)],
+    purpose: Annotated[
+        str,
+        typer.Option(
+            "--for",
+            help="Say in the first line whether the log can be used for this analysis: yes, no, in part, and what is "
+            "missing where. Exit 4 at no; with --fail-on warn at in part too. Logs of one session are judged together.",
+            metavar=PURPOSES,
+        ),
+    ] = "",
+    aircraft: AircraftFile = None,
+    site: SiteFile = None,
     thresholds: ThresholdsFile = None,
     config: ConfigFile = None,
     profile: Profile = None,
@@ -95,15 +109,18 @@ def check(
     json: Json = False,
     progress: Progress = "auto",
 ) -> int | None:
-    """Print the integrity ledger: rates, coverage, gaps, losses and odd values of every topic. Writes nothing."""
+    """Print the integrity ledger: rates, coverage, gaps, losses and odd values of every topic. Writes nothing.
+
+    With --for, what the log can be used for stands in the first line.
+    """
     from groundstation.cli import check_table, printing
     from groundstation.cli.progress import listener
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.check import check_many
 
-    configuration = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
+    configuration = load_configuration(config, aircraft, site, profile=profile, thresholds=thresholds, icds=icd)
     with listener("none" if quiet else progress) as listen:
-        checked = check_many(logs, configuration, fail_on=fail_on, listen=listen)
+        checked = check_many(logs, configuration, purpose=purpose, fail_on=fail_on, listen=listen)
     check_table.show(checked, as_json_text=json, quiet=quiet, everything=verbose)
     return printing.worst_code(tuple(one.outcome for one in checked))
 
