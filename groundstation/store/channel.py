@@ -1,6 +1,6 @@
 """One topic on its way into the file: batches become message records, gathered until they fill a chunk."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -73,11 +73,17 @@ class ChannelWriter:
         row_bytes = 64 + sum(2 + _width(column.values.dtype) for column in batch.columns.values())
         publish_ns = time_ns if batch.validity_time_ns is None else batch.validity_time_ns
         slots = self.slots(batch)
-        for rows in _pieces(time_ns, row_bytes):
-            self._close_at_boundary(int(time_ns[rows.start]))
-            self._append(time_ns[rows], publish_ns[rows], taken(slots, rows))
-            if self._bytes >= CHUNK_BYTES * 7 // 8:
-                self.flush()
+        for pieces in _together(_pieces(time_ns, row_bytes), CHUNK_BYTES // row_bytes):
+            rows = slice(pieces[0].start, pieces[-1].stop)
+            buffer, starts = encode(self.id, self.count, time_ns[rows], publish_ns[rows], taken(slots, rows))
+            self.count += len(starts)
+            ends = np.append(starts[1:], len(buffer))
+            for piece in pieces:
+                self._close_at_boundary(int(time_ns[piece.start]))
+                of_piece = slice(piece.start - rows.start, piece.stop - rows.start)
+                self._append(time_ns[piece], starts[of_piece], buffer[starts[of_piece.start] : ends[of_piece.stop - 1]])
+                if self._bytes >= CHUNK_BYTES * 7 // 8:
+                    self.flush()
 
     def _close_at_boundary(self, time_ns: int) -> None:
         before, self._piece_ns = self._piece_ns, time_ns
@@ -85,13 +91,12 @@ class ChannelWriter:
         if before // span != time_ns // span:
             self.flush()
 
-    def _append(self, time_ns: Int64Array, publish_ns: Int64Array, slots: list[Slot]) -> None:
-        buffer, starts = encode(self.id, self.count, time_ns, publish_ns, slots)
+    def _append(self, time_ns: Int64Array, starts: Int64Array, buffer: ByteArray) -> None:
+        """Gather records; ``starts`` count from wherever, the first record is the first of the buffer."""
         self._buffers.append(buffer)
         self._times.append(time_ns)
-        self._starts.append(starts + self._bytes)
+        self._starts.append(starts + (self._bytes - starts[0]))
         self._bytes += len(buffer)
-        self.count += len(time_ns)
 
     def flush(self) -> None:
         """Emit what is gathered as a chunk."""
@@ -191,6 +196,18 @@ def _pieces(time_ns: Int64Array, row_bytes: int) -> Iterator[slice]:
             rows = _rows_before_boundary(ahead, CHUNK_SPAN_NS)
         yield slice(at, at + rows)
         at += rows
+
+
+def _together(pieces: Iterable[slice], most_rows: int) -> Iterator[list[slice]]:
+    """Pieces that follow each other in groups of no more than so many rows: a group is encoded at once."""
+    group: list[slice] = []
+    for piece in pieces:
+        if group and piece.stop - group[0].start > most_rows:
+            yield group
+            group = []
+        group.append(piece)
+    if group:
+        yield group
 
 
 def _rows_before_boundary(time_ns: Int64Array, span_ns: int) -> int:
