@@ -1,6 +1,6 @@
 """One topic on its way into the file: batches become message records, gathered until they fill a chunk."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -27,13 +27,13 @@ DERIVED_KEY = "derived_from"  # in the metadata of a channel made from another o
 
 @dataclass(frozen=True)
 class Chunk:
-    """Message records of one channel, ready to be compressed: bytes, times and places of its messages."""
+    """Message records of one channel, ready to be compressed: bytes, times and places of its messages, in pieces."""
 
     channel_id: int
     topic: str
-    buffer: ByteArray
-    log_time: Int64Array
-    starts: Int64Array
+    buffers: Sequence[ByteArray]
+    log_times: Sequence[Int64Array]
+    starts: Sequence[Int64Array]
 
 
 class ChannelWriter:
@@ -102,17 +102,17 @@ class ChannelWriter:
         """Emit what is gathered as a chunk."""
         if not self._bytes:
             return
-        buffer, times, starts = _joined(self._buffers), _joined(self._times), _joined(self._starts)
+        chunk = Chunk(self.id, self.topic, self._buffers, self._times, self._starts)
         self._buffers, self._times, self._starts, self._bytes = [], [], [], 0
-        self._emit(Chunk(self.id, self.topic, buffer, times, starts))
+        self._emit(chunk)
 
     def _checked_times(self, batch: RecordBatch) -> Int64Array:
         where = f"topic {batch.topic}, record {int(batch.record_index[0])}"
         if batch.time_ns is None:
             raise GroundstationError(where, "no corrected time", "time_ns set", "apply the clock model first")
         time_ns = np.asarray(batch.time_ns, dtype=np.int64)
-        falls = np.flatnonzero(np.diff(time_ns, prepend=self._last_ns) < 0)
-        if len(falls):
+        if time_ns[0] < self._last_ns or (time_ns[1:] < time_ns[:-1]).any():
+            falls = np.flatnonzero(np.diff(time_ns, prepend=self._last_ns) < 0)
             place = f"topic {batch.topic}, record {int(batch.record_index[falls[0]])}"
             time = int(time_ns[falls[0]])
             expected = "not negative" if time < 0 else "no less than the time before"
@@ -174,10 +174,6 @@ def channel_record(channel_id: int, topic: str, metadata: Mapping[str, str]) -> 
     return Channel(
         id=channel_id, topic=topic, message_encoding="protobuf", metadata=dict(metadata), schema_id=channel_id
     )
-
-
-def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def _width(dtype: np.dtype[Any]) -> int:

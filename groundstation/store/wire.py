@@ -10,7 +10,7 @@ Sources: protobuf encoding, https://protobuf.dev/programming-guides/encoding; MC
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +27,7 @@ Rows = slice | NDArray[np.intp]
 Block = tuple[Rows, bytes, ByteArray]  # rows, the bytes before each value, the values as (k, width)
 
 
-@dataclass(frozen=True)
-class Slot:
+class Slot(NamedTuple):
     """One field's values on their way into messages.
 
     Parameters
@@ -116,8 +115,15 @@ def encode_text(values: NDArray[np.str_]) -> NDArray[np.bytes_]:
     if not len(values):
         return np.empty(0, "S1")
     starts = np.concatenate(([0], np.flatnonzero(values[1:] != values[:-1]) + 1))
-    distinct = np.strings.encode(values[starts], "utf-8", "replace")
+    distinct = _utf8(values[starts])
     return np.repeat(distinct, np.diff(starts, append=len(values)))
+
+
+def _utf8(values: NDArray[np.str_]) -> NDArray[np.bytes_]:
+    characters = np.ascontiguousarray(values).view(np.uint32)
+    if values.dtype.isnative and characters.max(initial=0) < 0x80:  # ASCII: a character is a byte
+        return characters.astype(np.uint8).view(f"S{len(characters) // len(values)}")
+    return np.strings.encode(values, "utf-8", "replace")
 
 
 def encode(
@@ -169,22 +175,24 @@ def _blocks(slots: Iterable[Slot]) -> list[Block]:
 def _alike(slots: Sequence[Slot], count: int) -> list[tuple[Rows, list[Slot]]] | None:
     """Rows in groups that have the same fields present, and the slots of those; None where few are alike."""
     masks = {identity: mask for identity, mask in _masks(slots).items() if not mask.all()}
-    if len(masks) > MAX_PARTIAL or any(slot.has_many_widths for slot in slots):
+    absent = {identity for identity, mask in masks.items() if not mask.any()}
+    partial = {identity: mask for identity, mask in masks.items() if identity not in absent}
+    slots = [slot for slot in slots if id(slot.present) not in absent]
+    if len(partial) > MAX_PARTIAL or any(slot.has_many_widths for slot in slots):
         return None
-    if not masks:
-        return [(slice(None), list(slots))]
+    if not partial:
+        return [(slice(None), slots)]
     pattern = np.zeros(count, np.int64)
-    for mask in masks.values():
+    for mask in partial.values():
         pattern = pattern * 2 + mask
     patterns = np.unique(pattern).tolist()
-    if len(patterns) > 1 and len(patterns) * ROWS_ALIKE > count:
+    if len(patterns) * ROWS_ALIKE > count:
         return None
     groups: list[tuple[Rows, list[Slot]]] = []
     for one in patterns:
         rows = np.flatnonzero(pattern == one)
-        absent = {identity for identity, mask in masks.items() if not mask[rows[0]]}
-        chosen: Rows = rows if len(patterns) > 1 else slice(None)
-        groups.append((chosen, [slot.take(chosen) for slot in slots if id(slot.present) not in absent]))
+        lacking = {identity for identity, mask in partial.items() if not mask[rows[0]]}
+        groups.append((rows, [slot.take(rows) for slot in slots if id(slot.present) not in lacking]))
     return groups
 
 
