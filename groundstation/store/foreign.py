@@ -30,6 +30,7 @@ from groundstation.store.framing import (
     read_summary,
 )
 from groundstation.store.messages import HEAD, RECORD_PREFIX, ByteArray, Messages
+from groundstation.store.sequences import Sequences
 from groundstation.store.walk import find_messages
 
 PEEK_BYTES = 64
@@ -68,7 +69,16 @@ class UnknownChannel:
     messages: int
 
 
-Found: TypeAlias = ForeignMessages | ForeignLost | UnknownChannel
+@dataclass(frozen=True)
+class Missing:
+    """Messages of a topic that are not in the file, by what the file itself tells."""
+
+    topic: str
+    count: int
+    what: str
+
+
+Found: TypeAlias = ForeignMessages | ForeignLost | UnknownChannel | Missing
 
 
 def read_header(head: bytes) -> Header | None:
@@ -93,6 +103,7 @@ class ForeignMcap:
         self._file, self._size = file, size
         self._known = Summary()
         self._count = self._unknown = 0
+        self._met: dict[int, Sequences] = {}
 
     def __iter__(self) -> Iterator[Found]:
         summary = read_summary(self._file, self._size)
@@ -134,6 +145,20 @@ class ForeignMcap:
             yield ForeignLost(self._size, self._size, "file that ends without its summary", 1, self._count, True)
         if self._unknown:
             yield UnknownChannel(self._unknown)
+        yield from self._missing()
+
+    def _missing(self) -> Iterator[Missing]:
+        """What the statistics count and was not met; where they tell of nothing, what the numbers of messages tell."""
+        counts = self._known.message_counts
+        gone = {number: counts.get(number, 0) - self._met[number].count for number in self._met}
+        gone |= {number: count for number, count in counts.items() if number not in self._met}
+        what = "messages that the statistics of the file count and that are not in it"
+        if not any(count > 0 for count in gone.values()):
+            gone = {number: met.missing for number, met in self._met.items()}
+            what = "messages missing between two chunks by their sequence numbers, which run through everywhere else"
+        for number, count in sorted(gone.items()):
+            if count > 0 and number in self._known.channels:
+                yield Missing(self._known.channels[number].topic, count, what)
 
     def _read(self, at: int, length: int) -> bytes:
         self._file.seek(at)
@@ -194,6 +219,7 @@ class ForeignMcap:
         self._count += len(starts)
         for number in np.unique(ids).tolist():
             rows = np.flatnonzero(ids == number)
+            self._met.setdefault(number, Sequences()).take(everything.take(rows).head("sequence"))
             channel = self._known.channels.get(number)
             if channel is None:
                 self._unknown += len(rows)
