@@ -196,7 +196,7 @@ class ForeignMcap:
         """Records that stand one after the other, searched for behind what is none; of a chunk without a checksum."""
         data, start = raw.tobytes(), 0
         while start < len(data):
-            whole = start + _whole_records(data[start:])
+            whole = _whole_records(data, start)
             yield from self._records(raw[start:whole], at, end)
             if whole == len(data):
                 return
@@ -247,14 +247,15 @@ class ForeignMcap:
         return self._known.is_intact and found.id in known
 
 
-def _whole_records(data: bytes) -> int:
-    """Bytes of the whole records that stand one after the other at the beginning."""
-    whole = 0
-    for opcode, record in parse_records(data):
-        if opcode == Opcode.MESSAGE and len(record) < HEAD.itemsize:
+def _whole_records(data: bytes, start: int = 0) -> int:
+    """Where the whole records end that stand one after the other from a place on; nothing is copied."""
+    at = start
+    while at + RECORD_PREFIX <= len(data):
+        end = at + RECORD_PREFIX + int.from_bytes(data[at + 1 : at + RECORD_PREFIX], "little")
+        if end > len(data) or (data[at] == Opcode.MESSAGE and end - at < HEAD.itemsize):
             break
-        whole += len(record)
-    return whole
+        at = end
+    return at
 
 
 def _next_message(data: bytes, start: int) -> int:
@@ -273,7 +274,7 @@ def _next_message(data: bytes, start: int) -> int:
 def _beginning(compression: str, data: bytes, size: int) -> ByteArray:
     """What the beginning of a chunk's data gives."""
     limit = min(size, MAX_CHUNK_BYTES)
-    raw = b""
+    raw = bytearray()
     try:
         if compression == "zstd":
             reader = zstandard.ZstdDecompressor(max_window_size=128 << 20).decompressobj()
@@ -282,9 +283,9 @@ def _beginning(compression: str, data: bytes, size: int) -> ByteArray:
                 if len(raw) > limit:
                     break
         elif compression == "lz4":
-            raw = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=limit)
+            raw += lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=limit)
         else:
-            raw = data
+            raw += data
     except (zstandard.ZstdError, RuntimeError, ValueError, EOFError):
         pass  # what came before is kept
-    return np.frombuffer(raw[:limit], np.uint8)
+    return np.frombuffer(bytes(raw[:limit]), np.uint8)
