@@ -6,6 +6,10 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 RUNTIME := $(VENV)/.runtime
 DEV     := $(VENV)/.dev
+# Bytecode is kept: the tests start hundreds of processes. pip would make it on one processor; for the demo it comes with
+# the first import, for the tests from all processors at once, as warnings while they import are errors.
+PIP     := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test check slow fuzz schemas bench lock newest sbom clean help
 
@@ -18,11 +22,12 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(RUNTIME): pyproject.toml | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	$(PIP) -e .
 	@touch $@
 
 $(DEV): pyproject.toml | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	$(PIP) -e '.[dev]'
+	@$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib || true
 	@touch $@ $(RUNTIME)
 
 demo: $(RUNTIME) ## run the main job on sample_logs/ into demo_results/
@@ -51,7 +56,7 @@ schemas: $(DEV) ## make the package's descriptor set from schemas/*.proto, schem
 	$(BIN)/python -m groundstation.pipeline.verbs.schema schemas/summary.schema.json
 
 bench: $(RUNTIME) ## benchmarks against peers, printed as ratios
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[bench]'
+	$(PIP) -e '.[bench]'
 	for file in benchmarks/bench_*.py; do $(BIN)/python $$file || exit 1; done
 
 TOOLS := build/tools
