@@ -51,6 +51,7 @@ def run_many(
     with_pdf: bool = True,
     redo: bool = False,
     stations: Path | None = None,
+    only_results: bool = False,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
     """Run logs and folders of logs into ``out``, then the sessions among the flights; the index lists all of them.
@@ -68,6 +69,8 @@ def run_many(
         Address of a Dask scheduler, whose workers do the work; they see local paths as this machine does.
     stations : Path, optional
         TOML file with the ground stations of the sessions; left out: stations.toml beside the logs of each.
+    only_results : bool
+        Neither recordings nor reports, of flights or of all; a later run without it makes them.
 
     Returns
     -------
@@ -83,9 +86,9 @@ def run_many(
     ground = None if stations is None else load_stations(stations)
     inputs = _inputs(paths, out, configuration)
     crew = _crew(scheduler, jobs or cores(), len(inputs), listen)
-    make = partial(Job, configuration=configuration, fail_on=fail_on, with_pdf=with_pdf)
+    make = partial(Job, configuration=configuration, fail_on=fail_on, with_pdf=with_pdf, only_results=only_results)
     listen(Event("begin", total=len(inputs)))
-    asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo)
+    asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo, only_results=only_results)
     if any(is_remote(str(place)) for place in (out, *paths)):
         remote = [RemoteJob(make(Path(), Path(), is_named=named), log, str(out), redo) for log, named in inputs]
         return _run_remote(remote, asked, crew, force, listen)
@@ -101,6 +104,7 @@ def run_together(
     force: bool = False,
     fail_on: str = "none",
     with_pdf: bool = True,
+    only_results: bool = False,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
     """Run several logs of one flight as that flight; see :func:`groundstation.pipeline.one_flight.join.join_logs`.
@@ -129,8 +133,8 @@ def run_together(
             reason, trace = reason_of(named, error)
             listen(Event("end", named, reason))
             return (Outcome(named, "failed", reason, trace=trace),)
-        job = Job(mcap, Path(out), configuration, fail_on, with_pdf=with_pdf, url=named)
-        asked = Asked(Path(out), configuration, None, fail_on, with_pdf, redo=True)
+        job = Job(mcap, Path(out), configuration, fail_on, with_pdf=with_pdf, url=named, only_results=only_results)
+        asked = Asked(Path(out), configuration, None, fail_on, with_pdf, redo=True, only_results=only_results)
         return _run_here([job], asked, partial(in_turn, listen=listen), force, listen)
 
 
@@ -156,7 +160,7 @@ def _run_here(work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen
         _run_into(placement, out, left(), run_flight, suffixed, crew, listen)
         sessions = _run_sessions(placement, asked, crew, listen)
         outcomes = (*placement.outcomes(), *sessions)
-        return (*outcomes, *write_beside(out, outcomes, with_pdf=asked.with_pdf))
+        return (*outcomes, *write_beside(out, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results))
 
 
 def _run_sessions(placement: Placement, asked: Asked, crew: Crew, listen: Listener) -> tuple[Outcome, ...]:
@@ -189,7 +193,7 @@ def _run_remote(
             _run_into(placement, copy, enumerate(work), run_remote, suffixed, crew, listen)
             sessions = _run_remote_sessions(placement, output, asked, listen)
             outcomes = (*placement.outcomes(), *sessions)
-            problems = write_beside(copy, outcomes, with_pdf=asked.with_pdf)
+            problems = write_beside(copy, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results)
             is_whole = True
         finally:
             output.publish(FLEET_FILES, is_whole=is_whole)
@@ -259,6 +263,7 @@ def plan_many(
     with_pdf: bool = True,
     redo: bool = False,
     stations: Path | None = None,
+    only_results: bool = False,
 ) -> tuple[Outcome, ...]:
     """Say what :func:`run_many` would do of each log, and of the sessions among finished flights; nothing is written.
 
@@ -272,7 +277,8 @@ def plan_many(
     inputs, out = _inputs(paths, out, configuration), Path(out)
     refuse_foreign(out, force=True)
     known = {} if redo or not out.is_dir() else finished_flights(flight_folders(out))
-    work = [Job(Path(log), out, configuration, is_named=named, with_pdf=with_pdf) for log, named in inputs]
+    make = partial(Job, out=out, configuration=configuration, with_pdf=with_pdf, only_results=only_results)
+    work = [make(Path(log), is_named=named) for log, named in inputs]
     outcomes = []
     for _number, job, twin in _with_steps(work, known):
         if twin is not None:
@@ -280,7 +286,7 @@ def plan_many(
         else:
             outcomes.append(_planned(job))
     ground = None if stations is None else load_stations(stations)
-    asked = Asked(out, configuration, ground, "none", with_pdf, redo)
+    asked = Asked(out, configuration, ground, "none", with_pdf, redo, only_results=only_results)
     return (*outcomes, *_planned_sessions(asked, outcomes))
 
 
