@@ -33,6 +33,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "run flight3.ulg -o out",
         "run logs -o out --aircraft aircraft.toml --site airfield.toml",
         "run flight3.ulg --reference sbet_20250708.out -o out",
+        "run logs -o out --only results",
         "run logs -o out --dry-run",
     ),
     "report": ("report out",),
@@ -92,6 +93,10 @@ Together = Annotated[
     typer.Option("--together", help="The logs are of one flight: put them on one clock, by GNSS time or by motion."),
 ]
 NoPdf = Annotated[bool, typer.Option("--no-pdf", help="Leave report.pdf and steer_card.pdf out.")]
+Only = Annotated[
+    Literal["results"] | None,
+    typer.Option("--only", help="results: no recording and no report, of a flight or of all; a later run makes them."),
+]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
 Profile = Annotated[
     Path | None,

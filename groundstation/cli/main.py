@@ -24,6 +24,7 @@ from groundstation.cli.application import (
     IntervalsFile,
     Json,
     NoPdf,
+    Only,
     Profile,
     Progress,
     Quiet,
@@ -214,6 +215,7 @@ def run(
         ),
     ] = None,
     no_pdf: NoPdf = False,
+    only: Only = None,
     redo: Annotated[bool, typer.Option("--redo", help="Do again what an earlier run finished.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done; write nothing.")] = False,
     force: Force = False,
@@ -240,7 +242,8 @@ def run(
     if together and (dry_run or scheduler or stations is not None or timeout is not None):
         raise UsageError("--together", "--dry-run, --scheduler, --stations or --timeout beside it", "it without them")
     if dry_run:
-        planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo, stations=stations)
+        plan = partial(plan_many, with_pdf=not no_pdf, only_results=only == "results")
+        planned = plan(paths, output, configuration, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)
         return DONE
     timeout_s = math.inf if timeout is None else timeout
@@ -249,7 +252,14 @@ def run(
     try:
         with listener("none" if quiet else progress) as listen:
             outcomes = run_logs(
-                paths, output, configuration, force=force, fail_on=fail_on, with_pdf=not no_pdf, listen=listen
+                paths,
+                output,
+                configuration,
+                force=force,
+                fail_on=fail_on,
+                with_pdf=not no_pdf,
+                only_results=only == "results",
+                listen=listen,
             )
     except KeyboardInterrupt:
         say(f"interrupted: {output} keeps what is finished; the same command again goes on with the rest")
