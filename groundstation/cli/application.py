@@ -35,7 +35,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "run flight3.ulg --reference sbet_20250708.out -o out",
         "run logs -o out --dry-run",
     ),
-    "report": ("report out",),
+    "report": ("report out", "report out --standard app-g -o acceptance"),
     "view": ("view out", "view flight3.ulg --web"),
     "export": ("export out/20260504T060000Z_SIM-1_101 -o flight.kml", "export flight3.ulg -o flight3.csv --track gnss"),
     "clip": ("clip flight3.mcap --from +05:00 --to +12:30 -o part.mcap",),

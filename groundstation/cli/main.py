@@ -18,6 +18,7 @@ from groundstation.cli.application import (
     AircraftFile,
     ConfigFile,
     FailOn,
+    FailOnMode,
     Force,
     IcdFiles,
     IntervalsFile,
@@ -234,13 +235,38 @@ def run(
 @answers_with_exit_code
 def report(
     out: Annotated[Path, typer.Argument(help="A folder that `run` made, or one flight folder in it.", metavar="OUT")],
+    standard: Annotated[
+        str,
+        typer.Option(
+            "--standard",
+            help="Judge the INS of the flights by a standard instead, and write the acceptance: app-g, irig261, or a "
+            "file of limits (TOML).",
+            metavar="NAME|FILE",
+        ),
+    ] = "",
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Folder for the acceptance; left out: OUT.", metavar="DIR"),
+    ] = None,
+    fail_on: Annotated[
+        FailOnMode,
+        typer.Option(
+            "--fail-on",
+            help="With --standard: exit 4 where it is failed (fail), or not passed for want of flights (warn).",
+        ),
+    ] = "none",
     no_pdf: NoPdf = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
-    """Make the reports and the index again from the saved results, without the logs."""
+    """Make the reports and the index again from the saved results, without the logs; or the acceptance of the INS."""
     from groundstation.cli import printing
+
+    if standard:
+        return fleets.acceptance(out, standard, output, fail_on, with_pdf=not no_pdf, quiet=quiet, json=json)
+    if output is not None or fail_on != "none":
+        raise UsageError("report", "-o or --fail-on without --standard", "--standard NAME beside it")
     from groundstation.pipeline.many_flights.publishing import report_again
 
     paths, problems = report_again(out, with_pdf=not no_pdf)
