@@ -27,7 +27,7 @@ VERBS = (
 
 EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "info": ("info flight3.ulg",),
-    "check": ("check flight3.ulg", "check logs/a.csv logs/b.csv --fail-on warn"),
+    "check": ("check flight3.ulg", "check flight3.ulg --for heading", "check logs/a.csv logs/b.csv --fail-on warn"),
     "convert": ("convert flight3.ulg -o flight3.mcap",),
     "run": (
         "run flight3.ulg -o out",
@@ -37,7 +37,11 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     ),
     "report": ("report out", "report out --standard app-g -o acceptance"),
     "view": ("view out", "view flight3.ulg --web"),
-    "export": ("export out/20260504T060000Z_SIM-1_101 -o flight.kml", "export flight3.ulg -o flight3.csv --track gnss"),
+    "export": (
+        "export out/20260504T060000Z_SIM-1_101 -o flight.kml",
+        "export flight3.ulg -o flight3.csv --track gnss",
+        "export out/20260504T060000Z_SIM-1_101 -o tables --figures",
+    ),
     "clip": ("clip flight3.mcap --from +05:00 --to +12:30 -o part.mcap",),
     "compare": ("compare out/first out/second -o comparison",),
     "cooperative": ("cooperative a.csv b.csv --stations stations.toml -o out",),

@@ -1,6 +1,7 @@
 """The command ``groundstation``: its verbs. Heavy imports happen inside them."""
 
 import io
+import math
 import sys
 from functools import partial
 from pathlib import Path
@@ -40,6 +41,9 @@ from groundstation.cli.application import (
 )
 
 __all__ = ["app", "fleets", "flights", "main", "plans"]  # the modules hold more verbs
+
+
+PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have an ``examine``; a test compares them
 
 
 def _version(is_asked: bool) -> None:
@@ -86,6 +90,17 @@ def info(
 @answers_with_exit_code
 def check(
     logs: Annotated[list[Path], typer.Argument(help="Recorded logs or MCAPs.", metavar="LOG", readable=False)],
+    purpose: Annotated[
+        str,
+        typer.Option(
+            "--for",
+            help="Say in the first line whether the log can be used for this analysis: yes, no, in part, and what is "
+            "missing where. Exit 4 at no; with --fail-on warn at in part too. Logs of one session are judged together.",
+            metavar=PURPOSES,
+        ),
+    ] = "",
+    aircraft: AircraftFile = None,
+    site: SiteFile = None,
     thresholds: ThresholdsFile = None,
     config: ConfigFile = None,
     profile: Profile = None,
@@ -96,15 +111,18 @@ def check(
     json: Json = False,
     progress: Progress = "auto",
 ) -> int | None:
-    """Print the integrity ledger: rates, coverage, gaps, losses and odd values of every topic. Writes nothing."""
+    """Print the integrity ledger: rates, coverage, gaps, losses and odd values of every topic. Writes nothing.
+
+    With --for, what the log can be used for stands in the first line.
+    """
     from groundstation.cli import check_table, printing
     from groundstation.cli.progress import listener
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.check import check_many
 
-    configuration = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
+    configuration = load_configuration(config, aircraft, site, profile=profile, thresholds=thresholds, icds=icd)
     with listener("none" if quiet else progress) as listen:
-        checked = check_many(logs, configuration, fail_on=fail_on, listen=listen)
+        checked = check_many(logs, configuration, purpose=purpose, fail_on=fail_on, listen=listen)
     check_table.show(checked, as_json_text=json, quiet=quiet, everything=verbose)
     return printing.worst_code(tuple(one.outcome for one in checked))
 
@@ -167,6 +185,15 @@ def run(
     scheduler: Annotated[
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
     ] = "",
+    timeout: Annotated[
+        float | None,
+        typer.Option(
+            "--timeout",
+            help="Longest time for one log; one that takes longer has failed. Left out: none.",
+            metavar="SECONDS",
+            min=1.0,
+        ),
+    ] = None,
     fail_on: FailOn = "none",
     apply: Annotated[
         str,
@@ -211,13 +238,14 @@ def run(
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd)
     is_one_log = together or (len(paths) == 1 and not Path(paths[0]).is_dir())
     configuration = judged_by(applying(settings, apply), reference or (), is_one_log=is_one_log)
-    if together and (dry_run or scheduler or stations is not None):
-        raise UsageError("--together", "--dry-run, --scheduler or --stations beside it", "it without them")
+    if together and (dry_run or scheduler or stations is not None or timeout is not None):
+        raise UsageError("--together", "--dry-run, --scheduler, --stations or --timeout beside it", "it without them")
     if dry_run:
         planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)
         return DONE
-    run_apart = partial(run_many, jobs=jobs, scheduler=scheduler, redo=redo, stations=stations)
+    timeout_s = math.inf if timeout is None else timeout
+    run_apart = partial(run_many, jobs=jobs, scheduler=scheduler, redo=redo, stations=stations, timeout_s=timeout_s)
     run_logs = run_together if together else run_apart  # logs are joined anew at every run, in this process
     try:
         with listener("none" if quiet else progress) as listen:

@@ -38,6 +38,19 @@ class RestsOn(NamedTuple):
     spans_s: tuple[tuple[float, float], ...]
 
 
+class Shortfall(NamedTuple):
+    """What keeps an answer from being a full one, and where: spans of flight seconds."""
+
+    text: str
+    spans_s: tuple[tuple[float, float], ...] = ()
+
+
+class Examine(Protocol[Data, KnownT, SettingsT]):  # type: ignore[misc]
+    """Tells what data lack for a full answer, without estimating; NotAssessableError where none would come."""
+
+    def __call__(self, data: Data, known: KnownT, settings: SettingsT, /) -> tuple[Shortfall, ...]: ...
+
+
 def _always(_data: Any, _known: Any) -> bool:
     return True
 
@@ -91,6 +104,9 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
         What it gives to the tables of flights: index.json, index.csv, fleet.parquet. Names differ between analyses.
     check : callable
         ``check(settings, aircraft)`` raises SettingsError for settings that contradict what is known of the aircraft.
+    examine : callable, optional
+        ``examine(data, known, settings)``: what the data lack, by the same selection of data as ``run`` makes; an
+        analysis that has it is a purpose of ``check --for``.
     judges : bool
         Whether it is given the truth, by which it judges the others: it runs where there is one, and last; every other
         analysis is given a flight without it.
@@ -112,6 +128,7 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     sentence: Callable[[Answers], str] = _nothing
     columns: tuple[AnswerColumn[AnswerT], ...] = ()
     check: Callable[[Any, Any], None] = _any_settings
+    examine: Examine[Data, KnownT, SettingsT] | None = None
     judges: bool = False
 
     def __post_init__(self) -> None:

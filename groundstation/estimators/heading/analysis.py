@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from groundstation.base.findings import Finding
-from groundstation.estimators.analysis import Analysis, Found, RestsOn
+from groundstation.estimators.analysis import Analysis, Found, RestsOn, Shortfall
 from groundstation.estimators.heading.columns import COLUMNS
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.known import Known
@@ -39,6 +39,12 @@ def _run(flight: "Flight", known: Known, settings: HeadingSettings) -> Found[Hea
         phases=known.phases,
     )
     return Found(found, (_verdict(found), *_steps(found), *_findings_of_what_was_set(flight, found, known)))
+
+
+def _examine(flight: "Flight", known: Known, settings: HeadingSettings) -> tuple[Shortfall, ...]:
+    from groundstation.estimators.heading.examine import examine_heading
+
+    return examine_heading(flight, known, settings)
 
 
 def _verdict(result: HeadingResult) -> Finding:
@@ -101,4 +107,5 @@ HEADING = Analysis(
     rests_on=_rests_on,
     sentence=_sentence,
     columns=COLUMNS,
+    examine=_examine,
 )

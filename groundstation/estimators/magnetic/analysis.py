@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from groundstation.base.findings import Finding
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.analysis import Analysis, Found
+from groundstation.estimators.analysis import Analysis, Found, Shortfall
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.known import Known
 from groundstation.estimators.magnetic.columns import COLUMNS
@@ -39,6 +39,12 @@ def _run(flight: "Flight", known: Known, settings: MagneticSettings) -> Found[Ma
         phases=known.phases,
     )
     return Found(found, (_verdict(found),))
+
+
+def _examine(flight: "Flight", known: Known, settings: MagneticSettings) -> tuple[Shortfall, ...]:
+    from groundstation.estimators.magnetic.examine import examine_magnetic
+
+    return examine_magnetic(flight, known, settings)
 
 
 def _verdict(found: MagneticResult) -> Finding:
@@ -124,6 +130,7 @@ MAGNETIC = Analysis(
     is_expected=_has_readings,
     sentence=_sentence,
     columns=COLUMNS,
+    examine=_examine,
 )
 MAGNETIC_GROUND = Analysis(
     name="magnetic_ground",
