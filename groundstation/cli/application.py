@@ -20,7 +20,21 @@ EXIT_CODES = (
 )
 
 VERBS = (
-    *("info", "check", "convert", "run", "report", "view", "clip", "export", "compare", "cooperative", "plan", "serve"),
+    *(
+        "info",
+        "check",
+        "convert",
+        "run",
+        "report",
+        "view",
+        "clip",
+        "export",
+        "compare",
+        "cooperative",
+        "plan",
+        "rules",
+        "serve",
+    ),
     *("simulate", "study", "list"),
 )
 
@@ -45,6 +59,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "clip": ("clip flight3.mcap --from +05:00 --to +12:30 -o part.mcap",),
     "compare": ("compare out/first out/second -o comparison",),
     "cooperative": ("cooperative a.csv b.csv --stations stations.toml -o out",),
+    "rules": ("rules test stricter.toml --over out", "rules test stricter.toml --over out -o changes.csv"),
     "serve": ("serve out",),
     "simulate": ("simulate taxi-good -o logs",),
     "study": ("study heading -o tables --runs 50",),

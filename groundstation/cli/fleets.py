@@ -38,6 +38,7 @@ def acceptance(
 ) -> int:
     """Write the acceptance of the INS of a folder and print its front; 4 where ``fail_on`` is reached."""
     from groundstation.chapters.acceptance import front
+    from groundstation.chapters.wording import NARROW_SPACE
     from groundstation.cli.text import as_json, printable
     from groundstation.pipeline.many_flights.acceptance import accept_to
 
@@ -46,7 +47,8 @@ def acceptance(
         typer.echo(as_json(found.to_dict() | {"written": [str(path) for path in paths]}))
     elif not quiet:
         top = front(found)
-        typer.echo("\n".join(map(printable, (top.line, *top.sentences, *(str(path) for path in paths)))))
+        told = (line.replace(NARROW_SPACE, " ") for line in (top.line, *top.sentences))
+        typer.echo("\n".join(map(printable, (*told, *map(str, paths)))))
     if problem:
         say(f"warning: {problem}")
     reached_at = {"fail": ("warn", "fail"), "not enough flights": ("warn",)}.get(found.decision, ())
