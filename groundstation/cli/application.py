@@ -20,7 +20,21 @@ EXIT_CODES = (
 )
 
 VERBS = (
-    *("info", "check", "convert", "run", "report", "view", "clip", "export", "compare", "cooperative", "plan", "serve"),
+    *(
+        "info",
+        "check",
+        "convert",
+        "run",
+        "report",
+        "view",
+        "clip",
+        "export",
+        "compare",
+        "cooperative",
+        "plan",
+        "rules",
+        "serve",
+    ),
     *("simulate", "study", "list"),
 )
 
@@ -36,7 +50,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "run logs -o out --only results",
         "run logs -o out --dry-run",
     ),
-    "report": ("report out",),
+    "report": ("report out", "report out --standard app-g -o acceptance"),
     "view": ("view out", "view flight3.ulg --web"),
     "export": (
         "export out/20260504T060000Z_SIM-1_101 -o flight.kml",
@@ -46,6 +60,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "clip": ("clip flight3.mcap --from +05:00 --to +12:30 -o part.mcap",),
     "compare": ("compare out/first out/second -o comparison",),
     "cooperative": ("cooperative a.csv b.csv --stations stations.toml -o out",),
+    "rules": ("rules test stricter.toml --over out", "rules test stricter.toml --over out -o changes.csv"),
     "serve": ("serve out",),
     "simulate": ("simulate taxi-good -o logs",),
     "study": ("study heading -o tables --runs 50",),

@@ -11,7 +11,7 @@ import typer
 
 from groundstation.base.errors import UsageError
 from groundstation.base.version import __version__
-from groundstation.cli import fleets, flights, plans
+from groundstation.cli import fleets, flights, plans, rules
 from groundstation.cli.application import (
     DATA_LOST,
     DONE,
@@ -19,6 +19,7 @@ from groundstation.cli.application import (
     AircraftFile,
     ConfigFile,
     FailOn,
+    FailOnMode,
     Force,
     IcdFiles,
     IntervalsFile,
@@ -40,7 +41,7 @@ from groundstation.cli.application import (
     tell_written,
 )
 
-__all__ = ["app", "fleets", "flights", "main", "plans"]  # the modules hold more verbs
+__all__ = ["app", "fleets", "flights", "main", "plans", "rules"]  # the modules hold more verbs
 
 
 PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have an ``examine``; a test compares them
@@ -272,13 +273,38 @@ def run(
 @answers_with_exit_code
 def report(
     out: Annotated[Path, typer.Argument(help="A folder that `run` made, or one flight folder in it.", metavar="OUT")],
+    standard: Annotated[
+        str,
+        typer.Option(
+            "--standard",
+            help="Judge the INS of the flights by a standard instead, and write the acceptance: app-g, irig261, or a "
+            "file of limits (TOML).",
+            metavar="NAME|FILE",
+        ),
+    ] = "",
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Folder for the acceptance; left out: OUT.", metavar="DIR"),
+    ] = None,
+    fail_on: Annotated[
+        FailOnMode,
+        typer.Option(
+            "--fail-on",
+            help="With --standard: exit 4 where it is failed (fail), or not passed for want of flights (warn).",
+        ),
+    ] = "none",
     no_pdf: NoPdf = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
-    """Make the reports and the index again from the saved results, without the logs."""
+    """Make the reports and the index again from the saved results, without the logs; or the acceptance of the INS."""
     from groundstation.cli import printing
+
+    if standard:
+        return fleets.acceptance(out, standard, output, fail_on, with_pdf=not no_pdf, quiet=quiet, json=json)
+    if output is not None or fail_on != "none":
+        raise UsageError("report", "-o or --fail-on without --standard", "--standard NAME beside it")
     from groundstation.pipeline.many_flights.publishing import report_again
 
     paths, problems = report_again(out, with_pdf=not no_pdf)
