@@ -20,7 +20,21 @@ EXIT_CODES = (
 )
 
 VERBS = (
-    *("info", "check", "convert", "run", "report", "view", "clip", "export", "compare", "cooperative", "plan", "serve"),
+    *(
+        "info",
+        "check",
+        "convert",
+        "run",
+        "watch",
+        "report",
+        "view",
+        "clip",
+        "export",
+        "compare",
+        "cooperative",
+        "plan",
+        "serve",
+    ),
     *("simulate", "study", "list"),
 )
 
@@ -35,6 +49,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "run flight3.ulg --reference sbet_20250708.out -o out",
         "run logs -o out --dry-run",
     ),
+    "watch": ("watch incoming -o out", "watch incoming -o out --once --every 5"),
     "report": ("report out",),
     "view": ("view out", "view flight3.ulg --web"),
     "export": (

@@ -10,7 +10,7 @@ import typer
 
 from groundstation.base.errors import UsageError
 from groundstation.base.version import __version__
-from groundstation.cli import fleets, flights, plans
+from groundstation.cli import fleets, flights, plans, watching
 from groundstation.cli.application import (
     DATA_LOST,
     DONE,
@@ -38,7 +38,7 @@ from groundstation.cli.application import (
     tell_written,
 )
 
-__all__ = ["app", "fleets", "flights", "main", "plans"]  # the modules hold more verbs
+__all__ = ["app", "fleets", "flights", "main", "plans", "watching"]  # the modules hold more verbs
 
 
 PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have an ``examine``; a test compares them
