@@ -20,9 +20,8 @@ from typing import Any
 import numpy as np
 
 INTEGER, NUMBER = "integer", "number"
-ARRAY_DTYPES = frozenset(
-    ("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64", "bool")
-)
+_DTYPES = ["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64", "bool"]
+ARRAY_DTYPES = {np.dtype(name): name for name in _DTYPES}  # in the byte order of this machine
 ENTRY, SUFFIX = "groundstation_entry", ".machine_code"
 _RESULTS: dict[Any, type] = {int: ctypes.c_int64, bool: ctypes.c_int64, float: ctypes.c_double, None: ctypes.c_int64}
 _NUMBERS = count()  # every library has a name of its own
@@ -55,10 +54,10 @@ def forms_of(arguments: Sequence[Any]) -> tuple[Form, ...] | None:
     forms: list[Form] = []
     for one in arguments:
         if isinstance(one, np.ndarray):
-            is_plain = one.ndim > 0 and one.flags.c_contiguous and one.flags.aligned
-            if not is_plain or not one.dtype.isnative or one.dtype.name not in ARRAY_DTYPES:
+            name, flags = ARRAY_DTYPES.get(one.dtype), one.flags
+            if name is None or not one.ndim or not flags.c_contiguous or not flags.aligned:
                 return None
-            forms.append((one.dtype.name, one.ndim))
+            forms.append((name, one.ndim))
         elif isinstance(one, int | np.integer):
             if not -(2**63) <= one < 2**63:
                 return None

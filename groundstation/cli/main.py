@@ -1,6 +1,7 @@
 """The command ``groundstation``: its verbs. Heavy imports happen inside them."""
 
 import io
+import math
 import sys
 from functools import partial
 from pathlib import Path
@@ -183,6 +184,15 @@ def run(
     scheduler: Annotated[
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
     ] = "",
+    timeout: Annotated[
+        float | None,
+        typer.Option(
+            "--timeout",
+            help="Longest time for one log; one that takes longer has failed. Left out: none.",
+            metavar="SECONDS",
+            min=1.0,
+        ),
+    ] = None,
     fail_on: FailOn = "none",
     apply: Annotated[
         str,
@@ -227,13 +237,14 @@ def run(
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd)
     is_one_log = together or (len(paths) == 1 and not Path(paths[0]).is_dir())
     configuration = judged_by(applying(settings, apply), reference or (), is_one_log=is_one_log)
-    if together and (dry_run or scheduler or stations is not None):
-        raise UsageError("--together", "--dry-run, --scheduler or --stations beside it", "it without them")
+    if together and (dry_run or scheduler or stations is not None or timeout is not None):
+        raise UsageError("--together", "--dry-run, --scheduler, --stations or --timeout beside it", "it without them")
     if dry_run:
         planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)
         return DONE
-    run_apart = partial(run_many, jobs=jobs, scheduler=scheduler, redo=redo, stations=stations)
+    timeout_s = math.inf if timeout is None else timeout
+    run_apart = partial(run_many, jobs=jobs, scheduler=scheduler, redo=redo, stations=stations, timeout_s=timeout_s)
     run_logs = run_together if together else run_apart  # logs are joined anew at every run, in this process
     try:
         with listener("none" if quiet else progress) as listen:

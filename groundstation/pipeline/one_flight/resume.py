@@ -22,6 +22,7 @@ from groundstation.base.version import __version__
 from groundstation.pipeline.one_flight.apply_deviation import APPLIED, corrected_name
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.identity import plain_id
+from groundstation.pipeline.one_flight.log import as_log, digest_of
 from groundstation.reports.flight_report import PDF, REPORT
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.document import SummaryDocument
@@ -136,8 +137,9 @@ def _layouts_of(configuration: Configuration) -> list[str]:
 
 
 def _content_of(file: str) -> str:
+    """Digest of a file, of all files of a bag, and of what is read along with a reference."""
     try:
-        return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+        return digest_of(as_log(Path(file)))
     except OSError as error:
         raise GroundstationError(file, error.strerror or "cannot be read", "a profile") from error
 
