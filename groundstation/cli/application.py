@@ -57,7 +57,10 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "export flight3.ulg -o flight3.csv --track gnss",
         "export out/20260504T060000Z_SIM-1_101 -o tables --figures",
     ),
-    "clip": ("clip flight3.mcap --from +05:00 --to +12:30 -o part.mcap",),
+    "clip": (
+        "clip flight3.mcap --from +05:00 --to +12:30 -o part.mcap",
+        "clip flight3.ulg --anonymous --no-recording -o for_others.mcap",
+    ),
     "compare": ("compare out/first out/second -o comparison",),
     "cooperative": ("cooperative a.csv b.csv --stations stations.toml -o out",),
     "serve": ("serve out",),
