@@ -25,6 +25,7 @@ VERBS = (
         "check",
         "convert",
         "run",
+        "watch",
         "report",
         "view",
         "clip",
@@ -50,6 +51,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "run logs -o out --only results",
         "run logs -o out --dry-run",
     ),
+    "watch": ("watch incoming -o out", "watch incoming -o out --once --every 5"),
     "report": ("report out", "report out --standard app-g -o acceptance"),
     "view": ("view out", "view flight3.ulg --web"),
     "export": (
@@ -57,7 +59,10 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "export flight3.ulg -o flight3.csv --track gnss",
         "export out/20260504T060000Z_SIM-1_101 -o tables --figures",
     ),
-    "clip": ("clip flight3.mcap --from +05:00 --to +12:30 -o part.mcap",),
+    "clip": (
+        "clip flight3.mcap --from +05:00 --to +12:30 -o part.mcap",
+        "clip flight3.ulg --anonymous --no-recording -o for_others.mcap",
+    ),
     "compare": ("compare out/first out/second -o comparison",),
     "cooperative": ("cooperative a.csv b.csv --stations stations.toml -o out",),
     "rules": ("rules test stricter.toml --over out", "rules test stricter.toml --over out -o changes.csv"),

@@ -11,7 +11,7 @@ import typer
 
 from groundstation.base.errors import UsageError
 from groundstation.base.version import __version__
-from groundstation.cli import fleets, flights, plans, rules
+from groundstation.cli import fleets, flights, plans, rules, watching
 from groundstation.cli.application import (
     DATA_LOST,
     DONE,
@@ -41,7 +41,7 @@ from groundstation.cli.application import (
     tell_written,
 )
 
-__all__ = ["app", "fleets", "flights", "main", "plans", "rules"]  # the modules hold more verbs
+__all__ = ["app", "fleets", "flights", "main", "plans", "rules", "watching"]  # the modules hold more verbs
 
 
 PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have an ``examine``; a test compares them
