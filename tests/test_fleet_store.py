@@ -20,6 +20,7 @@ from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET, gather, write_fleet
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
 from groundstation.pipeline.many_flights.fleet_samples import MEANINGS, SAMPLES, partition
+from groundstation.pipeline.many_flights.fleet_store import FLIGHTS, refresh
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.fleet import FleetResults
 from groundstation.results.heading import OnboardComparison, RunwayCheck
@@ -31,8 +32,9 @@ HOSTILE = "Як-130 №7/../=1+1%41 \udcff"
 
 
 def write(out: Path) -> FleetResults:
-    results, problems = write_fleet(out)
-    assert problems == ()
+    found, unwritten = refresh(out)
+    results, problems = write_fleet(out, found)
+    assert unwritten == problems == ()
     return results
 
 
@@ -41,7 +43,7 @@ def sample_files(out: Path) -> dict[str, Path]:
 
 
 def contents(out: Path) -> dict[str, bytes]:
-    files = [out / FLEET_PARQUET, *(out / SAMPLES).rglob("*")]
+    files = [out / FLEET_PARQUET, *(out / FLIGHTS).rglob("*"), *(out / SAMPLES).rglob("*")]
     return {str(path.relative_to(out)): path.read_bytes() for path in files if path.is_file()}
 
 
@@ -216,7 +218,9 @@ def test_a_full_disk_is_told_and_leaves_the_old_file(tmp_path: Path, monkeypatch
     save_flight(tmp_path, 1, error_deg=3.0)
     with monkeypatch.context() as patched:
         patched.setattr(Path, "replace", lambda self, target: (_ for _ in ()).throw(OSError(28, "No space left")))
-        results, problems = write_fleet(tmp_path)
+        found, problems = refresh(tmp_path)
+        results, unwritten = write_fleet(tmp_path, found)
+        problems += unwritten
     assert len(results) == 1 and contents(tmp_path) == old
     assert [problem.state for problem in problems] == ["failed", "failed"]
     assert all("No space left" in problem.text and "\n" not in problem.text for problem in problems)
