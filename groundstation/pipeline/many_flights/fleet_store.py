@@ -28,7 +28,8 @@ from groundstation.results.files import write_bytes
 
 FLIGHTS, KEYS = "flights.parquet", ".flights"
 UNKNOWN = "unknown"
-VERSION = repr((__version__, FLIGHT_COLUMNS, DETAILS))  # with another one everything is read again
+_COLUMNS = [(column.name, column.kind, column.meaning) for column in FLIGHT_COLUMNS]
+VERSION = repr((__version__, _COLUMNS, DETAILS))  # with another one everything is read again
 STAMPED = ("", SUMMARY, MANIFEST, f"{ARRAYS}/heading_samples.parquet")  # "": the folder, whose time its names change
 MOST_LISTED = 20_000  # flights: of more there is no index.json of rows, fleet.parquet or page with each of them
 MOST_READ_HERE = 300  # flights, by the process that leads a run
@@ -94,7 +95,7 @@ class Scan:
         wanted = None if columns is None else list(dict.fromkeys(("flight_id", *columns)))
         tables = []
         for month in months:
-            path = self.out / FLIGHTS / f"{month}.parquet"
+            path = _path(self.out, month)
             try:
                 with pq.ParquetFile(path) as file:
                     tables.append(file.read(wanted))
@@ -167,7 +168,7 @@ class MonthJob:
     @property
     def log(self) -> str:
         """What it is told by."""
-        return f"{self.out / FLIGHTS / self.month}.parquet"
+        return str(_path(self.out, self.month))
 
     @property
     def name(self) -> str:
@@ -234,8 +235,8 @@ def write_month(job: MonthJob, listen: Listener = silent) -> Outcome:
 def _write(job: MonthJob) -> None:
     import pyarrow as pa
 
-    path, keys = Path(job.log), [key for key in _keys(job.out, job.month) if key.flight_id in job.kept]
-    old = _chosen(_read(path), {key.flight_id: key for key in keys})
+    keys = [key for key in _keys(job.out, job.month) if key.flight_id in job.kept]
+    old = _chosen(_read(_path(job.out, job.month)), {key.flight_id: key for key in keys})
     samples, shares = SampleStore(job.out), []
     for name in sorted({*job.read, *job.kept} - set(old.column("flight_id").to_pylist())):
         stamp = stamp_of(job.out, name)
@@ -244,16 +245,25 @@ def _write(job: MonthJob) -> None:
         except GroundstationError:  # it is told of where the fleet is put together
             continue
         shares.append(share)
-        keys.append(_key_of(share, stamp or 0))
+        keys.append(key_of(share, stamp or 0))
+    put_month(job.out, job.month, pa.concat_tables([old, to_arrow(shares)]), keys)
+
+
+def put_month(out: Path, month: str, table: Any, keys: Sequence[Key]) -> None:
+    """Put a month of the dataset: the shares of the flights that have a key, in the order of their ids."""
     by_id = {key.flight_id: key for key in keys}
+    paths = _path(out, month), _key_path(out, month)
     if not by_id:
-        for one in (path, _key_path(job.out, job.month)):
-            one.unlink(missing_ok=True)
+        for path in paths:
+            path.unlink(missing_ok=True)
         return
-    table = _chosen(pa.concat_tables([old, to_arrow(shares)]), by_id)
-    for one, content in ((path, table), (_key_path(job.out, job.month), _key_table(by_id))):
-        one.parent.mkdir(exist_ok=True)
-        write_bytes(one, parquet_bytes(content))
+    for path, content in zip(paths, (_chosen(table, by_id), _key_table(by_id)), strict=True):
+        path.parent.mkdir(exist_ok=True)
+        write_bytes(path, parquet_bytes(content))
+
+
+def _path(out: Path, month: str) -> Path:
+    return out / FLIGHTS / f"{month}.parquet"
 
 
 def _read(path: Path) -> Any:
@@ -300,7 +310,8 @@ def _plain(column: Any) -> list[Any]:
     return [one.decode("utf-8", "surrogatepass") for one in values] if pa.types.is_binary(column.type) else values
 
 
-def _key_of(share: FlightShare, stamp: int) -> Key:
+def key_of(share: FlightShare, stamp: int) -> Key:
+    """What a run must know of a flight whose folder had a stamp when its share was read."""
     row, start_ns = share.row, share.row["start_utc"]
     duration_s = row["duration_s"]
     is_timed = start_ns is not None and duration_s == duration_s
