@@ -1,6 +1,6 @@
 """One topic on its way into the file: batches become message records, gathered until they fill a chunk."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -27,13 +27,13 @@ DERIVED_KEY = "derived_from"  # in the metadata of a channel made from another o
 
 @dataclass(frozen=True)
 class Chunk:
-    """Message records of one channel, ready to be compressed: bytes, times and places of its messages."""
+    """Message records of one channel, ready to be compressed: bytes, times and places of its messages, in pieces."""
 
     channel_id: int
     topic: str
-    buffer: ByteArray
-    log_time: Int64Array
-    starts: Int64Array
+    buffers: Sequence[ByteArray]
+    log_times: Sequence[Int64Array]
+    starts: Sequence[Int64Array]
 
 
 class ChannelWriter:
@@ -73,11 +73,17 @@ class ChannelWriter:
         row_bytes = 64 + sum(2 + _width(column.values.dtype) for column in batch.columns.values())
         publish_ns = time_ns if batch.validity_time_ns is None else batch.validity_time_ns
         slots = self.slots(batch)
-        for rows in _pieces(time_ns, row_bytes):
-            self._close_at_boundary(int(time_ns[rows.start]))
-            self._append(time_ns[rows], publish_ns[rows], taken(slots, rows))
-            if self._bytes >= CHUNK_BYTES * 7 // 8:
-                self.flush()
+        for pieces in _together(_pieces(time_ns, row_bytes), CHUNK_BYTES // row_bytes):
+            rows = slice(pieces[0].start, pieces[-1].stop)
+            buffer, starts = encode(self.id, self.count, time_ns[rows], publish_ns[rows], taken(slots, rows))
+            self.count += len(starts)
+            ends = np.append(starts[1:], len(buffer))
+            for piece in pieces:
+                self._close_at_boundary(int(time_ns[piece.start]))
+                of_piece = slice(piece.start - rows.start, piece.stop - rows.start)
+                self._append(time_ns[piece], starts[of_piece], buffer[starts[of_piece.start] : ends[of_piece.stop - 1]])
+                if self._bytes >= CHUNK_BYTES * 7 // 8:
+                    self.flush()
 
     def _close_at_boundary(self, time_ns: int) -> None:
         before, self._piece_ns = self._piece_ns, time_ns
@@ -85,29 +91,28 @@ class ChannelWriter:
         if before // span != time_ns // span:
             self.flush()
 
-    def _append(self, time_ns: Int64Array, publish_ns: Int64Array, slots: list[Slot]) -> None:
-        buffer, starts = encode(self.id, self.count, time_ns, publish_ns, slots)
+    def _append(self, time_ns: Int64Array, starts: Int64Array, buffer: ByteArray) -> None:
+        """Gather records; ``starts`` count from wherever, the first record is the first of the buffer."""
         self._buffers.append(buffer)
         self._times.append(time_ns)
-        self._starts.append(starts + self._bytes)
+        self._starts.append(starts + (self._bytes - starts[0]))
         self._bytes += len(buffer)
-        self.count += len(time_ns)
 
     def flush(self) -> None:
         """Emit what is gathered as a chunk."""
         if not self._bytes:
             return
-        buffer, times, starts = _joined(self._buffers), _joined(self._times), _joined(self._starts)
+        chunk = Chunk(self.id, self.topic, self._buffers, self._times, self._starts)
         self._buffers, self._times, self._starts, self._bytes = [], [], [], 0
-        self._emit(Chunk(self.id, self.topic, buffer, times, starts))
+        self._emit(chunk)
 
     def _checked_times(self, batch: RecordBatch) -> Int64Array:
         where = f"topic {batch.topic}, record {int(batch.record_index[0])}"
         if batch.time_ns is None:
             raise GroundstationError(where, "no corrected time", "time_ns set", "apply the clock model first")
         time_ns = np.asarray(batch.time_ns, dtype=np.int64)
-        falls = np.flatnonzero(np.diff(time_ns, prepend=self._last_ns) < 0)
-        if len(falls):
+        if time_ns[0] < self._last_ns or (time_ns[1:] < time_ns[:-1]).any():
+            falls = np.flatnonzero(np.diff(time_ns, prepend=self._last_ns) < 0)
             place = f"topic {batch.topic}, record {int(batch.record_index[falls[0]])}"
             time = int(time_ns[falls[0]])
             expected = "not negative" if time < 0 else "no less than the time before"
@@ -171,10 +176,6 @@ def channel_record(channel_id: int, topic: str, metadata: Mapping[str, str]) -> 
     )
 
 
-def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
-
-
 def _width(dtype: np.dtype[Any]) -> int:
     """About as many bytes as a value takes in a message."""
     return dtype.itemsize // 4 if dtype.kind == "U" else dtype.itemsize
@@ -191,6 +192,18 @@ def _pieces(time_ns: Int64Array, row_bytes: int) -> Iterator[slice]:
             rows = _rows_before_boundary(ahead, CHUNK_SPAN_NS)
         yield slice(at, at + rows)
         at += rows
+
+
+def _together(pieces: Iterable[slice], most_rows: int) -> Iterator[list[slice]]:
+    """Pieces that follow each other in groups of no more than so many rows: a group is encoded at once."""
+    group: list[slice] = []
+    for piece in pieces:
+        if group and piece.stop - group[0].start > most_rows:
+            yield group
+            group = []
+        group.append(piece)
+    if group:
+        yield group
 
 
 def _rows_before_boundary(time_ns: Int64Array, span_ns: int) -> int:

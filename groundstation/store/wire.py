@@ -10,7 +10,7 @@ Sources: protobuf encoding, https://protobuf.dev/programming-guides/encoding; MC
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +23,11 @@ from groundstation.store.walk import locate_fields
 MAX_TEXT_BYTES = 64 << 20  # of the matrix in which texts of one piece are laid side by side
 ROWS_ALIKE, MAX_PARTIAL = 512, 60  # rows with the same fields that are worth a matrix; fields that some rows lack
 
-Block = tuple[slice | NDArray[np.intp], bytes, ByteArray]  # rows, the bytes before each value, the values as (k, width)
+Rows = slice | NDArray[np.intp]
+Block = tuple[Rows, bytes, ByteArray]  # rows, the bytes before each value, the values as (k, width)
 
 
-@dataclass(frozen=True)
-class Slot:
+class Slot(NamedTuple):
     """One field's values on their way into messages.
 
     Parameters
@@ -55,13 +55,21 @@ class Slot:
         lengths = self.lengths if self.present is None else self.lengths[self.present]
         return len(lengths) > 0 and bool(lengths.min() != lengths.max())
 
-    def take(self, rows: slice | NDArray[np.intp], present: BoolArray | None = None) -> "Slot":
+    def take(self, rows: Rows, present: BoolArray | None = None) -> "Slot":
         """The slot of some rows, which are present as ``present`` tells."""
         return Slot(self.prefix, self.values[rows], present, None if self.lengths is None else self.lengths[rows])
 
+    def alike(self) -> tuple[bytes, NDArray[Any]]:
+        """What stands before each value, and the values, where all are present and texts have one length."""
+        if self.lengths is None:
+            return self.prefix, self.values
+        length = int(self.lengths[0])
+        narrow = self.values.astype(f"S{length}", copy=False) if length else np.empty(len(self.values), "V0")
+        return self.prefix + varint(length), narrow
+
     def blocks(self) -> Iterator[Block]:
         """Rows whose bytes have one width: their positions, the bytes before each value, the values as (k, width)."""
-        rows: slice | NDArray[np.intp] = slice(None)
+        rows: Rows = slice(None)
         if self.present is not None and not self.present.all():
             rows = np.flatnonzero(self.present)
         values = np.ascontiguousarray(self.values[rows])
@@ -81,8 +89,10 @@ class Slot:
             yield positions[chosen], self.prefix + varint(int(length)), matrix[chosen, :length]
 
 
-def taken(slots: Sequence[Slot], rows: slice) -> list[Slot]:
+def taken(slots: Sequence[Slot], rows: Rows) -> list[Slot]:
     """Slots of some rows; those that share a mask still do."""
+    if isinstance(rows, slice) and rows.indices(len(slots[0].values)) == (0, len(slots[0].values), 1):
+        return list(slots)
     masks = {id(mask): mask[rows] for mask in _masks(slots).values()}
     return [slot.take(rows, masks.get(id(slot.present))) for slot in slots]
 
@@ -105,8 +115,15 @@ def encode_text(values: NDArray[np.str_]) -> NDArray[np.bytes_]:
     if not len(values):
         return np.empty(0, "S1")
     starts = np.concatenate(([0], np.flatnonzero(values[1:] != values[:-1]) + 1))
-    distinct = np.strings.encode(values[starts], "utf-8", "replace")
+    distinct = _utf8(values[starts])
     return np.repeat(distinct, np.diff(starts, append=len(values)))
+
+
+def _utf8(values: NDArray[np.str_]) -> NDArray[np.bytes_]:
+    characters = np.ascontiguousarray(values).view(np.uint32)
+    if values.dtype.isnative and characters.max(initial=0) < 0x80:  # ASCII: a character is a byte
+        return characters.astype(np.uint8).view(f"S{len(characters) // len(values)}")
+    return np.strings.encode(values, "utf-8", "replace")
 
 
 def encode(
@@ -131,28 +148,21 @@ def encode(
         Where each record starts in the buffer.
     """
     count = len(log_time)
+    sequence = np.arange(first_sequence, first_sequence + count).astype("<u4")
+    head = [Slot(b"", sequence), Slot(b"", log_time), Slot(b"", publish_time)]  # what of HEAD differs from row to row
     groups = _alike(slots, count)
-    parts = [] if groups is None else [(rows, _blocks(of_rows)) for rows, of_rows in groups]
-    blocks = _blocks(slots) if groups is None else []
-    sizes = np.full(count, HEAD.itemsize, np.int64)
-    for rows, prefix, values in blocks:
-        sizes[rows] += len(prefix) + values.shape[1]
-    for rows, of_rows in parts:
-        sizes[rows] += sum(len(prefix) + values.shape[1] for _, prefix, values in of_rows)
-    starts = np.cumsum(sizes) - sizes
-    head = (  # in the order of HEAD
-        Slot(bytes([MESSAGE_OPCODE]), sizes - RECORD_PREFIX),
-        Slot(channel_id.to_bytes(2, "little"), np.arange(first_sequence, first_sequence + count).astype("<u4")),
-        Slot(b"", log_time),
-        Slot(b"", publish_time),
-    )
     if groups is None:
-        return _scatter(_blocks(head) + blocks, sizes, starts), starts
-    if len(parts) == 1:
-        return _lay_out(_blocks(head) + parts[0][1]).reshape(-1), starts
+        return _scatter(channel_id, [*head, *slots])
+    matrices = [(rows, _lay_out(channel_id, [*taken(head, rows), *of_rows])) for rows, of_rows in groups]
+    if len(matrices) == 1:
+        matrix = matrices[0][1]
+        return matrix.reshape(-1), np.arange(count, dtype=np.int64) * matrix.shape[1]
+    sizes = np.empty(count, np.int64)
+    for rows, matrix in matrices:
+        sizes[rows] = matrix.shape[1]
+    starts = np.cumsum(sizes) - sizes
     out = np.empty(int(sizes.sum()), np.uint8)
-    for rows, of_rows in parts:
-        matrix = _lay_out(_blocks([slot.take(rows) for slot in head]) + of_rows)
+    for rows, matrix in matrices:
         record = np.dtype(f"V{matrix.shape[1]}")
         at_any_byte(out, record)[starts[rows]] = matrix.view(record)[:, 0]
     return out, starts
@@ -162,56 +172,73 @@ def _blocks(slots: Iterable[Slot]) -> list[Block]:
     return [block for slot in slots for block in slot.blocks()]
 
 
-def _alike(slots: Sequence[Slot], count: int) -> list[tuple[slice | NDArray[np.intp], list[Slot]]] | None:
+def _alike(slots: Sequence[Slot], count: int) -> list[tuple[Rows, list[Slot]]] | None:
     """Rows in groups that have the same fields present, and the slots of those; None where few are alike."""
     masks = {identity: mask for identity, mask in _masks(slots).items() if not mask.all()}
-    if len(masks) > MAX_PARTIAL or any(slot.has_many_widths for slot in slots):
+    absent = {identity for identity, mask in masks.items() if not mask.any()}
+    partial = {identity: mask for identity, mask in masks.items() if identity not in absent}
+    slots = [slot for slot in slots if id(slot.present) not in absent]
+    if len(partial) > MAX_PARTIAL or any(slot.has_many_widths for slot in slots):
         return None
-    if not masks:
-        return [(slice(None), list(slots))]
+    if not partial:
+        return [(slice(None), slots)]
     pattern = np.zeros(count, np.int64)
-    for mask in masks.values():
+    for mask in partial.values():
         pattern = pattern * 2 + mask
     patterns = np.unique(pattern).tolist()
     if len(patterns) * ROWS_ALIKE > count:
         return None
-    groups: list[tuple[slice | NDArray[np.intp], list[Slot]]] = []
+    groups: list[tuple[Rows, list[Slot]]] = []
     for one in patterns:
         rows = np.flatnonzero(pattern == one)
-        absent = {identity for identity, mask in masks.items() if not mask[rows[0]]}
-        groups.append((rows, [slot.take(rows) for slot in slots if id(slot.present) not in absent]))
+        lacking = {identity for identity, mask in partial.items() if not mask[rows[0]]}
+        groups.append((rows, [slot.take(rows) for slot in slots if id(slot.present) not in lacking]))
     return groups
 
 
-def _lay_out(blocks: Sequence[Block]) -> ByteArray:
+def _lay_out(channel_id: int, slots: Sequence[Slot]) -> ByteArray:
     """Records that all have the same fields, shape (n, size): filled by columns over a copy of the constant bytes."""
-    template = b"".join(prefix + bytes(values.shape[1]) for _, prefix, values in blocks)
-    matrix = np.empty((len(blocks[0][2]), len(template)), np.uint8)
-    matrix[:] = np.frombuffer(template, np.uint8)
-    at = 0
-    for _, prefix, values in blocks:
+    pairs = [slot.alike() for slot in slots]
+    body = b"".join(prefix + bytes(values.itemsize) for prefix, values in pairs)
+    head = _record_head(channel_id, len(body))
+    size = len(head) + len(body)
+    matrix = np.empty((len(slots[0].values), size), np.uint8)
+    matrix[:] = np.frombuffer(head + body, np.uint8)
+    at = len(head)
+    for prefix, values in pairs:
         at += len(prefix)
-        width = values.shape[1]
-        if width in (4, 8):  # one move per value
-            matrix[:, at : at + width].view(f"u{width}")[:, 0] = values.view(f"u{width}")[:, 0]
-        else:
-            matrix[:, at : at + width] = values
-        at += width
+        if values.itemsize:
+            np.ndarray(values.shape, values.dtype, matrix, at, (size,))[...] = values
+        at += values.itemsize
     return matrix
 
 
-def _scatter(blocks: Sequence[Block], sizes: Int64Array, starts: Int64Array) -> ByteArray:
-    """Records of mixed fields: every block's bytes go to the next free place of its rows."""
+def _record_head(channel_id: int, rest_bytes: int) -> bytes:
+    """Opcode, length and channel of a record that has so many bytes behind them."""
+    return bytes([MESSAGE_OPCODE]) + (2 + rest_bytes).to_bytes(8, "little") + channel_id.to_bytes(2, "little")
+
+
+def _scatter(channel_id: int, slots: Sequence[Slot]) -> tuple[ByteArray, Int64Array]:
+    """Records of mixed fields and where each starts: every block's bytes go to the next free place of its rows."""
+    blocks = _blocks(slots)
+    sizes = np.full(len(slots[0].values), len(_record_head(channel_id, 0)), np.int64)
+    for rows, prefix, values in blocks:
+        sizes[rows] += len(prefix) + values.shape[1]
+    starts = np.cumsum(sizes) - sizes
     out = np.empty(int(sizes.sum()), np.uint8)
     free = starts.copy()
-    for rows, prefix, values in blocks:
+    heads = (
+        Slot(bytes([MESSAGE_OPCODE]), sizes - RECORD_PREFIX),
+        Slot(channel_id.to_bytes(2, "little"), np.empty(len(sizes), "V0")),
+    )
+    for rows, prefix, values in _blocks(heads) + blocks:
         width = len(prefix) + values.shape[1]
         block = np.empty((len(values), width), np.uint8)
         block[:, : len(prefix)] = np.frombuffer(prefix, np.uint8)
         block[:, len(prefix) :] = values
         at_any_byte(out, np.dtype(f"V{width}"))[free[rows]] = block.view(f"V{width}")[:, 0]
         free[rows] += width
-    return out
+    return out, starts
 
 
 @dataclass(frozen=True)

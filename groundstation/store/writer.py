@@ -5,14 +5,15 @@ import re
 import tempfile
 import zlib
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Self
+from typing import Any, BinaryIO, Self
 
+import numpy as np
 import zstandard
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -26,6 +27,7 @@ from mcap.records import (
     Statistics,
     SummaryOffset,
 )
+from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import RecordBatch
@@ -40,14 +42,16 @@ from groundstation.store.schema import PACKAGE
 LIBRARY = f"groundstation {__version__}"
 # Higher levels save 4 to 7 % of recorded flights and read random mantissas a quarter slower: docs/decisions/005.
 ZSTD_LEVEL = -1
+MEMORY_BYTES = 32 << 20  # of finished chunks that are kept in memory; when there are more, all go to the spool
 MOST_ON_THEIR_WAY = 4  # chunks that wait for the thread which compresses and writes them
 MAX_CHANNELS = 65_535  # MCAP's channel ids have 16 bits
 
 
-@dataclass(frozen=True)
-class _Spooled:
-    """A chunk and its message index in the spool."""
+@dataclass
+class _Finished:
+    """A chunk and its message index: in memory, or at a place of the spool where there are no ``parts``."""
 
+    parts: tuple[bytes, ...]
     place: int
     nbytes: int
     topic: str
@@ -58,10 +62,10 @@ class _Spooled:
 class StoreWriter:
     """Write batches of corrected records into an MCAP file.
 
-    The file appears under its name when the ``with`` block ends without an exception; until then its chunks are in an
-    unnamed temporary file of the same folder. Chunks stand in order of their first log time whatever the order in
-    which topics were written; equal input gives equal bytes. A thread compresses and writes one chunk after the other
-    while the next ones are encoded.
+    The file appears under its name when the ``with`` block ends without an exception; until then its chunks are in
+    memory, or, beyond ``MEMORY_BYTES``, in an unnamed temporary file of the same folder. Chunks stand in order of their
+    first log time whatever the order in which topics were written; equal input gives equal bytes. A thread compresses
+    one chunk after the other while the next ones are encoded.
 
     Parameters
     ----------
@@ -90,7 +94,8 @@ class StoreWriter:
         self._origin = Origin()
         self._names: set[str] = set()
         self._compressor = zstandard.ZstdCompressor(level=ZSTD_LEVEL)
-        self._chunks: list[_Spooled] = []
+        self._chunks: list[_Finished] = []
+        self._bytes = self._spooled = 0  # bytes of all of them; how many are in the spool
         self._spool: BinaryIO | None = None
         self._thread = ThreadPoolExecutor(1, "store")
         self._on_their_way: deque[Future[None]] = deque()
@@ -194,12 +199,13 @@ class StoreWriter:
     def _spool_chunk(self, chunk: Chunk) -> None:
         """Compress a chunk and write it to the spool; in the thread, chunk after chunk."""
         assert self._spool is not None
-        start, end = int(chunk.log_time[0]), int(chunk.log_time[-1])
-        raw = chunk.buffer.data
+        buffer, log_time, starts = (_joined(parts) for parts in (chunk.buffers, chunk.log_times, chunk.starts))
+        start, end = int(log_time[0]), int(log_time[-1])
+        raw = buffer.data
         data = self._compressor.compress(raw)
         head = chunk_head(start, end, len(raw), zlib.crc32(raw), len(data))
         length = len(head) + len(data)
-        messages = message_index(chunk.channel_id, chunk.log_time, chunk.starts)
+        messages = message_index(chunk.channel_id, log_time, starts)
         index = ChunkIndex(
             chunk_start_offset=0,  # known when all chunks are
             chunk_length=length,
@@ -211,9 +217,15 @@ class StoreWriter:
             compressed_size=len(data),
             uncompressed_size=len(raw),
         )
-        place = self._spool.tell()
-        self._spool.writelines((head, data, messages))
-        self._chunks.append(_Spooled(place, length + len(messages), chunk.topic, len(self._chunks), index))
+        nbytes = length + len(messages)
+        self._chunks.append(_Finished((head, data, messages), 0, nbytes, chunk.topic, len(self._chunks), index))
+        self._bytes += nbytes
+        if self._bytes > MEMORY_BYTES:
+            for one in self._chunks[self._spooled :]:
+                one.place = self._spool.tell()
+                self._spool.writelines(one.parts)
+                one.parts = ()
+            self._spooled = len(self._chunks)
 
     def _finish(self, file: BinaryIO) -> None:
         """Write the whole file: definitions, chunks, facts again, summary."""
@@ -247,12 +259,15 @@ class StoreWriter:
         ]
         file.write(_summary(groups, file.tell()) + MAGIC)
 
-    def _copy_chunk(self, file: BinaryIO, chunk: _Spooled) -> ChunkIndex:
+    def _copy_chunk(self, file: BinaryIO, chunk: _Finished) -> ChunkIndex:
         """Copy a chunk from the spool; returns its index with the places it now has."""
         assert self._spool is not None
         start = file.tell()
-        self._spool.seek(chunk.place)
-        file.write(self._spool.read(chunk.nbytes))
+        if chunk.parts:
+            file.writelines(chunk.parts)
+        else:
+            self._spool.seek(chunk.place)
+            file.write(self._spool.read(chunk.nbytes))
         chunk.index.chunk_start_offset = start
         chunk.index.message_index_offsets = {
             channel_id: start + offset for channel_id, offset in chunk.index.message_index_offsets.items()
@@ -282,7 +297,11 @@ class StoreWriter:
             raise GroundstationError(str(self.path), f"cannot be written ({reason})") from error
 
 
-def _order(chunk: _Spooled) -> tuple[int, str, int]:
+def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+def _order(chunk: _Finished) -> tuple[int, str, int]:
     """Chunks by first log time; of equal times by topic, and of one topic as they came."""
     return chunk.index.message_start_time, chunk.topic, chunk.ordinal
 
