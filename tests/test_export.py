@@ -18,8 +18,11 @@ from groundstation.exports.nmea import write_nmea
 from groundstation.exports.sbet import write_sbet
 from groundstation.exports.tracks import HALF_WIDTH, MSL, Track, tracks_of
 from groundstation.pipeline.verbs.export import WRITERS_OF_ONE, _written_alone, export
+from groundstation.pipeline.verbs.export_figures import export_figures
 from groundstation.results.figures import FigureData
 from groundstation.tables.table import Flight, Table
+from tests.fleet_example import save_flight
+from tests.saved import load
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 START_NS = 1_777_874_400_000_000_000  # 2026-05-04T06:00Z
@@ -252,3 +255,46 @@ def test_refusals_are_one_line_and_leave_nothing(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no such file"):
         export(tmp_path / "none.csv", tmp_path / "a.csv")
     assert [path.name for path in tmp_path.iterdir()] == ["b.csv"]
+
+
+def test_a_made_track_has_the_height_of_its_ins_and_no_other() -> None:
+    at_s = np.array([1.0, 5.0, 40.0])  # the last is long after the log's end
+    place = {"corrected_latitude_deg": at_s * 1e-4, "corrected_longitude_deg": at_s * 0.0}
+    figures = {"inertial_track": FigureData("inertial_track", {"time_s": at_s, **place}, {})}
+
+    def made(ins_topic: str) -> Track:
+        (track,) = (one for one in tracks_of(flight(), figures, ins_topic) if one.name == "corrected")
+        return track
+
+    height_m = made("ins").column("altitude_ellipsoid_m")
+    assert np.allclose(height_m[:2], 530.0 + at_s[:2], atol=0.051)
+    assert np.isnan(height_m[2])
+    assert "altitude_ellipsoid_m" not in made("").columns
+
+
+def test_figures_are_written_with_units_and_utc(tmp_path: Path) -> None:
+    folder = save_flight(tmp_path / "out", 0)
+    target = tmp_path / "taxi.csv"
+    export_figures(folder, target, ["heading_samples"])
+    with target.open() as file:
+        rows = list(csv.DictReader(file))
+    saved = load(folder).figures["heading_samples"]
+    assert list(rows[0]) == ["utc", *saved.columns]
+    assert rows[0]["utc"] == "2026-05-04T06:01:00.000Z"
+    assert [float(row["ground_speed_mps"]) for row in rows] == saved["ground_speed_mps"].tolist()
+    assert rows[0]["track_deg"] == ""
+    export_figures(folder, tmp_path / "all")
+    assert {path.stem for path in (tmp_path / "all").iterdir()} == set(load(folder).figures)
+
+
+def test_figures_need_a_flight_folder_and_a_name_that_is_there(tmp_path: Path) -> None:
+    folder = save_flight(tmp_path / "out", 0)
+    with pytest.raises(UsageError, match="heading_samples"):
+        export_figures(folder, tmp_path / "a.csv", ["headings"])
+    with pytest.raises(UsageError, match="flight folder"):
+        export_figures(SAMPLES / "taxi-good.csv", tmp_path / "a.csv", ["heading_samples"])
+    with pytest.raises(UsageError, match="suffix"):
+        export_figures(folder, tmp_path / "a.kml", ["heading_samples"])
+    (tmp_path / "a.csv").write_text("mine")
+    with pytest.raises(UsageError, match="overwrites"):
+        export_figures(folder, tmp_path / "a.csv", ["heading_samples"])

@@ -149,10 +149,10 @@ def test_bombs_are_refused_in_time(tmp_path: Path, kind: str) -> None:
         "gzip-members": lambda: gzip.compress(b"", mtime=0) * 200_000,
     }[kind]()
     (tmp_path / "bomb").write_bytes(content)
-    began = time.perf_counter()
+    began = time.process_time()
     with pytest.raises(GroundstationError):
         list(registry.read(tmp_path / "bomb"))
-    assert time.perf_counter() - began < LIMIT_S
+    assert time.process_time() - began < LIMIT_S
 
 
 def test_many_small_members_are_still_one_log(tmp_path: Path) -> None:
@@ -174,9 +174,9 @@ def test_cyclic_deep_and_wide_definitions(tmp_path: Path) -> None:
     for row in range(20):
         log.row(40, "Q4f", 1_000_000 + row * 100_000, 1, 0, 0, 0)
     (tmp_path / "log.ulg").write_bytes(bytes(log.data))
-    began = time.perf_counter()
+    began = time.process_time()
     items = list(registry.read(tmp_path / "log.ulg"))
-    assert time.perf_counter() - began < LIMIT_S
+    assert time.process_time() - began < LIMIT_S
     rows = sum(len(item) for item in items if isinstance(item, RecordBatch) and item.topic == "raw.vehicle_attitude")
     assert rows == 20 and any(isinstance(item, Damage) and item.kind == "dropped_channel" for item in items)
 
@@ -199,9 +199,9 @@ def _many_ulog() -> bytes:
 @pytest.mark.parametrize("content", [_many_csv, _many_ulog], ids=["csv", "ulog"])
 def test_ten_thousand_channels_are_read(tmp_path: Path, content: object) -> None:
     (tmp_path / "log").write_bytes(content())  # type: ignore[operator]
-    began = time.perf_counter()
+    began = time.process_time()
     topics = {item.topic for item in registry.read(tmp_path / "log") if isinstance(item, RecordBatch)}
-    assert len(topics) >= CHANNELS and time.perf_counter() - began < 3 * LIMIT_S
+    assert len(topics) >= CHANNELS and time.process_time() - began < 3 * LIMIT_S
 
 
 @pytest.mark.slow

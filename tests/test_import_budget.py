@@ -42,6 +42,14 @@ def test_a_table_is_read_without_what_it_does_not_need(verb: str, tmp_path: Path
     assert loaded(BY_VERB, verb, str(SAMPLE), *target) == []
 
 
+def test_a_purpose_is_answered_without_estimating() -> None:
+    asked = ["check", str(SAMPLE), "--for", "heading"]
+    loaded(BY_VERB, *asked)  # compiles, where that was not done before
+    used = ("groundstation.estimators", "groundstation.tables.phases", "scipy")  # a quantile at standstill
+    not_needed = tuple(name for name in NOT_NEEDED if name not in used)
+    assert loaded(BY_VERB, *asked, names=(*not_needed, "groundstation.estimators.heading.solution")) == []
+
+
 def test_a_log_is_opened_without_what_it_does_not_need() -> None:
     assert loaded(BY_OPEN, str(SAMPLE), names=(*NOT_NEEDED, "pyarrow.csv", "typer")) == []
 

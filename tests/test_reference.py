@@ -13,6 +13,7 @@ from groundstation.chapters.by_answer import chapter_of
 from groundstation.chapters.markdown import markdown
 from groundstation.estimators.known import Known
 from groundstation.estimators.reference.analysis import REFERENCE
+from groundstation.estimators.reference.columns import REFERENCE_COLUMNS
 from groundstation.estimators.reference.errors import Errors, errors_of, turned_arm
 from groundstation.estimators.reference.paths import path_rows
 from groundstation.estimators.reference.placing import fit_place
@@ -347,3 +348,16 @@ def test_the_chapter_tells_claimed_against_seen_and_a_fleet_counts_it(tmp_path: 
     assert len(checks) == int(claim.effective_samples)
     share = sum(check.is_inside for check in checks) / len(checks)
     assert share == pytest.approx(claim.share_inside95, abs=0.05)
+
+
+def test_the_columns_of_a_fleet_are_those_of_the_first_of_a_kind_whatever_its_name() -> None:
+    """In a joined flight the one receiver is ``gnss.b``, where the first log has none."""
+    rng = np.random.default_rng(15)
+    flight = ride(rng.normal(0.0, 2.0, (3_000, 2)), horizontal_sigma_m=1.4)
+    tables = {("gnss.b" if topic == "gnss" else topic): one for topic, one in flight.tables.items()}
+    alone, joined = judged(flight), judged(replace(flight, tables=tables))
+    for column in REFERENCE_COLUMNS:
+        assert column.value(joined) == column.value(alone), column.name
+    by_name = {column.name: column.value(joined) for column in REFERENCE_COLUMNS}
+    assert by_name["gnss_reference_rmse_m"] == pytest.approx(2.0 * np.sqrt(2.0), rel=0.05)
+    assert by_name["gnss_inside95_share"] is not None

@@ -18,6 +18,7 @@ from groundstation.pipeline.one_flight.configuration import NO_REFERENCES, Confi
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
 from groundstation.pipeline.one_flight.flight import given_of, read_flight
 from groundstation.pipeline.one_flight.log import open_log
+from groundstation.pipeline.one_flight.resume import keys_of
 from groundstation.pipeline.verbs.conversions import convert_many
 from groundstation.readers.sbet import RECORD
 from groundstation.results.flight import FlightResults
@@ -26,6 +27,7 @@ from groundstation.results.summary import summary_of
 from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import simulate
 from groundstation.tables.table import Flight
+from tests.bag_writer import small_flight, write_ros2
 from tests.real_logs import real_log
 from tests.simulated_flights import quiet
 
@@ -230,3 +232,28 @@ def test_gps_time_of_a_recorded_solution_becomes_utc(tmp_path: Path) -> None:
     assert row is not None
     assert row.spread.rmse < 0.002
     assert not answer.is_judge
+
+
+def test_what_is_read_along_with_a_reference_counts_in_what_a_run_need_not_do_again(
+    folder: Path, tmp_path: Path
+) -> None:
+    """The accuracies beside an SBET, the files of a bag: with others a run that is continued begins anew."""
+    sbet = tmp_path / "sbet_20260504.out"
+    sbet.write_bytes((folder / "references" / "sbet.out").read_bytes())
+    bag = write_ros2(tmp_path / "bag", small_flight())
+    source = open_log(folder / "flight.csv").source
+
+    def key(reference: Path) -> str:
+        configuration = Configuration(references=References((reference,)))
+        return keys_of(source, configuration, with_pdf=False).conversion
+
+    (inside,) = bag.glob("*.mcap")
+    for reference, other in ((sbet, tmp_path / "smrmsg_20260504.out"), (bag, inside), (bag / "metadata.yaml", inside)):
+        before = key(reference)
+        assert key(reference) == before
+        other.write_bytes((other.read_bytes() if other.exists() else b"") + b"other")
+        assert key(reference) != before
+    sha256 = open_log(sbet).source.sha256
+    (tmp_path / "smrmsg_20260504.out").write_bytes(b"still others")
+    assert open_log(sbet).source.sha256 != sha256, "they are a part of the log"
+    assert open_log(sbet).source.name == sbet.name

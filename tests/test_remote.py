@@ -2,6 +2,7 @@
 
 import json
 import os
+import platform
 import shutil
 import signal
 import subprocess
@@ -18,6 +19,7 @@ from distributed import Client
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.pipeline.many_flights.batch import plan_many, run_many
 from groundstation.pipeline.many_flights.cluster import on_cluster
+from groundstation.pipeline.many_flights.lease import alone_elsewhere
 from groundstation.pipeline.many_flights.remote import RemoteFolder, far_logs
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job
@@ -89,13 +91,14 @@ def test_what_is_finished_elsewhere_is_not_done_again(
 ) -> None:
     out, source = f"{memory}out", f"{memory}logs"
     RemoteFolder(source).write(SHORT.name, SHORT.read_bytes())
-    run_many([source], out, Configuration(), jobs=1)
     told: list[str] = []
 
     def listen(event: Event) -> None:
         told.append(event.text if event.kind == "stage" else "")
 
-    (again,) = run_many([source], out, Configuration(), jobs=1, listen=listen)
+    with sketching():
+        run_many([source], out, Configuration(), jobs=1, with_pdf=False)
+        (again,) = run_many([source], out, Configuration(), jobs=1, with_pdf=False, listen=listen)
     assert again.state == "done" and set(told) == {""}
     run_many([source], out, SETTINGS, jobs=1, listen=listen)
     assert "estimating" in told and "converting" not in told
@@ -145,8 +148,72 @@ def test_what_groundstation_made_is_no_log(memory: str) -> None:
         "one/one.mcap",
     ):
         far.write(name, b"x")
-    assert [log.removeprefix(far.url) for log, _named in far_logs(far.url)] == ["/a.ulg", "/sub/b.csv"]
-    assert far_logs(f"{far.url}/a.ulg") == [(f"{far.url}/a.ulg", True)]
+    assert [log.url.removeprefix(far.url) for log in far_logs(far.url)] == ["/a.ulg", "/sub/b.csv"]
+    assert far_logs(f"{far.url}/a.ulg") == [(f"{far.url}/a.ulg", True, 1)]
+
+
+def test_twins_elsewhere_are_run_once(memory: str) -> None:
+    source, told = RemoteFolder(f"{memory}logs"), []
+    content = SHORT.read_bytes()
+    for name, one in {"a.csv": content, "b.csv": content, "c.csv": b"!" + content[1:]}.items():
+        source.write(name, one)
+
+    def listen(event: Event) -> None:
+        if event.text == "estimating":
+            told.append(event.name)
+
+    with sketching():
+        outcomes = run_many([source.url], f"{memory}out", Configuration(), jobs=1, with_pdf=False, listen=listen)
+    assert [one.state for one in outcomes][:2] == ["done", "skipped"]
+    assert outcomes[1].text == f"b.csv: same content as {source.url}/a.csv, listed once"
+    assert told.count("b.csv") == 0 and told.count("a.csv") == 1
+
+
+def test_one_run_at_a_time_writes_into_a_place_elsewhere(memory: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = RemoteFolder(f"{memory}out")
+    with alone_elsewhere(out):
+        with pytest.raises(UsageError, match=rf"another run is writing into it \({platform.node()}, process \d+\)"):
+            run_many([SHORT], out.url, Configuration())
+        assert out.names() == [".lock"]
+    assert out.names(".lock") == []
+    dead = f'{{"token": "x", "owner": "gone", "until_s": {time.time() - 1.0}}}'.encode()
+    out.write(".lock/6", dead)
+    with alone_elsewhere(out) as lease:  # nobody renewed it
+        assert out.names(".lock") == ["7"]
+        lease.require()
+        out.write(".lock/8", json.dumps({"token": "y", "owner": "other", "until_s": time.time() + 9.0}).encode())
+        with pytest.raises(GroundstationError, match=r"another run took over \(other\)"):
+            lease.require()
+    assert out.names(".lock") == ["8"]
+    out.write(".lock/8", b"not a lock")
+    monkeypatch.setattr("groundstation.pipeline.many_flights.lease.RENEW_S", 0.05)
+    with alone_elsewhere(out):
+        first = json.loads(out.read(".lock/9") or b"")["until_s"]
+        deadline = time.monotonic() + 10.0
+        while json.loads(out.read(".lock/9") or b"")["until_s"] <= first:
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+
+
+def begun_together(out: RemoteFolder, runs: int = 8) -> list[str]:
+    """What becomes of runs that begin at the same moment in one place."""
+    together, found = threading.Barrier(runs), []
+
+    def begin() -> None:
+        together.wait()
+        try:
+            with alone_elsewhere(RemoteFolder(out.url)):
+                found.append("alone")
+                time.sleep(1.0)
+        except UsageError:
+            found.append("refused")
+
+    threads = [threading.Thread(target=begin) for _ in range(runs)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return sorted(found)
 
 
 @pytest.fixture
@@ -169,6 +236,13 @@ def bucket(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     yield "s3://flights"
     fsspec.filesystem("s3").clear_instance_cache()
     server.stop()
+
+
+def test_a_bucket_lets_one_of_several_runs_begin(bucket: str) -> None:
+    out = RemoteFolder(f"{bucket}/out")
+    assert begun_together(out) == ["alone", *["refused"] * 7]
+    out.write(".lock/3", b'{"token": "x", "owner": "gone", "until_s": 0}')
+    assert begun_together(out) == ["alone", *["refused"] * 7]
 
 
 @pytest.mark.slow

@@ -14,8 +14,10 @@ from pathlib import Path
 
 import pytest
 from filelock import FileLock
+from typer.testing import CliRunner
 
 from groundstation.base.errors import UsageError
+from groundstation.cli.main import app
 from groundstation.pipeline.many_flights.batch import _crew, plan_many, run_many
 from groundstation.pipeline.many_flights.out_folder import LOCK
 from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, _teller, in_turn, side_by_side
@@ -102,6 +104,33 @@ def test_a_changed_setting_keeps_the_mcap_and_gives_what_a_new_run_gives(
     assert mcap.stat().st_ino == before
     assert_equal_runs(out, Path(finished_run(SHORT.stem, SETTINGS).folder).parent)
     assert plan_many([SHORT], out, SETTINGS)[0].text == "finished, nothing to do"
+
+
+def test_results_alone_are_those_of_a_whole_run_which_makes_the_rest_later(finished: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = ["run", str(SHORT), "-o", str(out), "--only", "results", "-q"]
+    assert CliRunner().invoke(app, command).exit_code == 0
+    made, whole = promised_files(out), promised_files(finished)
+    assert {path.suffix for path in out.rglob("*.*")}.isdisjoint({".rrd", ".html", ".pdf"})
+    listed = {"index.json", "index.csv"}  # they link to what there is
+    for name in made.keys() - listed:
+        assert made[name] == whole[name], name
+    assert whole.keys() - made.keys() == {name for name in whole if "/report." in name}
+    (row,), (row_of_whole,) = (json.loads(files["index.json"])["rows"] for files in (made, whole))
+    assert row_of_whole | {"report": None, "recording": None} == row
+    assert plan_many([SHORT], out, Configuration(), only_results=True)[0].text == "finished, nothing to do"
+    _outcome, told = stages([SHORT], out, Configuration())
+    assert {"recording", "reporting"} <= told and "converting" not in told
+    assert_equal_runs(out, finished)
+
+
+def test_results_alone_leave_no_pages_of_other_results(finished: Path, tmp_path: Path) -> None:
+    out = copied(finished, tmp_path / "out")
+    assert plan_many([SHORT], out, Configuration(), only_results=True)[0].text == "finished, nothing to do"
+    (flight_in(out) / "notes.txt").touch()
+    (outcome,) = run_many([SHORT], out, SETTINGS, only_results=True)
+    assert outcome.state == "done" and (flight_in(out) / "notes.txt").exists()
+    assert {path.suffix for path in out.rglob("*.*")}.isdisjoint({".rrd", ".html", ".pdf"})
 
 
 def test_a_limit_of_the_ledger_redoes_everything(finished: Path) -> None:
@@ -195,11 +224,8 @@ def test_an_interrupted_run_stops_at_once_and_keeps_its_index(tmp_path: Path) ->
 
     with pytest.raises(KeyboardInterrupt) as caught:
         run_many([SAMPLES], tmp_path / "out", Configuration(), jobs=2, with_pdf=False, listen=interrupt)
-    deadline = time.monotonic() + 10.0
-    while multiprocessing.active_children() and time.monotonic() < deadline:
-        time.sleep(0.05)
     assert caught.value is not None  # the frames of the run are alive: its processes ended all the same
-    assert multiprocessing.active_children() == []
+    assert ended_children()
     assert (tmp_path / "out" / "index.json").is_file()
 
 
@@ -277,6 +303,44 @@ def test_a_process_that_dies_takes_its_own_log_alone(tmp_path: Path) -> None:
     first, killer, last = run_many([logs], tmp_path / "out", Configuration(), jobs=2, with_pdf=False, listen=kill)
     assert (first.state, last.state) == ("done", "done")
     assert killer.state == "failed" and killer.text == "killer.csv: its process died (killed, or out of memory)"
+
+
+def hang_or_run(job: Job, listen: Listener) -> Outcome:
+    """What a worker of the tests of time limits does: the log named "hang" never ends, another one takes a moment."""
+    time.sleep(120.0 if job.name == "hang" else 0.3)
+    return Outcome(job.log, "done", "")
+
+
+def test_a_log_that_takes_too_long_costs_itself_alone(tmp_path: Path) -> None:
+    jobs = [Job(Path(name), tmp_path, Configuration()) for name in ("a", "hang", "b", "c", "d")]
+    began = time.monotonic()
+    ended = dict(side_by_side(enumerate(jobs), hang_or_run, workers=2, listen=silent, timeout_s=2.0))
+    assert [ended[number].state for number in range(5)] == ["done", "failed", "done", "done", "done"]
+    assert ended[1].text == "hang: not done within 2 s (--timeout), ended" and ended[1].code == 1
+    assert time.monotonic() - began < 60.0 and ended_children()
+
+
+def ended_children() -> bool:
+    deadline = time.monotonic() + 10.0
+    while multiprocessing.active_children() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return not multiprocessing.active_children()
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_a_time_limit_leaves_no_part_of_a_flight(tmp_path: Path) -> None:
+    limited = _crew("", 1, 1, silent, 1.0)
+    assert limited.func is side_by_side  # one log, too, is run in a process that can be ended
+
+    def stop(event: Event) -> None:
+        if event.text == "estimating":
+            for child in multiprocessing.active_children():
+                os.kill(child.pid or 0, signal.SIGSTOP)
+
+    (late,) = run_many([SHORT], tmp_path, Configuration(), jobs=1, timeout_s=8.0, listen=stop, with_pdf=False)
+    assert late.state == "failed" and "not done within 8 s" in late.text
+    assert [path.name for path in tmp_path.iterdir() if path.is_dir()] == []
+    assert ended_children()
 
 
 def killed_and_continued(moments_s: list[float], folder: Path) -> None:

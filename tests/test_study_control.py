@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from groundstation.chapters.markdown import escaped
 from groundstation.estimators.control.laws import Session, integral_law
 from groundstation.results.figures import FigureData
 from groundstation.studies.control import laws_table, page, placement_table, published_table
 from groundstation.studies.control_cases import CASES, SPEED, placements, scenario, with_fixed_point
 from groundstation.studies.control_flown import fly
+from groundstation.studies.page import StudyResult
 
 RUNS = 60
 SIGMA_OF_RMS = 4.0 / np.sqrt(2.0 * RUNS)  # four of its relative standard error
@@ -66,5 +68,5 @@ def test_the_published_distance_belongs_to_its_fixed_point_alone() -> None:
 def test_the_page_tells_every_table(published: FigureData) -> None:
     laws = laws_table(scenario(SPEED), 10, 3, lambda _text: None)
     placed = placement_table(dict(list(placements().items())[:1]), lambda _text: None)
-    text = page((published, laws, placed), 10, 3)
-    assert all(case.published in text for case in CASES) and "NEES" in text and "440" in text
+    text = StudyResult("control", (), page((published, laws, placed), 10, 3)).markdown
+    assert all(escaped(case.published) in text for case in CASES) and "NEES" in text and "440" in text

@@ -20,7 +20,7 @@ from groundstation.estimators.two_clocks.relation import NotOneFlightError
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
-from groundstation.pipeline.one_flight.join import join_logs
+from groundstation.pipeline.one_flight.join import join_files, join_logs
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.results.figures import numbers
 from groundstation.results.files import load
@@ -117,6 +117,39 @@ def test_a_log_that_cannot_be_read_is_left_out_and_told(logs: Path, tmp_path: Pa
     assert found.findings[0].code == "together.unreadable"
     assert found.findings[0].text.startswith("d.ulg: log that is left out")
     assert found.info.ledger.loses_data
+
+
+@pytest.mark.parametrize("content", [b"", b"nothing that a reader knows\n" * 9])
+def test_an_empty_or_unknown_file_is_left_out_and_the_others_close_up(
+    logs: Path, tmp_path: Path, content: bytes
+) -> None:
+    odd = tmp_path / "odd.xyz"
+    odd.write_bytes(content)
+    target = tmp_path / "joined.mcap"
+    found = join_files([logs / "a.ulg", odd, logs / "b.ubx"], target, Configuration())
+    assert found.has_lost_data
+    assert (found.findings[0].code, found.findings[0].severity) == ("together.unreadable", "fail")
+    assert found.findings[0].text.startswith("odd.xyz: log that is left out")
+    assert {"gnss", "gnss.b"} <= set(found.info.ledger.topics)
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_where_one_log_is_left_it_is_a_plain_run_that_says_what_is_left_out(logs: Path, tmp_path: Path) -> None:
+    odd = tmp_path / "odd.xyz"
+    odd.write_bytes(b"")
+    out = tmp_path / "out"
+    code, _out, _err = groundstation("run", str(odd), str(logs / "b.ubx"), "--together", "-o", str(out), "--no-pdf")
+    assert code == 3
+    (folder,) = (path for path in out.iterdir() if (path / "summary.json").exists())
+    results = load(folder, ANSWER_TYPES).results
+    alone = convert_log(open_log(logs / "b.ubx"), tmp_path / "alone.mcap").info
+    assert results.answer(Together) is None
+    assert (results.source.name, results.source.sha256) == ("b.ubx", alone.source_sha256)
+    assert results.findings[0].code == "together.unreadable"
+    assert set(results.ledger.topics) == set(alone.ledger.topics)
+    assert [one.text for one in results.findings if "left out" in one.text] == [results.findings[0].text]
+    two = [str(odd), str(odd)]
+    assert groundstation("convert", *two, "--together", "-o", str(tmp_path / "x.mcap"))[0] == 1
 
 
 def test_the_same_log_twice_is_refused(logs: Path, tmp_path: Path) -> None:

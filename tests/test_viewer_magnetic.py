@@ -64,7 +64,7 @@ def test_text_holds_verdict_card_and_reasons(contents: Contents) -> None:
     found = figure_eight().answer(MagneticResult)
     assert found is not None
     text = contents.text("/magnetic/answer")
-    assert text.startswith("# Magnetic deviation\\: accept\n")
+    assert text.startswith("# Magnetic deviation: accept\n")
     section = magnetic(figure_eight())
     assert section is not None
     assert text == markdown(section)
@@ -87,4 +87,4 @@ def test_with_empty_figures_the_tab_stands_and_without_a_result_there_is_none(tm
     write_recording(tmp_path / "b.rrd", flight, bare)
     without = Contents(tmp_path / "a.rrd")
     assert "no opposite turns" in without.text("/summary") and "/magnetic/answer" not in without.fixed
-    assert Contents(tmp_path / "b.rrd").text("/magnetic/answer").startswith("# Magnetic deviation\\: accept")
+    assert Contents(tmp_path / "b.rrd").text("/magnetic/answer").startswith("# Magnetic deviation: accept")

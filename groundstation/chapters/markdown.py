@@ -6,7 +6,9 @@ from collections.abc import Iterable, Sequence
 from groundstation.chapters.parts import Cell, Facts, Figure, Front, Grid, Mark, Note, Part, Section
 from groundstation.chapters.wording import clean
 
-_MARKUP = re.compile(r"([\\`*_{}\[\]()<>#+\-.!|~&:])")
+# What can be markup anywhere or make an address a link; and what only a line can begin with: a title, a list, a rule.
+_ANYWHERE = re.compile(r"([\\`*_\[\]<>|~&]|:(?=//)|(?<=www)\.)", re.IGNORECASE)
+_AT_START = re.compile(r"^(\s*\d*)(#(?=#*(?:\s|$))|[-+.)](?=\s|$)|-(?=-)|=)")
 WIDEST_CELL = 60  # characters: a panel does not wrap cells, so longer remarks stand below the table
 
 
@@ -16,9 +18,11 @@ def escaped(text: str) -> str:
     Examples
     --------
     >>> print(escaped("a|b ![x](http://y)"))
-    a\\|b \\!\\[x\\]\\(http\\://y\\)
+    a\\|b !\\[x\\](http\\://y)
+    >>> print(escaped("1. -0.5 (about)"))
+    1\\. -0.5 (about)
     """
-    return _MARKUP.sub(r"\\\1", clean(text))
+    return _AT_START.sub(r"\1\\\2", _ANYWHERE.sub(r"\\\1", clean(text)))
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -35,7 +39,7 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join([lines[0], "|" + "---|" * len(heads), *lines[1:]])
 
 
-def markdown(section: Section, *, level: int = 1) -> str:
+def markdown(section: Section, *, level: int = 1, widest: int = WIDEST_CELL) -> str:
     """A section as a Markdown document, headed by its headline or its title.
 
     The parts set small are left out, and figures, but for what stands in their place.
@@ -45,10 +49,12 @@ def markdown(section: Section, *, level: int = 1) -> str:
     section : Section
     level : int
         Of its heading: 1 is ``#``.
+    widest : int
+        Characters of a cell; a longer remark stands below its table.
     """
     parts = [f"{'#' * level} {escaped(section.headline or section.title)}"]
     for part in (*section.above, *section.parts):
-        parts += _part(part, level + 1)
+        parts += _part(part, level + 1, widest)
     return "\n\n".join(parts)
 
 
@@ -75,32 +81,32 @@ def front_markdown(front: Front) -> str:
     return "\n\n".join(parts)
 
 
-def _part(part: Part | None, level: int) -> list[str]:
+def _part(part: Part | None, level: int, widest: int = WIDEST_CELL) -> list[str]:
     if isinstance(part, Figure):
-        return _part(part.instead, level)
+        return _part(part.instead, level, widest)
     if isinstance(part, Note) and part.files:  # they lie beside a report
         return []
     if isinstance(part, Note):
         return [f"**{mark}** {escaped(part.text)}" if (mark := Mark(part.tone, "").symbol) else escaped(part.text)]
     if isinstance(part, Facts):
-        return [] if part.compact else _facts(part, level)
-    return _grid(part, level) if isinstance(part, Grid) else []
+        return [] if part.compact else _facts(part, level, widest)
+    return _grid(part, level, widest) if isinstance(part, Grid) else []
 
 
-def _facts(facts: Facts, level: int) -> list[str]:
-    short = [remark if len(remark) <= WIDEST_CELL else "" for _label, _value, remark in facts.pairs]
+def _facts(facts: Facts, level: int, widest: int = WIDEST_CELL) -> list[str]:
+    short = [remark if len(remark) <= widest else "" for _label, _value, remark in facts.pairs]
     rows = [(label, value, remark) for (label, value, _), remark in zip(facts.pairs, short, strict=True)]
     shown = 3 if any(short) else 2
     cells = table(("", "value", "")[:shown], [[escaped(text) for text in row[:shown]] for row in rows])
-    long = [f"{escaped(label)}: {escaped(remark)}" for label, _, remark in facts.pairs if len(remark) > WIDEST_CELL]
+    long = [f"{escaped(label)}: {escaped(remark)}" for label, _, remark in facts.pairs if len(remark) > widest]
     return [*_title(facts.title, level), cells, *long, *_caption(facts.caption)]
 
 
-def _grid(grid: Grid, level: int) -> list[str]:
+def _grid(grid: Grid, level: int, widest: int) -> list[str]:
     """A table; where a column has long remarks they stand below it, each under the name of its row."""
     rows = [[_cell(cell) for cell in row] for row in grid.rows]
     named = min((place for row in grid.rows for place, cell in enumerate(row) if isinstance(cell, str)), default=0)
-    long = {place for row in grid.rows for place, cell in enumerate(row) if len(_text(cell)) > WIDEST_CELL}
+    long = {place for row in grid.rows for place, cell in enumerate(row) if len(_text(cell)) > widest}
     shown = [place for place in _in_sight(grid, named in long, named) if place == named or place not in long]
     heads = [escaped(grid.heads[place].title) for place in shown]
     cells = [table(heads, [[row[place] for place in shown] for row in rows])] if shown != [named] else []

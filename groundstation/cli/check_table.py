@@ -45,7 +45,8 @@ def text_of(one: Checked, everything: bool = False) -> str:
     """The ledger of one log as text."""
     topics = one.ledger.topics
     shown = {name: topic for name, topic in topics.items() if everything or is_canonical(name) or _is_odd(topic)}
-    parts = [_head(one), _clock(one.clock)]
+    usable = printable(one.usability.text) if one.usability else ""
+    parts = [usable, _head(one), _clock(one.clock)]
     if shown:
         parts.append(_topics(shown))
     if len(shown) < len(topics):

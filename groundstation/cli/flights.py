@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from groundstation.base.errors import UsageError
 from groundstation.cli.application import (
     DONE,
     ConfigFile,
@@ -43,6 +44,23 @@ def clip(
     topics: Annotated[
         list[str] | None, typer.Option("--topics", help="Topic or pattern to keep; may be repeated.", metavar="GLOB")
     ] = None,
+    anonymous: Annotated[
+        bool,
+        typer.Option(
+            "--anonymous",
+            help="Turn all longitudes by a secret angle, move dates by weeks, replace names, leave texts, raw topics, "
+            "magnetometer and satellites out. Latitude, height, time of day and the shape of the track stay: who knows "
+            "where such flights are flown may still find the place.",
+        ),
+    ] = False,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            "--seed",
+            help="Of --anonymous: the same for all logs of a session, and a secret like a password; left out: random.",
+            min=0,
+        ),
+    ] = None,
     no_recording: Annotated[bool, typer.Option("--no-recording", help="Leave the recording out.")] = False,
     config: ConfigFile = None,
     profile: Profile = None,
@@ -59,11 +77,13 @@ def clip(
     from groundstation.pipeline.verbs.clip import Wanted
     from groundstation.pipeline.verbs.clip import clip as cut
 
+    if seed is not None and not anonymous:
+        raise UsageError("--seed", "it without --anonymous", "both")
     with listener("none" if quiet else progress) as listen:
         outcome = cut(
             flight,
             output,
-            Wanted(start, end, tuple(topics or ())),
+            Wanted(start, end, tuple(topics or ()), anonymous, seed),
             configuration=load_configuration(config, profile=profile),
             with_recording=not no_recording,
             force=force,
@@ -79,7 +99,12 @@ def export(
     flight: Annotated[Path, typer.Argument(help="Flight folder, MCAP or log.", metavar="X", readable=False)],
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", help=".kml, .gpx, .csv, .parquet, .nmea or .sbet (.out).", metavar="FILE"),
+        typer.Option(
+            "-o",
+            "--output",
+            help=".kml, .gpx, .csv, .parquet, .nmea or .sbet (.out); a folder for several figures.",
+            metavar="FILE",
+        ),
     ],
     tracks: Annotated[
         list[str] | None,
@@ -90,6 +115,16 @@ def export(
             metavar="NAME",
         ),
     ] = None,
+    figure: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--figure",
+            help="What a figure of a flight folder shows, as CSV, in place of tracks: its name in tables/; may be "
+            "repeated.",
+            metavar="NAME",
+        ),
+    ] = None,
+    figures: Annotated[bool, typer.Option("--figures", help="The same of all figures.")] = False,
     config: ConfigFile = None,
     profile: Profile = None,
     force: Force = False,
@@ -97,13 +132,19 @@ def export(
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
-    """Write the tracks of a flight for other programs: Google Earth, GPX, a table, NMEA sentences, SBET."""
+    """Write tracks for other programs (Google Earth, GPX, a table, NMEA, SBET), or what figures show as CSV."""
     from groundstation.cli import printing
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.export import export as written
+    from groundstation.pipeline.verbs.export_figures import export_figures
 
-    settings = load_configuration(config, profile=profile)
-    outcome = written(flight, output, names=tuple(tracks or ()), configuration=settings, force=force)
+    if figure or figures:
+        if tracks or (figure and figures):
+            raise UsageError("--figure", "--track or --figures beside it", "it without them")
+        outcome = export_figures(flight, output, tuple(figure or ()), force=force)
+    else:
+        settings = load_configuration(config, profile=profile)
+        outcome = written(flight, output, names=tuple(tracks or ()), configuration=settings, force=force)
     printing.outcomes((outcome,), as_json_text=json, quiet=quiet)
     return outcome.code
 

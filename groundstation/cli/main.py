@@ -1,6 +1,7 @@
 """The command ``groundstation``: its verbs. Heavy imports happen inside them."""
 
 import io
+import math
 import sys
 from functools import partial
 from pathlib import Path
@@ -10,7 +11,7 @@ import typer
 
 from groundstation.base.errors import UsageError
 from groundstation.base.version import __version__
-from groundstation.cli import fleets, flights, plans
+from groundstation.cli import fleets, flights, plans, rules, watching
 from groundstation.cli.application import (
     DATA_LOST,
     DONE,
@@ -18,11 +19,13 @@ from groundstation.cli.application import (
     AircraftFile,
     ConfigFile,
     FailOn,
+    FailOnMode,
     Force,
     IcdFiles,
     IntervalsFile,
     Json,
     NoPdf,
+    Only,
     Profile,
     Progress,
     Quiet,
@@ -38,7 +41,10 @@ from groundstation.cli.application import (
     tell_written,
 )
 
-__all__ = ["app", "fleets", "flights", "main", "plans"]  # the modules hold more verbs
+__all__ = ["app", "fleets", "flights", "main", "plans", "rules", "watching"]  # the modules hold more verbs
+
+
+PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have an ``examine``; a test compares them
 
 
 def _version(is_asked: bool) -> None:
@@ -85,6 +91,17 @@ def info(
 @answers_with_exit_code
 def check(
     logs: Annotated[list[Path], typer.Argument(help="Recorded logs or MCAPs.", metavar="LOG", readable=False)],
+    purpose: Annotated[
+        str,
+        typer.Option(
+            "--for",
+            help="Say in the first line whether the log can be used for this analysis: yes, no, in part, and what is "
+            "missing where. Exit 4 at no; with --fail-on warn at in part too. Logs of one session are judged together.",
+            metavar=PURPOSES,
+        ),
+    ] = "",
+    aircraft: AircraftFile = None,
+    site: SiteFile = None,
     thresholds: ThresholdsFile = None,
     config: ConfigFile = None,
     profile: Profile = None,
@@ -95,15 +112,18 @@ def check(
     json: Json = False,
     progress: Progress = "auto",
 ) -> int | None:
-    """Print the integrity ledger: rates, coverage, gaps, losses and odd values of every topic. Writes nothing."""
+    """Print the integrity ledger: rates, coverage, gaps, losses and odd values of every topic. Writes nothing.
+
+    With --for, what the log can be used for stands in the first line.
+    """
     from groundstation.cli import check_table, printing
     from groundstation.cli.progress import listener
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.check import check_many
 
-    configuration = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
+    configuration = load_configuration(config, aircraft, site, profile=profile, thresholds=thresholds, icds=icd)
     with listener("none" if quiet else progress) as listen:
-        checked = check_many(logs, configuration, fail_on=fail_on, listen=listen)
+        checked = check_many(logs, configuration, purpose=purpose, fail_on=fail_on, listen=listen)
     check_table.show(checked, as_json_text=json, quiet=quiet, everything=verbose)
     return printing.worst_code(tuple(one.outcome for one in checked))
 
@@ -166,6 +186,15 @@ def run(
     scheduler: Annotated[
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
     ] = "",
+    timeout: Annotated[
+        float | None,
+        typer.Option(
+            "--timeout",
+            help="Longest time for one log; one that takes longer has failed. Left out: none.",
+            metavar="SECONDS",
+            min=1.0,
+        ),
+    ] = None,
     fail_on: FailOn = "none",
     apply: Annotated[
         str,
@@ -187,6 +216,7 @@ def run(
         ),
     ] = None,
     no_pdf: NoPdf = False,
+    only: Only = None,
     redo: Annotated[bool, typer.Option("--redo", help="Do again what an earlier run finished.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done; write nothing.")] = False,
     force: Force = False,
@@ -210,18 +240,27 @@ def run(
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd)
     is_one_log = together or (len(paths) == 1 and not Path(paths[0]).is_dir())
     configuration = judged_by(applying(settings, apply), reference or (), is_one_log=is_one_log)
-    if together and (dry_run or scheduler or stations is not None):
-        raise UsageError("--together", "--dry-run, --scheduler or --stations beside it", "it without them")
+    if together and (dry_run or scheduler or stations is not None or timeout is not None):
+        raise UsageError("--together", "--dry-run, --scheduler, --stations or --timeout beside it", "it without them")
     if dry_run:
-        planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo, stations=stations)
+        plan = partial(plan_many, with_pdf=not no_pdf, only_results=only == "results")
+        planned = plan(paths, output, configuration, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)
         return DONE
-    run_apart = partial(run_many, jobs=jobs, scheduler=scheduler, redo=redo, stations=stations)
+    timeout_s = math.inf if timeout is None else timeout
+    run_apart = partial(run_many, jobs=jobs, scheduler=scheduler, redo=redo, stations=stations, timeout_s=timeout_s)
     run_logs = run_together if together else run_apart  # logs are joined anew at every run, in this process
     try:
         with listener("none" if quiet else progress) as listen:
             outcomes = run_logs(
-                paths, output, configuration, force=force, fail_on=fail_on, with_pdf=not no_pdf, listen=listen
+                paths,
+                output,
+                configuration,
+                force=force,
+                fail_on=fail_on,
+                with_pdf=not no_pdf,
+                only_results=only == "results",
+                listen=listen,
             )
     except KeyboardInterrupt:
         say(f"interrupted: {output} keeps what is finished; the same command again goes on with the rest")
@@ -234,13 +273,38 @@ def run(
 @answers_with_exit_code
 def report(
     out: Annotated[Path, typer.Argument(help="A folder that `run` made, or one flight folder in it.", metavar="OUT")],
+    standard: Annotated[
+        str,
+        typer.Option(
+            "--standard",
+            help="Judge the INS of the flights by a standard instead, and write the acceptance: app-g, irig261, or a "
+            "file of limits (TOML).",
+            metavar="NAME|FILE",
+        ),
+    ] = "",
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Folder for the acceptance; left out: OUT.", metavar="DIR"),
+    ] = None,
+    fail_on: Annotated[
+        FailOnMode,
+        typer.Option(
+            "--fail-on",
+            help="With --standard: exit 4 where it is failed (fail), or not passed for want of flights (warn).",
+        ),
+    ] = "none",
     no_pdf: NoPdf = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
-    """Make the reports and the index again from the saved results, without the logs."""
+    """Make the reports and the index again from the saved results, without the logs; or the acceptance of the INS."""
     from groundstation.cli import printing
+
+    if standard:
+        return fleets.acceptance(out, standard, output, fail_on, with_pdf=not no_pdf, quiet=quiet, json=json)
+    if output is not None or fail_on != "none":
+        raise UsageError("report", "-o or --fail-on without --standard", "--standard NAME beside it")
     from groundstation.pipeline.many_flights.publishing import report_again
 
     paths, problems = report_again(out, with_pdf=not no_pdf)

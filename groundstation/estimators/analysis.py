@@ -8,6 +8,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar, cast
 from groundstation.base.findings import Finding
 from groundstation.results.answer import Answer, Answers
 from groundstation.results.columns import AnswerColumn
+from groundstation.results.rules import Rejudged
 
 Data = TypeVar("Data", contravariant=True)  # a flight, or a session of several
 KnownT = TypeVar("KnownT", contravariant=True)
@@ -38,6 +39,19 @@ class RestsOn(NamedTuple):
     spans_s: tuple[tuple[float, float], ...]
 
 
+class Shortfall(NamedTuple):
+    """What keeps an answer from being a full one, and where: spans of flight seconds."""
+
+    text: str
+    spans_s: tuple[tuple[float, float], ...] = ()
+
+
+class Examine(Protocol[Data, KnownT, SettingsT]):  # type: ignore[misc]
+    """Tells what data lack for a full answer, without estimating; NotAssessableError where none would come."""
+
+    def __call__(self, data: Data, known: KnownT, settings: SettingsT, /) -> tuple[Shortfall, ...]: ...
+
+
 def _always(_data: Any, _known: Any) -> bool:
     return True
 
@@ -52,6 +66,18 @@ def _any_settings(_settings: Any, _known: Any) -> None:
 
 def _no_samples(_data: Any, _answer: Any) -> None:
     """No damage is held against the answer."""
+
+
+@dataclass(frozen=True)
+class Rules:
+    """How the gates of an answer are judged again under other limits, without the log.
+
+    ``limits`` are the settings that bound gates and choose no data; a change of any other one needs the log.
+    ``rejudge(answer, settings)`` gives each verdict before and after.
+    """
+
+    limits: frozenset[str]
+    rejudge: Callable[[Any, Any], tuple[Rejudged, ...]]
 
 
 @dataclass(frozen=True)
@@ -91,6 +117,11 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
         What it gives to the tables of flights: index.json, index.csv, fleet.parquet. Names differ between analyses.
     check : callable
         ``check(settings, aircraft)`` raises SettingsError for settings that contradict what is known of the aircraft.
+    examine : callable, optional
+        ``examine(data, known, settings)``: what the data lack, by the same selection of data as ``run`` makes; an
+        analysis that has it is a purpose of ``check --for``.
+    rules : Rules, optional
+        Of an answer with gates.
     judges : bool
         Whether it is given the truth, by which it judges the others: it runs where there is one, and last; every other
         analysis is given a flight without it.
@@ -112,7 +143,9 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     sentence: Callable[[Answers], str] = _nothing
     columns: tuple[AnswerColumn[AnswerT], ...] = ()
     check: Callable[[Any, Any], None] = _any_settings
+    examine: Examine[Data, KnownT, SettingsT] | None = None
     judges: bool = False
+    rules: Rules | None = None
 
     def __post_init__(self) -> None:
         known = {field.name for field in dataclasses.fields(cast(Any, self.answer))}

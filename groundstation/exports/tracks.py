@@ -21,11 +21,12 @@ MOVES = ("velocity_north_mps", "velocity_east_mps", "velocity_down_mps", "roll_d
 DIRECTIONS = ("track_deg", "true_heading_deg")
 OF_THE_FIX = ("hdop", "satellites_used")
 BRIDGED_S = 0.25  # altitude, attitude and velocity of other rows are interpolated over at most so long
+EPOCH_BRIDGED_S = 1.5  # altitude of the INS at the epochs of the estimator, which bridges as much
 SPEED, HALF_WIDTH = "ground_speed_mps", "horizontal95_m"
 # Tracks of the estimator: what begins their columns, and what they are.
 MADE = {
-    "corrected": ("corrected", "INS less its estimated error"),
-    "smoothed": ("reference", "INS less its smoothed error"),
+    "corrected": ("corrected", "INS less its estimated error, height of the INS"),
+    "smoothed": ("reference", "INS less its smoothed error, height of the INS"),
 }
 NORTH_SIGMA, EAST_SIGMA = "north_sigma_m", "east_sigma_m"
 
@@ -71,11 +72,14 @@ class Track:
         return self.columns.get(name, np.full(len(self), np.nan))
 
 
-def tracks_of(flight: Flight, figures: Mapping[str, FigureData]) -> tuple[Track, ...]:
-    """Tracks of a flight: of every receiver and INS that has positions, then those of the estimator."""
+def tracks_of(flight: Flight, figures: Mapping[str, FigureData], ins_topic: str = "") -> tuple[Track, ...]:
+    """Tracks of a flight: of every receiver and INS that has positions, then those of the estimator.
+
+    ``ins_topic`` is the INS whose errors were estimated: its altitude stands beside the estimator's positions.
+    """
     topics = [topic for kind in ("gnss", "ins", "truth") for topic in topics_of_kind(kind, flight.topics())]
     logged = [_logged(flight, flight[topic].unique_times()) for topic in topics]
-    made = [_made(flight, figures, name) for name in MADE]
+    made = [_made(flight, figures, name, ins_topic) for name in MADE]
     return tuple(track for track in (*logged, *made) if track is not None and len(track))
 
 
@@ -98,7 +102,14 @@ def _logged(flight: Flight, table: Table) -> Track | None:
     )
 
 
-def _bridged(at_s: FloatArray, time_s: FloatArray, values: FloatArray, *, is_direction: bool = False) -> FloatArray:
+def _bridged(
+    at_s: FloatArray,
+    time_s: FloatArray,
+    values: FloatArray,
+    *,
+    is_direction: bool = False,
+    longest_s: float = BRIDGED_S,
+) -> FloatArray:
     """Values at other times of the topic: many logs give position and attitude in rows of their own."""
     known = np.isfinite(values)
     if not known.any():
@@ -106,13 +117,16 @@ def _bridged(at_s: FloatArray, time_s: FloatArray, values: FloatArray, *, is_dir
     time_s, values = time_s[known], values[known]
     after = np.clip(np.searchsorted(time_s, at_s), 0, len(time_s) - 1)
     before = np.clip(np.searchsorted(time_s, at_s, side="right") - 1, 0, None)
-    near = (time_s[after] - time_s[before] <= BRIDGED_S) & (time_s[before] <= at_s) & (at_s <= time_s[after])
+    near = (time_s[after] - time_s[before] <= longest_s) & (time_s[before] <= at_s) & (at_s <= time_s[after])
     between = interpolate_heading(at_s, time_s, values) if is_direction else np.interp(at_s, time_s, values)
     return np.where(near, between, np.nan)
 
 
-def _made(flight: Flight, figures: Mapping[str, FigureData], name: str) -> Track | None:
-    """A track of the estimator, at the times its figures have; half of the 95 % ellipse's major axis is its width."""
+def _made(flight: Flight, figures: Mapping[str, FigureData], name: str, ins_topic: str) -> Track | None:
+    """A track of the estimator, at the times its figures have; half of the 95 % ellipse's major axis is its width.
+
+    No error of height is estimated: the altitude is that of the INS, as logged.
+    """
     data, states = figures.get("inertial_track"), figures.get("inertial_states")
     prefix, text = MADE[name]
     if data is None or f"{prefix}_latitude_deg" not in data.columns:
@@ -120,7 +134,7 @@ def _made(flight: Flight, figures: Mapping[str, FigureData], name: str) -> Track
     latitude, longitude = (np.asarray(data[f"{prefix}_{axis}"], dtype=np.float64) for axis in POSITION)
     known = np.isfinite(latitude) & np.isfinite(longitude)
     time_s = np.asarray(data["time_s"], dtype=np.float64)[known]
-    columns: dict[str, FloatArray] = {}
+    columns = _altitudes(flight, ins_topic, time_s)
     if name == "corrected" and states is not None and len(states):
         at_s = np.asarray(states["time_s"], dtype=np.float64)
         north, east = (
@@ -128,7 +142,20 @@ def _made(flight: Flight, figures: Mapping[str, FigureData], name: str) -> Track
             for axis in ("north", "east")
         )
         major = principal_axes(north, east, np.zeros(len(north)))[0]
-        columns = {NORTH_SIGMA: north, EAST_SIGMA: east, HALF_WIDTH: ELLIPSE_95 * major}
+        columns |= {NORTH_SIGMA: north, EAST_SIGMA: east, HALF_WIDTH: ELLIPSE_95 * major}
     time_ns = flight.start_ns + np.rint(time_s * NS_PER_S).astype(np.int64)
     place = (latitude[known], longitude[known])
     return Track(name, text, time_ns, flight.start_ns, flight.has_utc, *place, columns)
+
+
+def _altitudes(flight: Flight, ins_topic: str, at_s: FloatArray) -> dict[str, FloatArray]:
+    """Altitudes of an INS at given flight seconds."""
+    if ins_topic not in flight:
+        return {}
+    table = flight[ins_topic].unique_times()
+    time_s = flight.seconds(table.time_ns)
+    return {
+        name: _bridged(at_s, time_s, table.values(name), longest_s=EPOCH_BRIDGED_S)
+        for name in ALTITUDES
+        if table.has(name)
+    }

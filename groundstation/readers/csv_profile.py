@@ -11,6 +11,7 @@ from pathlib import Path
 
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Item, LogHeader, Remark
+from groundstation.base.slips import slips
 from groundstation.base.source_units import PREFIX, units_entry
 from groundstation.readers.dialect import (
     DELIMITERS,
@@ -24,6 +25,7 @@ from groundstation.readers.dialect import (
     uses_decimal_comma,
 )
 from groundstation.readers.layout import Derivation, Layout, Rule, TimeRule, rule_for
+from groundstation.readers.misnamed import misnamed
 from groundstation.readers.profile import Profile, load, shipped
 from groundstation.readers.source import Claim, Source
 from groundstation.readers.start import unusable_references, utc_of_zero
@@ -113,7 +115,7 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
     items = TableReader(source, dialect, layout).items(header)
     yield next(items)
     yield from remarks + layout_remarks + unusable_references(metadata)
-    yield from items
+    yield from misnamed(items, _slips(fit), last.number - fit.profile.rows_after_header)
 
 
 def _fit(source: Source, profile: Profile, limit: int = 1000) -> _Fit | None:
@@ -208,6 +210,12 @@ def _layout(fit: _Fit) -> tuple[Layout, list[Remark]]:
     ]
     layout = Layout(time, tuple(rules), derivations, uses_decimal_comma(fit.first_rows, fit.delimiter))
     return layout, remarks if missing else []
+
+
+def _slips(fit: _Fit) -> dict[tuple[str, str], tuple[str, str]]:
+    """Columns that are almost ones of the profile, by raw topic and name: their name, and what was perhaps meant."""
+    known = (*(rule.name for rule in fit.profile.columns), *(name for name in fit.profile.time.columns))
+    return {(fit.profile.raw_topic, name): (name, meant) for name, meant in slips(fit.names, known).items()}
 
 
 def _derivations(profile: Profile, rules: list[Rule], columns: Container[str]) -> tuple[Derivation, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 from groundstation.base.errors import UnreadableLogError, near_names
 from groundstation.base.records import Damage, Item, LogHeader, Remark
 from groundstation.base.signals import RAW_PREFIX, TOPICS, field_of, kind_of
+from groundstation.base.slips import slips
 from groundstation.readers.dialect import (
     Dialect,
     Line,
@@ -25,6 +26,7 @@ from groundstation.readers.dialect import (
     uses_decimal_comma,
 )
 from groundstation.readers.layout import Derivation, Layout, Rule, TimeRule, rule_for
+from groundstation.readers.misnamed import misnamed
 from groundstation.readers.source import Claim, Source
 from groundstation.readers.start import told_at_zero, unusable_references, utc_of_zero
 
@@ -151,7 +153,7 @@ def read(source: Source) -> Iterator[Item]:
     if top.strange_lines:
         what = "lines above the header row that are no metadata"
         yield Damage("corrupt", f"rows 1 to {top.header.number - 1}", top.strange_lines, what)
-    yield from items
+    yield from misnamed(items, _slips(top), top.header.number)
 
 
 def _utc_of_zero(
@@ -226,13 +228,24 @@ def _derivations(rules: tuple[Rule, ...]) -> tuple[Derivation, ...]:
 
 
 def _mistakes(top: _Top) -> list[Remark]:
-    """Column names that look like a slip of a canonical one: they are kept as raw, and the user is told."""
-    unknown = [name for name in top.names if "." in name and field_of(*name.rpartition(".")[::2]) is None]
-    slips = [name for name in unknown if not name.startswith(RAW_PREFIX)]
-    if not slips:
+    """Columns that name no canonical field: they are kept as raw, and the user is told."""
+    unknown = [name for name in _unknown(top) if "." in name and not name.startswith(RAW_PREFIX)]
+    if not unknown:
         return []
-    shown = ", ".join(map(_with_near, slips[:5])) + (", ..." if len(slips) > 5 else "")
-    return [Remark("unknown_columns", f"{len(slips)} columns name no canonical field and are kept as raw: {shown}")]
+    shown = ", ".join(map(_with_near, unknown[:5])) + (", ..." if len(unknown) > 5 else "")
+    return [Remark("unknown_columns", f"{len(unknown)} columns name no canonical field and are kept as raw: {shown}")]
+
+
+def _unknown(top: _Top) -> list[str]:
+    return [name for name in top.names if field_of(*name.rpartition(".")[::2]) is None and name not in TIME_COLUMNS]
+
+
+def _slips(top: _Top) -> Mapping[tuple[str, str], tuple[str, str]]:
+    """Columns that are almost canonical ones, by topic and field: their name, and what was perhaps meant."""
+    topics = dict.fromkeys((*(name.rpartition(".")[0] for name in top.canonical), *TOPICS))
+    known = [f"{topic}.{one.name}" for topic in topics for one in TOPICS.get(kind_of(topic), ())]
+    found = slips(top.names, known)
+    return {_rule(0, name).key: (name, meant) for name, meant in found.items() if not name.startswith(RAW_PREFIX)}
 
 
 def _with_near(name: str) -> str:

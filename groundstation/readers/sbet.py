@@ -267,11 +267,17 @@ def _batches(
     yield RecordBatch("raw.sbet", index, time, raw)
 
 
+def accuracies_beside(path: Path) -> Path | None:
+    """Where the accuracies of an SBET would stand; None where the name of the file tells of none."""
+    name, is_sbet = re.subn(r"(?i)^sbet", "smrmsg", path.name)
+    return path.with_name(name) if is_sbet else None
+
+
 def _accuracies(path: Path) -> NDArray[Any]:
     """Records of the file of accuracies beside an SBET; none where there is no such file."""
-    if not re.match(r"(?i)sbet", path.name):
+    beside = accuracies_beside(path)
+    if beside is None:
         return np.zeros(0, ACCURACY)
-    beside = path.with_name(re.sub(r"(?i)^sbet", "smrmsg", path.name))
     try:
         content = beside.read_bytes() if beside.stat().st_size < 1 << 28 else b""
     except OSError:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.errors import NotAssessableError
+from groundstation.chapters.parts import Section
 from groundstation.estimators.approaches.analysis import LANDING
 from groundstation.estimators.approaches.settings import LandingSettings
 from groundstation.estimators.known import Known, Runway, SiteData
@@ -25,7 +26,7 @@ from groundstation.simulation.approach import (
     TrueRunway,
     simulate_approach,
 )
-from groundstation.studies.page import StudyResult, markdown_table
+from groundstation.studies.page import StudyResult, section, table
 from groundstation.tables.phases import flight_phases
 
 Progress = Callable[[str], None]
@@ -222,15 +223,12 @@ def _share(scaled: list[float]) -> float:
     return float(np.mean(np.abs(scaled) <= LINEAR_95)) if scaled else float("nan")
 
 
-def _page(table: FigureData, families: tuple[Family, ...], runs: int, seed: int) -> str:
-    lines = [
-        "# Study: the localizer as a reference for recorded positions",
-        "",
+def _page(data: FigureData, families: tuple[Family, ...], runs: int, seed: int) -> tuple[Section, ...]:
+    head = section(
+        "Study: the localizer as a reference for recorded positions",
         f"{runs} approaches of each family of docs/approaches.md (seed {seed}), each through phases and analysis, with "
         "the runway in a site file. Coverage: share of runs whose 95 % interval holds the truth.",
-        "",
-        *markdown_table(table),
-        "",
-        *(f"- {family.name}: {family.what}" for family in families),
-    ]
-    return "\n".join(lines) + "\n"
+        table(data),
+        *(f"{family.name}: {family.what}" for family in families),
+    )
+    return (head,)

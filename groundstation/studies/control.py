@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from groundstation.chapters.parts import Section
 from groundstation.estimators.control.laws import Session, integral_law, local_law
 from groundstation.estimators.control.placement import plan_placement
 from groundstation.estimators.control.plan import plan_session
@@ -14,7 +15,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.placement import PlacementPlan
 from groundstation.studies.control_cases import CASES, FACTOR, FIRST_SEED, PUBLISHED_M, SPEED, placements, scenario
 from groundstation.studies.control_flown import fly
-from groundstation.studies.page import StudyResult, markdown_table
+from groundstation.studies.page import StudyResult, section, table
 
 Progress = Callable[[str], object]
 
@@ -119,34 +120,30 @@ def _is_published(before_m: float) -> bool:
     return abs(before_m - PUBLISHED_M) <= 0.05 * PUBLISHED_M
 
 
-def page(tables: Sequence[FigureData], runs: int, seed: int) -> str:
-    """The study as Markdown."""
+def page(tables: Sequence[FigureData], runs: int, seed: int) -> tuple[Section, ...]:
+    """The study in sections."""
     published, laws, placed = tables
-    lines = [
-        "# Study: control of a session, and placement of ground points",
-        "",
-        "Plans are the TOML files of plans/session; the covariance is that of the centralised filter along each law.",
-        "",
-        "## Published figures",
-        "",
-        *markdown_table(published),
-        "",
-        "## The worked example, flown",
-        "",
-        f"{runs} simulated flights a law, seed {seed}: errors drawn as the plan believes them, ranges of the true "
-        "places, an iterated extended filter that takes directions at its own estimate. Twice the RMS error beside the "
-        "computed 2 sigma; NEES (2 is honest) with its 95 % limits.",
-        "",
-        *markdown_table(laws),
-        "",
-        "## The third point of an approach",
-        "",
-        "Two points stand 1000 m abeam the threshold; distances are those before the threshold. Analysis: s + h^2 / s "
-        "for a fixed point s before the threshold at height h. The rectangle ends 4000 m before the threshold. The "
-        "published 440 m is the best place for a fixed point 437 m before the threshold and for no other: it is a "
-        "property of the fixed point. For the threshold itself the determinant grows to the end of the rectangle.",
-        "",
-        *markdown_table(placed),
-        "",
-    ]
-    return "\n".join(lines)
+    return (
+        section(
+            "Study: control of a session, and placement of ground points",
+            "Plans are the TOML files of plans/session; the covariance is that of the centralised filter along each "
+            "law.",
+        ),
+        section("Published figures", table(published)),
+        section(
+            "The worked example, flown",
+            f"{runs} simulated flights a law, seed {seed}: errors drawn as the plan believes them, ranges of the true "
+            "places, an iterated extended filter that takes directions at its own estimate. Twice the RMS error beside "
+            "the computed 2 sigma; NEES (2 is honest) with its 95 % limits.",
+            table(laws),
+        ),
+        section(
+            "The third point of an approach",
+            "Two points stand 1000 m abeam the threshold; distances are those before the threshold. Analysis: "
+            "s + h^2 / s for a fixed point s before the threshold at height h. The rectangle ends 4000 m before the "
+            "threshold. The published 440 m is the best place for a fixed point 437 m before the threshold and for no "
+            "other: it is a property of the fixed point. For the threshold itself the determinant grows to the end of "
+            "the rectangle.",
+            table(placed),
+        ),
+    )

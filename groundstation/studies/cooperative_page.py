@@ -4,11 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from groundstation.chapters.parts import Section
 from groundstation.estimators.cooperative.consistency import DIVERGED, nees_limits
 from groundstation.results.figures import FigureData
 from groundstation.studies.cooperative_cases import FACTOR, Case
 from groundstation.studies.cooperative_runs import Outcome, diverges
-from groundstation.studies.page import markdown_rows
+from groundstation.studies.page import grid, section
 
 HONEST_SHARE = 0.99  # of honest filters inside the limits: some twenty are judged at once
 
@@ -87,8 +88,8 @@ def study_table(cases: Sequence[Case], outcomes: dict[str, tuple[Outcome, ...]])
     return FigureData("cooperative_published", columns, digits | {"measured": 3})
 
 
-def page(cases: Sequence[Case], table: FigureData, runs: int, seed: int) -> str:
-    """The study as Markdown."""
+def page(cases: Sequence[Case], table: FigureData, runs: int, seed: int) -> tuple[Section, ...]:
+    """The study in sections."""
     head = ("case", "algorithm", "published", "computed", "measured", "factor 2", "NEES (2)", "consistent", "diverges")
     body = []
     for k, case in enumerate(cases):
@@ -107,30 +108,26 @@ def page(cases: Sequence[Case], table: FigureData, runs: int, seed: int) -> str:
             )
         )
     outside = [k for k in range(len(cases)) if table["within_factor_two"][k] == "no"]
-    lines = [
-        "# Study: navigation between aircraft",
-        "",
-        f"{runs} simulated sessions a case, seed {seed}; sessions are the TOML files of simulation/sessions, "
-        "the filter believes exactly what they draw from. Computed: what the filter says of itself; measured: errors "
-        "against truth over the runs. 2 sigma_r unless the metric in tables/cooperative_published.csv says otherwise. "
-        "NEES of "
-        "the judged aircraft's position at the time of the figure, with the 99 % limits of that many independent runs. "
-        f"Diverges: error over computed sigma_r above {DIVERGED:g} in the last tenth, root mean square over all "
-        "aircraft and runs (in brackets: middle, end; median spectral radius of the joint error map over 10 s).",
-        "",
-        *markdown_rows(head, body),
-        "",
-        "## Outside a factor of two",
-        "",
-        *[f"- {_outside(cases[k], float(table['measured'][k]))}" for k in outside],
-        *(["None."] if not outside else []),
-        "",
-        "## Notes",
-        "",
-        *[f"- {case.title}: {case.why}" for k, case in enumerate(cases) if case.why and k not in outside],
-        "",
-    ]
-    return "\n".join(lines)
+    return (
+        section(
+            "Study: navigation between aircraft",
+            f"{runs} simulated sessions a case, seed {seed}; sessions are the TOML files of simulation/sessions, "
+            "the filter believes exactly what they draw from. Computed: what the filter says of itself; measured: "
+            "errors against truth over the runs. 2 sigma_r unless the metric in tables/cooperative_published.csv says "
+            "otherwise. NEES of the judged aircraft's position at the time of the figure, with the 99 % limits of that "
+            f"many independent runs. Diverges: error over computed sigma_r above {DIVERGED:g} in the last tenth, root "
+            "mean square over all aircraft and runs (in brackets: middle, end; median spectral radius of the joint "
+            "error map over 10 s).",
+            grid(head, body),
+        ),
+        section(
+            "Outside a factor of two",
+            *([_outside(cases[k], float(table["measured"][k])) for k in outside] or ["None."]),
+        ),
+        section(
+            "Notes", *(f"{case.title}: {case.why}" for k, case in enumerate(cases) if case.why and k not in outside)
+        ),
+    )
 
 
 def _outside(case: Case, measured_: float) -> str:

@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.chapters.parts import Grid, Section
 from groundstation.results.figures import FigureData
 from groundstation.results.forecast import METHODS
 from groundstation.studies.forecast_cases import Case
 from groundstation.studies.forecast_runs import COUPLED, METHOD_NAMES, SETS_OF_STARTS, STUDY_HORIZONS_MIN
 from groundstation.studies.forecast_tables import BETTER, COMPARED, REFERENCE, UNDECIDED, WORSE
-from groundstation.studies.page import markdown_rows, markdown_table
+from groundstation.studies.page import grid, section, table
 
 HORIZON_HEAD = [f"{horizon:g} min" for horizon in STUDY_HORIZONS_MIN]
 FREEDOM_A_RUN = 12  # six states, two channels
@@ -21,51 +22,48 @@ CONFIRMED = {BETTER: "confirmed", WORSE: "refuted", UNDECIDED: "neither shown"}
 
 def page(
     cases: Sequence[Case], tables: dict[str, FigureData], runs: int, calibrated_runs: int, default_method: str
-) -> str:
-    """The study as Markdown."""
-    lines = [
-        "# Study: forecast of INS errors",
-        "",
-        f"{runs} simulated flights of 16 000 s a case ({calibrated_runs} of routes nothing was tuned on); "
-        "radial position error built up since the start of the forecast, "
-        "against the truth, in metres; RMS over flights and starts, 95 % limits from a bootstrap over flights. "
-        "All starts: every 300 s from 5400 s on; the paper's four: 1.5, 2, 2.5 and 3 h.",
-        "",
-        *markdown_rows(("case", "what it is", "seed"), [(case.name, case.title, str(case.seed)) for case in cases]),
-        "",
-        *_windows(cases, tables["forecast_ratios"]),
-        *_later(cases, tables["forecast_later_starts"]),
-        *_held_out(cases, tables, default_method),
-        *_honesty(tables, calibrated_runs),
-        "## RMS of every method, all starts",
-        "",
-        *(line for case in cases for line in _rms_of(case, tables["forecast_rms"])),
-        "## RMS at the paper's four starts",
-        "",
-        *_classic(cases, tables["forecast_rms"]),
-    ]
-    return "\n".join(lines).rstrip() + "\n"
+) -> tuple[Section, ...]:
+    """The study in sections."""
+    return (
+        section(
+            "Study: forecast of INS errors",
+            f"{runs} simulated flights of 16 000 s a case ({calibrated_runs} of routes nothing was tuned on); "
+            "radial position error built up since the start of the forecast, "
+            "against the truth, in metres; RMS over flights and starts, 95 % limits from a bootstrap over flights. "
+            "All starts: every 300 s from 5400 s on; the paper's four: 1.5, 2, 2.5 and 3 h.",
+            grid(("case", "what it is", "seed"), [(case.name, case.title, str(case.seed)) for case in cases]),
+        ),
+        _windows(cases, tables["forecast_ratios"]),
+        _later(cases, tables["forecast_later_starts"]),
+        _held_out(cases, tables, default_method),
+        _honesty(tables, calibrated_runs),
+        section(
+            "RMS of every method, all starts",
+            *(part for case in cases for part in _rms_of(case, tables["forecast_rms"])),
+        ),
+        section("RMS at the paper's four starts", _classic(cases, tables["forecast_rms"])),
+    )
 
 
-def _windows(cases: Sequence[Case], ratios: FigureData) -> list[str]:
+def _windows(cases: Sequence[Case], ratios: FigureData) -> Section:
     """Whether windows are better: in words, then as ratios."""
-    lines = ["## Are windows better than the last estimate?", ""]
+    said = []
     for title, group in (
         ("the filter is told something false", [case.name for case in cases if case.is_misled]),
         ("the filter's noise is honest", [case.name for case in cases if not case.is_misled]),
     ):
         chosen = _rows(ratios, starts="all", method="windows") & np.isin(ratios["case"], group)
-        lines += [f"Where {title} ({', '.join(group)}): {_tally(ratios['finding'][chosen])}.", ""]
+        said.append(f"Where {title} ({', '.join(group)}): {_tally(ratios['finding'][chosen])}.")
     for method in COMPARED[:2]:
-        lines += [f"{METHODS[method].capitalize()} against the last estimate, all starts:", ""]
-        lines += [f"- {case.name}: {_in_words(ratios, case.name, method)}" for case in cases] + [""]
+        said.append(f"{METHODS[method].capitalize()} against the last estimate, all starts:")
+        said += [f"{case.name}: {_in_words(ratios, case.name, method)}" for case in cases]
     cells = [
         [case.name, method, *(_cell(ratios, "ratio", 2, case=case.name, method=method, starts="all"))]
         for case in cases
         for method in COMPARED
     ]
     head = ["case", "RMS over that of the last estimate", *HORIZON_HEAD]
-    return [*lines, *markdown_rows(head, cells), ""]
+    return section("Are windows better than the last estimate?", *said, grid(head, cells))
 
 
 def _tally(says: NDArray[Any]) -> str:
@@ -84,20 +82,18 @@ def _in_words(ratios: FigureData, case: str, method: str) -> str:
     return "; ".join(parts)
 
 
-def _later(cases: Sequence[Case], later: FigureData) -> list[str]:
-    lines = [
-        "## Is a later start better at equal horizon?",
-        "",
-        "RMS from the latest of the four starts whose horizon still fits over RMS from 1.5 h: "
-        f"{_tally(later['finding'])} and methods.",
-        "",
-    ]
+def _later(cases: Sequence[Case], later: FigureData) -> Section:
     cells = [
         [case.name, method, *_cell(later, "ratio", 2, case=case.name, method=method), _claim(later, case.name, method)]
         for case in cases
         for method in (REFERENCE, "windows")
     ]
-    return [*lines, *markdown_rows(["case", "method", *HORIZON_HEAD, "the claim"], cells), ""]
+    return section(
+        "Is a later start better at equal horizon?",
+        "RMS from the latest of the four starts whose horizon still fits over RMS from 1.5 h: "
+        f"{_tally(later['finding'])} and methods.",
+        grid(["case", "method", *HORIZON_HEAD, "the claim"], cells),
+    )
 
 
 def _claim(later: FigureData, case: str, method: str) -> str:
@@ -105,17 +101,17 @@ def _claim(later: FigureData, case: str, method: str) -> str:
     return ", ".join(f"{word} {says.count(verdict)}" for verdict, word in CONFIRMED.items() if verdict in says)
 
 
-def _held_out(cases: Sequence[Case], tables: dict[str, FigureData], default_method: str) -> list[str]:
+def _held_out(cases: Sequence[Case], tables: dict[str, FigureData], default_method: str) -> Section:
     """Which method wins on flights that stand for real ones."""
-    table, rms = tables["forecast_held_out"], tables["forecast_rms"]
-    order = [str(name) for name in table["method"]]
-    equal = [name for name, low in zip(order[1:], table["against_best_low"][1:], strict=True) if low <= 1.0]
+    held_out, rms = tables["forecast_held_out"], tables["forecast_rms"]
+    order = [str(name) for name in held_out["method"]]
+    equal = [name for name, low in zip(order[1:], held_out["against_best_low"][1:], strict=True) if low <= 1.0]
     names = [case.name for case in cases if case.is_held_out]
     text = f"Best by score: {order[0]}."
     text += f" Not shown to be worse: {', '.join(equal)}." if equal else " Every other method is shown to be worse."
     place = order.index(default_method)
     if place:
-        behind, low, high = (table[f"against_best{end}"][place] for end in ("", "_low", "_high"))
+        behind, low, high = (held_out[f"against_best{end}"][place] for end in ("", "_low", "_high"))
         text += (
             f" The default, {default_method}, has {behind:.3f} ({low:.3f} to {high:.3f}) times the error of the best."
         )
@@ -128,68 +124,53 @@ def _held_out(cases: Sequence[Case], tables: dict[str, FigureData], default_meth
             rows = np.flatnonzero(_rows(rms, case=name, starts="all") & (rms["horizon_min"] == horizon))
             best.append(str(rms["method"][rows[np.argmin(rms["rms_m"][rows])]]))
         cells.append([name, *best])
-    return [
-        "## Which method wins on held-out flights",
-        "",
+    return section(
+        "Which method wins on held-out flights",
         f"Cases {', '.join(names)}; no seed of theirs was used for tuning. Score: geometric mean over cases and "
         "horizons of RMS over that of the last estimate.",
-        "",
         text,
-        "",
-        *markdown_table(table),
-        "",
-        *markdown_rows(["least RMS", *HORIZON_HEAD], cells),
-        "",
+        table(held_out),
+        grid(["least RMS", *HORIZON_HEAD], cells),
         "Where GNSS errors are correlated, R inflated honestly is set against the paper's windows (same flights):",
-        "",
-        *markdown_table(tables["forecast_cure"]),
-        "",
-    ]
+        table(tables["forecast_cure"]),
+    )
 
 
-def _honesty(tables: dict[str, FigureData], calibrated_runs: int) -> list[str]:
+def _honesty(tables: dict[str, FigureData], calibrated_runs: int) -> Section:
     honesty = tables["forecast_honesty"]
     consistent_runs = int(tables["forecast_consistency"]["freedom"][0]) // FREEDOM_A_RUN
     chosen = np.isin(honesty["method"], [REFERENCE, *COMPARED[:2], "noise_bank", COUPLED])
     columns = {name: values[chosen] for name, values in honesty.columns.items() if name not in HONESTY_LEFT_OUT}
     shown = FigureData(honesty.name, columns, honesty.digits)
-    return [
-        "## Are the sigmas honest?",
-        "",
+    return section(
+        "Are the sigmas honest?",
         f"The filter on {consistent_runs} flights of which its model is exactly true, 99 % limits of chi-square:",
-        "",
-        *markdown_table(tables["forecast_consistency"]),
-        "",
+        table(tables["forecast_consistency"]),
         f"Forecasts of {calibrated_runs} flights a case: coverage of the bands and NEES over all starts (1 is honest); "
         "first model: NEES of the first start alone, with its 99 % limits. Columns with model: before the sigma is "
         "scaled by the class and the flight's own past. All methods stand in tables/forecast_honesty.csv.",
-        "",
         "Coverage is a mean over flights: outages of one flight overlap, so that with an honest sigma one flight may "
         "have 0.8 and another 1. coverage95_worst is what the tenth of the flights with the least has at most, "
         "flights_within the share of the flights whose own NEES lies within its 95 % limits.",
-        "",
-        *markdown_table(shown),
-        "",
+        table(shown),
         "Position measurements that the gate rejected:",
-        "",
-        *markdown_table(tables["forecast_gate"]),
-        "",
-    ]
+        table(tables["forecast_gate"]),
+    )
 
 
-def _rms_of(case: Case, rms: FigureData) -> list[str]:
+def _rms_of(case: Case, rms: FigureData) -> tuple[str, Grid]:
     cells = [[method, *_cell(rms, "rms_m", 0, case=case.name, method=method, starts="all")] for method in METHOD_NAMES]
-    return [f"{case.name}: {case.title}", "", *markdown_rows(["method", *HORIZON_HEAD], cells), ""]
+    return f"{case.name}: {case.title}", grid(["method", *HORIZON_HEAD], cells)
 
 
-def _classic(cases: Sequence[Case], rms: FigureData) -> list[str]:
+def _classic(cases: Sequence[Case], rms: FigureData) -> Grid:
     cells = [
         [case.name, starts, method, *_cell(rms, "rms_m", 0, case=case.name, method=method, starts=starts)]
         for case in cases
         for starts in SETS_OF_STARTS[1:]
         for method in ("raw_ins", REFERENCE, "windows", "drift_windows")
     ]
-    return markdown_rows(["case", "start", "method", *HORIZON_HEAD], cells)
+    return grid(["case", "start", "method", *HORIZON_HEAD], cells)
 
 
 def _cell(table: FigureData, value: str, digits: int, **chosen: str) -> list[str]:

@@ -5,6 +5,7 @@ import time
 import numpy as np
 
 from groundstation.base.normal import NORMAL_95
+from groundstation.chapters.parts import Section
 from groundstation.results.figures import FigureData
 from groundstation.simulation.taxi import Family
 from groundstation.studies.heading_family import (
@@ -19,7 +20,7 @@ from groundstation.studies.heading_family import (
     time_to_precision_table,
 )
 from groundstation.studies.heading_paper import arm_table, precision_table, quality_table, standstill_tables
-from groundstation.studies.page import StudyResult, markdown_table
+from groundstation.studies.page import StudyResult, section, table
 
 PUBLISHED: tuple[Family, ...] = ("grid", "continuous")  # families that the published figures are compared with
 PAPER_RUNS = 2000  # realisations of the plain processes: the paper had more than 500 at standstill
@@ -113,19 +114,20 @@ TITLES = {
 }
 
 
-def _page(tables: list[FigureData], families: tuple[tuple[Family, int], ...], runs: int) -> str:
+def _page(tables: list[FigureData], families: tuple[tuple[Family, int], ...], runs: int) -> tuple[Section, ...]:
     seeds = ", ".join(f"{family} seed {seed}" for family, seed in families)
-    lines = [
-        "# Study: heading correction before take-off",
-        "",
-        f"{runs} runs of each family of docs/heading-family.md ({seeds}), each through tables and estimator.",
-        "Coverage is the share of runs whose 95 % interval holds the truth; its sampling error stands beside it.",
-        "Measured are coverage and half width without steady sideslip and mounting, which only family wide has.",
-        "It has cells for what one flight cannot show: there only the whole interval can hold the truth.",
+    sections = [
+        section(
+            "Study: heading correction before take-off",
+            f"{runs} runs of each family of docs/heading-family.md ({seeds}), each through tables and estimator. "
+            "Coverage is the share of runs whose 95 % interval holds the truth; its sampling error stands beside it. "
+            "Measured are coverage and half width without steady sideslip and mounting, which only family wide has. "
+            "It has cells for what one flight cannot show: there only the whole interval can hold the truth.",
+        )
     ]
-    for table in tables:
-        title = next((text for key, text in TITLES.items() if table.name.startswith(key)), "")
+    for one in tables:
+        title = next((text for key, text in TITLES.items() if one.name.startswith(key)), "")
         if title:
-            family = next((f" (family {family})" for family, _seed in families if table.name.endswith(family)), "")
-            lines += ["", f"## {title}{family}", "", *markdown_table(table)]
-    return "\n".join(lines) + "\n"
+            family = next((f" (family {family})" for family, _seed in families if one.name.endswith(family)), "")
+            sections.append(section(f"{title}{family}", table(one)))
+    return tuple(sections)

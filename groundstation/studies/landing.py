@@ -10,7 +10,7 @@ from groundstation.studies.landing_tables import (
     trial_table,
     variation_table,
 )
-from groundstation.studies.page import StudyResult, markdown_table
+from groundstation.studies.page import StudyResult, section, table
 
 DRAWS_A_RUN = 100  # of bearings, which cost next to nothing
 
@@ -51,15 +51,13 @@ def study_landing(runs: int = 100, seed: int = 0, progress: Progress | None = No
         "Two locators and a beacon beside the threshold: 95 % of the errors",
         "Where bearings meet a category, metres before the threshold",
     )
-    lines = [
-        "# Study: landing",
-        "",
+    head = section(
+        "Study: landing",
         f"{runs} simulated approaches of each that is flown, seed {FIRST_SEED + seed}. Scenarios are the shipped plans "
         "of landings. Sigmas are one sigma; categories are held against 95 %: 1.96 sigma of one axis, the radius of "
         "95 % in the plane. Accuracy only: integrity, continuity and availability are not shown. Locators stand "
         f"{-BEACONS_M[0, 0]:.0f} and {-BEACONS_M[1, 0]:.0f} m before the threshold, the beacon beside it "
         f"{BEACONS_M[2, 1]:.0f} m from the axis.",
-    ]
-    for title, one in zip(titles, tables, strict=True):
-        lines += ["", f"## {title}", "", *markdown_table(one)]
-    return StudyResult("landing", tables, "\n".join((*lines, "")))
+    )
+    told = (section(title, table(one)) for title, one in zip(titles, tables, strict=True))
+    return StudyResult("landing", tables, (head, *told))

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from groundstation.base.records import BoolArray
+from groundstation.chapters.parts import Grid, Section
 from groundstation.results.figures import FigureData
 from groundstation.results.magnetic import LETTERS, METHOD_TITLES
 from groundstation.studies.magnetic_cases import BANK_DEG, CLAIM, PUBLISHED_FIELD_NT, SWEEPS, SWEPT, Sweep
@@ -19,7 +20,7 @@ from groundstation.studies.magnetic_tables import (
     WORSE,
     rows_where,
 )
-from groundstation.studies.page import markdown_rows, markdown_table
+from groundstation.studies.page import grid, section, table
 
 TITLES: dict[str, str] = {"none": "no correction", "one_branch": "one branch alone"}
 TITLES.update((str(name), title) for name, title in METHOD_TITLES.items())
@@ -29,66 +30,56 @@ PERCENT = 100.0
 NOT_A_NUMBER = "-"
 
 
-def page(tables: dict[str, FigureData], runs: int, seed: int, sweeps: Sequence[Sweep] = SWEEPS) -> str:
-    """The study as Markdown."""
-    lines = [
-        "# Study: magnetic deviation determined in flight",
-        "",
-        f"{runs} whole simulated flights and a part of them at every point of the sweeps (the tables say how many), "
-        f"seed {seed}; no seed of theirs belongs to a test. Error = corrected minus "
-        "true magnetic heading, the truth of the simulation: the INS, the declination and the readings of every flight "
-        "are wrong by draws. Brackets hold 95 % limits: of shares exact, of RMS from a bootstrap over flights. "
-        "The modulus is fitted with its refusals switched off; how often it is refused stands beside it.",
-        "",
-        *_whole_flights(tables),
-        *_coverage(tables["magnetic_coverage"]),
-        *_claim(tables),
-        *(line for sweep in sweeps for line in _sweep(sweep, tables)),
-        *_incomplete(tables["magnetic_incomplete"]),
-    ]
-    return "\n".join(lines).rstrip() + "\n"
+def page(tables: dict[str, FigureData], runs: int, seed: int, sweeps: Sequence[Sweep] = SWEEPS) -> tuple[Section, ...]:
+    """The study in sections."""
+    return (
+        section(
+            "Study: magnetic deviation determined in flight",
+            f"{runs} whole simulated flights and a part of them at every point of the sweeps (the tables say how "
+            f"many), seed {seed}; no seed of theirs belongs to a test. Error = corrected minus true magnetic heading, "
+            "the truth of the simulation: the INS, the declination and the readings of every flight are wrong by "
+            "draws. Brackets hold 95 % limits: of shares exact, of RMS from a bootstrap over flights. The modulus is "
+            "fitted with its refusals switched off; how often it is refused stands beside it.",
+        ),
+        _whole_flights(tables),
+        _coverage(tables["magnetic_coverage"]),
+        _claim(tables),
+        *(_sweep(sweep, tables) for sweep in sweeps),
+        _incomplete(tables["magnetic_incomplete"]),
+    )
 
 
 # Whole flights
 
 
-def _whole_flights(tables: dict[str, FigureData]) -> list[str]:
+def _whole_flights(tables: dict[str, FigureData]) -> Section:
     verdicts, residuals, honesty = (tables[f"magnetic_{name}"] for name in ("verdicts", "residuals", "honesty"))
     row = int(np.flatnonzero(verdicts["sweep"] == "whole flights")[0])
     flights, kept = int(verdicts["flights"][row]), int(verdicts["accepted"][row])
     text = f"{kept} of {flights} flights were accepted ({_shares(verdicts, row, 'accepted_share', 'low', 'high')})."
     if kept < flights:
         text += f" Most frequent reason of the others: {verdicts['most_frequent_reason'][row]}."
-    return [
-        "## Is what is left within the stated sigma?",
-        "",
+    return section(
+        "Is what is left within the stated sigma?",
         "Whole flights from the stand on, drawn from a family of irons, latitudes, latencies and INS errors, answered "
         "as the pipeline does: latencies, alignment on the ground, deviation.",
-        "",
         text,
-        "",
-        *(line for method in JUDGED_METHODS for line in (residual_claim(honesty, method), "")),
-        *(line for method in JUDGED_METHODS for line in (coefficient_claim(honesty, method), "")),
-        *_honesty_rows(honesty),
-        "",
+        *(residual_claim(honesty, method) for method in JUDGED_METHODS),
+        *(coefficient_claim(honesty, method) for method in JUDGED_METHODS),
+        _honesty_rows(honesty),
         _left_text(residuals),
-        "",
-        *_residual_rows(residuals),
-        "",
-    ]
+        _residual_rows(residuals),
+    )
 
 
-def _coverage(table: FigureData) -> list[str]:
-    return [
-        "## Coverage cell by cell",
-        "",
+def _coverage(coverage: FigureData) -> Section:
+    return section(
+        "Coverage cell by cell",
         "Shares within 1.96 stated sigma on accepted flights, 0.95 wanted: A to E, and the headings of level flight; "
         "D of the iron as error over sigma. First family: whole flights and the points of the sweeps; wide: the cells "
         "of docs/magnetic-family.md.",
-        "",
-        *markdown_table(table),
-        "",
-    ]
+        table(coverage),
+    )
 
 
 def residual_claim(honesty: FigureData, method: str) -> str:
@@ -134,7 +125,7 @@ def _too_small(honesty: FigureData, rows: BoolArray) -> str:
     )
 
 
-def _honesty_rows(honesty: FigureData) -> list[str]:
+def _honesty_rows(honesty: FigureData) -> Grid:
     cells = []
     for row in range(len(honesty)):
         shares = [_shares(honesty, row, f"inside{limit}") for limit in (1, 2, 3)]
@@ -142,7 +133,7 @@ def _honesty_rows(honesty: FigureData) -> list[str]:
         method = TITLES[str(honesty["method"][row])]
         cells.append([method, str(honesty["error_of"][row]), str(honesty["flights"][row]), *shares, ratio])
     head = ["method", "error of", "flights", "within 1 sigma", "within 2 sigma", "within 3 sigma", "rms of error/sigma"]
-    return markdown_rows(head, cells)
+    return grid(head, cells)
 
 
 def _left_text(residuals: FigureData) -> str:
@@ -155,7 +146,7 @@ def _left_text(residuals: FigureData) -> str:
     )
 
 
-def _residual_rows(residuals: FigureData) -> list[str]:
+def _residual_rows(residuals: FigureData) -> Grid:
     cells = [
         [
             TITLES[str(residuals["method"][row])],
@@ -165,13 +156,13 @@ def _residual_rows(residuals: FigureData) -> list[str]:
         for row in range(len(residuals))
     ]
     head = ["deg rms", "flights", "every heading", "the same without A", "held out, against truth", "held out, by INS"]
-    return markdown_rows(head, cells)
+    return grid(head, cells)
 
 
 # The claim
 
 
-def _claim(tables: dict[str, FigureData]) -> list[str]:
+def _claim(tables: dict[str, FigureData]) -> Section:
     claim, power = tables["magnetic_claim"], tables["magnetic_power"]
     horizontal_ut, dip_deg = (float(tables["magnetic_bank"][name][0]) for name in ("horizontal_nt", "dip_deg"))
     horizontal_ut /= 1000.0
@@ -195,22 +186,14 @@ def _claim(tables: dict[str, FigureData]) -> list[str]:
     power_cells = [
         [str(power["source"][row]), _limits(power, row, "exponent", 2), _bank(power, row)] for row in range(len(power))
     ]
-    return [
-        "## Does the bank error cancel between opposite branches?",
-        "",
+    return section(
+        "Does the bank error cancel between opposite branches?",
         claim_text(claim),
-        "",
         conditions,
-        "",
-        *markdown_rows(head, cells),
-        "",
+        grid(head, cells),
         limit_text(power),
-        "",
-        *markdown_rows(
-            ["bias of the average", "exponent of bank", f"bank of {LIMITS.bank_bias_max_deg:g} deg"], power_cells
-        ),
-        "",
-    ]
+        grid(["bias of the average", "exponent of bank", f"bank of {LIMITS.bank_bias_max_deg:g} deg"], power_cells),
+    )
 
 
 def claim_text(claim: FigureData) -> str:
@@ -248,16 +231,9 @@ def _bank(power: FigureData, row: int) -> str:
 # Sweeps
 
 
-def _sweep(sweep: Sweep, tables: dict[str, FigureData]) -> list[str]:
-    table, verdicts, ratios = (tables[f"magnetic_{name}"] for name in (sweep.name, "verdicts", "ratios"))
-    return [
-        f"## {sweep.title}",
-        "",
-        sweep_text(sweep, table, verdicts, ratios),
-        "",
-        *_sweep_rows(sweep, table, verdicts),
-        "",
-    ]
+def _sweep(sweep: Sweep, tables: dict[str, FigureData]) -> Section:
+    errors, verdicts, ratios = (tables[f"magnetic_{name}"] for name in (sweep.name, "verdicts", "ratios"))
+    return section(sweep.title, sweep_text(sweep, errors, verdicts, ratios), _sweep_rows(sweep, errors, verdicts))
 
 
 def sweep_text(sweep: Sweep, table: FigureData, verdicts: FigureData, ratios: FigureData) -> str:
@@ -299,7 +275,7 @@ def _comparison(sweep: Sweep, ratios: FigureData, method: str, subject: str) -> 
     return f"{subject} {'; '.join(said)}." if said else "No flight to compare on."
 
 
-def _sweep_rows(sweep: Sweep, table: FigureData, verdicts: FigureData) -> list[str]:
+def _sweep_rows(sweep: Sweep, found: FigureData, verdicts: FigureData) -> Grid:
     cells = []
     for value, _setup in sweep.points:
         row = int(np.flatnonzero(rows_where(verdicts, sweep=sweep.name) & (verdicts["value"] == value))[0])
@@ -307,16 +283,16 @@ def _sweep_rows(sweep: Sweep, table: FigureData, verdicts: FigureData) -> list[s
         counts = f"{verdicts['accepted'][row]} / {verdicts['rejected'][row]} / {verdicts['not_assessable'][row]}"
         for name, words in (("rms", "whole"), ("shape", "without A")):
             rows = [
-                int(np.flatnonzero(rows_where(table, method=method) & (table[sweep.column] == value))[0])
+                int(np.flatnonzero(rows_where(found, method=method) & (found[sweep.column] == value))[0])
                 for method in METHODS
             ]
-            errors = [_limits(table, place, name) for place in rows]
+            errors = [_limits(found, place, name) for place in rows]
             if name == "shape":
-                errors[-1] += f"; fitted {table['fitted'][rows[-1]]}, to be refused {refused}"
-            said = [_value(sweep, value, table, rows[0]), f"{flights}: {counts}"] if name == "rms" else ["", ""]
+                errors[-1] += f"; fitted {found['fitted'][rows[-1]]}, to be refused {refused}"
+            said = [_value(sweep, value, found, rows[0]), f"{flights}: {counts}"] if name == "rms" else ["", ""]
             cells.append([*said, words, *errors])
     head = [sweep.column.replace("_", " "), "flights: accepted / rejected / not assessable", "error, deg rms"]
-    return markdown_rows([*head, *(TITLES[method] for method in METHODS)], cells)
+    return grid([*head, *(TITLES[method] for method in METHODS)], cells)
 
 
 def _value(sweep: Sweep, value: float, table: FigureData | None = None, row: int = 0) -> str:
@@ -329,23 +305,20 @@ def _value(sweep: Sweep, value: float, table: FigureData | None = None, row: int
 # Refusals
 
 
-def _incomplete(table: FigureData) -> list[str]:
+def _incomplete(refusals: FigureData) -> Section:
     cells = [
         [
-            *(str(table[name][row]) for name in ("figure", "flights", "verdict", "count")),
-            _shares(table, row, "share", "low", "high"),
-            str(table["reason"][row]),
+            *(str(refusals[name][row]) for name in ("figure", "flights", "verdict", "count")),
+            _shares(refusals, row, "share", "low", "high"),
+            str(refusals["reason"][row]),
         ]
-        for row in range(len(table))
+        for row in range(len(refusals))
     ]
-    return [
-        "## Are incomplete figures refused, and why?",
-        "",
-        refusal_text(table),
-        "",
-        *markdown_rows(["figure", "flights", "verdict", "count", "share", "reason (# is a number)"], cells),
-        "",
-    ]
+    return section(
+        "Are incomplete figures refused, and why?",
+        refusal_text(refusals),
+        grid(["figure", "flights", "verdict", "count", "share", "reason (# is a number)"], cells),
+    )
 
 
 def refusal_text(table: FigureData) -> str:

@@ -1,35 +1,54 @@
-"""What every study hands back, and tables as Markdown."""
+"""What every study hands back: tables, and a page of sections, told as those of a report are."""
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.chapters.markdown import markdown
+from groundstation.chapters.parts import Grid, Head, Note, Part, Section
 from groundstation.results.figures import FigureData
 
 
 @dataclass(frozen=True)
 class StudyResult:
-    """What a study found: tables (arrays with units in their names) and a page of text."""
+    """What a study found: tables (arrays with units in their names) and its page, the heading section first."""
 
     name: str
     tables: tuple[FigureData, ...]
-    markdown: str
+    sections: tuple[Section, ...]
+
+    @property
+    def markdown(self) -> str:
+        """The page as a Markdown document."""
+        parts = (
+            markdown(section, level=2 if number else 1, widest=sys.maxsize)
+            for number, section in enumerate(self.sections)
+        )
+        return "\n\n".join(parts) + "\n"
 
 
-def markdown_table(table: FigureData) -> list[str]:
-    """A table as Markdown, numbers rounded to the digits of their columns."""
+def section(title: str, *parts: Part | str) -> Section:
+    """A section of a page; a text becomes a paragraph, an empty one is left out."""
+    made = [Note(part) if isinstance(part, str) else part for part in parts if part != ""]
+    return Section("", title, "", made)
+
+
+def table(data: FigureData) -> Grid:
+    """A table with all its columns, numbers rounded to the digits of their columns."""
 
     def cell(name: str, value: object) -> str:
         if isinstance(value, float | np.floating):
-            return "" if np.isnan(value) else f"{value:.{table.digits.get(name, 2)}f}"
+            return "" if np.isnan(value) else f"{value:.{data.digits.get(name, 2)}f}"
         return str(value)
 
-    names = list(table.columns)
-    head = [name.replace("_", " ") for name in names]
-    return markdown_rows(head, [[cell(name, table[name][row]) for name in names] for row in range(len(table))])
+    names = list(data.columns)
+    rows = [[cell(name, data[name][row]) for name in names] for row in range(len(data))]
+    heads = [Head(name.replace("_", " "), data[name].dtype.kind in "iuf") for name in names]
+    return Grid("", heads, rows)
 
 
-def markdown_rows(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of a Markdown table from its cells."""
-    return [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *rows)]
+def grid(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Grid:
+    """A table of texts."""
+    return Grid("", [Head(head) for head in heads], rows)

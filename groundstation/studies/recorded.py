@@ -12,6 +12,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.findings import Finding
+from groundstation.chapters.parts import Section
 from groundstation.estimators.cooperative.algorithms import run_algorithm
 from groundstation.estimators.cooperative.consistency import judge
 from groundstation.estimators.cooperative.events import prepare
@@ -24,7 +25,7 @@ from groundstation.estimators.cooperative.settings import (
 )
 from groundstation.estimators.cooperative.tracks import AlgorithmRun
 from groundstation.results.figures import FigureData
-from groundstation.studies.page import StudyResult, markdown_rows, markdown_table
+from groundstation.studies.page import StudyResult, grid, section, table
 from groundstation.tables.session import Session
 from groundstation.tables.session_robots import blinded
 
@@ -188,11 +189,11 @@ def study_recorded(
                     progress(f"{one.name}, {case}, {name}: {found.rms_m:.3f} m, NEES {found.nees:.2f}")
     values = zip(*rows, strict=True) if rows else ((),) * len(COLUMNS)
     columns = dict(zip(COLUMNS, map(np.array, values), strict=True))
-    table = FigureData("cooperative_recorded", columns, DIGITS)
-    return StudyResult("cooperative", (table,), _page(sets, table, remarks))
+    data = FigureData("cooperative_recorded", columns, DIGITS)
+    return StudyResult("cooperative", (data,), _page(sets, data, remarks))
 
 
-def _page(sets: Sequence[RecordedSet], table: FigureData, remarks: Sequence[str]) -> str:
+def _page(sets: Sequence[RecordedSet], data: FigureData, remarks: Sequence[str]) -> tuple[Section, ...]:
     head = ["set", "vehicles", "points", "measurements", "seconds", "draws"]
     cells = []
     for one in sets:
@@ -200,21 +201,15 @@ def _page(sets: Sequence[RecordedSet], table: FigureData, remarks: Sequence[str]
         length_s = max(float(track.time_s[-1]) for track in first.vehicles)
         counts = (len(first.vehicles), len(first.points), len(first.ranges), round(length_s), len(one.sessions))
         cells.append([one.name, *map(str, counts)])
-    lines = [
-        "# Navigation between vehicles: recorded sets",
-        "",
-        "Horizontal error of all vehicles together against motion capture, at every second of the whole set; that of "
-        "their places to one another; NEES of the position (2 is honest). Nothing is calibrated with the truth: one "
-        "group of settings for a kind of set. Bytes are those that a vehicle sends in a second.",
-        "",
-        *(f"{PROTOCOLS[kind]}\n" for kind in dict.fromkeys(one.kind for one in sets)),
-        *markdown_table(table),
-        "",
-        "## Sets",
-        "",
-        *markdown_rows(head, cells),
-        "",
+    sections = [
+        section(
+            "Navigation between vehicles: recorded sets",
+            "Horizontal error of all vehicles together against motion capture, at every second of the whole set; that "
+            "of their places to one another; NEES of the position (2 is honest). Nothing is calibrated with the truth: "
+            "one group of settings for a kind of set. Bytes are those that a vehicle sends in a second.",
+            *(PROTOCOLS[kind] for kind in dict.fromkeys(one.kind for one in sets)),
+            table(data),
+        ),
+        section("Sets", grid(head, cells)),
     ]
-    if remarks:
-        lines += ["## Findings", "", *(f"- {text}" for text in remarks), ""]
-    return "\n".join(lines)
+    return (*sections, section("Findings", *remarks)) if remarks else tuple(sections)

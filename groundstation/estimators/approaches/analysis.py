@@ -8,7 +8,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.analysis import Analysis, Found, RestsOn
+from groundstation.estimators.analysis import Analysis, Found, RestsOn, Rules, Shortfall
 from groundstation.estimators.approaches.columns import COLUMNS
 from groundstation.estimators.approaches.figures import path_columns, path_figure, protection_figure
 from groundstation.estimators.approaches.finals import Final, ends_of, final_of
@@ -31,8 +31,8 @@ from groundstation.estimators.approaches.reference import (
     position_error,
     sensitivity_of,
 )
-from groundstation.estimators.approaches.settings import LandingSettings
-from groundstation.estimators.approaches.stabilised import stabilised
+from groundstation.estimators.approaches.settings import LIMITS, LandingSettings
+from groundstation.estimators.approaches.stabilised import rejudge, stabilised
 from groundstation.estimators.approaches.touchdown import touchdown_of
 from groundstation.estimators.known import Known
 from groundstation.results.answer import Answers, answer_of
@@ -66,30 +66,56 @@ class _Told:
 
 
 def _run(flight: "Flight", known: Known, settings: LandingSettings) -> Found[LandingResult]:
-    path = path_of(flight, settings)
-    ends = ends_of(path, known.phases, settings)
-    if not ends:
-        raise NotAssessableError("landing", "no landing in the log, and no descent on a guidance that a climb follows")
-    told: list[_Told] = []
-    left_out: list[LeftOutApproach] = []
-    for end in ends[:MOST_APPROACHES]:
-        final = final_of(path, end, known.site, settings)
-        if isinstance(final, LeftOutApproach):
-            left_out.append(final)
-        else:
-            told.append(_approach(len(told) + 1, flight, path, final, settings))
-    if not told:
-        reasons = list(dict.fromkeys(one.reason for one in left_out))
-        raise NotAssessableError("landing", f"no straight final: {'; '.join(reasons[:3])}")
+    path, finals, left_out = _finals(flight, known, settings)
+    told = [_approach(number, flight, path, final, settings) for number, final in enumerate(finals, 1)]
     approaches = tuple(one.approach for one in told)
     answer = LandingResult(
         approaches,
-        tuple(left_out),
+        left_out,
         (ACCURACY_ONLY,),
         asdict(settings),
         (path_figure([one.path for one in told]), *protection_figure([one.protection for one in told])),
     )
     return Found(answer, findings_of(answer))
+
+
+def _finals(
+    flight: "Flight", known: Known, settings: LandingSettings
+) -> tuple[FlightPath, list[Final], tuple[LeftOutApproach, ...]]:
+    """The path of a flight, its straight finals, and the ends that none leads to.
+
+    Raises
+    ------
+    NotAssessableError
+        Where there is no final.
+    """
+    path = path_of(flight, settings)
+    ends = ends_of(path, known.phases, settings)
+    if not ends:
+        raise NotAssessableError("landing", "no landing in the log, and no descent on a guidance that a climb follows")
+    found = [final_of(path, end, known.site, settings) for end in ends[:MOST_APPROACHES]]
+    left_out = tuple(one for one in found if isinstance(one, LeftOutApproach))
+    finals = [one for one in found if isinstance(one, Final)]
+    if not finals:
+        reasons = list(dict.fromkeys(one.reason for one in left_out))
+        raise NotAssessableError("landing", f"no straight final: {'; '.join(reasons[:3])}")
+    return path, finals, left_out
+
+
+def _examine(flight: "Flight", known: Known, settings: LandingSettings) -> tuple[Shortfall, ...]:
+    """Whether every end has a final, and every final a runway of the site file and a guidance followed."""
+    path, finals, left_out = _finals(flight, known, settings)
+
+    def where(some: list[Final]) -> tuple[tuple[float, float], ...]:
+        return tuple((float(path.time_s[one.first]), one.end.time_s) for one in some)
+
+    unlisted, unguided = ([one for one in finals if getattr(one, name) is None] for name in ("runway", "established"))
+    found = [Shortfall(f"no straight final: {one.reason}", ((one.time_s, one.time_s),)) for one in left_out]
+    if unlisted:
+        found.append(Shortfall("no runway of the site file: course and threshold from the positions", where(unlisted)))
+    if unguided:
+        found.append(Shortfall("no guidance followed: errors across the course are not measured", where(unguided)))
+    return tuple(found)
 
 
 def _approach(number: int, flight: "Flight", path: FlightPath, final: Final, settings: LandingSettings) -> _Told:
@@ -307,4 +333,6 @@ LANDING = Analysis(
     rests_on=_rests_on,
     sentence=_sentence,
     columns=COLUMNS,
+    rules=Rules(LIMITS, rejudge),
+    examine=_examine,
 )

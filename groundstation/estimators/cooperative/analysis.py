@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
-from groundstation.estimators.analysis import Analysis, Found
+from groundstation.estimators.analysis import Analysis, Found, Shortfall
 from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.cooperative import CooperativeResult
@@ -44,6 +45,19 @@ def _run(session: "Session", known: SessionKnown, settings: CooperativeSettings)
 
     answer, findings = estimate_session(session, settings=settings, truth=dict(known.truth))
     return Found(answer, (*findings, *_misplaced(answer), *_too_sure(answer)))
+
+
+def _examine(session: "Session", _known: SessionKnown, settings: CooperativeSettings) -> tuple[Shortfall, ...]:
+    """Whether ranges between the vehicles, or to ground points, are left when what cannot be used is left out."""
+    from groundstation.estimators.cooperative.arrays import PEER, POINT
+    from groundstation.estimators.cooperative.events import prepare
+
+    prepared = prepare(session, settings)
+    if not prepared.vehicles:
+        raise NotAssessableError("cooperative", "no vehicle with dead reckoning")
+    if not any(kind in (PEER, POINT) for kind in prepared.events.kind):
+        raise NotAssessableError("cooperative", "no range over the data link that can be used")
+    return tuple(Shortfall(finding.text) for finding in prepared.findings if finding.severity != "info")
 
 
 def innovations_of(answer: CooperativeResult) -> dict[str, float]:
@@ -116,4 +130,5 @@ COOPERATIVE = Analysis(
     answer=CooperativeResult,
     run=_run,
     sentence=_sentence,
+    examine=_examine,
 )

@@ -4,24 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from groundstation.base.angles import wrap_360
-from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.heading.answer import build_answer
 from groundstation.estimators.heading.delay import known_delay
-from groundstation.estimators.heading.gating import gate_samples
 from groundstation.estimators.heading.samples import (
     HeadingOf,
     OnGround,
-    Samples,
     choose_topics,
     logged_heading,
-    pair_samples,
 )
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.heading.solution import solve
 from groundstation.estimators.heading.standstill import find_standstill
 from groundstation.estimators.heading.steady import steady_prior
 from groundstation.estimators.heading.steps import heading_steps
+from groundstation.estimators.heading.taxi import straight_taxi
 from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.results.heading import HeadingResult, HeadingStep
 from groundstation.results.latency import Latencies
@@ -84,27 +80,16 @@ def estimate_heading_error(
     site, request = site or SiteData(), request or HeadingRequest()
     ins_topic, gnss_topic = choose_topics(flight, request)
     delay = known_delay((ins_topic, gnss_topic), latencies, aircraft, settings)
-
-    def gated(with_later_runs: bool) -> Samples:
-        paired = pair_samples(
-            *(flight, ins_topic, gnss_topic),
-            settings=settings,
-            on_ground=on_ground,
-            heading=heading,
-            with_later_runs=with_later_runs,
-            gnss_latency_s=delay.latency_s if delay else 0.0,
-        )
-        if aircraft.mounting_deg:
-            paired = replace(paired, heading_deg=wrap_360(paired.heading_deg - aircraft.mounting_deg))
-        return gate_samples(paired, settings, request, phases)
-
-    antenna = gated(with_later_runs=settings.runs == "all_ground")
-    if settings.runs == "auto" and antenna.is_used.sum() * antenna.interval_s < settings.taxi_min_s:
-        # Too little before take-off: what the whole flight says is worth more, though never a number to type.
-        whole = gated(with_later_runs=True)
-        antenna = whole if whole.is_used.sum() > antenna.is_used.sum() else antenna
-    if antenna.is_used.sum() < 2:
-        raise NotAssessableError("heading", _why_nothing_is_used(antenna, settings))
+    antenna = straight_taxi(
+        *(flight, ins_topic, gnss_topic),
+        settings=settings,
+        aircraft=aircraft,
+        request=request,
+        on_ground=on_ground,
+        heading=heading,
+        phases=phases,
+        gnss_latency_s=delay.latency_s if delay else 0.0,
+    )
     standstill = find_standstill(antenna, settings)
     span_s = tuple(float(time_s) for time_s in antenna.time_s[antenna.is_used][[0, -1]])
     steady = steady_prior(flight, span_s, aircraft, settings)
@@ -128,16 +113,3 @@ def _steps(
     time_s = flight.time_s(ins_topic)
     inside = (time_s >= span_s[0]) & (time_s <= span_s[1])
     return heading_steps(time_s[inside], np.asarray(given.values_deg)[inside], settings)
-
-
-def _why_nothing_is_used(samples: Samples, settings: HeadingSettings) -> str:
-    limit = settings.taxi_speed_min_mps
-    highest = float(np.max(samples.speed_mps)) if len(samples) else 0.0
-    if not np.isfinite(samples.heading_deg).any():
-        return "no INS heading at the times of the GNSS velocities on the ground"
-    if highest <= limit:
-        return f"ground speed never above {limit:g} m/s before lift-off: highest {highest:.1f} m/s"
-    fast = samples.gate[samples.speed_mps > limit]
-    names, counts = np.unique(fast, return_counts=True)
-    shares = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
-    return f"no straight taxi: of {len(fast)} epochs above {limit:g} m/s before lift-off: {shares}"

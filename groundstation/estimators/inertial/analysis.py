@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from groundstation.base.errors import NotAssessableError
-from groundstation.estimators.analysis import Analysis, Found, RestsOn
+from groundstation.estimators.analysis import Analysis, Found, RestsOn, Shortfall
 from groundstation.estimators.inertial.columns import FORECAST_COLUMNS, INERTIAL_COLUMNS
 from groundstation.estimators.inertial.noise import choose_class
 from groundstation.estimators.inertial.settings import InertialSettings
@@ -14,7 +14,6 @@ from groundstation.results.answer import Answers, answer_of
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.inertial import InertialResult
 from groundstation.tables.phases import Phases
-from groundstation.tables.sources import said_of
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight
@@ -30,17 +29,21 @@ def take_off_s(phases: Phases) -> float:
 
 def _run(flight: "Flight", known: Known, settings: InertialSettings) -> Found[InertialResult]:
     from groundstation.estimators.inertial.aided import compare_aided
-    from groundstation.estimators.inertial.differences import differences
     from groundstation.estimators.inertial.estimate import estimate_compared
-    from groundstation.estimators.inertial.kind import UNAIDED, kind_of, stated_kind
+    from groundstation.estimators.inertial.examine import compared_with_kind
+    from groundstation.estimators.inertial.kind import UNAIDED
 
-    compared = differences(flight, settings=settings, excluded_s=known.excluded_s)
-    said = said_of(flight, compared.ins_topic, "ins_kind")
-    kind = kind_of(compared, settings, stated_kind(known.aircraft.ins_kind, {"ins_kind": said}))
+    compared, kind = compared_with_kind(flight, known, settings)
     if kind[0] != UNAIDED:
         return Found(*compare_aided(flight, kind, settings=settings, excluded_s=known.excluded_s))
     found = estimate_compared(flight, compared, kind, settings=settings, aircraft_class=known.aircraft.ins_class)
     return Found(found.result, found.findings, found)
+
+
+def _examine(flight: "Flight", known: Known, settings: InertialSettings) -> tuple[Shortfall, ...]:
+    from groundstation.estimators.inertial.examine import examine_inertial
+
+    return examine_inertial(flight, known, settings)
 
 
 def _run_forecast(_flight: "Flight", known: Known, settings: InertialSettings) -> Found[ForecastResult]:
@@ -106,6 +109,7 @@ INERTIAL = Analysis(
     sentence=_sentence,
     check=_check,
     columns=INERTIAL_COLUMNS,
+    examine=_examine,
 )
 FORECAST = Analysis(
     name="forecast",

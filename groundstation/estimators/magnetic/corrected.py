@@ -14,7 +14,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.apply import corrected_by_coefficients, corrected_by_iron, corrected_by_table
 from groundstation.estimators.magnetic.attitude import levelled_heading_deg
-from groundstation.estimators.magnetic.estimate import IN_THE_AIR
+from groundstation.estimators.magnetic.flown import IN_THE_AIR
 from groundstation.estimators.magnetic.readings import (
     ANALYSIS,
     FIELD,

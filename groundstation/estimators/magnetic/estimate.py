@@ -7,7 +7,6 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
-from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.known import AircraftData
@@ -17,9 +16,10 @@ from groundstation.estimators.magnetic.before_lift_off import HeadingBasis, find
 from groundstation.estimators.magnetic.compass_table import CompassTable, build_table
 from groundstation.estimators.magnetic.earth import earth_field
 from groundstation.estimators.magnetic.figures import draw, parts_of
+from groundstation.estimators.magnetic.flown import find_flown
 from groundstation.estimators.magnetic.held_out import Unseen, advantage, find_unseen, hold_out, is_level
 from groundstation.estimators.magnetic.iron import bank_bias, heading_errors, parameters_of
-from groundstation.estimators.magnetic.manoeuvre import Figure, FoundTurn, find_figures, find_turns, widest_gap_deg
+from groundstation.estimators.magnetic.manoeuvre import Figure, FoundTurn, widest_gap_deg
 from groundstation.estimators.magnetic.methods import (
     FORECAST_BANKS_DEG,
     Fits,
@@ -29,7 +29,7 @@ from groundstation.estimators.magnetic.methods import (
     recommend,
 )
 from groundstation.estimators.magnetic.poisson import IronFit, corrected_heading_deg
-from groundstation.estimators.magnetic.readings import ANALYSIS, Readings, choose_topics, gather, why_not_independent
+from groundstation.estimators.magnetic.readings import Readings, choose_topics
 from groundstation.estimators.magnetic.remarks import remarks_on
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.estimators.magnetic.swings import compare_swings, steer_card
@@ -48,8 +48,6 @@ from groundstation.results.magnetic import (
 )
 from groundstation.tables.phases import Phases, flight_phases
 from groundstation.tables.table import Flight
-
-IN_THE_AIR = ("airborne", "unknown")  # ground contact is a phase of its own where it is proven
 
 
 def estimate_deviation(
@@ -103,17 +101,9 @@ def estimate_deviation(
     """
     settings = settings or MagneticSettings()
     topics = choose_topics(flight, ins_topic, magnetometer_topic)
-    objection = why_not_independent(flight, topics[0], dict(kinds or {}), settings)
-    if objection:
-        raise NotAssessableError(ANALYSIS, objection)
-    readings, latency_s = gather(flight, topics, latencies, settings)
     phases = phases or flight_phases(flight)
-    phase = phases.at(readings.time_s)
-    is_airborne = np.isin(phase, IN_THE_AIR)
-    turns = find_turns(readings, is_airborne, settings)
-    figures, turns = find_figures(readings, turns, settings)
-    if not figures:
-        raise NotAssessableError(ANALYSIS, _why_no_figure(turns))
+    flown = find_flown(flight, topics, phases, kinds or {}, latencies, settings)
+    readings, is_airborne, figures, turns = flown.readings, flown.is_airborne, flown.figures, flown.turns
     figure_at_s = float(np.mean([0.5 * (figure.start_s + figure.end_s) for figure in figures]))
     request = heading_request or HeadingRequest()
     basis = HeadingBasis(heading_settings or HeadingSettings(), aircraft or AircraftData(), request, latencies)
@@ -122,7 +112,7 @@ def estimate_deviation(
     alignment = align(heading, topics[0], figure_at_s, settings, runs, gyros)
     readings = _aligned(readings, alignment, aircraft.mounting_deg if aircraft else 0.0)
     result = _answer(flight, topics, readings, is_airborne, (figures, turns), alignment, settings)
-    return replace(result, remarks=remarks_on(flight, result, latency_s, kinds or {}, settings))
+    return replace(result, remarks=remarks_on(flight, result, flown.latency_s, kinds or {}, settings))
 
 
 def _answer(
@@ -218,19 +208,6 @@ def _aligned(readings: Readings, alignment: Alignment, mounting_deg: float) -> R
     hours = (readings.time_s - alignment.figure_at_s) / S_PER_H
     error = alignment.error_deg + alignment.drift_deg_per_h * hours
     return replace(readings, true_heading_deg=wrap_360(readings.true_heading_deg - mounting_deg - error))
-
-
-def _why_no_figure(turns: list[FoundTurn]) -> str:
-    """What was found instead of a figure, the longest turns first."""
-    if not turns:
-        return "no turn of steady bank in flight: opposite turns over the whole circle are needed"
-    longest = sorted(turns, key=lambda one: -abs(one.turn.turned_deg))[:3]
-    told = "; ".join(
-        f"at {one.turn.start_s:.0f} s {one.turn.turned_deg:+.0f} deg at {one.turn.bank_deg:+.0f} deg of bank: "
-        f"{one.turn.reason}"
-        for one in longest
-    )
-    return f"no opposite turns that cover the circle: {told}"
 
 
 def _coverage(figures: list[Figure], table: CompassTable) -> Coverage:

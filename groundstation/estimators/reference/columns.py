@@ -1,19 +1,27 @@
 """What the comparison with a reference gives to the tables of flights."""
 
+from groundstation.base.signals import kind_of
 from groundstation.results.columns import AnswerColumn
 from groundstation.results.reference import ReferenceResult
 
 
-def _rmse(answer: ReferenceResult, subject: str, quantity: str, axis: str) -> float | None:
-    """RMS of an axis; None where it was not compared, or the reference judges nothing."""
-    row = answer.error(subject, quantity, axis) if answer.is_judge else None
+def _rmse(answer: ReferenceResult, kind: str, quantity: str, axis: str) -> float | None:
+    """RMS of an axis of the first of a kind; None where it was not compared, or the reference judges nothing."""
+    row = answer.error(_first(answer, kind, quantity, axis), quantity, axis) if answer.is_judge else None
     return None if row is None else row.spread.rmse
 
 
-def _share(answer: ReferenceResult, subject: str) -> float | None:
-    """Share of the horizontal position errors inside the 95 % claimed."""
-    row = answer.claim(subject, "position", "horizontal") if answer.is_judge else None
+def _share(answer: ReferenceResult, kind: str) -> float | None:
+    """Share of the horizontal position errors of the first of a kind inside the 95 % claimed."""
+    place = ("position", "horizontal")
+    row = answer.claim(_first(answer, kind, *place), *place) if answer.is_judge else None
     return None if row is None or row.state == "reference_too_coarse" else row.share_inside95
+
+
+def _first(answer: ReferenceResult, kind: str, quantity: str, axis: str) -> str:
+    """The first subject of a kind that was compared along an axis: ``gnss``, or ``gnss.b`` of another log."""
+    compared = (row.subject for row in answer.errors if (row.quantity, row.axis) == (quantity, axis))
+    return next((subject for subject in compared if kind_of(subject) == kind), kind)
 
 
 REFERENCE_COLUMNS: tuple[AnswerColumn[ReferenceResult], ...] = (

@@ -1,6 +1,8 @@
 """Several logs: each in its turn, several at once or on a cluster, one bad log never stopping the others."""
 
+import math
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -16,12 +18,12 @@ from groundstation.pipeline.many_flights.found_sessions import (
     run_sessions,
 )
 from groundstation.pipeline.many_flights.inputs import collect, flight_folders, is_ours, session_folders
-from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
+from groundstation.pipeline.many_flights.out_folder import alone_in, clear_unfinished, prepare, refuse_foreign
 from groundstation.pipeline.many_flights.output import LocalOutput, RemoteOutput
 from groundstation.pipeline.many_flights.placement import Placement
 from groundstation.pipeline.many_flights.publishing import FLEET_FILES, write_beside, write_index_of
-from groundstation.pipeline.many_flights.remote import far_logs, is_remote
-from groundstation.pipeline.many_flights.remote_runs import RemoteJob, run_remote
+from groundstation.pipeline.many_flights.remote import FarLog, far_logs, is_remote
+from groundstation.pipeline.many_flights.remote_runs import RemoteJob, digest_remote, run_remote
 from groundstation.pipeline.many_flights.session import load_stations, planned_session
 from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJob, Crew, cores, in_turn, side_by_side
 from groundstation.pipeline.one_flight.configuration import Configuration
@@ -51,6 +53,8 @@ def run_many(
     with_pdf: bool = True,
     redo: bool = False,
     stations: Path | None = None,
+    only_results: bool = False,
+    timeout_s: float = math.inf,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
     """Run logs and folders of logs into ``out``, then the sessions among the flights; the index lists all of them.
@@ -68,6 +72,10 @@ def run_many(
         Address of a Dask scheduler, whose workers do the work; they see local paths as this machine does.
     stations : Path, optional
         TOML file with the ground stations of the sessions; left out: stations.toml beside the logs of each.
+    only_results : bool
+        Neither recordings nor reports, of flights or of all; a later run without it makes them.
+    timeout_s : float
+        A log, or a session, that takes longer has failed, and the process that ran it is ended.
 
     Returns
     -------
@@ -82,14 +90,16 @@ def run_many(
     """
     ground = None if stations is None else load_stations(stations)
     inputs = _inputs(paths, out, configuration)
-    crew = _crew(scheduler, jobs or cores(), len(inputs), listen)
-    make = partial(Job, configuration=configuration, fail_on=fail_on, with_pdf=with_pdf)
+    crew = _crew(scheduler, jobs or cores(), len(inputs), listen, timeout_s)
+    make = partial(Job, configuration=configuration, fail_on=fail_on, with_pdf=with_pdf, only_results=only_results)
     listen(Event("begin", total=len(inputs)))
-    asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo)
+    asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo, only_results=only_results)
     if any(is_remote(str(place)) for place in (out, *paths)):
-        remote = [RemoteJob(make(Path(), Path(), is_named=named), log, str(out), redo) for log, named in inputs]
+        remote = [
+            RemoteJob(make(Path(), Path(), is_named=one.is_named), one.url, str(out), redo, one.size) for one in inputs
+        ]
         return _run_remote(remote, asked, crew, force, listen)
-    near = [make(Path(log), Path(out), is_named=named) for log, named in inputs]
+    near = [make(Path(one.url), Path(out), is_named=one.is_named) for one in inputs]
     return _run_here(near, asked, crew, force, listen)
 
 
@@ -101,6 +111,7 @@ def run_together(
     force: bool = False,
     fail_on: str = "none",
     with_pdf: bool = True,
+    only_results: bool = False,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
     """Run several logs of one flight as that flight; see :func:`groundstation.pipeline.one_flight.join.join_logs`.
@@ -129,8 +140,8 @@ def run_together(
             reason, trace = reason_of(named, error)
             listen(Event("end", named, reason))
             return (Outcome(named, "failed", reason, trace=trace),)
-        job = Job(mcap, Path(out), configuration, fail_on, with_pdf=with_pdf, url=named)
-        asked = Asked(Path(out), configuration, None, fail_on, with_pdf, redo=True)
+        job = Job(mcap, Path(out), configuration, fail_on, with_pdf=with_pdf, url=named, only_results=only_results)
+        asked = Asked(Path(out), configuration, None, fail_on, with_pdf, redo=True, only_results=only_results)
         return _run_here([job], asked, partial(in_turn, listen=listen), force, listen)
 
 
@@ -154,9 +165,10 @@ def _run_here(work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen
             return replace(work[number], add_suffix=True)
 
         _run_into(placement, out, left(), run_flight, suffixed, crew, listen)
+        clear_unfinished(out)  # of processes that died or took too long
         sessions = _run_sessions(placement, asked, crew, listen)
         outcomes = (*placement.outcomes(), *sessions)
-        return (*outcomes, *write_beside(out, outcomes, with_pdf=asked.with_pdf))
+        return (*outcomes, *write_beside(out, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results))
 
 
 def _run_sessions(placement: Placement, asked: Asked, crew: Crew, listen: Listener) -> tuple[Outcome, ...]:
@@ -182,18 +194,43 @@ def _run_remote(
         copy = Path(folder)
         output = RemoteOutput(work[0].out, copy)
         output.refuse_foreign(force=force)
-        output.copy_all()
-        placement = Placement(output, [one.log for one in work])
-        is_whole = False
-        try:
-            _run_into(placement, copy, enumerate(work), run_remote, suffixed, crew, listen)
-            sessions = _run_remote_sessions(placement, output, asked, listen)
-            outcomes = (*placement.outcomes(), *sessions)
-            problems = write_beside(copy, outcomes, with_pdf=asked.with_pdf)
-            is_whole = True
-        finally:
-            output.publish(FLEET_FILES, is_whole=is_whole)
-        return (*outcomes, *problems)
+        with output.alone() as lease:
+            output.copy_all()
+            placement = Placement(output, [one.log for one in work])
+            is_whole = False
+            try:
+                _run_into(placement, copy, _once(work, placement, crew, listen), run_remote, suffixed, crew, listen)
+                sessions = _run_remote_sessions(placement, output, asked, listen)
+                outcomes = (*placement.outcomes(), *sessions)
+                problems = write_beside(copy, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results)
+                is_whole = True
+            finally:
+                lease.require()
+                output.publish(FLEET_FILES, is_whole=is_whole)
+            return (*outcomes, *problems)
+
+
+def _once(
+    work: Sequence[RemoteJob], placement: Placement, crew: Crew, listen: Listener
+) -> Iterator[tuple[int, RemoteJob]]:
+    """The jobs by number, without those whose content another one before them has.
+
+    Only logs of one size can be equal: those are fetched for their digests first.
+    """
+    like = Counter(job.size for job in work)
+    alike = [(number, job) for number, job in enumerate(work) if like[job.size] > 1]
+    digests: dict[int, str] = {}
+    if alike:
+        with closing(crew(alike, digest_remote)) as ended:
+            digests = {number: outcome.sha256 for number, outcome in ended if outcome.sha256}
+    first: dict[str, int] = {}
+    for number, job in enumerate(work):
+        kept = first.setdefault(digests[number], number) if number in digests else number
+        if kept == number:
+            yield number, job
+        else:
+            placement.put_twin(number, Outcome(job.log, "skipped", "", sha256=digests[number]), kept)
+            listen(Event("end", job.name, "same content as another log"))
 
 
 def _run_remote_sessions(
@@ -240,15 +277,15 @@ def _run_into(
         raise
 
 
-def _crew(scheduler: str, workers: int, logs: int, listen: Listener) -> Crew:
-    """Who does the work: a cluster, processes, or this process alone, where there is little."""
+def _crew(scheduler: str, workers: int, logs: int, listen: Listener, timeout_s: float = math.inf) -> Crew:
+    """Who does the work: a cluster, processes, or this process alone, where there is little and no limit of time."""
     if scheduler:
         from groundstation.pipeline.many_flights.cluster import on_cluster
 
-        return partial(on_cluster, scheduler=scheduler)
-    if min(workers, logs) <= 1 and logs <= TASKS_PER_PROCESS:
+        return partial(on_cluster, scheduler=scheduler, timeout_s=timeout_s)
+    if min(workers, logs) <= 1 and logs <= TASKS_PER_PROCESS and math.isinf(timeout_s):
         return partial(in_turn, listen=listen)
-    return partial(side_by_side, workers=min(workers, logs), listen=listen)
+    return partial(side_by_side, workers=min(workers, logs), listen=listen, timeout_s=timeout_s)
 
 
 def plan_many(
@@ -259,6 +296,7 @@ def plan_many(
     with_pdf: bool = True,
     redo: bool = False,
     stations: Path | None = None,
+    only_results: bool = False,
 ) -> tuple[Outcome, ...]:
     """Say what :func:`run_many` would do of each log, and of the sessions among finished flights; nothing is written.
 
@@ -272,7 +310,8 @@ def plan_many(
     inputs, out = _inputs(paths, out, configuration), Path(out)
     refuse_foreign(out, force=True)
     known = {} if redo or not out.is_dir() else finished_flights(flight_folders(out))
-    work = [Job(Path(log), out, configuration, is_named=named, with_pdf=with_pdf) for log, named in inputs]
+    make = partial(Job, out=out, configuration=configuration, with_pdf=with_pdf, only_results=only_results)
+    work = [make(Path(one.url), is_named=one.is_named) for one in inputs]
     outcomes = []
     for _number, job, twin in _with_steps(work, known):
         if twin is not None:
@@ -280,7 +319,7 @@ def plan_many(
         else:
             outcomes.append(_planned(job))
     ground = None if stations is None else load_stations(stations)
-    asked = Asked(out, configuration, ground, "none", with_pdf, redo)
+    asked = Asked(out, configuration, ground, "none", with_pdf, redo, only_results=only_results)
     return (*outcomes, *_planned_sessions(asked, outcomes))
 
 
@@ -312,17 +351,18 @@ def _planned_sessions(asked: Asked, planned: Sequence[Outcome]) -> list[Outcome]
     return sessions
 
 
-def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configuration) -> tuple[tuple[str, bool], ...]:
-    """Logs by path or URL, in a stable order, each with whether the user named it."""
+def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configuration) -> tuple[FarLog, ...]:
+    """Logs by path or URL, in a stable order."""
     near = [Path(path) for path in paths if not is_remote(str(path))]
-    found = {log: named for path in paths if is_remote(str(path)) for log, named in far_logs(str(path))}
+    found = {log.url: log for path in paths if is_remote(str(path)) for log in far_logs(str(path))}
     judges = {path.resolve() for path in configuration.references.paths}  # in a folder they are no logs to run
-    listed = collect(near, None if is_remote(str(out)) else Path(out))
-    found |= {str(one.path): one.is_named for one in listed if one.is_named or one.path.resolve() not in judges}
+    for one in collect(near, None if is_remote(str(out)) else Path(out)):
+        if one.is_named or one.path.resolve() not in judges:
+            found[str(one.path)] = FarLog(str(one.path), one.is_named, one.path.stat().st_size)
     if not found:
         hint = "what groundstation made is no input" if any(path.is_dir() and is_ours(path) for path in near) else ""
         raise UsageError(", ".join(map(str, paths)), "no log in it", "", hint)
-    return tuple(sorted(found.items()))
+    return tuple(log for _, log in sorted(found.items()))
 
 
 def _with_steps(jobs: Sequence[Job], known: Mapping[str, Finished]) -> Iterator[tuple[int, Job, int | None]]:

@@ -1,32 +1,41 @@
 """Jobs on a cluster of Dask, which schedules and repeats them; groundstation must be installed on its workers."""
 
 import logging
+import math
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import contextmanager
+from concurrent.futures import Future as Promise
+from concurrent.futures import wait
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.version import __version__
-from groundstation.pipeline.many_flights.workers import AnyJob, Work
+from groundstation.pipeline.many_flights.workers import AnyJob, Work, overdue
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Listener, silent
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-CONNECT_S = 10
+CONNECT_S, RESTART_S = 10, 30
 AHEAD = 2  # jobs for each thread of the cluster that are handed over before one has ended
 _one_at_a_time = threading.Lock()  # a worker may have several threads; figures and recordings are for one
 
 
 def on_cluster(
-    tasks: Iterable[tuple[int, AnyJob]], run: Callable[[AnyJob, Listener], Outcome], *, scheduler: str
+    tasks: Iterable[tuple[int, AnyJob]],
+    run: Callable[[AnyJob, Listener], Outcome],
+    *,
+    scheduler: str,
+    timeout_s: float = math.inf,
 ) -> Generator[tuple[int, Outcome]]:
     """Run jobs on the workers of a scheduler; yields number and outcome as each one ends.
 
-    A job whose worker dies is run again by another; one that has killed several has failed.
+    A job whose worker dies is run again by another; one that has killed several has failed. One that takes longer than
+    ``timeout_s`` has failed, too: its worker is started anew, if it has a nanny, or goes on beside what hangs.
 
     Parameters
     ----------
@@ -52,7 +61,7 @@ def on_cluster(
         def handed_over(most: int) -> list["Future"]:
             futures = []
             for task in islice(waiting, most):
-                futures.append(client.submit(_alone, run, task[1], pure=False))
+                futures.append(client.submit(_alone, run, task[1], timeout_s, pure=False))
                 running[futures[-1].key] = task
             return futures
 
@@ -63,13 +72,47 @@ def on_cluster(
                 hint = "start it, and run again: what was finished is kept"
                 raise GroundstationError(scheduler, "the scheduler is gone", "", hint)
             error = future.exception()
-            yield number, future.result() if error is None else _failed(job, error)
+            result = future.result() if error is None else _failed(job, error)
+            if isinstance(result, _Hanging):
+                future.release()
+                _start_anew(client, result.worker)
+                result = overdue(job, timeout_s)
+            yield number, result
             ended.update(handed_over(1))
 
 
-def _alone(run: Callable[[AnyJob, Listener], Outcome], job: AnyJob) -> Outcome:
+@dataclass(frozen=True)
+class _Hanging:
+    """What a worker gives back in place of an outcome when a job takes too long: its own address."""
+
+    worker: str
+
+
+def _alone(run: Callable[[AnyJob, Listener], Outcome], job: AnyJob, timeout_s: float) -> Outcome | _Hanging:
     with _one_at_a_time:
-        return run(job, silent)
+        if math.isinf(timeout_s):
+            return run(job, silent)
+        promise: Promise[Outcome] = Promise()
+        threading.Thread(target=_keep, args=(promise, run, job), name="job", daemon=True).start()
+        wait([promise], timeout_s)
+        if promise.done():
+            return promise.result()
+    from distributed import get_worker
+
+    return _Hanging(get_worker().address)
+
+
+def _keep(promise: Promise[Outcome], run: Callable[[AnyJob, Listener], Outcome], job: AnyJob) -> None:
+    try:
+        promise.set_result(run(job, silent))
+    except BaseException as error:
+        promise.set_exception(error)
+
+
+def _start_anew(client: "Client", worker: str) -> None:
+    """End a worker's process, which its nanny starts again; one without a nanny stays as it is."""
+    with suppress(Exception):  # whatever is wrong with that worker concerns no other
+        client.restart_workers([worker], timeout=RESTART_S, raise_for_error=False)
 
 
 def _failed(job: Work, error: BaseException) -> Outcome:

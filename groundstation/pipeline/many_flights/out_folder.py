@@ -42,8 +42,13 @@ def alone_in(out: Path) -> Iterator[None]:
 
 def prepare(out: Path) -> None:
     """Clear away what a killed run left, and mark the folder as ours."""
-    for left_over in out.iterdir():
-        if left_over.name.startswith(PARTIAL_PREFIX):  # of a run that is no more: this one is alone in here
-            shutil.rmtree(left_over, ignore_errors=True)
+    clear_unfinished(out)
     if not (out / OUT_FOLDER_MARK).exists():
         write_index_of(out, ())  # from now on the folder is known for ours, whatever happens to the run
+
+
+def clear_unfinished(out: Path) -> None:
+    """Clear away what nobody writes any more: this run is alone in here, and none of its jobs is running."""
+    for left_over in out.iterdir():
+        if left_over.name.startswith(PARTIAL_PREFIX):
+            shutil.rmtree(left_over, ignore_errors=True)

@@ -3,18 +3,20 @@
 import shutil
 import uuid
 from collections.abc import Collection, Sequence
+from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
 from typing import Protocol
 
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, SESSION_ARRAYS
+from groundstation.pipeline.many_flights.lease import LOCKS, Lease, alone_elsewhere
 from groundstation.pipeline.many_flights.remote import RemoteFolder
 from groundstation.pipeline.many_flights.remote_runs import BY_LOG, STAGING, array_files
 from groundstation.pipeline.one_flight.flight import is_made, place, remove
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports.flight_report import PDF, REPORT
-from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY
+from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 
 FLEET_ARRAYS = (
     "heading_samples.parquet",
@@ -81,9 +83,13 @@ class RemoteOutput:
         self.root = root
         self._out = RemoteFolder(url)
 
+    def alone(self) -> AbstractContextManager[Lease]:
+        """Keep other runs out while this one writes."""
+        return alone_elsewhere(self._out)
+
     def refuse_foreign(self, *, force: bool) -> None:
         """Raise UsageError when something else is in the folder."""
-        names = self._out.names()
+        names = [name for name in self._out.names() if name != LOCKS]
         if FLIGHT_FOLDER_MARK in names:
             raise UsageError(self._out.url, "a flight folder", "a folder that holds flight folders", "name another -o")
         if names and OUT_FOLDER_MARK not in names and BY_LOG not in names and not force:
@@ -138,7 +144,7 @@ class RemoteOutput:
     def send_session(self, session_id: str) -> None:
         """Send what was made of a session of the copy; files that stand there by name alone are there already."""
         folder = self.root / session_id
-        if (folder / f"{session_id}.rrd").stat().st_size:
+        if (folder / TABLES).is_dir():  # made just now: of what is there already the copy has no tables
             staged = f"{STAGING}/{session_id}-{uuid.uuid4().hex[:8]}"
             self._out.send(folder, staged)
             self._out.replace(staged, session_id, partial(is_made, identity=session_id))

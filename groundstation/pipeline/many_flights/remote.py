@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, NO_LOGS, OUT_FOLDER_MARK
@@ -68,16 +69,13 @@ class RemoteFolder:
                 return []
             return sorted({PurePosixPath(path).name for path in listed} - {PurePosixPath(self._path(name)).name, ""})
 
-    def files(self) -> list[str]:
-        """All files below, by their path from here, sorted; none where there is nothing."""
+    def files(self) -> dict[str, int]:
+        """Bytes of all files below, by their path from here, sorted; "" where the URL names a file itself."""
         with self._told(""):
-            found = self._fs.find(self._root)
-            return sorted(str(PurePosixPath(path).relative_to(self._root)) for path in found)
-
-    def is_file(self) -> bool:
-        """Whether the URL names a file."""
-        with self._told(""):
-            return bool(self._fs.isfile(self._root))
+            if self._fs.isfile(self._root):
+                return {"": int(self._fs.size(self._root))}
+            found = self._fs.find(self._root, detail=True).items()
+            return dict(sorted((str(PurePosixPath(path).relative_to(self._root)), one["size"]) for path, one in found))
 
     def read(self, name: str) -> bytes | None:
         """Content of a file, None where there is none."""
@@ -92,6 +90,23 @@ class RemoteFolder:
         with self._told(name):
             self._make_parent(name)
             self._fs.pipe_file(self._path(name), content)
+
+    def create(self, name: str, content: bytes) -> bool:
+        """Write a small file unless there is one; whether it was written.
+
+        In S3 the server decides (If-None-Match), elsewhere whatever the store has for it.
+        """
+        with self._told(name):
+            self._make_parent(name)
+            try:
+                if "file" in self._fs.protocol:  # fsspec looks first and writes then
+                    with Path(self._path(name)).open("xb") as stream:
+                        stream.write(content)
+                else:
+                    self._fs.pipe_file(self._path(name), content, mode="create")
+            except FileExistsError:
+                return False
+            return True
 
     def fetch(self, name: str, target: Path) -> None:
         """Copy a file from there."""
@@ -147,8 +162,16 @@ class RemoteFolder:
                 return
 
 
-def far_logs(url: str) -> list[tuple[str, bool]]:
-    """Logs at a URL, a file or a folder with all below it, each with whether the user named it.
+class FarLog(NamedTuple):
+    """A log by its URL or path, whether the user named it, and its bytes."""
+
+    url: str
+    is_named: bool
+    size: int
+
+
+def far_logs(url: str) -> list[FarLog]:
+    """Logs at a URL: a file, or a folder with all below it.
 
     Raises
     ------
@@ -156,13 +179,14 @@ def far_logs(url: str) -> list[tuple[str, bool]]:
         When nothing is there.
     """
     folder = RemoteFolder(url)
-    if folder.is_file():
-        return [(url, True)]
-    paths = [PurePosixPath(name) for name in folder.files()]
-    if not paths:
+    sizes = folder.files()
+    if not sizes:
         raise UsageError(url, "no such file or folder")
+    if "" in sizes:
+        return [FarLog(url, True, sizes[""])]
+    paths = {PurePosixPath(name): size for name, size in sizes.items()}
     ours = {path.parent for path in paths if path.name in (FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK)}
-    return [(f"{folder.url}/{path}", False) for path in paths if not _is_left_out(path, ours)]
+    return [FarLog(f"{folder.url}/{path}", False, size) for path, size in paths.items() if not _is_left_out(path, ours)]
 
 
 def _is_left_out(path: PurePosixPath, ours: set[PurePosixPath]) -> bool:

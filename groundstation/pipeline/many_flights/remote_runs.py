@@ -12,8 +12,9 @@ from pathlib import Path, PurePosixPath
 from groundstation.base.errors import GroundstationError
 from groundstation.pipeline.many_flights.remote import RemoteFolder, is_remote
 from groundstation.pipeline.one_flight.flight import Job, run_flight
+from groundstation.pipeline.one_flight.log import digest_of
 from groundstation.pipeline.one_flight.outcome import Outcome
-from groundstation.pipeline.one_flight.progress import Listener, silent
+from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, finished
 from groundstation.reports.flight_report import PDF
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
@@ -26,13 +27,14 @@ STAGING, BY_LOG = ".staging", ".logs"  # in an OUT elsewhere: what is on its way
 class RemoteJob:
     """A job whose log or results lie elsewhere.
 
-    ``log`` and ``out`` are URLs or paths; with ``redo`` nothing counts as finished.
+    ``log`` and ``out`` are URLs or paths; with ``redo`` nothing counts as finished; ``size`` is that of the log, bytes.
     """
 
     job: Job
     log: str
     out: str
     redo: bool = False
+    size: int = 0
 
     @property
     def name(self) -> str:
@@ -58,14 +60,31 @@ def run_remote(remote: RemoteJob, listen: Listener = silent) -> Outcome:
     return outcome
 
 
+def digest_remote(remote: RemoteJob, listen: Listener = silent) -> Outcome:
+    """Fetch a log for its digest alone, which the outcome holds; its run tells what is wrong with one that has none."""
+    listen(Event("stage", remote.name, "comparing its content"))
+    try:
+        with tempfile.TemporaryDirectory(prefix="groundstation-") as scratch:
+            return Outcome(remote.log, "done", "", sha256=digest_of(_here(Path(scratch), remote)))
+    except (GroundstationError, OSError) as error:
+        return Outcome(remote.log, "failed", str(error))
+
+
+def _here(scratch: Path, remote: RemoteJob) -> Path:
+    """The path of a log on this machine, fetched if need be."""
+    if not is_remote(remote.log):
+        return Path(remote.log)
+    parent, _, _name = remote.log.rpartition("/")
+    path = scratch / "log" / remote.name
+    RemoteFolder(parent).fetch(remote.name, path)
+    return path
+
+
 def _run_in(scratch: Path, remote: RemoteJob, listen: Listener) -> Outcome:
     out = RemoteFolder(remote.out)
-    path = Path(remote.log)
-    if is_remote(remote.log):
-        parent, _, _name = remote.log.rpartition("/")
-        path = scratch / "log" / remote.name
-        RemoteFolder(parent).fetch(remote.name, path)
-    job = replace(remote.job, path=path, out=scratch / "out", url=remote.log if is_remote(remote.log) else "")
+    job = replace(
+        remote.job, path=_here(scratch, remote), out=scratch / "out", url=remote.log if is_remote(remote.log) else ""
+    )
     if not remote.redo:
         job = _planned(job, out, scratch / "finished")
     outcome = run_flight(job, listen)

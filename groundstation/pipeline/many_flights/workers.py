@@ -1,22 +1,27 @@
-"""Worker processes that run jobs side by side; one that dies takes its own log with it and no other."""
+"""Worker processes that run jobs side by side; one that dies or hangs takes its own log with it and no other."""
 
 import json
+import math
 import multiprocessing
 import os
 import threading
+import time
+from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager, suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, field
+from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.connection import wait as wait_for
-from typing import Any, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
 TASKS_PER_PROCESS = 32  # Rerun leaves a few threads behind for every recording
 MOST_EVENT_CHARACTERS = 160  # of a name or a text: an event is one write to a pipe, 4096 bytes that nothing cuts in two
+LOOK_EVERY_S, END_S = 0.2, 5.0  # for jobs that take too long; given to their processes to end
 _END = b""
 
 
@@ -44,6 +49,7 @@ class Crew(Protocol):
 # Spawned, never forked: numba, Arrow and Rerun hold threads that a fork would freeze.
 _CONTEXT = multiprocessing.get_context("spawn")
 _tell: Listener = silent  # of a worker process: how it tells the run of its stages
+_tell_begin: Callable[[object], None] = print  # ... and of the number of a job that it begins
 
 
 def in_turn(
@@ -60,35 +66,61 @@ def side_by_side(
     *,
     workers: int,
     listen: Listener,
+    timeout_s: float = math.inf,
 ) -> Generator[tuple[int, Outcome]]:
     """Run jobs in several processes; yields number and outcome as each one ends.
 
     A process that is killed (by the system when memory runs out) breaks the pool with everything in it. What was in it
-    is run again, one job at a time: the job whose process dies again has failed, and the others go on.
+    is run again, one job at a time: the job whose process dies again has failed, and the others go on. A job that takes
+    longer than ``timeout_s`` has failed, too; its pool is ended, and what else was in it is run again as it was.
     """
-    waiting = iter(tasks)
-    with _events(listen) as sender:
+    queue = _Queue(iter(tasks))
+    with _events(listen, queue) as sender:
         while True:
             suspects: list[tuple[int, AnyJob]] = []
-            yield from _until_broken(waiting, run, workers, sender, suspects)
-            if not suspects:
-                return
+            yield from _until_broken(queue, run, workers, sender, suspects, timeout_s)
             for task in suspects:
                 broken: list[tuple[int, AnyJob]] = []
-                yield from _until_broken(iter((task,)), run, 1, sender, broken)
+                yield from _until_broken(_Queue(iter((task,)), queue.begun), run, 1, sender, broken, timeout_s)
                 for number, job in broken:
                     reason = f"{job.name}: its process died (killed, or out of memory)"
                     yield number, Outcome(job.log, "failed", reason)
+            if not suspects and not queue.again:
+                return
+
+
+@dataclass
+class _Queue(Generic[AnyJob]):
+    """Jobs that wait: those to be run again, then the others; and when each of those that run began, by number."""
+
+    waiting: Iterator[tuple[int, AnyJob]]
+    begun: dict[int, float] = field(default_factory=dict)
+    again: deque[tuple[int, AnyJob]] = field(default_factory=deque)
+
+    def next(self) -> tuple[int, AnyJob] | None:
+        return self.again.popleft() if self.again else next(self.waiting, None)
+
+    def is_overdue(self, number: int, timeout_s: float) -> bool:
+        return time.monotonic() - self.begun.get(number, math.inf) > timeout_s
+
+
+def overdue(job: Work, timeout_s: float) -> Outcome:
+    """The outcome of a job that was ended because it took too long."""
+    return Outcome(job.log, "failed", f"{job.name}: not done within {timeout_s:g} s (--timeout), ended")
 
 
 def _until_broken(
-    waiting: Iterator[tuple[int, AnyJob]],
+    queue: _Queue[AnyJob],
     run: Callable[[AnyJob, Listener], Outcome],
     workers: int,
     sender: Connection,
     broken: list[tuple[int, AnyJob]],
+    timeout_s: float,
 ) -> Generator[tuple[int, Outcome]]:
-    """Run jobs until there are none, or until a process dies: then those that were in the pool are ``broken``."""
+    """Run jobs until there are none, or until a process dies: then those that were in the pool are ``broken``.
+
+    Where a job takes too long, those that were in the pool with it are in the queue again.
+    """
     pool = ProcessPoolExecutor(
         workers, mp_context=_CONTEXT, initializer=_begin, initargs=(sender,), max_tasks_per_child=TASKS_PER_PROCESS
     )
@@ -96,16 +128,17 @@ def _until_broken(
 
     def hand_over() -> None:
         """One job more than there are workers, so that none waits for its next."""
-        while len(running) <= workers and not broken and (task := next(waiting, None)) is not None:
+        while len(running) <= workers and not broken and (task := queue.next()) is not None:
+            queue.begun.pop(task[0], None)
             try:
-                running[pool.submit(_run, run, task[1])] = task
+                running[pool.submit(_run, run, task[0], task[1])] = task
             except BrokenExecutor:
                 broken.append(task)
 
     try:
         hand_over()
         while running:
-            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            done, _ = wait(running, LOOK_EVERY_S if math.isfinite(timeout_s) else None, return_when=FIRST_COMPLETED)
             for future in done:
                 task = running.pop(future)
                 try:
@@ -114,24 +147,39 @@ def _until_broken(
                     broken.append(task)
                 else:
                     yield task[0], outcome
+            late = [task for task in running.values() if queue.is_overdue(task[0], timeout_s)]
+            if late:
+                queue.again.extend(task for task in running.values() if task not in late)
+                _end(pool, at_once=True)
+                yield from ((number, overdue(job, timeout_s)) for number, job in late)
+                return
             hand_over()
     except BaseException:  # interrupted: nobody waits for the rest
-        processes = list((getattr(pool, "_processes", None) or {}).values())
-        pool.shutdown(wait=False, cancel_futures=True)
-        for process in processes:
-            process.terminate()
+        _end(pool, at_once=False)
         raise
     pool.shutdown()
 
 
-def _run(run: Callable[[AnyJob, Listener], Outcome], job: AnyJob) -> Outcome:
+def _end(pool: ProcessPoolExecutor, *, at_once: bool) -> None:
+    """End the processes of a pool, ``at_once`` also those that do not listen; one that cannot end is not waited for."""
+    processes = list((getattr(pool, "_processes", None) or {}).values())
+    pool.shutdown(wait=False, cancel_futures=True)
+    for process in processes:
+        process.kill() if at_once else process.terminate()
+    if at_once:
+        wait_for([process.sentinel for process in processes], END_S)
+
+
+def _run(run: Callable[[AnyJob, Listener], Outcome], number: int, job: AnyJob) -> Outcome:
+    _tell_begin(number)
     return run(job, _tell)
 
 
 def _begin(sender: Connection) -> None:
     """Set up a worker process: its stages are told through the pipe, and it ends with the run, however that ends."""
-    global _tell
+    global _tell, _tell_begin
     _tell = _teller(sender)
+    _tell_begin = partial(_send, sender)
     threading.Thread(target=_end_with_the_run, name="parent", daemon=True).start()
 
 
@@ -148,15 +196,19 @@ def _teller(sender: Connection) -> Callable[[Event], None]:
             key: value[:MOST_EVENT_CHARACTERS] if isinstance(value, str) else value
             for key, value in asdict(event).items()
         }
-        with suppress(OSError):  # the run is gone
-            sender.send_bytes(json.dumps(short).encode())
+        _send(sender, short)
 
     return tell
 
 
+def _send(sender: Connection, message: object) -> None:
+    with suppress(OSError):  # the run is gone
+        sender.send_bytes(json.dumps(message).encode())
+
+
 @contextmanager
-def _events(listen: Listener) -> Iterator[Connection]:
-    """A pipe for the events of all workers, which a thread passes on.
+def _events(listen: Listener, queue: _Queue[Any]) -> Iterator[Connection]:
+    """A pipe for the events of all workers, which a thread passes on, and for the numbers of the jobs that they begin.
 
     Every event is one short write, which the system does not mix with another's: no lock that a killed process holds.
     """
@@ -164,8 +216,11 @@ def _events(listen: Listener) -> Iterator[Connection]:
 
     def pass_on() -> None:
         while (data := receiver.recv_bytes()) != _END:
-            document: dict[str, Any] = json.loads(data)
-            listen(Event(**document))
+            message: dict[str, Any] | int = json.loads(data)
+            if isinstance(message, int):
+                queue.begun[message] = time.monotonic()
+            else:
+                listen(Event(**message))
 
     thread = threading.Thread(target=pass_on, name="events", daemon=True)
     thread.start()

@@ -82,8 +82,7 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     FlightResults
         Analyses that could not run stand in ``not_assessable`` with their reasons.
     """
-    if configuration.settings.aircraft.always_on_ground:
-        flight = replace(flight, metadata=MappingProxyType({**flight.metadata, ALWAYS_ON_GROUND: "true"}))
+    flight = _as_stated(flight, configuration)
     found, known = answers_of(flight, configuration)
     flight = flight.without(TRUTH)
     thresholds = configuration.thresholds
@@ -111,6 +110,18 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
         figures=tuple(figures),
         chosen=chosen_intervals(configuration.to_dict()),
     )
+
+
+def _as_stated(flight: Flight, configuration: Configuration) -> Flight:
+    """The flight with what the aircraft file says of its ground contact."""
+    if not configuration.settings.aircraft.always_on_ground:
+        return flight
+    return replace(flight, metadata=MappingProxyType({**flight.metadata, ALWAYS_ON_GROUND: "true"}))
+
+
+def seen_by_analyses(flight: Flight, configuration: Configuration) -> Flight:
+    """The flight as every analysis but those that judge is given it."""
+    return _as_stated(flight, configuration).without(TRUTH)
 
 
 def answers_of(flight: Flight, configuration: Configuration) -> tuple[Answered, Known]:

@@ -86,7 +86,7 @@ def _convert_recorded(log: Log, target: Path, limits: Thresholds, references: Re
         source_sha256=log.source.sha256,
         reader=found.header.reader,
         versions={"groundstation": __version__, "mcap": installed.version("mcap")},
-        metadata={**found.header.metadata, **_told_of_fields(found.remarks), **laid.facts},
+        metadata={**found.header.metadata, **told_of_fields(found.remarks), **laid.facts},
         has_utc=found.clock.is_absolute,
         start_ns=span_ns[0],
         clock=found.clock.document(),
@@ -112,7 +112,7 @@ def _with_truth(ledger: Ledger, laid: Laid, limits: Thresholds) -> Ledger:
     return replace(ledger, topics=dict(sorted({**ledger.topics, **counted}.items())))
 
 
-def _told_of_fields(remarks: tuple[Remark, ...]) -> dict[str, str]:
+def told_of_fields(remarks: tuple[Remark, ...]) -> dict[str, str]:
     """What the analyses must know of a field: it stays with the flight.
 
     ``derived.<topic>.<field>``: what it was derived from; ``heading_is_track.<topic>.<field>``: in words.

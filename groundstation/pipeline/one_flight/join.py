@@ -72,20 +72,31 @@ def join_files(
 ) -> Converted:
     """Write one MCAP of several logs of one flight, by their paths; see :func:`join_logs`.
 
+    A file that no reader claims is left out as one that cannot be read.
+
     Raises
     ------
     UsageError
         When a path is missing or a folder, and as :func:`join_logs`, as is all else.
     """
+    logs: list[Log] = []
+    unclaimed: list[tuple[str, GroundstationError]] = []
     for path in paths:
         if not path.exists():
             raise UsageError(str(path), "no such file")
         if as_log(path).is_dir():
             raise UsageError(str(path), "a folder", "the logs of one flight by name", "--together takes files")
-    logs = [open_log(path, configuration.profile_path, configuration.icds) for path in paths]
+        try:
+            logs.append(open_log(path, configuration.profile_path, configuration.icds))
+        except UnreadableLogError as error:
+            unclaimed.append((path.name, error))
+    if not logs and unclaimed:
+        raise unclaimed[0][1]
     listen(Event("stage", joined_name(logs), "joining"))
     target.parent.mkdir(parents=True, exist_ok=True)
-    return join_logs(logs, target, configuration.thresholds, settings=configuration.settings.of(TwoClocksSettings))
+    settings = configuration.settings.of(TwoClocksSettings)
+    left_out = [_left_out(name, error) for name, error in unclaimed]
+    return join_logs(logs, target, configuration.thresholds, settings=settings, left_out=left_out)
 
 
 def join_logs(
@@ -94,12 +105,14 @@ def join_logs(
     thresholds: Thresholds | None = None,
     *,
     settings: TwoClocksSettings | None = None,
+    left_out: Sequence[Damage] = (),
 ) -> Converted:
     """Write one MCAP of several logs of one flight.
 
     The flight has the clock of the first log that GNSS tells the time, else of the first with UTC, else of the first.
     Topics of the first log keep their names; those of the second end in ``.b``, of the third in ``.c``. A log that
-    cannot be read is left out with a finding, as long as another is left.
+    cannot be read is left out with a finding, as are those of ``left_out``, and the others close up; where one is left
+    the flight is that of this log.
 
     Raises
     ------
@@ -111,9 +124,12 @@ def join_logs(
         When none can be read.
     """
     limits = thresholds or shipped()
-    _require_different(logs)
+    _require_different(logs, len(left_out))
     with TemporaryDirectory(prefix="groundstation-") as folder:
-        parts, left_out = _converted(logs, Path(folder), limits, settings)
+        parts, unread = _converted(logs, Path(folder), limits, settings)
+        left_out = (*left_out, *unread)
+        if len(parts) == 1:
+            return Converted(info := _alone(parts[0], target, left_out), info.findings, has_lost_data=True)
         clock_of = next((one for one in parts if one.timed.gnss_time), None)
         clock_of = clock_of or next((one for one in parts if one.timed.flight.has_utc), parts[0])
         parts = [_related(one, clock_of, settings) for one in parts]
@@ -128,9 +144,10 @@ def _related(part: _Part, clock_of: _Part, settings: TwoClocksSettings | None) -
     return replace(part, relation=relate(clock_of.timed, part.timed, settings=settings))
 
 
-def _require_different(logs: Sequence[Log]) -> None:
-    if not 2 <= len(logs) <= len(LABELS) + 1:
-        raise UsageError("--together", f"{len(logs)} log" + "s" * (len(logs) != 1), f"2 to {len(LABELS) + 1} logs")
+def _require_different(logs: Sequence[Log], left_out: int) -> None:
+    count = len(logs) + left_out
+    if not 2 <= count <= len(LABELS) + 1:
+        raise UsageError("--together", f"{count} log" + "s" * (count != 1), f"2 to {len(LABELS) + 1} logs")
     first: dict[str, str] = {}
     for log in logs:
         if log.source.sha256 in first:
@@ -143,24 +160,53 @@ def _require_different(logs: Sequence[Log]) -> None:
 def _converted(
     logs: Sequence[Log], folder: Path, limits: Thresholds, settings: TwoClocksSettings | None
 ) -> tuple[list[_Part], list[Damage]]:
-    """The logs that can be read, and a damage for each of the others; the first keeps its place without a label."""
+    """The logs that can be read, the first of them without a label, and a damage for each of the others."""
     parts: list[_Part] = []
     left_out: list[Damage] = []
     error: GroundstationError | None = None
-    for label, log in zip(("", *LABELS), logs, strict=False):
+    for log in logs:
+        label = ("", *LABELS)[len(parts)]
         mcap = folder / f"{label or 'a'}.mcap"
         try:
             converted = convert_log(log, mcap, limits)
             flight = read_flight(mcap, converted)
         except GroundstationError as reason:
-            error = reason
-            left_out.append(Damage("unreadable_log", log.source.name, 1, f"log that is left out ({reason})"))
+            error = error or reason
+            left_out.append(_left_out(log.source.name, reason))
             continue
         timed = TimedLog(flight, gnss_time_of(converted.info.clock, converted.info.reader, settings))
         parts.append(_Part(label, log, mcap, converted, timed))
     if not parts:
         raise error or UnreadableLogError("--together", "no log")
     return parts, left_out
+
+
+def _left_out(name: str, reason: GroundstationError) -> Damage:
+    return Damage("unreadable_log", name, 1, f"log that is left out ({reason})")
+
+
+def _told_left_out(left_out: Sequence[Damage]) -> Iterator[Finding]:
+    for one in left_out:
+        yield Finding("fail", "together.unreadable", f"{one.place}: {one.what}")
+
+
+def _alone(part: _Part, target: Path, left_out: Sequence[Damage]) -> StoreInfo:
+    """The MCAP of the one log that is left, as it is without the others but for what is told of them."""
+    from groundstation.store.reader import read
+    from groundstation.store.writer import StoreWriter
+
+    info = part.converted.info
+    told = replace(
+        info,
+        ledger=replace(info.ledger, damages=(*map(damage_entry, left_out), *info.ledger.damages)),
+        findings=(*_told_left_out(left_out), *info.findings),
+        damages=(*map(asdict, left_out), *info.damages),
+    )
+    with StoreWriter(target, told) as writer:
+        for item in read(part.mcap):
+            if isinstance(item, RecordBatch):
+                writer.write(item)
+    return told
 
 
 def _written(
@@ -279,7 +325,7 @@ def _merged(
         start_ns=min(part.start_ns for part in parts),
         ledger=ledger,
         findings=(
-            *(Finding("fail", "together.unreadable", f"{one.place}: {one.what}") for one in left_out),
+            *_told_left_out(left_out),
             *_findings(joining.logs),
             *(finding for info in infos for finding in info.findings),
         ),

@@ -76,7 +76,7 @@ def as_log(path: Path) -> Path:
 
 def log_name(path: Path) -> str:
     """Name of a log: that of its file, or of the folder that is a bag of ROS 2."""
-    return path.resolve().parent.name if _files_of(path)[1:] else path.name
+    return path.resolve().parent.name if _is_metadata(path) else path.name
 
 
 def digest_of(path: Path) -> str:
@@ -85,12 +85,18 @@ def digest_of(path: Path) -> str:
 
 
 def _files_of(path: Path) -> tuple[Path, ...]:
-    """The files of a log: of a bag of ROS 2 its metadata and what that names."""
-    from groundstation.readers.bags.bag import METADATA, files_of, is_bag_folder
+    """The files of a log: of a bag of ROS 2 its metadata and what that names; a file that is read along with it."""
+    from groundstation.readers.bags.bag import files_of
+    from groundstation.readers.sbet import accuracies_beside
 
-    if path.name != METADATA or not is_bag_folder(path.parent):
-        return (path,)
-    return (path, *(file for file in files_of(path) if file.is_file()))
+    others = files_of(path) if _is_metadata(path) else (accuracies_beside(path),)
+    return (path, *(file for file in others if file is not None and file.is_file()))
+
+
+def _is_metadata(path: Path) -> bool:
+    from groundstation.readers.bags.bag import METADATA, is_bag_folder
+
+    return path.name == METADATA and is_bag_folder(path.parent)
 
 
 def open_log(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()) -> Log:

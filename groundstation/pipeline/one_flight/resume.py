@@ -22,6 +22,7 @@ from groundstation.base.version import __version__
 from groundstation.pipeline.one_flight.apply_deviation import APPLIED, corrected_name
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.identity import plain_id
+from groundstation.pipeline.one_flight.log import as_log, digest_of
 from groundstation.reports.flight_report import PDF, REPORT
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.document import SummaryDocument
@@ -79,14 +80,22 @@ class Finished:
         """Whether the digest of the log was put into the id, because another flight had the same."""
         return plain_id(self.flight_id, self.sha256) != self.flight_id
 
-    def step(self, keys: Keys, *, with_pdf: bool) -> Step:
-        """What has to be done for the results to be those of ``keys``; a file that somebody took away is made again."""
+    def step(self, keys: Keys, *, with_pdf: bool, only_results: bool = False) -> Step:
+        """What has to be done for the results to be those of ``keys``; a file that somebody took away is made again.
+
+        With ``only_results`` neither recording nor reports are asked for; what there is of them stays.
+        """
         if keys.conversion != self.keys.conversion or self.mcap.name not in self.files:
             return "everything"
-        analysed = {f"{self.flight_id}.rrd", *([corrected_name(self.flight_id)] if self.has_applied else [])}
+        analysed = {corrected_name(self.flight_id)} if self.has_applied else set()
+        if not only_results:
+            analysed.add(f"{self.flight_id}.rrd")
         if keys.analysis != self.keys.analysis or not analysed <= self.files:
             return "analysis"
-        wanted = {REPORT, *([DEVIATION_CSV] if self.has_deviation else [])}
+        wanted = {DEVIATION_CSV} if self.has_deviation else set()
+        if only_results:
+            return "nothing" if wanted <= self.files else "reports"
+        wanted.add(REPORT)
         if with_pdf:
             wanted |= {PDF, *([STEER_CARD] if self.has_deviation else [])}
         return "nothing" if keys.reports == self.keys.reports and wanted <= self.files else "reports"
@@ -136,8 +145,9 @@ def _layouts_of(configuration: Configuration) -> list[str]:
 
 
 def _content_of(file: str) -> str:
+    """Digest of a file, of all files of a bag, and of what is read along with a reference."""
     try:
-        return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+        return digest_of(as_log(Path(file)))
     except OSError as error:
         raise GroundstationError(file, error.strerror or "cannot be read", "a profile") from error
 

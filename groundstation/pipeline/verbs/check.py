@@ -1,9 +1,9 @@
-"""The verb ``check``: the integrity ledger of logs, which is computed and told, and written nowhere."""
+"""The verb ``check``: the integrity ledger of logs, and what they can be used for; written nowhere."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from groundstation.base.clock import Clock
 from groundstation.base.errors import UnreadableLogError, UsageError
@@ -14,11 +14,15 @@ from groundstation.base.serial import to_json_exactly
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.convert import census_of, has_other_limits, recounted
+from groundstation.pipeline.one_flight.convert import census_of, has_other_limits, recounted, told_of_fields
 from groundstation.pipeline.one_flight.log import Log, as_log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.verbs.describe import facts_of
+
+if TYPE_CHECKING:
+    from groundstation.pipeline.verbs.usable import Usability
+    from groundstation.tables.table import Flight
 
 
 @dataclass(frozen=True)
@@ -34,6 +38,8 @@ class Checked:
     ledger : Ledger
     clock : Clock
     findings : tuple of Finding
+    usability : Usability, optional
+        Whether it serves the purpose that was asked for.
     """
 
     outcome: Outcome
@@ -41,6 +47,7 @@ class Checked:
     ledger: Ledger
     clock: Clock
     findings: tuple[Finding, ...]
+    usability: "Usability | None" = None
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-able."""
@@ -54,23 +61,40 @@ class Checked:
             "clock": to_json_exactly(self.clock),
             "ledger": to_json_exactly(self.ledger),
             "findings": [asdict(finding) for finding in self.findings],
+            **({"usability": self.usability.to_dict()} if self.usability else {}),
         }
+
+    def judged(self, usability: "Usability", fail_on: str) -> "Checked":
+        """With what it can be used for: of no use, or of partial use under ``--fail-on warn``, is at the limit."""
+        is_short = usability.state == "no" or (usability.state == "in part" and fail_on == "warn")
+        outcome = replace(self.outcome, state="limit_reached") if is_short else self.outcome
+        return replace(self, outcome=outcome, usability=usability)
 
 
 def check_many(
     paths: Sequence[Path],
     configuration: Configuration,
     *,
+    purpose: str = "",
     fail_on: str = "none",
     listen: Listener = silent,
 ) -> tuple[Checked, ...]:
     """Check logs one after the other, in the order given; a bad one never stops the others.
 
+    Parameters
+    ----------
+    purpose : str
+        Name of an analysis: say of each log whether it can be used for it. Those of a session are judged together.
+
     Raises
     ------
     UsageError
-        When a log is missing, is a folder, or a threshold is wrong.
+        When a log is missing, is a folder, a threshold is wrong, or there is no such purpose.
     """
+    if purpose:
+        from groundstation.pipeline.verbs.usable import SESSION_PURPOSES, require_purpose
+
+        require_purpose(purpose)
     paths = [as_log(path) for path in paths]
     for path in paths:
         if not path.exists():
@@ -79,11 +103,41 @@ def check_many(
             raise no_log(path)
     listen(Event("begin", total=len(paths)))
     found = []
-    for path in paths:
+    flights: dict[int, Flight] = {}
+    for number, path in enumerate(paths):
         listen(Event("stage", path.name, "reading"))
-        found.append(_check_or_reason(path, configuration, fail_on))
-        listen(Event("end", path.name, found[-1].outcome.text))
+        checked, flight = _check_or_reason(path, configuration, fail_on, with_flight=bool(purpose))
+        if flight is not None and purpose in SESSION_PURPOSES:
+            flights[number] = flight
+        elif flight is not None:
+            checked = _for_purpose(checked, purpose, flight, configuration, fail_on)
+        found.append(checked)
+        listen(Event("end", path.name, checked.outcome.text))
+    if flights:
+        found = _for_session(found, purpose, flights, configuration, fail_on)
     return tuple(found)
+
+
+def _for_purpose(
+    checked: Checked, purpose: str, flight: "Flight", configuration: Configuration, fail_on: str
+) -> Checked:
+    from groundstation.pipeline.verbs.usable import usability_of_flight
+
+    return checked.judged(usability_of_flight(purpose, flight, configuration), fail_on)
+
+
+def _for_session(
+    found: Sequence[Checked], purpose: str, flights: Mapping[int, "Flight"], configuration: Configuration, fail_on: str
+) -> list[Checked]:
+    """The checks with what their logs can be used for together, with the stations beside the first of them."""
+    from groundstation.pipeline.many_flights.found_sessions import STATIONS_TOML
+    from groundstation.pipeline.many_flights.session import load_stations
+    from groundstation.pipeline.verbs.usable import usability_of_session
+
+    file = Path(found[min(flights)].outcome.source).with_name(STATIONS_TOML)
+    stations = load_stations(file if file.is_file() else None)
+    usability = usability_of_session(purpose, list(flights.values()), configuration, stations)
+    return [one.judged(usability, fail_on) if number in flights else one for number, one in enumerate(found)]
 
 
 def check_log(log: Log, thresholds: Thresholds | None = None, *, fail_on: str = "none") -> Checked:
@@ -91,41 +145,75 @@ def check_log(log: Log, thresholds: Thresholds | None = None, *, fail_on: str = 
 
     The topics of a groundstation MCAP are counted anew; what only the log could tell is taken from the ledger in it.
     """
-    limits = thresholds or shipped()
-    return _stored(log, limits, fail_on) if log.is_store else _recorded(log, limits, fail_on)
+    return checked_with_flight(log, thresholds or shipped(), fail_on, with_flight=False)[0]
 
 
-def _check_or_reason(path: Path, configuration: Configuration, fail_on: str) -> Checked:
+def _check_or_reason(
+    path: Path, configuration: Configuration, fail_on: str, *, with_flight: bool
+) -> tuple[Checked, "Flight | None"]:
     try:
         log = open_log(path, configuration.profile_path, configuration.icds)
-        return check_log(log, configuration.thresholds, fail_on=fail_on)
+        return checked_with_flight(log, configuration.thresholds, fail_on, with_flight=with_flight)
     except Exception as error:
         reason, trace = reason_of(path.name, error)
-    return Checked(Outcome(str(path), "failed", reason, trace=trace), {}, Ledger(), Clock(), ())
+    return Checked(Outcome(str(path), "failed", reason, trace=trace), {}, Ledger(), Clock(), ()), None
 
 
-def _recorded(log: Log, limits: Thresholds, fail_on: str) -> Checked:
+def checked_with_flight(
+    log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool
+) -> tuple[Checked, "Flight | None"]:
+    """The check of a log and, where it is wanted and anything can be read, its tables."""
+    read = _stored if log.is_store else _recorded
+    checked, flight = read(log, limits, fail_on, with_flight=with_flight)
+    return checked, None if checked.outcome.state == "failed" else flight
+
+
+def _recorded(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) -> tuple[Checked, "Flight | None"]:
     from groundstation.integrity.ledger_findings import ledger_findings
     from groundstation.integrity.survey import survey
 
-    found = survey(log.items(), thresholds=limits)
-    ledger = found.ledger.document()
+    items = log.replay() if with_flight else log.items()
+    found = survey(items, thresholds=limits)
+    ledger, flight = found.ledger.document(), None
+    if with_flight and ledger.topics:
+        from groundstation.integrity.ordering import corrected
+        from groundstation.tables.assemble import flight_from_batches
+
+        metadata = {**found.header.metadata, **told_of_fields(found.remarks)}
+        batches = corrected(items, found.clock)
+        flight = flight_from_batches(
+            batches, metadata=metadata, has_utc=found.clock.is_absolute, source_name=log.source.name
+        )
     facts = facts_of(log, found.header.metadata, ledger)
     findings = ledger_findings(found.ledger)
-    return _checked(log, facts, ledger, found.clock.document(), findings, found.ledger.loses_data, fail_on)
+    has_lost = found.ledger.loses_data
+    return _checked(log, facts, ledger, found.clock.document(), findings, has_lost, fail_on), flight
 
 
-def _stored(log: Log, limits: Thresholds, fail_on: str) -> Checked:
+def _stored(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) -> tuple[Checked, "Flight | None"]:
     from groundstation.store.reader import read_info
+    from groundstation.tables.assemble import flight_from_batches
 
     info = read_info(log.path)
     damages: list[Damage] = []
     census = census_of(info, limits)
-    for item in log.items():
-        if isinstance(item, RecordBatch):
-            census.add(item)
-        elif isinstance(item, Damage):
-            damages.append(item)
+
+    def intact() -> Iterator[RecordBatch]:
+        for item in log.items():
+            if isinstance(item, RecordBatch):
+                census.add(item)
+                yield item
+            elif isinstance(item, Damage):
+                damages.append(item)
+
+    flight = None
+    if with_flight:
+        flight = flight_from_batches(
+            intact(), metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name
+        )
+    else:
+        for _ in intact():
+            pass
     if not census.rows:
         raise UnreadableLogError(log.path.name, "no intact record", "", "the file is damaged beyond its index")
     anew = recounted(info, damages, census)
@@ -133,7 +221,7 @@ def _stored(log: Log, limits: Thresholds, fail_on: str) -> Checked:
         info = anew
     facts = facts_of(log, info.metadata, anew.ledger)
     has_lost = any(entry.get("loses_data") for entry in info.damages)
-    return _checked(log, facts, anew.ledger, info.clock, info.findings, has_lost, fail_on)
+    return _checked(log, facts, anew.ledger, info.clock, info.findings, has_lost, fail_on), flight
 
 
 def _checked(

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 from groundstation.base.errors import NotAssessableError, UsageError, told_in_a_line
 from groundstation.base.records import Damage, RecordBatch
@@ -12,8 +13,12 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import as_log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
-from groundstation.results.figures import FigureData
+from groundstation.results.answer import answer_of
+from groundstation.results.inertial import InertialResult
 from groundstation.tables.table import Flight
+
+if TYPE_CHECKING:
+    from groundstation.results.files import SavedFlight
 
 
 def export(
@@ -40,16 +45,12 @@ def export(
     NotAssessableError
         When the flight has no track, or the format needs what it lacks.
     """
-    suffixes = ", ".join((*WRITERS, *WRITERS_OF_ONE))
     suffix = target.suffix.lower()
-    if suffix not in WRITERS and suffix not in WRITERS_OF_ONE:
-        raise UsageError(str(target), f"suffix {target.suffix or 'none'}", f"one of {suffixes}")
-    if not path.exists():
-        raise UsageError(str(path), "no such file or folder")
-    if target.is_dir() or (target.exists() and (not force or target.resolve() == path.resolve())):
-        raise UsageError(str(target), "a file that exists", "a new name", "-f overwrites it")
-    flight, figures, has_lost = _read(path, configuration or Configuration())
-    tracks = _wanted(tracks_of(flight, figures), names, path.name)
+    require_suffix(target, (*WRITERS, *WRITERS_OF_ONE))
+    require_place(path, target, force)
+    flight, saved, has_lost = _read(path, configuration or Configuration())
+    figures, ins_topic = ({}, "") if saved is None else (saved.figures, _compared_ins(saved))
+    tracks = _wanted(tracks_of(flight, figures, ins_topic), names, path.name)
     with told_in_a_line(str(target)):
         target.parent.mkdir(parents=True, exist_ok=True)
         if suffix in WRITERS:
@@ -60,15 +61,39 @@ def export(
     return Outcome(str(path), "data_lost" if has_lost else "done", f"-> {target}: {told}", folder=str(target))
 
 
-def _read(path: Path, configuration: Configuration) -> tuple[Flight, Mapping[str, FigureData], bool]:
-    """Tables of a flight, the arrays that a run saved of it, and whether data were lost on the way."""
+def require_suffix(target: Path, suffixes: Sequence[str]) -> None:
+    """Refuse a file of another kind.
+
+    Raises
+    ------
+    UsageError
+    """
+    if target.suffix.lower() not in suffixes:
+        raise UsageError(str(target), f"suffix {target.suffix or 'none'}", f"one of {', '.join(suffixes)}")
+
+
+def require_place(source: Path, target: Path, force: bool) -> None:
+    """Refuse a source that is not there, and a target that is, unless ``force`` is given and it is not the source.
+
+    Raises
+    ------
+    UsageError
+    """
+    if not source.exists():
+        raise UsageError(str(source), "no such file or folder")
+    if target.is_dir() or (target.exists() and (not force or target.resolve() == source.resolve())):
+        raise UsageError(str(target), "a file that exists", "a new name", "-f overwrites it")
+
+
+def _read(path: Path, configuration: Configuration) -> "tuple[Flight, SavedFlight | None, bool]":
+    """Tables of a flight, what a run saved of it, and whether data were lost on the way."""
     from groundstation.store.reader import read, read_info
     from groundstation.tables.assemble import flight_from_batches
 
-    figures: Mapping[str, FigureData] = {}
+    saved = None
     log_path = as_log(path)
     if log_path.is_dir():
-        figures, log_path = _saved_figures(path), file_in(path, ".mcap")
+        saved, log_path = saved_flight(path), file_in(path, ".mcap")
     log = open_log(log_path, configuration.profile_path, configuration.icds)
     with told_in_a_line(log_path.name), TemporaryDirectory(prefix="groundstation-") as folder:
         mcap, has_lost = log.path, False
@@ -79,16 +104,29 @@ def _read(path: Path, configuration: Configuration) -> tuple[Flight, Mapping[str
     batches = (item for item in items if isinstance(item, RecordBatch))
     has_lost |= any(isinstance(item, Damage) and item.loses_data for item in items)
     flight = flight_from_batches(batches, metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name)
-    return flight, figures, has_lost
+    return flight, saved, has_lost
 
 
-def _saved_figures(folder: Path) -> Mapping[str, FigureData]:
+def saved_flight(folder: Path) -> "SavedFlight":
+    """What a run saved of a flight.
+
+    Raises
+    ------
+    UsageError
+        When it is no folder of a flight.
+    """
     from groundstation.estimators.analyses import ANSWER_TYPES
     from groundstation.results.files import load
 
     if not (folder / FLIGHT_FOLDER_MARK).is_file():
         raise no_log(folder)
-    return load(folder, ANSWER_TYPES).figures
+    return load(folder, ANSWER_TYPES)
+
+
+def _compared_ins(saved: "SavedFlight") -> str:
+    """The INS whose errors were estimated; empty where none was."""
+    inertial = answer_of(saved.results.answers, InertialResult)
+    return "" if inertial is None else inertial.ins_topic
 
 
 def _wanted(tracks: tuple[Track, ...], names: Sequence[str], source: str) -> tuple[Track, ...]:

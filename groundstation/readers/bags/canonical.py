@@ -10,11 +10,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from groundstation.base.angles import wrap_360
 from groundstation.base.records import Column
 from groundstation.base.units import DEG_PER_RAD
-from groundstation.readers.bags.values import Columns, Values, attitude, body, level, rotated
+from groundstation.readers.bags.values import Values, attitude, body, level, rotated
 from groundstation.readers.layout import velocity_from_track
+from groundstation.readers.mapping import Columns, direction
 
 NT_PER_TESLA = 1e9
 RATES = ("rate_x_dps", "rate_y_dps", "rate_z_dps")
@@ -108,7 +108,7 @@ def gps_fix(values: Values) -> Columns:
         for name, (source, sign) in _GPS_FIX.items()
         if source in values
     }
-    columns["track_deg"] = Column(np.asarray(wrap_360(np.where(has_track, track, 0.0))), has_track)
+    columns["track_deg"] = direction(np.where(has_track, track, 0.0), has_track)
     columns["velocity_north_mps"], columns["velocity_east_mps"] = Column(north, has_track), Column(east, has_track)
     columns["integrity_ok"] = Column(has_fix)
     if "status.satellites_used" in values:

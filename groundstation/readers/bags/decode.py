@@ -69,6 +69,13 @@ class Decoder:
 
             self._object = message_reader(connection.type, connection.schema)
             self.reason = "" if self._object else f"a definition of {connection.type} that cannot be used"
+        elif connection.encoding == "flatbuffer":
+            from groundstation.readers.bags.flatbuffer import message_reader as flatbuffer_reader
+
+            try:
+                self._object = flatbuffer_reader(connection.type, connection.schema)
+            except DefinitionError as error:
+                self.reason = f"a flatbuffer definition of {connection.type} that cannot be used ({error})"
         else:
             self.reason = f"encoding {connection.encoding!r}"
 

@@ -18,7 +18,8 @@ from groundstation.base.signals import is_canonical
 from groundstation.readers.bags.canonical import ACCEL, FIELD, POSITION, RATES, VELOCITY
 from groundstation.readers.bags.definitions import plain_name
 from groundstation.readers.bags.messages import Connection
-from groundstation.readers.bags.values import Columns, Values, attitude, body, level
+from groundstation.readers.bags.values import Values, attitude, body, level
+from groundstation.readers.mapping import Columns
 from groundstation.readers.profile import TIME_UNITS, Checker, ColumnRule, read_table
 
 _EARTH, _BODY = ("enu", "ned"), ("flu", "frd")

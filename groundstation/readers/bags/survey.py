@@ -1,6 +1,6 @@
 """The first pass over a bag: which messages serve as what, which of three clocks tells when values were true."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,7 +14,8 @@ from groundstation.readers.bags.canonical import MESSAGES, is_earth_frame, wheel
 from groundstation.readers.bags.decode import Decoder
 from groundstation.readers.bags.messages import Block, Connection
 from groundstation.readers.bags.profile import MessageProfile, MessageRule
-from groundstation.readers.bags.values import Columns, Values
+from groundstation.readers.bags.values import Values
+from groundstation.readers.mapping import Columns, mapped
 
 SAMPLE = 4_000  # messages of a connection that are looked at
 LARGEST_LAG_S = 2.0  # between header stamp and log time: what is further apart is another clock
@@ -191,7 +192,11 @@ def _map(found: Survey) -> None:
             topic = kind if len(several) == 1 else f"{kind}.{place}"
             _feed(found, topic, unit)
     px4.feed(found.seen, found.feeds, found.remarks, Feed)
-    found.remarks += _mapped(found)
+    sources: dict[str, list[str]] = {}
+    for number, feeds in found.feeds.items():
+        for feed in feeds:
+            sources.setdefault(feed.topic, []).append(found.seen[number].connection.topic)
+    found.remarks += mapped(sources)
 
 
 def _serves(seen: Seen) -> bool:
@@ -298,14 +303,3 @@ def _lag_text(seen: Seen) -> str:
     lags_s = np.sort(seen.lags) / NS_PER_S
     low, middle, high = lags_s[0], lags_s[len(lags_s) // 2], lags_s[-1]
     return f"{middle:.3f} s ({low:.3f} to {high:.3f})"
-
-
-def _mapped(found: Survey) -> Iterator[Remark]:
-    sources: dict[str, list[str]] = {}
-    for number, feeds in found.feeds.items():
-        for feed in feeds:
-            sources.setdefault(feed.topic, []).append(found.seen[number].connection.topic)
-    if sources:
-        yield Remark(
-            "mapped", "; ".join(f"{topic} from {', '.join(names)}" for topic, names in sorted(sources.items()))
-        )

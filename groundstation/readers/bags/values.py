@@ -6,14 +6,11 @@ ROS has east-north-up and body axes forward-left-up (REP 103); we have north-eas
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from groundstation.base.angles import wrap_360
+from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.records import BoolArray, Column
 from groundstation.base.units import DEG_PER_RAD
-
-FloatArray = NDArray[np.float64]
-Columns = dict[str, Column]
+from groundstation.readers.mapping import Columns
 
 
 class Values:

@@ -135,7 +135,7 @@ class Scanner:
         self._lengths = np.zeros(256, dtype=np.int64)
         self._time_kind = np.zeros(256, dtype=np.int64)
         self._lengths[FMT_ID] = FMT_BYTES
-        self._payloads: dict[int, bytes] = {}
+        self.payloads: dict[int, bytes] = {}
         self._seen = np.zeros(256, dtype=bool)  # types met since the log (of those joined in the file) began
         self._state = scan.new_state()
         self._base = 0  # place in the file of the first byte of the data at hand
@@ -240,12 +240,12 @@ class Scanner:
     def _accepted(self, payload: bytes, types: NDArray[np.uint8], place: int) -> Definition | None:
         """The definition of a FMT record where it is new and believed."""
         type_id = payload[0]
-        if type_id == FMT_ID or self._payloads.get(type_id) == payload:
+        if type_id == FMT_ID or self.payloads.get(type_id) == payload:
             return None
         self._met += 1
         new = parse_fmt(payload) if self._met <= MOST_DEFINITIONS else None
         if new is not None and not self._contradicts(type_id, types):
-            self._payloads[type_id] = payload
+            self.payloads[type_id] = payload
             return new
         if new is not None and len(self.refused) < REFUSED_SHOWN:
             self.refused.append((place, new))

@@ -105,7 +105,7 @@ def _instance(unit: Unit) -> int:
 
 
 def _units_of(found: Overview, name: str) -> list[Unit]:
-    return [unit for unit in found.sensors if unit[0] == name]
+    return [unit for unit in found.sensors if unit[0] == name and _instance(unit) < rules.MOST_SENSORS]
 
 
 def _sensor_topics(found: Overview) -> dict[Unit, str]:

@@ -1,6 +1,7 @@
 """Puts a log together: an overview, then block by block every record as raw, and what maps to canonical topics."""
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 
 from groundstation.base.records import MAX_BATCH_ROWS, Damage, Item, LogHeader, RecordBatch
@@ -8,6 +9,7 @@ from groundstation.readers.dataflash.blocks import Block, Scanner
 from groundstation.readers.dataflash.canonical import Mapper
 from groundstation.readers.dataflash.choices import choose
 from groundstation.readers.dataflash.definitions import Definition
+from groundstation.readers.dataflash.doubts import doubts, odd_instances
 from groundstation.readers.dataflash.facts import metadata, utc_of_power_up
 from groundstation.readers.dataflash.overview import Overview, overview
 from groundstation.readers.dataflash.values import Rows, by_instance, rows_of
@@ -26,9 +28,12 @@ def items(source: Source) -> Iterator[Item]:
     choices = choose(found, facts.get("vehicle", ""))
     mapper, topics = Mapper(found, choices), _Topics()
     unreadable: dict[str, int] = {}
+    by_type, by_topic = Counter[int](), Counter[str]()
     for block in scanner.again():
         for rows in _rows(block, found):
             topic = topics.of(rows)
+            by_type[rows.definition.type_id] += len(rows)
+            by_topic[topic] += len(rows)
             if rows.definition.time_field is not None:
                 unreadable[topic] = unreadable.get(topic, 0) + int((~rows.time_ns.mask).sum())
             yield from _batches(topic, rows)
@@ -38,6 +43,8 @@ def items(source: Source) -> Iterator[Item]:
     yield from choices.remarks(found, mapper.fields)
     yield from found.damages
     yield from mapper.damages()
+    yield from doubts(scanner.payloads, scanner.definitions, by_type)
+    yield from odd_instances(by_topic)
     for topic, count in unreadable.items():
         if count:
             yield Damage("unreadable_cells", topic, count, "times that no clock writes", topic)

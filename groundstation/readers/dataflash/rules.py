@@ -88,6 +88,7 @@ CURRENT = (Rule("Curr", "current_a", integer_factor=0.01),)
 WIND = (Rule("VWN", "wind_north_mps"), Rule("VWE", "wind_east_mps"))
 HEIGHT = (Rule("Dist", "height_m", integer_factor=0.01),)
 
+MOST_SENSORS = 16  # of one type; another instance is damage
 # Sensors of one kind in the order in which their topics are numbered; the first group that has records is taken.
 SENSOR_TYPES: Mapping[str, tuple[tuple[str, ...], ...]] = MappingProxyType(
     {

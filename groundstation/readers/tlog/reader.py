@@ -1,6 +1,6 @@
 """Items of a telemetry log: batches of every message, raw and canonical, then remarks and damages."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.signals import EVENT_SEPARATOR, RAW_PREFIX
+from groundstation.readers.mapping import Assignment, Offer, assigned, mapped
 from groundstation.readers.parts import Part, bounded, merged, occupied
 from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
-from groundstation.readers.tlog.canonical import ARMED, INSTEAD, RULES, Rule
+from groundstation.readers.tlog.canonical import ARMED, INSTANCES, ROLES
 from groundstation.readers.tlog.dialect import MOST_IDS, Message, crc_extras, messages
 
 BLOCK_BYTES = 4 << 20
@@ -94,8 +95,7 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
     vehicle, met = _survey(source)
     metadata = {"vehicle": f"system {vehicle >> 8}, component {vehicle & 255}"}
     yield LogHeader(reader_name, metadata, utc_of_zero_ns=0, has_counting_clock=True)
-    rules = {name: served for name, served in RULES.items() if name in met and INSTEAD.get(name, "") not in met}
-    topics = _topic_names(rules)
+    served = _served(met)
     frames, armed = _Frames(source), _Arming()
     for block in frames:
         canonical: dict[str, list[Part]] = {}
@@ -109,12 +109,12 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
                     RecordBatch(f"{RAW_PREFIX}{message.name}{suffix}", part.index, part.time, part.columns)
                 )
                 if system == vehicle:
-                    _take(canonical, part, rules.get(message.name, ()), topics)
+                    _take(canonical, part, served.get(message.name, ()))
                     armed.take(canonical, part, message.name)
         for topic, parts in sorted(canonical.items()):
             batch = merged(topic, parts)
             yield from bounded(batch)
-    yield from _remarks(rules, topics)
+    yield from _remarks(served)
     yield from frames.damages()
 
 
@@ -126,8 +126,8 @@ def _by_number(block: _Block, rows: Int64Array) -> Iterator[tuple[int, Int64Arra
         yield int(block.frames[which[0], 1]), which
 
 
-def _survey(source: Source) -> tuple[int, set[str]]:
-    """The vehicle (system x 256 + component) whose attitude is in the log most often, and its messages."""
+def _survey(source: Source) -> tuple[int, dict[str, frozenset[str]]]:
+    """The vehicle (system x 256 + component) that tells its attitude most often, and the columns of its messages."""
     known = messages()
     counts: dict[tuple[int, int], int] = {}
     for block in _Frames(source):
@@ -138,7 +138,8 @@ def _survey(source: Source) -> tuple[int, set[str]]:
     for (system, number), count in counts.items():
         own[system] = own.get(system, 0) + count * (1_000 if known[number].name == "ATTITUDE" else 1)
     vehicle = max(own, key=lambda system: (own[system], -system), default=256 + AUTOPILOT)
-    return vehicle, {known[number].name for system, number in counts if system == vehicle}
+    met = (known[number] for system, number in counts if system == vehicle)
+    return vehicle, {message.name: frozenset(message.dtype.names or ()) for message in met}
 
 
 def _part(block: _Block, which: Int64Array, message: Message) -> Part:
@@ -169,28 +170,29 @@ def _part(block: _Block, which: Int64Array, message: Message) -> Part:
     return Part(block.first_index + which, time, columns)
 
 
-def _topic_names(rules: dict[str, tuple[Rule, ...]]) -> dict[str, str]:
-    """Topics as they are named: the only receiver is ``gnss``."""
-    topics = {rule.topic for several in rules.values() for rule in several}
-    return {
-        topic: "gnss" if topic.startswith("gnss") and len(topics & {"gnss.1", "gnss.2"}) == 1 else topic
-        for topic in topics
-    }
+def _served(met: Mapping[str, frozenset[str]]) -> dict[str, list[Assignment]]:
+    """What messages with these columns feed, by their names."""
+    names = {INSTANCES.get(name, (name, 0)): name for name in met}
+    offers = [Offer(*source, met[name]) for source, name in names.items()]
+    served: dict[str, list[Assignment]] = {}
+    for one in assigned(ROLES, offers):
+        served.setdefault(names[one.offer.source, one.offer.instance], []).append(one)
+    return served
 
 
-def _take(canonical: dict[str, list[Part]], part: Part, rules: tuple[Rule, ...], topics: dict[str, str]) -> None:
+def _take(canonical: dict[str, list[Part]], part: Part, assignments: Sequence[Assignment]) -> None:
     """Add what a message gives to canonical topics."""
-    if not rules:
+    if not assignments:
         return
     numbers = {
         name: one.values.astype(np.float64) for name, one in part.columns.items() if one.values.dtype.kind != "U"
     }
-    for rule in rules:
+    for one in assignments:
         with np.errstate(over="ignore", invalid="ignore"):
-            columns = rule.columns(numbers)
+            columns = one.rule.columns(numbers)
         kept = occupied(Part(part.index, part.time, columns))
         if kept is not None:
-            canonical.setdefault(topics[rule.topic], []).append(kept)
+            canonical.setdefault(one.topic, []).append(kept)
 
 
 @dataclass
@@ -219,17 +221,13 @@ class _Arming:
             canonical.setdefault("event", []).append(event)
 
 
-def _remarks(rules: dict[str, tuple[Rule, ...]], topics: dict[str, str]) -> Iterator[Remark]:
+def _remarks(served: Mapping[str, Sequence[Assignment]]) -> Iterator[Remark]:
     """What serves as what, and by which clock."""
     sources: dict[str, list[str]] = {}
-    for name, several in rules.items():
-        for rule in several:
-            sources.setdefault(topics[rule.topic], []).append(name)
-            if rule.remark:
-                yield Remark("derived", f"{topics[rule.topic]}: {name}: {rule.remark}", topics[rule.topic])
-    if sources:
-        yield Remark(
-            "mapped", "; ".join(f"{topic} from {', '.join(names)}" for topic, names in sorted(sources.items()))
-        )
+    for name, several in served.items():
+        for one in several:
+            sources.setdefault(one.topic, []).append(name)
+            yield from one.rule.told(one.topic)
+    yield from mapped(sources)
     text = "times are those of receipt on the ground, by the ground station's clock; the link's delay is in them"
     yield Remark("clock_used", text)

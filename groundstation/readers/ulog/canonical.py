@@ -5,20 +5,26 @@ needs is taken. Units and senses are those of the message definitions (PX4-Autop
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.angles import wrap_360
-from groundstation.base.atmosphere import pressure_altitude_m
-from groundstation.base.records import BoolArray, Column
+from groundstation.base.angles import FloatArray
+from groundstation.base.records import Column
 from groundstation.base.units import DEG_PER_RAD, NT_PER_GAUSS
+from groundstation.readers.mapping import (
+    Columns,
+    Numbers,
+    Role,
+    Rule,
+    direction,
+    holds,
+    pressure_altitude,
+    scaled,
+)
 
-FloatArray = NDArray[np.float64]
-Columns = dict[str, Column]
 _DOWNWARD = 25  # distance_sensor.orientation: ROTATION_DOWNWARD_FACING
 _2D_FIX, FIX_3D = 2, 3
 _HPA_BELOW = 1_200.0  # sensor_baro.pressure is in hPa before PX4 1.13, in Pa from then on
@@ -42,64 +48,16 @@ class Rows:
         with np.errstate(invalid="ignore"):  # some NaN of four bytes signal when they are widened
             return np.asarray(self._rows[name].astype(np.float64))
 
-    def holds(self, name: str) -> BoolArray | None:
-        """Where a flag is set, shape (n,); None in a version that has no such flag."""
-        return self._rows[name] != 0 if name in self else None
+
+def _vector(fields: tuple[str, str, str], name: str, factor: float) -> Callable[[Numbers], Columns]:
+    return scaled({field: (f"{name}[{axis}]", factor) for axis, field in enumerate(fields)})
 
 
-@dataclass(frozen=True)
-class Rule:
-    """How one PX4 topic gives fields of a canonical one.
-
-    Parameters
-    ----------
-    source : str
-        Topic of PX4.
-    needs : tuple of str
-        Columns without which the rule does not apply.
-    columns : callable
-        Rows to canonical columns.
-    derived : mapping of field to str
-        What a user must know of a field.
-    """
-
-    source: str
-    needs: tuple[str, ...]
-    columns: Callable[[Rows], Columns]
-    derived: Mapping[str, str]
+def _rule(source: str, fields: Mapping[str, tuple[str, float]], **derived: str) -> Rule:
+    return Rule(source, tuple(name for name, _factor in fields.values()), scaled(fields), derived)
 
 
-@dataclass(frozen=True)
-class Role:
-    """Something that a canonical topic tells, and the rules for it, best first.
-
-    ``has_instances``: each instance of the source is a topic of its own (``gnss.1``, ``gnss.2``).
-    """
-
-    topic: str
-    rules: tuple[Rule, ...]
-    has_instances: bool = False
-
-
-def _scaled(fields: Mapping[str, tuple[str, float]], valid: str = "") -> Callable[[Rows], Columns]:
-    """Rule of plain factors: canonical field -> (column, factor); absent where the flag ``valid`` is not set."""
-
-    def columns(rows: Rows) -> Columns:
-        present = rows.holds(valid) if valid else None
-        return {field: Column(rows[name] * factor, present) for field, (name, factor) in fields.items() if name in rows}
-
-    return columns
-
-
-def _vector(fields: tuple[str, str, str], name: str, factor: float) -> Callable[[Rows], Columns]:
-    return _scaled({field: (f"{name}[{axis}]", factor) for axis, field in enumerate(fields)})
-
-
-def _rule(source: str, fields: Mapping[str, tuple[str, float]], valid: str = "", **derived: str) -> Rule:
-    return Rule(source, tuple(name for name, _factor in fields.values()), _scaled(fields, valid), derived)
-
-
-def attitude_from_quaternion(rows: Rows) -> Columns:
+def attitude_from_quaternion(rows: Numbers) -> Columns:
     """Roll, pitch and heading of ``q`` (w, x, y, z), which turns body forward-right-down into north-east-down.
 
     A quaternion whose length is not one is none: PX4 writes zeros before the filter has started.
@@ -114,21 +72,21 @@ def attitude_from_quaternion(rows: Rows) -> Columns:
         return {
             "roll_deg": Column(roll * DEG_PER_RAD, present),
             "pitch_deg": Column(pitch * DEG_PER_RAD, present),
-            "true_heading_deg": Column(wrap_360(heading * DEG_PER_RAD), present),
+            "true_heading_deg": direction(heading * DEG_PER_RAD, present),
         }
 
 
-def attitude_from_angles(rows: Rows) -> Columns:
+def attitude_from_angles(rows: Numbers) -> Columns:
     """Roll, pitch and heading that PX4 logged as angles (before 1.5)."""
     with np.errstate(invalid="ignore", over="ignore"):
-        heading = wrap_360(rows["yaw"] * DEG_PER_RAD)
+        heading = direction(rows["yaw"] * DEG_PER_RAD)
     roll, pitch = rows["roll"] * DEG_PER_RAD, rows["pitch"] * DEG_PER_RAD
-    return {"roll_deg": Column(roll), "pitch_deg": Column(pitch), "true_heading_deg": Column(heading)}
+    return {"roll_deg": Column(roll), "pitch_deg": Column(pitch), "true_heading_deg": heading}
 
 
-def local_velocity(rows: Rows) -> Columns:
+def local_velocity(rows: Numbers) -> Columns:
     """Velocity of ``vehicle_local_position``, absent where the filter calls it invalid."""
-    level, vertical = rows.holds("v_xy_valid"), rows.holds("v_z_valid")
+    level, vertical = holds(rows, "v_xy_valid"), holds(rows, "v_z_valid")
     return {
         "velocity_north_mps": Column(rows["vx"], level),
         "velocity_east_mps": Column(rows["vy"], level),
@@ -136,18 +94,18 @@ def local_velocity(rows: Rows) -> Columns:
     }
 
 
-def global_position(rows: Rows) -> Columns:
+def global_position(rows: Numbers) -> Columns:
     """Position of ``vehicle_global_position``; its flags of validity came with PX4 1.16."""
-    level, vertical = rows.holds("lat_lon_valid"), rows.holds("alt_valid")
+    level, vertical = holds(rows, "lat_lon_valid"), holds(rows, "alt_valid")
     columns = {"latitude_deg": Column(rows["lat"], level), "longitude_deg": Column(rows["lon"], level)}
     names = {"altitude_msl_m": "alt", "altitude_ellipsoid_m": "alt_ellipsoid"}
     return columns | {field: Column(rows[name], vertical) for field, name in names.items() if name in rows}
 
 
-def gnss(rows: Rows) -> Columns:
+def gnss(rows: Numbers) -> Columns:
     """Fix of a satellite receiver; position and velocity are absent where there is no fix."""
     fix = rows["fix_type"] >= _2D_FIX
-    velocity = rows.holds("vel_ned_valid")
+    velocity = holds(rows, "vel_ned_valid")
     velocity = fix if velocity is None else fix & velocity
     columns = {}
     for field, choices in _GNSS_FIELDS.items():
@@ -157,7 +115,7 @@ def gnss(rows: Rows) -> Columns:
             columns[field] = Column(rows[name] * factor, velocity if is_velocity else fix)
     if "track_deg" in columns:
         with np.errstate(invalid="ignore"):
-            columns["track_deg"] = Column(wrap_360(columns["track_deg"].values), velocity)
+            columns["track_deg"] = direction(columns["track_deg"].values, velocity)
     if "satellites_used" in rows:
         columns["satellites_used"] = Column(rows["satellites_used"])
     columns["integrity_ok"] = Column(rows["fix_type"] >= FIX_3D)
@@ -179,36 +137,31 @@ _GNSS_FIELDS: Mapping[str, tuple[tuple[str, float], ...]] = {
 }
 
 
-def _pressure_altitude(pressure_pa: FloatArray) -> Columns:
-    altitude, is_refused = pressure_altitude_m(pressure_pa)
-    return {"pressure_altitude_m": Column(altitude, ~is_refused)}
+def _air_data(rows: Numbers) -> Columns:
+    return pressure_altitude(rows["baro_pressure_pa"])
 
 
-def _air_data(rows: Rows) -> Columns:
-    return _pressure_altitude(rows["baro_pressure_pa"])
-
-
-def _barometer(rows: Rows) -> Columns:
+def _barometer(rows: Numbers) -> Columns:
     pressure = rows["pressure"]
     with np.errstate(invalid="ignore"):
         pascals = np.where(pressure < _HPA_BELOW, pressure * 100.0, pressure)
-    return _pressure_altitude(pascals)
+    return pressure_altitude(pascals)
 
 
-def _current(rows: Rows) -> Columns:
+def _current(rows: Numbers) -> Columns:
     current = rows["current_a"]
     return {"current_a": Column(current, current != _UNKNOWN_CURRENT)}
 
 
-def _height(rows: Rows) -> Columns:
+def _height(rows: Numbers) -> Columns:
     present = rows["orientation"] == _DOWNWARD
     if "signal_quality" in rows:
         present &= rows["signal_quality"] != 0.0
     return {"height_m": Column(rows["current_distance"], present)}
 
 
-def _landed(rows: Rows) -> Columns:
-    landed = rows.holds("landed")
+def _landed(rows: Numbers) -> Columns:
+    landed = holds(rows, "landed")
     return {"weight_on_wheels": Column(landed)} if landed is not None else {}
 
 
@@ -258,17 +211,17 @@ ROLES: tuple[Role, ...] = (
     Role(
         "ins",
         (
-            Rule("vehicle_local_position", ("vx", "vy", "vz"), local_velocity, {}),
+            Rule("vehicle_local_position", ("vx", "vy", "vz"), local_velocity),
             _rule(
                 "vehicle_global_position",
                 {f"velocity_{axis}_mps": (f"vel_{axis[0]}", 1.0) for axis in ("north", "east", "down")},
             ),
         ),
     ),
-    Role("ins", (Rule("vehicle_global_position", ("lat", "lon", "alt"), global_position, {}),)),
+    Role("ins", (Rule("vehicle_global_position", ("lat", "lon", "alt"), global_position),)),
     Role(
         "gnss",
-        (Rule("vehicle_gps_position", _GNSS_NEEDS, gnss, {}), Rule("sensor_gps", _GNSS_NEEDS, gnss, {})),
+        (Rule("vehicle_gps_position", _GNSS_NEEDS, gnss), Rule("sensor_gps", _GNSS_NEEDS, gnss)),
         has_instances=True,
     ),
     Role(
@@ -284,7 +237,7 @@ ROLES: tuple[Role, ...] = (
         ),
         has_instances=True,
     ),
-    Role("electric", (Rule("battery_status", ("current_a",), _current, {}),), has_instances=True),
+    Role("electric", (Rule("battery_status", ("current_a",), _current),), has_instances=True),
     Role(
         "baro",
         (
@@ -303,7 +256,7 @@ ROLES: tuple[Role, ...] = (
     Role("air", (_rule("wind", _WIND), _rule("wind_estimate", _WIND), _rule("estimator_wind", _WIND))),
     Role(
         "radio_altimeter",
-        (Rule("distance_sensor", ("current_distance", "orientation"), _height, {}),),
+        (Rule("distance_sensor", ("current_distance", "orientation"), _height),),
         has_instances=True,
     ),
     Role(

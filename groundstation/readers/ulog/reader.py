@@ -20,6 +20,7 @@ from groundstation.base.records import (
     Remark,
 )
 from groundstation.base.signals import EVENT_SEPARATOR
+from groundstation.readers.mapping import mapped
 from groundstation.readers.parts import Part, bounded, merged, occupied
 from groundstation.readers.source import Source
 from groundstation.readers.ulog.blocks import NOT_SUBSCRIBED, Block, Topic, Walk
@@ -222,9 +223,7 @@ class _CanonicalTopics:
                 name = f"{source}.{instance}" if instance else source
                 if name not in sources.setdefault(assignment.topic, []):
                     sources[assignment.topic].append(name)
-        if sources:
-            text = "; ".join(f"{topic} from {', '.join(names)}" for topic, names in sorted(sources.items()))
-            yield Remark("mapped", text)
+        yield from mapped(sources)
         if any(a.topic == "ins" for several in self._found.assignments.values() for a in several):
             text = "ins.mode: the autopilot's own filter; gnss_aided when the log has a satellite fix, else attitude"
             yield Remark("derived", text, "ins", ("mode",))

@@ -1,29 +1,22 @@
 """The first pass over a ULog: what the header must tell before the first batch, and which rule serves which signal."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Int64Array, Remark
+from groundstation.readers.mapping import Assignment, Offer, assigned
 from groundstation.readers.start import told_at_zero
 from groundstation.readers.ulog.blocks import Block, Definitions, Topic
-from groundstation.readers.ulog.canonical import ARMING, FIX_3D, ROLES, UTC_SOURCES, Rule
+from groundstation.readers.ulog.canonical import ARMING, FIX_3D, ROLES, UTC_SOURCES
 from groundstation.readers.ulog.messages import Keyed, keyed, release_text
 
 EARLIEST_US, LATEST_US = 1_072_915_200_000_000, 4_102_444_800_000_000  # 2004, 2100: PX4 flies between them
 MAX_METADATA = 200
 MAX_METADATA_CHARACTERS = 256
 _KEPT_PREFIXES = ("sys_", "ver_", "time_ref_utc", "log_type", "replay")
-
-
-@dataclass(frozen=True)
-class Assignment:
-    """What one PX4 topic gives: a canonical topic and the rule that makes its columns."""
-
-    topic: str
-    rule: Rule
 
 
 @dataclass
@@ -114,31 +107,14 @@ def _relate_to_utc(found: Overview, clocks: dict[str, list[Int64Array]]) -> None
 
 def _assign(found: Overview, topics: list[Topic]) -> None:
     """Choose the rule of each role among the topics that have data."""
-    for role in ROLES:
-        rule = next((rule for rule in role.rules if any(_serves(rule, topic) for topic in topics)), None)
-        if rule is None:
-            continue
-        served = sorted({topic.instance for topic in topics if _serves(rule, topic)})
-        for place, instance in enumerate(served if role.has_instances else served[:1], start=1):
-            name = f"{role.topic}.{place}" if role.has_instances and len(served) > 1 else role.topic
-            found.assignments.setdefault((rule.source, instance), []).append(Assignment(name, rule))
-            found.remarks += _derivations(name, rule)
+    offers = [Offer(topic.name, topic.instance, topic.layout.names) for topic in topics if topic.layout is not None]
+    for one in assigned(ROLES, offers):
+        found.assignments.setdefault((one.offer.source, one.offer.instance), []).append(one)
+        found.remarks += one.rule.told(one.topic)
     for source, column, armed in ARMING:
         if any(topic.name == source and topic.layout and column in topic.layout.names for topic in topics):
             found.arming = (source, column, armed)
             break
-
-
-def _serves(rule: Rule, topic: Topic) -> bool:
-    return topic.name == rule.source and topic.layout is not None and topic.layout.names.issuperset(rule.needs)
-
-
-def _derivations(topic: str, rule: Rule) -> Iterator[Remark]:
-    texts: dict[str, list[str]] = {}
-    for name, text in rule.derived.items():
-        texts.setdefault(text, []).append(name)
-    for text, fields in texts.items():
-        yield Remark("derived", f"{topic}: {', '.join(fields)} from {text}", topic, tuple(fields))
 
 
 def _note_facts(block: Block, metadata: dict[str, str]) -> None:

@@ -1,0 +1,71 @@
+"""The epochs of straight taxi that the heading is estimated from."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from groundstation.base.angles import wrap_360
+from groundstation.base.errors import NotAssessableError
+from groundstation.estimators.heading.gating import gate_samples
+from groundstation.estimators.heading.samples import HeadingOf, OnGround, Samples, pair_samples
+from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.estimators.known import AircraftData
+from groundstation.tables.phases import Phases
+from groundstation.tables.table import Flight
+
+
+def straight_taxi(
+    flight: Flight,
+    ins_topic: str,
+    gnss_topic: str,
+    *,
+    settings: HeadingSettings,
+    aircraft: AircraftData,
+    request: HeadingRequest,
+    on_ground: OnGround | None = None,
+    heading: HeadingOf | None = None,
+    phases: Phases | None = None,
+    gnss_latency_s: float = 0.0,
+) -> Samples:
+    """Pair GNSS epochs with the INS heading and say which are used: those before take-off, all where these are too few.
+
+    Raises
+    ------
+    NotAssessableError
+        When fewer than two are used, with the reason.
+    """
+
+    def gated(with_later_runs: bool) -> Samples:
+        paired = pair_samples(
+            *(flight, ins_topic, gnss_topic),
+            settings=settings,
+            on_ground=on_ground,
+            heading=heading,
+            with_later_runs=with_later_runs,
+            gnss_latency_s=gnss_latency_s,
+        )
+        if aircraft.mounting_deg:
+            paired = replace(paired, heading_deg=wrap_360(paired.heading_deg - aircraft.mounting_deg))
+        return gate_samples(paired, settings, request, phases)
+
+    antenna = gated(with_later_runs=settings.runs == "all_ground")
+    if settings.runs == "auto" and antenna.is_used.sum() * antenna.interval_s < settings.taxi_min_s:
+        # Too little before take-off: what the whole flight says is worth more, though never a number to type.
+        whole = gated(with_later_runs=True)
+        antenna = whole if whole.is_used.sum() > antenna.is_used.sum() else antenna
+    if antenna.is_used.sum() < 2:
+        raise NotAssessableError("heading", _why_nothing_is_used(antenna, settings))
+    return antenna
+
+
+def _why_nothing_is_used(samples: Samples, settings: HeadingSettings) -> str:
+    limit = settings.taxi_speed_min_mps
+    highest = float(np.max(samples.speed_mps)) if len(samples) else 0.0
+    if not np.isfinite(samples.heading_deg).any():
+        return "no INS heading at the times of the GNSS velocities on the ground"
+    if highest <= limit:
+        return f"ground speed never above {limit:g} m/s before lift-off: highest {highest:.1f} m/s"
+    fast = samples.gate[samples.speed_mps > limit]
+    names, counts = np.unique(fast, return_counts=True)
+    shares = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
+    return f"no straight taxi: of {len(fast)} epochs above {limit:g} m/s before lift-off: {shares}"

@@ -1,0 +1,60 @@
+"""What a flight lacks for an estimate of the INS errors, told from the comparison with GNSS alone."""
+
+import numpy as np
+
+from groundstation.estimators.analysis import Shortfall
+from groundstation.estimators.inertial.differences import Differences, differences, seconds_covered
+from groundstation.estimators.inertial.kind import AIDED, UNAIDED, kind_of, stated_kind
+from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.estimators.known import Known
+from groundstation.tables.sources import said_of
+from groundstation.tables.table import Flight
+
+LEAST_COVERED = 0.95  # of the time of the INS: more without GNSS is worth a word
+LISTED = 5  # outages
+
+
+def compared_with_kind(flight: Flight, known: Known, settings: InertialSettings) -> tuple[Differences, tuple[str, str]]:
+    """INS minus GNSS of a flight, and whether GNSS corrects the INS with the reason for thinking so.
+
+    Raises
+    ------
+    NotAssessableError
+        As :func:`groundstation.estimators.inertial.differences.differences`.
+    """
+    compared = differences(flight, settings=settings, excluded_s=known.excluded_s)
+    said = said_of(flight, compared.ins_topic, "ins_kind")
+    return compared, kind_of(compared, settings, stated_kind(known.aircraft.ins_kind, {"ins_kind": said}))
+
+
+def examine_inertial(flight: Flight, known: Known, settings: InertialSettings) -> tuple[Shortfall, ...]:
+    """Judge INS and GNSS of a flight: is the INS left alone, is GNSS there throughout, is one Schuler period covered.
+
+    Raises
+    ------
+    NotAssessableError
+        Where nothing can be compared, with the reason that the estimate would give.
+    """
+    compared, (kind, reason) = compared_with_kind(flight, known, settings)
+    if kind != UNAIDED:
+        says = "GNSS corrects this INS" if kind == AIDED else "whether GNSS corrects this INS cannot be told"
+        return (Shortfall(f"{says} ({reason}): INS minus GNSS is shown, errors are not estimated"),)
+    found = []
+    time_s, has_gnss = compared.epochs.time_s, compared.epochs.has_gnss
+    covered_s = seconds_covered(time_s[has_gnss], settings.outage_s)
+    whole_s = seconds_covered(time_s, settings.outage_s)
+    if covered_s < LEAST_COVERED * whole_s:
+        text = f"GNSS for {covered_s:.0f} of {whole_s:.0f} s of the INS"
+        found.append(Shortfall(text, _longest_outages(time_s, time_s[has_gnss], settings.outage_s)))
+    if covered_s < settings.schuler_fit_s:
+        text = f"{covered_s / 60.0:.0f} min with GNSS, one Schuler period ({settings.schuler_fit_s / 60.0:.1f} min) "
+        found.append(Shortfall(text + "shows tilt and drift apart: till then sigmas rest on the class"))
+    return tuple(found)
+
+
+def _longest_outages(time_s: np.ndarray, gnss_s: np.ndarray, least_s: float) -> tuple[tuple[float, float], ...]:
+    """The longest outages of GNSS in order of time, those at either end among them."""
+    edges = np.concatenate([time_s[:1], gnss_s, time_s[-1:]])
+    long = np.flatnonzero(np.diff(edges) > least_s)
+    kept = np.sort(long[np.argsort(-np.diff(edges)[long], kind="stable")][:LISTED])
+    return tuple((float(edges[row]), float(edges[row + 1])) for row in kept)

@@ -1,0 +1,53 @@
+"""What a flight lacks for the magnetic deviation, told from what was flown."""
+
+import numpy as np
+
+from groundstation.base.errors import NotAssessableError
+from groundstation.estimators.analysis import Shortfall
+from groundstation.estimators.inertial.examine import compared_with_kind
+from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.estimators.known import Known
+from groundstation.estimators.magnetic.earth import earth_field
+from groundstation.estimators.magnetic.flown import Flown, find_flown
+from groundstation.estimators.magnetic.held_out import find_unseen, is_level
+from groundstation.estimators.magnetic.readings import choose_topics
+from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.results.latency import Latencies
+from groundstation.tables.table import Flight
+
+
+def examine_magnetic(flight: Flight, known: Known, settings: MagneticSettings) -> tuple[Shortfall, ...]:
+    """Judge the turns of a flight: do they cover the circle, is level flight there to judge by.
+
+    Raises
+    ------
+    NotAssessableError
+        Where nothing can be estimated, with the reason that the estimate would give.
+    """
+    topics = choose_topics(flight)
+    flown = find_flown(flight, topics, known.phases, _kinds(flight, known), known.answer(Latencies), settings)
+    rows = np.sort(np.concatenate([one.rows(right) for one in flown.figures for right in (True, False)]))
+    earth_field(flight, flown.readings, rows, settings)
+    found = []
+    share = max(one.covered_share for one in flown.figures)
+    if share < settings.coverage_min:
+        text = f"opposite turns cover {share:.0%} of the circle, {settings.coverage_min:.0%} needed"
+        found.append(Shortfall(text, tuple((one.start_s, one.end_s) for one in flown.figures)))
+    level = _level_readings(flown, settings)
+    if level < settings.held_out_samples_min:
+        found.append(Shortfall(f"no level flight beside the figure to judge by ({level} readings)"))
+    return tuple(found)
+
+
+def _kinds(flight: Flight, known: Known) -> dict[str, str]:
+    """Whether GNSS corrects the INS, as the inertial analysis would say."""
+    try:
+        compared, (kind, _reason) = compared_with_kind(flight, known, known.settings_of(InertialSettings))
+    except NotAssessableError:
+        return {}
+    return {compared.ins_topic: kind}
+
+
+def _level_readings(flown: Flown, settings: MagneticSettings) -> int:
+    unseen = find_unseen(flown.readings, flown.is_airborne, flown.figures, settings)
+    return int(np.count_nonzero(unseen & is_level(flown.readings, settings)))

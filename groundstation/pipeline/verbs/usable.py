@@ -1,0 +1,121 @@
+"""Whether logs can be used for a named purpose: what an analysis would lack, told without running it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Literal
+
+from groundstation.base.errors import NotAssessableError, SettingsError, UsageError
+from groundstation.base.findings import Finding
+from groundstation.base.signals import topics_of_kind
+from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
+from groundstation.estimators.analysis import Analysis, Shortfall
+from groundstation.estimators.cooperative.analysis import SessionKnown
+from groundstation.pipeline.one_flight.analyse import known_of, seen_by_analyses
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.tables.session_assemble import session_from_flights
+from groundstation.tables.session_settings import Stations
+from groundstation.tables.table import Flight
+
+LISTED = 3  # spans told of a shortfall
+
+FLIGHT_PURPOSES: Mapping[str, Analysis] = MappingProxyType({one.name: one for one in FLIGHT_ANALYSES if one.examine})
+SESSION_PURPOSES: Mapping[str, Analysis] = MappingProxyType({one.name: one for one in SESSION_ANALYSES if one.examine})
+
+
+@dataclass(frozen=True)
+class Usability:
+    """Whether data serve a purpose.
+
+    Parameters
+    ----------
+    purpose : str
+        Name of an analysis.
+    state : str
+        ``no``: the analysis would give no answer; ``in part``: the answer would fall short by what is listed.
+    shortfalls : tuple of Shortfall
+    """
+
+    purpose: str
+    state: Literal["yes", "in part", "no"]
+    shortfalls: tuple[Shortfall, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """One line: state, what is missing, and where.
+
+        Examples
+        --------
+        >>> Usability("heading", "in part", (Shortfall("12 s of straight taxi, 20 s needed", ((3.0, 15.0),)),)).text
+        'usable for heading: in part: 12 s of straight taxi, 20 s needed (at 3 to 15 s)'
+        """
+        lacking = "; ".join(f"{one.text}{_where(one.spans_s)}" for one in self.shortfalls)
+        return f"usable for {self.purpose}: {self.state}{f': {lacking}' if lacking else ''}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-able."""
+        lacking = [{"text": one.text, "spans_s": [list(span) for span in one.spans_s]} for one in self.shortfalls]
+        return {"purpose": self.purpose, "state": self.state, "lacking": lacking}
+
+
+def require_purpose(name: str) -> None:
+    """Refuse a purpose that no analysis serves.
+
+    Raises
+    ------
+    UsageError
+    """
+    names = (*FLIGHT_PURPOSES, *SESSION_PURPOSES)
+    if name not in names:
+        raise UsageError(f"--for {name}", "no such purpose", f"one of {', '.join(names)}")
+
+
+def usability_of_flight(purpose: str, flight: Flight, configuration: Configuration) -> Usability:
+    """Say whether a flight serves an analysis of flights."""
+    seen = seen_by_analyses(flight, configuration)
+    return _examined(FLIGHT_PURPOSES[purpose], seen, known_of(seen, configuration))
+
+
+def usability_of_session(
+    purpose: str, flights: Sequence[Flight], configuration: Configuration, stations: Stations
+) -> Usability:
+    """Say whether flights together serve an analysis of sessions; as in ``run``, some of them must range to others."""
+    analysis = SESSION_PURPOSES[purpose]
+    heard = {topic.partition(".")[2] for flight in flights for topic in topics_of_kind("link", flight.topics())}
+    if not heard:
+        return Usability(purpose, "no", (Shortfall("no ranges to another aircraft in the log (link.<peer>)"),))
+    assembled = session_from_flights(flights, stations, settings=configuration.settings.session)
+    known = SessionKnown(assembled.truth, configuration.settings.analyses)
+    told = _shortfalls(assembled.findings)
+    absent = sorted(heard - {*assembled.session.names, *(point.name for point in assembled.session.points)})
+    if absent:
+        shown = ", ".join(absent)
+        told = (Shortfall(f"ranges to {shown}, of whom no log is named: name theirs beside it"), *told)
+    if len(assembled.session.vehicles) == 1 and absent:
+        return Usability(purpose, "in part", told)
+    found = _examined(analysis, assembled.session, known)
+    shortfalls = (*found.shortfalls, *told)
+    state = "in part" if found.state == "yes" and shortfalls else found.state
+    return Usability(purpose, state, shortfalls)
+
+
+def _examined(analysis: Analysis, data: Any, known: Any) -> Usability:
+    assert analysis.examine is not None
+    try:
+        found = analysis.examine(data, known, known.settings[analysis.settings_table])
+    except (NotAssessableError, SettingsError) as error:
+        reason = str(error).removeprefix(f"{analysis.name}: ")
+        return Usability(analysis.name, "no", (Shortfall(reason),))
+    return Usability(analysis.name, "in part" if found else "yes", found)
+
+
+def _shortfalls(findings: Sequence[Finding]) -> tuple[Shortfall, ...]:
+    return tuple(Shortfall(finding.text) for finding in findings if finding.severity != "info")
+
+
+def _where(spans_s: tuple[tuple[float, float], ...]) -> str:
+    if not spans_s:
+        return ""
+    shown = [f"{start:.0f} to {end:.0f} s" if end > start else f"{start:.0f} s" for start, end in spans_s[:LISTED]]
+    more = f" and {len(spans_s) - LISTED} more" if len(spans_s) > LISTED else ""
+    return f" (at {', '.join(shown)}{more})"

@@ -1,0 +1,133 @@
+"""Which messages of a log give which canonical fields: roles, each with its rules, best first.
+
+The one engine of the readers whose logs name their messages: a reader states its roles and tells what its log offers.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Protocol, TypeAlias
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray, wrap_360
+from groundstation.base.atmosphere import pressure_altitude_m
+from groundstation.base.records import BoolArray, Column, Remark
+
+Columns: TypeAlias = dict[str, Column]
+
+
+class Numbers(Protocol):
+    """Columns of messages by name, as floating-point numbers."""
+
+    def __contains__(self, name: str, /) -> bool: ...
+
+    def __getitem__(self, name: str, /) -> FloatArray: ...
+
+
+@dataclass(frozen=True)
+class Rule:
+    """How the messages of one source give fields of a canonical topic.
+
+    Parameters
+    ----------
+    source : str
+        Name of the messages in the log.
+    needs : tuple of str
+        Columns without which the rule does not apply.
+    columns : callable
+        Numbers to canonical columns.
+    derived : mapping of field to str
+        What a user must know of a field.
+    """
+
+    source: str
+    needs: tuple[str, ...]
+    columns: Callable[[Numbers], Columns]
+    derived: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+
+    def told(self, topic: str) -> Iterator[Remark]:
+        """What a user must know, fields of which the same is to be said in one line."""
+        for text in dict.fromkeys(self.derived.values()):
+            fields = tuple(name for name, one in self.derived.items() if one == text)
+            yield Remark("derived", f"{topic}: {', '.join(fields)} from {text}", topic, fields)
+
+
+@dataclass(frozen=True)
+class Role:
+    """Something that a canonical topic tells, and the rules for it, best first.
+
+    ``has_instances``: each instance of the source is a topic of its own (``gnss.1``, ``gnss.2``).
+    """
+
+    topic: str
+    rules: tuple[Rule, ...]
+    has_instances: bool = False
+
+
+@dataclass(frozen=True)
+class Offer:
+    """Messages that a log has: their name, which of several sources of that name, and their columns."""
+
+    source: str
+    instance: int
+    columns: frozenset[str]
+
+    def serves(self, rule: Rule) -> bool:
+        """Whether a rule applies."""
+        return self.source == rule.source and self.columns.issuperset(rule.needs)
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """Messages, and the canonical topic that they feed by a rule."""
+
+    offer: Offer
+    topic: str
+    rule: Rule
+
+
+def assigned(roles: Iterable[Role], offers: Sequence[Offer]) -> Iterator[Assignment]:
+    """For each role the first rule that messages of the log serve, and all messages that do; or the first of them."""
+    for role in roles:
+        for rule in role.rules:
+            instances = {offer.instance: offer for offer in offers if offer.serves(rule)}
+            served = [offer for _instance, offer in sorted(instances.items())]
+            is_numbered = role.has_instances and len(served) > 1
+            for place, offer in enumerate(served if role.has_instances else served[:1], start=1):
+                yield Assignment(offer, f"{role.topic}.{place}" if is_numbered else role.topic, rule)
+            if served:
+                break
+
+
+def mapped(sources: Mapping[str, Sequence[str]]) -> Iterator[Remark]:
+    """What serves as what: names of the log by canonical topic, in one line."""
+    if sources:
+        yield Remark(
+            "mapped", "; ".join(f"{topic} from {', '.join(names)}" for topic, names in sorted(sources.items()))
+        )
+
+
+def scaled(fields: Mapping[str, tuple[str, float]]) -> Callable[[Numbers], Columns]:
+    """Columns of plain factors: canonical field -> (column, factor)."""
+
+    def columns(numbers: Numbers) -> Columns:
+        return {field: Column(numbers[name] * factor) for field, (name, factor) in fields.items() if name in numbers}
+
+    return columns
+
+
+def holds(numbers: Numbers, name: str) -> BoolArray | None:
+    """Where a flag is set, shape (n,); None in messages that have no such flag."""
+    return numbers[name] != 0.0 if name in numbers else None
+
+
+def pressure_altitude(pressure_pa: FloatArray) -> Columns:
+    """Pressure as altitude in the standard atmosphere; absent where it is no pressure of the air."""
+    altitude, is_refused = pressure_altitude_m(pressure_pa)
+    return {"pressure_altitude_m": Column(altitude, ~is_refused)}
+
+
+def direction(values_deg: FloatArray, present: BoolArray | None = None) -> Column:
+    """A direction in [0, 360)."""
+    return Column(np.asarray(wrap_360(values_deg)), present)
