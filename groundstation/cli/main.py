@@ -11,7 +11,7 @@ import typer
 
 from groundstation.base.errors import UsageError
 from groundstation.base.version import __version__
-from groundstation.cli import fleets, flights, plans, rules
+from groundstation.cli import fleets, flights, plans, rules, watching
 from groundstation.cli.application import (
     DATA_LOST,
     DONE,
@@ -25,6 +25,7 @@ from groundstation.cli.application import (
     IntervalsFile,
     Json,
     NoPdf,
+    Only,
     Profile,
     Progress,
     Quiet,
@@ -40,7 +41,7 @@ from groundstation.cli.application import (
     tell_written,
 )
 
-__all__ = ["app", "fleets", "flights", "main", "plans", "rules"]  # the modules hold more verbs
+__all__ = ["app", "fleets", "flights", "main", "plans", "rules", "watching"]  # the modules hold more verbs
 
 
 PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have an ``examine``; a test compares them
@@ -215,6 +216,7 @@ def run(
         ),
     ] = None,
     no_pdf: NoPdf = False,
+    only: Only = None,
     redo: Annotated[bool, typer.Option("--redo", help="Do again what an earlier run finished.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done; write nothing.")] = False,
     force: Force = False,
@@ -241,7 +243,8 @@ def run(
     if together and (dry_run or scheduler or stations is not None or timeout is not None):
         raise UsageError("--together", "--dry-run, --scheduler, --stations or --timeout beside it", "it without them")
     if dry_run:
-        planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo, stations=stations)
+        plan = partial(plan_many, with_pdf=not no_pdf, only_results=only == "results")
+        planned = plan(paths, output, configuration, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)
         return DONE
     timeout_s = math.inf if timeout is None else timeout
@@ -250,7 +253,14 @@ def run(
     try:
         with listener("none" if quiet else progress) as listen:
             outcomes = run_logs(
-                paths, output, configuration, force=force, fail_on=fail_on, with_pdf=not no_pdf, listen=listen
+                paths,
+                output,
+                configuration,
+                force=force,
+                fail_on=fail_on,
+                with_pdf=not no_pdf,
+                only_results=only == "results",
+                listen=listen,
             )
     except KeyboardInterrupt:
         say(f"interrupted: {output} keeps what is finished; the same command again goes on with the rest")
