@@ -27,12 +27,11 @@ from groundstation.estimators.fleet.moments import moments_of
 from groundstation.estimators.fleet.skill import SkillMerger, SkillOfFlight
 from groundstation.pipeline.many_flights.fleet import gather
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
-from groundstation.pipeline.many_flights.fleet_rows import flights_table
 from groundstation.reports.fleet import densities
 from groundstation.reports.fleet_report import MOST_ROWS_ON_PAPER, PAGE, write_fleet_report
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import FleetResults, NotInFleet
-from tests.fleet_example import DAY_NS, START_NS, save_flight, skill
+from tests.fleet_example import DAY_NS, START_NS, flights_table, save_flight, skill
 from tests.test_fleet_statistics import EMPTY
 from tests.test_reports import HOSTILE, Page
 

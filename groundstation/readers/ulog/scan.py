@@ -198,7 +198,7 @@ def _is_known_type(kind: Any) -> bool:
 
 
 @in_place
-def _is_cut(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
+def _is_cut(data: Any, at: int, end: int, least: Any, most: Any) -> bool:
     """Whether a data message begins at a place and is cut by the end."""
     if at + 5 > end or data[at + 2] != 0x44:
         return False
