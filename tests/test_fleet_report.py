@@ -145,10 +145,11 @@ def page_of(out: Path, fleet: FleetResults) -> Page:
     return Page((out / PAGE).read_text(encoding="utf-8"))
 
 
-def paper_of(out: Path, fleet: FleetResults) -> str:
+def page_and_paper_of(out: Path, fleet: FleetResults) -> tuple[Page, str]:
     written = write_fleet_report(out, fleet)
     assert not written.problem
-    return " ".join(" ".join(page.extract_text() for page in PdfReader(written.paths[1]).pages).split())
+    paper = " ".join(" ".join(page.extract_text() for page in PdfReader(written.paths[1]).pages).split())
+    return Page((out / PAGE).read_text(encoding="utf-8")), paper
 
 
 def cells(html: str) -> list[list[str]]:
@@ -227,10 +228,10 @@ def test_nothing_from_a_log_is_markup(tmp_path: Path) -> None:
     fleet = fleet_of(40, names, not_in_fleet=(NotInFleet("failed", HOSTILE, HOSTILE * 20),))
     columns = dict(fleet.flights.columns) | {"verdict_reason": np.full(40, HOSTILE), "report": np.full(40, HOSTILE)}
     fleet = replace(fleet, flights=FigureData("flights", columns, {}))
-    page = page_of(tmp_path, fleet)
+    page, paper = page_and_paper_of(tmp_path, fleet)
     assert page.tags.count("script") == 1 and "img" not in page.tags
     assert HOSTILE in page.text and "{{7*7}}" in page.text
-    assert "alert(1)" in paper_of(tmp_path, fleet)
+    assert "alert(1)" in paper
 
 
 def test_the_same_fleet_gives_the_same_bytes_wherever_it_is_made(usual: FleetResults, tmp_path: Path) -> None:
@@ -265,11 +266,10 @@ ODD: dict[str, Any] = {
 @pytest.mark.parametrize("name", ODD)
 def test_every_fleet_gets_its_report(tmp_path: Path, name: str) -> None:
     fleet = ODD[name]()
-    page = page_of(tmp_path, fleet)
+    page, paper = page_and_paper_of(tmp_path, fleet)
     assert not {"nan", "inf", "nat"} & {word for text in page.texts for word in re.split(r"[^a-z]+", text.lower())}
     if len(fleet):
         assert len(cells((tmp_path / PAGE).read_text(encoding="utf-8"))) == len(fleet)
-    paper = paper_of(tmp_path, fleet)
     assert ("No flights" if not len(fleet) else f"{len(fleet)} flight") in paper
     assert "How it was computed" in paper
 
@@ -277,7 +277,7 @@ def test_every_fleet_gets_its_report(tmp_path: Path, name: str) -> None:
 def test_paper_lists_what_is_of_note_and_says_how_many_more(tmp_path: Path) -> None:
     missing = [NotInFleet("failed", f"log-{number:03d}.csv", "empty") for number in range(MOST_ROWS_ON_PAPER + 40)]
     fleet = fleet_of(200, not_in_fleet=missing, samples=20, findings_fail=[0.0] * 199 + [2.0])
-    paper = paper_of(tmp_path, fleet)
+    _, paper = page_and_paper_of(tmp_path, fleet)
     shown = set(re.findall(r"log-\d{3}\.csv", paper))
     assert len(shown) == MOST_ROWS_ON_PAPER and "The first 60; 40 more in summary.html." in paper
     rejected = fleet.flights["flight_id"][fleet.flights["verdict"] == "reject"].tolist()

@@ -4,12 +4,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.writer import CompressionType, Writer
 
-from groundstation.base.records import Damage
+from groundstation.base.records import Damage, RecordBatch
 from groundstation.base.signals import TOPICS
 from groundstation.readers import registry
+from groundstation.store.reader import read as store_items
+from tests.bag_writer import START_NS
 from tests.dataflash_writer import flight_log
+from tests.fuzz.bases import bases
 from tests.fuzz.silent import values_of
+from tests.mcap_surgery import chunk_count, without_chunk
 
 KINDS = ("ins", "gnss", "discrete", "magnetometer", "baro", "air")
 FMT_BYTES = 89
@@ -107,3 +112,58 @@ def test_a_flipped_bit_in_definitions_is_seldom_silent(tmp_path: Path) -> None:
         if not tells and any(found[name] < count for name, count in values.items()):
             silent.append(at)
     assert not silent
+
+
+def foreign(path: Path, times: range, *, counts: bool = True) -> Path:
+    """An MCAP of another program: messages of 100 in a chunk, numbered as they are made."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=4_000, compression=CompressionType.NONE, use_statistics=counts)
+        writer.start()
+        schema = writer.register_schema("own.State", "jsonschema", b"{}")
+        channel = writer.register_channel("/state", "json", schema)
+        for at in times:
+            writer.add_message(channel, START_NS + at * 10**7, f'{{"x": {at + 0.5}}}'.encode(), 0, at)
+        writer.finish()
+    return path
+
+
+@pytest.mark.parametrize("number", [0, 3, -1])
+@pytest.mark.parametrize("is_mended", [True, False])
+def test_a_chunk_taken_out_of_an_mcap_of_ours_is_told(tmp_path: Path, number: int, is_mended: bool) -> None:
+    sound = bases("mcap", recorded=False)[0].data
+    path = tmp_path / "a.mcap"
+    path.write_bytes(sound)
+    before, tells = values_of(path)
+    assert not tells
+    path.write_bytes(without_chunk(sound, number % chunk_count(sound), is_mended=is_mended))
+    after, tells = values_of(path)
+    is_derived = after == before  # a chunk of the map: nothing recorded was in it
+    assert tells or is_derived
+    if is_mended and not is_derived:
+        told = [item for item in store_items(path) if isinstance(item, Damage) and item.loses_data]
+        assert told and all("ledger in the file counts" in one.what for one in told)
+
+
+@pytest.mark.parametrize("number", [0, 3, -1])
+def test_a_chunk_taken_out_of_a_foreign_mcap_is_told_by_the_statistics(tmp_path: Path, number: int) -> None:
+    sound = foreign(tmp_path / "a.mcap", range(1_000)).read_bytes()
+    path = tmp_path / "b.mcap"
+    path.write_bytes(without_chunk(sound, number % chunk_count(sound), is_mended=False))
+    (told,) = [one for one in damages(path) if "statistics of the file count" in one.what]
+    rows = sum(len(item) for item in registry.read(path) if isinstance(item, RecordBatch))
+    assert told.count == 1_000 - rows > 0 and told.loses_data
+
+
+def test_a_chunk_taken_out_of_a_foreign_mcap_is_told_by_the_numbers_of_its_messages(tmp_path: Path) -> None:
+    sound = foreign(tmp_path / "a.mcap", range(1_000)).read_bytes()
+    path = tmp_path / "b.mcap"
+    path.write_bytes(without_chunk(sound, 3, is_mended=True))
+    (told,) = damages(path)
+    rows = sum(len(item) for item in registry.read(path) if isinstance(item, RecordBatch))
+    assert "sequence numbers" in told.what and told.count == 1_000 - rows
+
+
+def test_a_sound_foreign_mcap_and_one_that_lost_messages_before_it_was_written_are_told_nothing(tmp_path: Path) -> None:
+    assert not damages(foreign(tmp_path / "a.mcap", range(1_000)))
+    assert not damages(foreign(tmp_path / "b.mcap", range(0, 3_000, 3), counts=False))
+    assert not damages(foreign(tmp_path / "c.mcap", range(5), counts=False))

@@ -33,6 +33,7 @@ VERBS = (
         "compare",
         "cooperative",
         "plan",
+        "rules",
         "serve",
     ),
     *("simulate", "study", "list"),
@@ -47,10 +48,11 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "run flight3.ulg -o out",
         "run logs -o out --aircraft aircraft.toml --site airfield.toml",
         "run flight3.ulg --reference sbet_20250708.out -o out",
+        "run logs -o out --only results",
         "run logs -o out --dry-run",
     ),
     "watch": ("watch incoming -o out", "watch incoming -o out --once --every 5"),
-    "report": ("report out",),
+    "report": ("report out", "report out --standard app-g -o acceptance"),
     "view": ("view out", "view flight3.ulg --web"),
     "export": (
         "export out/20260504T060000Z_SIM-1_101 -o flight.kml",
@@ -63,6 +65,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     ),
     "compare": ("compare out/first out/second -o comparison",),
     "cooperative": ("cooperative a.csv b.csv --stations stations.toml -o out",),
+    "rules": ("rules test stricter.toml --over out", "rules test stricter.toml --over out -o changes.csv"),
     "serve": ("serve out",),
     "simulate": ("simulate taxi-good -o logs",),
     "study": ("study heading -o tables --runs 50",),
@@ -110,6 +113,10 @@ Together = Annotated[
     typer.Option("--together", help="The logs are of one flight: put them on one clock, by GNSS time or by motion."),
 ]
 NoPdf = Annotated[bool, typer.Option("--no-pdf", help="Leave report.pdf and steer_card.pdf out.")]
+Only = Annotated[
+    Literal["results"] | None,
+    typer.Option("--only", help="results: no recording and no report, of a flight or of all; a later run makes them."),
+]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
 Profile = Annotated[
     Path | None,

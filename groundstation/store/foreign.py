@@ -30,6 +30,7 @@ from groundstation.store.framing import (
     read_summary,
 )
 from groundstation.store.messages import HEAD, RECORD_PREFIX, ByteArray, Messages
+from groundstation.store.sequences import Sequences
 from groundstation.store.walk import find_messages
 
 PEEK_BYTES = 64
@@ -68,7 +69,16 @@ class UnknownChannel:
     messages: int
 
 
-Found: TypeAlias = ForeignMessages | ForeignLost | UnknownChannel
+@dataclass(frozen=True)
+class Missing:
+    """Messages of a topic that are not in the file, by what the file itself tells."""
+
+    topic: str
+    count: int
+    what: str
+
+
+Found: TypeAlias = ForeignMessages | ForeignLost | UnknownChannel | Missing
 
 
 def read_header(head: bytes) -> Header | None:
@@ -93,6 +103,7 @@ class ForeignMcap:
         self._file, self._size = file, size
         self._known = Summary()
         self._count = self._unknown = 0
+        self._met: dict[int, Sequences] = {}
 
     def __iter__(self) -> Iterator[Found]:
         summary = read_summary(self._file, self._size)
@@ -134,6 +145,20 @@ class ForeignMcap:
             yield ForeignLost(self._size, self._size, "file that ends without its summary", 1, self._count, True)
         if self._unknown:
             yield UnknownChannel(self._unknown)
+        yield from self._missing()
+
+    def _missing(self) -> Iterator[Missing]:
+        """What the statistics count and was not met; where they tell of nothing, what the numbers of messages tell."""
+        counts = self._known.message_counts
+        gone = {number: counts.get(number, 0) - self._met[number].count for number in self._met}
+        gone |= {number: count for number, count in counts.items() if number not in self._met}
+        what = "messages that the statistics of the file count and that are not in it"
+        if not any(count > 0 for count in gone.values()):
+            gone = {number: met.missing for number, met in self._met.items()}
+            what = "messages missing between two chunks by their sequence numbers, which run through everywhere else"
+        for number, count in sorted(gone.items()):
+            if count > 0 and number in self._known.channels:
+                yield Missing(self._known.channels[number].topic, count, what)
 
     def _read(self, at: int, length: int) -> bytes:
         self._file.seek(at)
@@ -171,7 +196,7 @@ class ForeignMcap:
         """Records that stand one after the other, searched for behind what is none; of a chunk without a checksum."""
         data, start = raw.tobytes(), 0
         while start < len(data):
-            whole = start + _whole_records(data[start:])
+            whole = _whole_records(data, start)
             yield from self._records(raw[start:whole], at, end)
             if whole == len(data):
                 return
@@ -194,6 +219,7 @@ class ForeignMcap:
         self._count += len(starts)
         for number in np.unique(ids).tolist():
             rows = np.flatnonzero(ids == number)
+            self._met.setdefault(number, Sequences()).take(everything.take(rows).head("sequence"))
             channel = self._known.channels.get(number)
             if channel is None:
                 self._unknown += len(rows)
@@ -221,14 +247,15 @@ class ForeignMcap:
         return self._known.is_intact and found.id in known
 
 
-def _whole_records(data: bytes) -> int:
-    """Bytes of the whole records that stand one after the other at the beginning."""
-    whole = 0
-    for opcode, record in parse_records(data):
-        if opcode == Opcode.MESSAGE and len(record) < HEAD.itemsize:
+def _whole_records(data: bytes, start: int = 0) -> int:
+    """Where the whole records end that stand one after the other from a place on; nothing is copied."""
+    at = start
+    while at + RECORD_PREFIX <= len(data):
+        end = at + RECORD_PREFIX + int.from_bytes(data[at + 1 : at + RECORD_PREFIX], "little")
+        if end > len(data) or (data[at] == Opcode.MESSAGE and end - at < HEAD.itemsize):
             break
-        whole += len(record)
-    return whole
+        at = end
+    return at
 
 
 def _next_message(data: bytes, start: int) -> int:
@@ -247,7 +274,7 @@ def _next_message(data: bytes, start: int) -> int:
 def _beginning(compression: str, data: bytes, size: int) -> ByteArray:
     """What the beginning of a chunk's data gives."""
     limit = min(size, MAX_CHUNK_BYTES)
-    raw = b""
+    raw = bytearray()
     try:
         if compression == "zstd":
             reader = zstandard.ZstdDecompressor(max_window_size=128 << 20).decompressobj()
@@ -256,9 +283,9 @@ def _beginning(compression: str, data: bytes, size: int) -> ByteArray:
                 if len(raw) > limit:
                     break
         elif compression == "lz4":
-            raw = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=limit)
+            raw += lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=limit)
         else:
-            raw = data
+            raw += data
     except (zstandard.ZstdError, RuntimeError, ValueError, EOFError):
         pass  # what came before is kept
-    return np.frombuffer(raw[:limit], np.uint8)
+    return np.frombuffer(bytes(raw[:limit]), np.uint8)

@@ -263,6 +263,14 @@ class Summary:
     statistics: Statistics | None = None
     metadata: list[MetadataIndex] = field(default_factory=list)
 
+    @property
+    def message_counts(self) -> dict[int, int]:
+        """Messages by channel, as statistics that agree with themselves tell; empty where there are none."""
+        found = self.statistics
+        if not self.is_intact or found is None or sum(found.channel_message_counts.values()) != found.message_count:
+            return {}
+        return dict(found.channel_message_counts)
+
     def add(self, record: McapRecord, raw: bytes) -> None:
         """Take in one record."""
         if isinstance(record, Schema):

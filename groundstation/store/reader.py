@@ -2,6 +2,7 @@
 
 import os
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -93,15 +94,43 @@ def read(path: str | os.PathLike[str], part: Part | None = None) -> Iterator[Ite
         else:
             found = chunks_by_walk(file, size)
         is_cut = False
+        missing = _Missing(info)
         for chunk in found:
             if isinstance(chunk, Lost):
                 is_cut |= chunk.is_cut
-                yield reading.damage(chunk)
+                items: Iterator[RecordBatch | Damage] = iter([reading.damage(chunk)])
             else:
-                yield from reading.batches(chunk) if part is None else _cut(reading.batches(chunk), part)
+                items = reading.batches(chunk) if part is None else _cut(reading.batches(chunk), part)
+            for item in items:
+                missing.take(item)
+                yield item
+        if part is None and is_intact:
+            yield from missing.damages()
         if not by_index and not is_cut:
             what = "summary at the end of the file, or what stands before it; the chunks were found by walking the file"
             yield Damage("corrupt", "summary", 1, what, loses_data=False)
+
+
+class _Missing:
+    """What the ledger in the file counts and what of it is there: a chunk may be gone with all that told of it."""
+
+    def __init__(self, info: StoreInfo) -> None:
+        self._left = Counter({topic: entry.rows for topic, entry in info.ledger.topics.items()})
+        self._is_told = False
+
+    def take(self, item: RecordBatch | Damage) -> None:
+        """Count what is there, and what is told to be lost already."""
+        if isinstance(item, RecordBatch):
+            self._left[item.topic] -= len(item)
+        elif item.loses_data:
+            self._is_told = True
+
+    def damages(self) -> Iterator[Damage]:
+        """What is missing by the ledger, where no loss is told that may be the same."""
+        for topic, count in self._left.items():
+            if count > 0 and not self._is_told:
+                what = "messages that the ledger in the file counts and that are not in it"
+                yield Damage("dropped_rows", "the whole log", count, what, topic)
 
 
 @contextmanager
@@ -170,7 +199,7 @@ def _narrowed(summary: Summary, part: Part, definitions: dict[int, _Definition])
     return replace(summary, chunks=chunks)
 
 
-def _cut(items: Iterator[Item], part: Part) -> Iterator[Item]:
+def _cut(items: Iterator[RecordBatch | Damage], part: Part) -> Iterator[RecordBatch | Damage]:
     for item in items:
         kept = part.cut(item) if isinstance(item, RecordBatch) else item
         if not isinstance(kept, RecordBatch) or len(kept):
@@ -186,7 +215,7 @@ class _Reading:
         self._last_ns: dict[int, int] = {}  # channel -> time of its last message
         self._seen: set[tuple[int, int]] = set()  # channel and sequence number of the first message of each chunk
 
-    def batches(self, chunk: Intact) -> Iterator[Item]:
+    def batches(self, chunk: Intact) -> Iterator[RecordBatch | Damage]:
         """Batches of a chunk's messages."""
         for messages in chunk.messages:
             definition = self._definitions.get(messages.channel_id)

@@ -10,8 +10,9 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import BinaryIO, TypeAlias
+from typing import BinaryIO, TypeAlias, cast
 
 from mcap.opcode import Opcode
 from mcap.records import Channel, ChunkIndex, Metadata, Schema
@@ -48,6 +49,8 @@ _DEFINITION = re.compile(rb"[\x03\x04](?=[\x00-\xff]{3}\x00{5})")
 _ENCODING = struct.pack("<I", 8) + b"protobuf"  # stands behind the name of either
 _NAME_BYTES = 4096  # names of topics and types are shorter
 _MOST_DEFINITIONS = 1 << 17  # twice as many as there are channel ids
+_READ_AGAIN = 16  # bytes that may be read for each byte of a file: what is read may turn out to be none, time and again
+_CALL_BYTES = 64  # what a call costs, as bytes
 _INDEX_BYTES = RECORD_PREFIX + 6  # of a MessageIndex without its entries
 
 
@@ -77,6 +80,32 @@ class Lost:
 
 
 Found: TypeAlias = Intact | Lost
+
+
+class _TooMuchReadError(Exception):
+    """More was read than a file that is damaged by accident asks for."""
+
+
+class _Bounded:
+    """A file of which no more than so many bytes are read."""
+
+    def __init__(self, file: BinaryIO, most: int) -> None:
+        self._file, self._left = file, most
+
+    def seek(self, at: int) -> int:
+        return self._file.seek(at)
+
+    def read(self, length: int) -> bytes:
+        data = self._file.read(length)
+        self._left -= len(data) + _CALL_BYTES
+        if self._left < 0:
+            raise _TooMuchReadError
+        return data
+
+
+def bounded(file: BinaryIO, size: int) -> BinaryIO:
+    """The file, for work on ``size`` bytes of it: reading more than is due to them raises an error."""
+    return cast(BinaryIO, _Bounded(file, _READ_AGAIN * size + MAX_RECORD_BYTES))
 
 
 def _read(file: BinaryIO, at: int, length: int) -> bytes:
@@ -140,6 +169,15 @@ def chunks_by_walk(file: BinaryIO, size: int) -> Iterator[Found]:
     record stands before the cut.
     """
     at, has_end = len(MAGIC), ends_whole(file, size)
+    try:
+        for found in _walked(bounded(file, size), at, size, has_end):
+            at = found.start
+            yield found
+    except _TooMuchReadError:
+        yield Lost(at, size, "heads of chunks that contradict each other: given up")
+
+
+def _walked(file: BinaryIO, at: int, size: int, has_end: bool) -> Iterator[Found]:
     while at < size:
         peek = _read(file, at, PEEK_BYTES)
         head = _chunk_at(peek, at, size)
@@ -278,6 +316,11 @@ def chunk_bytes(file: BinaryIO, size: int) -> int:
 
 def definitions_in(file: BinaryIO, start: int, end: int) -> Iterator[tuple[Schema | Channel, bytes]]:
     """Schemas and channels that begin in a part of a file, told by their form: each record and its bytes."""
+    with suppress(_TooMuchReadError):
+        yield from _definitions_in(bounded(file, end - start), start, end)
+
+
+def _definitions_in(file: BinaryIO, start: int, end: int) -> Iterator[tuple[Schema | Channel, bytes]]:
     overlap = RECORD_PREFIX + 8 + _NAME_BYTES + len(_ENCODING)
     for base in range(start, end, SEARCH_BYTES):
         block = _read(file, base, SEARCH_BYTES + overlap)

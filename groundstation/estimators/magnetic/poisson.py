@@ -223,6 +223,8 @@ def _with_dip(readings: Readings, earth: EarthField, settings: MagneticSettings)
         horizontal, down = float(strength * np.cos(dip_rad)), float(strength * np.sin(dip_rad))
         return EarthField(earth.declination_deg, horizontal, down, is_modelled=False)
 
+    from scipy.optimize import minimize_scalar  # 0.15 s to import, which flights without a magnetometer are spared
+
     best = minimize_scalar(
         lambda dip_deg: float(np.mean(_solved(readings, of_dip(dip_deg), settings).residual_nt ** 2)),
         bounds=(-DIP_MAX_DEG, DIP_MAX_DEG),

@@ -53,6 +53,7 @@ def run_many(
     with_pdf: bool = True,
     redo: bool = False,
     stations: Path | None = None,
+    only_results: bool = False,
     timeout_s: float = math.inf,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
@@ -71,6 +72,8 @@ def run_many(
         Address of a Dask scheduler, whose workers do the work; they see local paths as this machine does.
     stations : Path, optional
         TOML file with the ground stations of the sessions; left out: stations.toml beside the logs of each.
+    only_results : bool
+        Neither recordings nor reports, of flights or of all; a later run without it makes them.
     timeout_s : float
         A log, or a session, that takes longer has failed, and the process that ran it is ended.
 
@@ -88,9 +91,9 @@ def run_many(
     ground = None if stations is None else load_stations(stations)
     inputs = _inputs(paths, out, configuration)
     crew = _crew(scheduler, jobs or cores(), len(inputs), listen, timeout_s)
-    make = partial(Job, configuration=configuration, fail_on=fail_on, with_pdf=with_pdf)
+    make = partial(Job, configuration=configuration, fail_on=fail_on, with_pdf=with_pdf, only_results=only_results)
     listen(Event("begin", total=len(inputs)))
-    asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo)
+    asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo, only_results=only_results)
     if any(is_remote(str(place)) for place in (out, *paths)):
         remote = [
             RemoteJob(make(Path(), Path(), is_named=one.is_named), one.url, str(out), redo, one.size) for one in inputs
@@ -108,6 +111,7 @@ def run_together(
     force: bool = False,
     fail_on: str = "none",
     with_pdf: bool = True,
+    only_results: bool = False,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
     """Run several logs of one flight as that flight; see :func:`groundstation.pipeline.one_flight.join.join_logs`.
@@ -136,8 +140,8 @@ def run_together(
             reason, trace = reason_of(named, error)
             listen(Event("end", named, reason))
             return (Outcome(named, "failed", reason, trace=trace),)
-        job = Job(mcap, Path(out), configuration, fail_on, with_pdf=with_pdf, url=named)
-        asked = Asked(Path(out), configuration, None, fail_on, with_pdf, redo=True)
+        job = Job(mcap, Path(out), configuration, fail_on, with_pdf=with_pdf, url=named, only_results=only_results)
+        asked = Asked(Path(out), configuration, None, fail_on, with_pdf, redo=True, only_results=only_results)
         return _run_here([job], asked, partial(in_turn, listen=listen), force, listen)
 
 
@@ -164,7 +168,7 @@ def _run_here(work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen
         clear_unfinished(out)  # of processes that died or took too long
         sessions = _run_sessions(placement, asked, crew, listen)
         outcomes = (*placement.outcomes(), *sessions)
-        return (*outcomes, *write_beside(out, outcomes, with_pdf=asked.with_pdf))
+        return (*outcomes, *write_beside(out, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results))
 
 
 def _run_sessions(placement: Placement, asked: Asked, crew: Crew, listen: Listener) -> tuple[Outcome, ...]:
@@ -198,7 +202,7 @@ def _run_remote(
                 _run_into(placement, copy, _once(work, placement, crew, listen), run_remote, suffixed, crew, listen)
                 sessions = _run_remote_sessions(placement, output, asked, listen)
                 outcomes = (*placement.outcomes(), *sessions)
-                problems = write_beside(copy, outcomes, with_pdf=asked.with_pdf)
+                problems = write_beside(copy, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results)
                 is_whole = True
             finally:
                 lease.require()
@@ -292,6 +296,7 @@ def plan_many(
     with_pdf: bool = True,
     redo: bool = False,
     stations: Path | None = None,
+    only_results: bool = False,
 ) -> tuple[Outcome, ...]:
     """Say what :func:`run_many` would do of each log, and of the sessions among finished flights; nothing is written.
 
@@ -305,7 +310,8 @@ def plan_many(
     inputs, out = _inputs(paths, out, configuration), Path(out)
     refuse_foreign(out, force=True)
     known = {} if redo or not out.is_dir() else finished_flights(flight_folders(out))
-    work = [Job(Path(one.url), out, configuration, is_named=one.is_named, with_pdf=with_pdf) for one in inputs]
+    make = partial(Job, out=out, configuration=configuration, with_pdf=with_pdf, only_results=only_results)
+    work = [make(Path(one.url), is_named=one.is_named) for one in inputs]
     outcomes = []
     for _number, job, twin in _with_steps(work, known):
         if twin is not None:
@@ -313,7 +319,7 @@ def plan_many(
         else:
             outcomes.append(_planned(job))
     ground = None if stations is None else load_stations(stations)
-    asked = Asked(out, configuration, ground, "none", with_pdf, redo)
+    asked = Asked(out, configuration, ground, "none", with_pdf, redo, only_results=only_results)
     return (*outcomes, *_planned_sessions(asked, outcomes))
 
 

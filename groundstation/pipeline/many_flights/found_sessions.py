@@ -39,6 +39,7 @@ class Asked:
     with_pdf: bool
     redo: bool = False
     mcap_in: Callable[[Path], Path] = lambda folder: file_in(folder, ".mcap")
+    only_results: bool = False
 
 
 @dataclass(frozen=True)
@@ -110,6 +111,7 @@ def _job(asked: Asked, group: Sequence[Member]) -> SessionJob:
         asked.redo,
         is_found=True,
         notes=notes,
+        only_results=asked.only_results,
     )
 
 

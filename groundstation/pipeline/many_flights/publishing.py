@@ -27,14 +27,26 @@ FLEET_FILES = (INDEX_JSON, INDEX_CSV, FLEET_PARQUET, SAMPLES, FLEET_RECORDING, F
 
 
 def write_beside(
-    out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[IndexRow] = (), *, with_pdf: bool = True
+    out: Path,
+    outcomes: Sequence[Outcome],
+    kept_rows: Sequence[IndexRow] = (),
+    *,
+    with_pdf: bool = True,
+    only_results: bool = False,
 ) -> tuple[Outcome, ...]:
-    """Write everything that stands beside the flight folders; returns what could not be written or read."""
-    from groundstation.viewer.fleet import write_fleet_recording
+    """Write everything that stands beside the flight folders; returns what could not be written or read.
 
+    With ``only_results`` the page and the recording of all flights are removed: they would tell of an earlier run.
+    """
     problems = list(write_index_of(out, outcomes, kept_rows))
     fleet, unwritten = write_fleet(out)
     problems += unwritten
+    if only_results:
+        for name in (FLEET_PAGE, FLEET_PDF, FLEET_RECORDING):
+            (out / name).unlink(missing_ok=True)
+        return tuple(problems)
+    from groundstation.viewer.fleet import write_fleet_recording
+
     try:
         with told_in_a_line(str(out)):
             problem = write_fleet_report(out, fleet, with_pdf=with_pdf).problem

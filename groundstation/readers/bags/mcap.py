@@ -29,7 +29,7 @@ class Mcap:
         self._connections: dict[tuple[str, str, str, bytes], Connection] = {}
 
     def __iter__(self) -> Iterator[Part]:
-        from groundstation.store.foreign import ForeignLost, ForeignMcap, ForeignMessages
+        from groundstation.store.foreign import ForeignLost, ForeignMcap, ForeignMessages, Missing
 
         with self._source.open() as stream:
             for found in ForeignMcap(stream, self._source.size):
@@ -46,6 +46,8 @@ class Mcap:
                     )
                 elif isinstance(found, ForeignLost):
                     yield _damage(found)
+                elif isinstance(found, Missing):
+                    yield Damage("dropped_rows", "the whole log", found.count, f"{found.what} (topic {found.topic})")
                 else:
                     what = "messages of a channel that no record of the file defines"
                     yield Damage("dropped_channel", "the whole log", found.messages, what)

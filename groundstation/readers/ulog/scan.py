@@ -208,7 +208,7 @@ def _is_cut(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
 
 
 @in_place
-def leads_on(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
+def leads_on(data: Any, at: int, end: int, least: Any, most: Any) -> bool:
     """Whether a strong message begins at a place, or behind at most three weak ones; the end of the data is as good."""
     for _ in range(4):
         if at + 3 > end:
