@@ -169,6 +169,7 @@ def _run_here(
         found, unwritten = _swept(placement, out, refresher)
         sessions = _run_sessions(placement, asked, found, crew, listen)
         outcomes = (*placement.outcomes(), *sessions)
+        found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
         return (*outcomes, *unwritten, *write_beside(out, outcomes, with_pdf=asked.with_pdf, found=found))
 
 
@@ -210,6 +211,7 @@ def _run_remote(
                 found, unwritten = _swept(placement, copy)
                 sessions = _run_remote_sessions(placement, output, asked, found, listen)
                 outcomes = (*placement.outcomes(), *sessions)
+                found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
                 problems = (*unwritten, *write_beside(copy, outcomes, with_pdf=asked.with_pdf, found=found))
                 is_whole = True
             finally:

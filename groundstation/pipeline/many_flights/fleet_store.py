@@ -7,7 +7,7 @@ whole, the hidden one last, so that a run that is killed leaves a month that is 
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from hashlib import blake2b
 from pathlib import Path
@@ -75,6 +75,10 @@ class Scan:
 
     def __len__(self) -> int:
         return len(self.fresh) + len(self.stale)
+
+    def with_sessions(self, names: Iterable[str]) -> "Scan":
+        """The same with session folders that were made since."""
+        return replace(self, others=tuple(sorted({*self.others, *names})))
 
     @property
     def sessions(self) -> list[Path]:
