@@ -3,6 +3,7 @@
 ``python -m benchmarks.bench_fleet_store [FLIGHTS]`` prints the figures.
 """
 
+import multiprocessing
 import os
 import resource
 import shutil
@@ -20,8 +21,8 @@ import numpy as np
 
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.fleet import write_fleet
-from groundstation.pipeline.many_flights.fleet_share import FlightShare, share_of, to_arrow
-from groundstation.pipeline.many_flights.fleet_store import Key, key_of, month_of, put_month, refresh, scan, stamp_of
+from groundstation.pipeline.many_flights.fleet_share import share_of, to_arrow
+from groundstation.pipeline.many_flights.fleet_store import key_of, month_of, put_month, refresh, scan, stamp_of
 from groundstation.pipeline.many_flights.known_flights import KnownFlights
 from groundstation.pipeline.many_flights.publishing import write_index_of
 from groundstation.pipeline.many_flights.session_search import members_of
@@ -52,23 +53,26 @@ def make_fleet(out: Path, templates: list[Path], flights: int) -> None:
     """Make a folder of flights, and what workers put into the dataset of them, as if they had read them."""
     shares = [share_of(template) for template in templates]
     rng = np.random.default_rng(7)
-    months: dict[str, list[tuple[FlightShare, Key]]] = {}
+    months: dict[str, list[int]] = {}
     for number in range(flights):
-        identity, share = identity_of(number, flights), shares[number % TEMPLATES]
-        make_flight(out, identity, templates[number % TEMPLATES])
-        start = datetime.strptime(identity[:16], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
-        own = {
-            "flight_id": identity,
-            "aircraft": f"A{number % AIRCRAFT:02d}",
-            "start_utc": int(start.timestamp()) * NS_PER_S,
-            "month": f"{start:%Y-%m}",
-            "error_deg": round(float(rng.normal(0.02 * (number % AIRCRAFT), 0.2)), 4),
-        }
-        index = replace(share.index, flight_id=identity, aircraft=own["aircraft"], sha256=f"{number:064x}")
-        made = replace(share, row=share.row | own, index=index, path=f"/logs/{number}.ulg")
-        months.setdefault(month_of(identity), []).append((made, key_of(made, stamp_of(out, identity) or 0)))
-    for month, found in months.items():
-        put_month(out, month, to_arrow([share for share, _ in found]), [key for _, key in found])
+        months.setdefault(month_of(identity_of(number, flights)), []).append(number)
+    for month, numbers in months.items():
+        made, keys = [], []
+        for number in numbers:
+            identity, share = identity_of(number, flights), shares[number % TEMPLATES]
+            make_flight(out, identity, templates[number % TEMPLATES])
+            start = datetime.strptime(identity[:16], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
+            own = {
+                "flight_id": identity,
+                "aircraft": f"A{number % AIRCRAFT:02d}",
+                "start_utc": int(start.timestamp()) * NS_PER_S,
+                "month": f"{start:%Y-%m}",
+                "error_deg": round(float(rng.normal(0.02 * (number % AIRCRAFT), 0.2)), 4),
+            }
+            index = replace(share.index, flight_id=identity, aircraft=own["aircraft"], sha256=f"{number:064x}")
+            made.append(replace(share, row=share.row | own, index=index, path=f"/logs/{number}.ulg"))
+            keys.append(key_of(made[-1], stamp_of(out, identity) or 0))
+        put_month(out, month, to_arrow(made), keys)
 
 
 def timed(what: str, work: Callable[[], Any]) -> Any:
@@ -101,7 +105,9 @@ def main() -> None:
             for number in range(TEMPLATES)
         ]
         timed(f"{TEMPLATES} flights read by a worker", lambda: refresh(Path(folder)))
-        timed(f"{flights} flights made", lambda: make_fleet(out, templates, flights))
+        maker = multiprocessing.get_context("spawn").Process(target=make_fleet, args=(out, templates, flights))
+        maker.start()  # its memory is not that of the process that leads a run
+        maker.join()
         found = scan(out)
         assert len(found) == len(found.fresh) == flights
         run(out, templates, flights)

@@ -173,6 +173,7 @@ def _run_here(
         found, unwritten = _swept(placement, out, refresher)
         sessions = _run_sessions(placement, asked, found, crew, listen)
         outcomes = (*placement.outcomes(), *sessions)
+        found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
         problems = write_beside(out, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found)
         return (*outcomes, *unwritten, *problems)
 
@@ -215,6 +216,7 @@ def _run_remote(
                 found, unwritten = _swept(placement, copy)
                 sessions = _run_remote_sessions(placement, output, asked, found, listen)
                 outcomes = (*placement.outcomes(), *sessions)
+                found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
                 beside = write_beside(
                     copy, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found
                 )

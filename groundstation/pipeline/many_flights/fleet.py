@@ -135,7 +135,7 @@ def _results(found: Scan, table: Any, unread: list[NotInFleet]) -> FleetResults:
         for row in sampled
     ]
     aircraft = flights["aircraft"][sampled].tolist()
-    histograms = list(histograms_of(table.take(sampled)))
+    histograms = list(histograms_of(table, sampled))
     trend, changes = answer.trends(flights, settings)
     checks = _table("calibration_checks", CHECK_COLUMNS, _check_rows(table, flights))
     merger, skill_rows = _skill(table, flights)

@@ -27,6 +27,7 @@ from groundstation.results.files import load, utf8_text
 from groundstation.tables.session_tracks import aircraft_named
 
 TEXTS = ("text", "category")
+TEXTS_AT_ONCE = 1000
 MOST_WIDE_CHARACTERS = 10_000_000  # of a column of texts as wide as its longest; beyond it each is an object
 DETAILS = {
     "index": "JSON: the flight's row of index.json",
@@ -127,20 +128,29 @@ def index_rows_of(table: Any) -> list[IndexRow]:
 
 def skill_rows_of(table: Any) -> Iterator[tuple[str, list[SkillOfFlight]]]:
     """The shipped method and the skill of each flight in a table of shares."""
-    for text in table.column("forecast").to_pylist():
+    for text in _texts(table, "forecast"):
         shipped, rows = json.loads(text)
         yield shipped, [SkillOfFlight(**({"coverage95": math.nan} | row)) for row in rows]
 
 
 def check_rows_of(table: Any) -> Iterator[list[Check]]:
     """The checks of each flight in a table of shares."""
-    for text in table.column("checks").to_pylist():
+    for text in _texts(table, "checks"):
         yield [Check(**row) for row in json.loads(text)]
 
 
-def histograms_of(table: Any) -> Iterator[SampleHistogram]:
-    """The histogram of the used samples of each flight in a table of shares."""
-    yield from map(SampleHistogram, *(_lists(table.column(name)) for name in ("sample_cell", "sample_count")))
+def histograms_of(table: Any, rows: NDArray[np.intp]) -> Iterator[SampleHistogram]:
+    """The histogram of the used samples of some flights in a table of shares."""
+    yield from map(
+        SampleHistogram, *(_lists(table.column(name).take(rows)) for name in ("sample_cell", "sample_count"))
+    )
+
+
+def _texts(table: Any, name: str) -> Iterator[str]:
+    """The texts of a column, a few at a time."""
+    column = table.column(name)
+    for start in range(0, len(column), TEXTS_AT_ONCE):
+        yield from column.slice(start, TEXTS_AT_ONCE).to_pylist()
 
 
 def fleet_parquet(table: Any) -> bytes:

@@ -7,7 +7,7 @@ whole, the hidden one last, so that a run that is killed leaves a month that is 
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from hashlib import blake2b
 from pathlib import Path
@@ -24,7 +24,7 @@ from groundstation.pipeline.many_flights.workers import Crew, in_turn
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.results.file_names import ARRAYS, MANIFEST, SUMMARY
-from groundstation.results.files import write_bytes
+from groundstation.results.files import utf8_text, write_bytes
 
 FLIGHTS, KEYS = "flights.parquet", ".flights"
 UNKNOWN = "unknown"
@@ -33,7 +33,7 @@ VERSION = repr((__version__, _COLUMNS, DETAILS))  # with another one everything 
 STAMPED = ("", SUMMARY, MANIFEST, f"{ARRAYS}/heading_samples.parquet")  # "": the folder, whose time its names change
 MOST_LISTED = 20_000  # flights: of more there is no index.json of rows, fleet.parquet or page with each of them
 MOST_READ_HERE = 300  # flights, by the process that leads a run
-_VERSION_DIGEST = blake2b(VERSION.encode(), digest_size=32).digest()
+_VERSION = int.from_bytes(blake2b(VERSION.encode(), digest_size=8).digest(), "big")
 
 
 class Key(NamedTuple):
@@ -63,18 +63,22 @@ class Scan:
         The others, in order.
     others : tuple of str
         Folders of sessions and plans.
-    months : frozenset of str
-        Those that the dataset has.
+    months : mapping
+        How many flights the dataset has of each of its months.
     """
 
     out: Path
     fresh: Mapping[str, Key]
     stale: tuple[str, ...]
     others: tuple[str, ...]
-    months: frozenset[str]
+    months: Mapping[str, int]
 
     def __len__(self) -> int:
         return len(self.fresh) + len(self.stale)
+
+    def with_sessions(self, names: Iterable[str]) -> "Scan":
+        """The same with session folders that were made since."""
+        return replace(self, others=tuple(sorted({*self.others, *names})))
 
     @property
     def sessions(self) -> list[Path]:
@@ -120,8 +124,8 @@ def month_of(flight_id: str) -> str:
 
 def scan(out: Path) -> Scan:
     """Look at the flight folders of an OUT and at the dataset: of a known flight only times and sizes are asked for."""
-    months = {path.stem for path in (out / FLIGHTS).glob("*.parquet")}
-    keys = {key.flight_id: key for month in sorted(months) for key in _keys(out, month)}
+    by_month = {path.stem: _keys(out, path.stem) for path in sorted((out / FLIGHTS).glob("*.parquet"))}
+    keys = {key.flight_id: key for found in by_month.values() for key in found}
     fresh: dict[str, Key] = {}
     stale: list[str] = []
     others: list[str] = []
@@ -131,7 +135,7 @@ def scan(out: Path) -> Scan:
             fresh[name] = key
         elif stamp is not None:
             (stale if is_flight(out / name) else others).append(name)
-    return Scan(out, fresh, tuple(stale), tuple(others), frozenset(months))
+    return Scan(out, fresh, tuple(stale), tuple(others), {month: len(found) for month, found in by_month.items()})
 
 
 def _folder_names(out: Path) -> list[str]:
@@ -153,7 +157,7 @@ def stamp_of(out: Path, name: str) -> int | None:
             if file == SUMMARY:
                 return None
             told += [0, -1]
-    return int.from_bytes(blake2b(repr(told).encode(), digest_size=8, key=_VERSION_DIGEST).digest(), "big", signed=True)
+    return hash((_VERSION, *told))  # of whole numbers: the same in every process
 
 
 @dataclass(frozen=True)
@@ -201,13 +205,15 @@ def refresh(out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, .
     if problems:
         return scan(out), problems
     keys = {name: before.fresh[name] for name in fresh}
+    months = dict(before.months)
     for job in jobs:
-        keys |= {key.flight_id: key for key in _keys(out, job.month)}
+        written = {key.flight_id: key for key in _keys(out, job.month)}
+        keys, months[job.month] = keys | written, len(written)
     keys = {name: keys[name] for name in before.names if name in keys}
     unread = tuple(name for name in before.names if name not in keys)
     expected = {key.samples for key in keys.values()}
     samples.remove(name for name in there - expected if Path(name).stem not in unread)
-    return Scan(out, keys, unread, before.others, before.months | {job.month for job in jobs}), ()
+    return Scan(out, keys, unread, before.others, months), ()
 
 
 def _jobs(before: Scan, fresh: set[str]) -> Iterator[MonthJob]:
@@ -216,9 +222,8 @@ def _jobs(before: Scan, fresh: set[str]) -> Iterator[MonthJob]:
     read: dict[str, list[str]] = {}
     for name in before.names:
         (kept if name in fresh else read).setdefault(month_of(name), []).append(name)
-    for month in sorted(before.months | set(read)):
-        is_short = len(_keys(before.out, month)) != len(kept.get(month, ()))
-        if month in read or is_short:
+    for month in sorted({*before.months, *read}):
+        if month in read or before.months.get(month) != len(kept.get(month, ())):
             yield MonthJob(before.out, month, frozenset(kept.get(month, ())), tuple(read.get(month, ())))
 
 
@@ -283,8 +288,11 @@ def _chosen(table: Any, keys: Iterable[str]) -> Any:
     """The rows of some flights, in the order of their ids."""
     import numpy as np
 
-    places = {name: place for place, name in enumerate(table.column("flight_id").to_pylist())}
-    return table.take(np.array([places[name] for name in sorted(keys) if name in places], dtype=np.int64))
+    wanted, names = sorted(keys), table.column("flight_id").to_pylist()
+    if names == wanted:
+        return table
+    places = {name: place for place, name in enumerate(names)}
+    return table.take(np.array([places[name] for name in wanted if name in places], dtype=np.int64))
 
 
 def _key_path(out: Path, month: str) -> Path:
@@ -298,16 +306,9 @@ def _keys(out: Path, month: str) -> list[Key]:
     try:
         with pq.ParquetFile(_key_path(out, month)) as file:
             table = file.read()
-        return list(map(Key, *(_plain(table.column(name)) for name in Key._fields)))
+        return list(map(Key, *(table.column(name).to_pylist() for name in Key._fields)))
     except (OSError, ValueError, KeyError):
         return []
-
-
-def _plain(column: Any) -> list[Any]:
-    import pyarrow as pa
-
-    values: list[Any] = column.to_pylist()
-    return [one.decode("utf-8", "surrogatepass") for one in values] if pa.types.is_binary(column.type) else values
 
 
 def key_of(share: FlightShare, stamp: int) -> Key:
@@ -316,18 +317,18 @@ def key_of(share: FlightShare, stamp: int) -> Key:
     duration_s = row["duration_s"]
     is_timed = start_ns is not None and duration_s == duration_s
     end_ns = start_ns + round(duration_s * NS_PER_S) if is_timed else None
-    hears = "\n".join(share.hears)
-    name, sha256 = row["flight_id"], str(share.index.sha256)
-    return Key(name, stamp, share.path, sha256, share.link_name, hears, start_ns, end_ns, share.samples)
+    path, name, hears = map(utf8_text, (share.path, share.link_name, "\n".join(share.hears)))
+    sha256 = str(share.index.sha256)
+    return Key(row["flight_id"], stamp, path, sha256, name, hears, start_ns, end_ns, share.samples)
 
 
 def _key_table(by_id: Mapping[str, Key]) -> Any:
     import pyarrow as pa
 
-    def array(name: str, values: Sequence[Any]) -> Any:
-        if name in ("stamp", "start_ns", "end_ns"):
-            return pa.array(values, pa.int64())
-        return pa.array([one.encode("utf-8", "surrogatepass") for one in values], pa.binary())  # names of files
-
+    numbers = ("stamp", "start_ns", "end_ns")
     columns = zip(*(by_id[name] for name in sorted(by_id)), strict=True)
-    return pa.table({name: array(name, values) for name, values in zip(Key._fields, columns, strict=True)})
+    arrays = {
+        name: pa.array(values, pa.int64() if name in numbers else pa.string())
+        for name, values in zip(Key._fields, columns, strict=True)
+    }
+    return pa.table(arrays)

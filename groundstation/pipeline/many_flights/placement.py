@@ -13,6 +13,7 @@ from groundstation.pipeline.many_flights.remote import is_remote
 from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.file_names import MANIFEST
+from groundstation.results.files import utf8_text
 
 
 @dataclass(frozen=True)
@@ -106,14 +107,14 @@ class Placement:
         """
         flights = [outcome for outcome in self._outcomes.values() if outcome.flight_id]
         now = {outcome.sha256: outcome.flight_id for outcome in flights}
-        versions = {(_place_of(outcome), plain_id(outcome.flight_id, outcome.sha256)) for outcome in flights}
+        versions = {(utf8_text(_place_of(one)), plain_id(one.flight_id, one.sha256)) for one in flights}
         old = []
         for name in found.names:
             known = found.fresh.get(name)
             origin = _origin_of(found.out / name) if known is None else _Origin(known.path, known.sha256)
             if origin is None or now.get(origin.sha256) == name:
                 continue
-            if origin.sha256 in now or (origin.path, plain_id(name, origin.sha256)) in versions:
+            if origin.sha256 in now or (utf8_text(origin.path), plain_id(name, origin.sha256)) in versions:
                 old.append(name)
         for name in old:
             with suppress(OSError, GroundstationError):  # the next run tries again
