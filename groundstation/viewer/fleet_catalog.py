@@ -17,6 +17,7 @@ from groundstation.base.errors import GroundstationError
 from groundstation.viewer.catalog_table import save_flight_table
 from groundstation.viewer.fleet import FLEET, FLIGHTS_TEXT
 from groundstation.viewer.recording import open_stream
+from groundstation.viewer.verification import damaged
 
 FLIGHTS, SESSIONS = "flights", "sessions"
 VIEWS = "/view/"  # where a layout keeps its views
@@ -110,9 +111,10 @@ def reachable(url: str) -> str:
 
 def _register(dataset: DatasetEntry, paths: Sequence[Path]) -> tuple[dict[str, Path], list[tuple[Path, str]]]:
     """Register recordings, those at fault left out: segment ids with their files, files refused with the reason."""
-    by_uri = {path.absolute().as_uri(): path for path in paths}
+    faults = damaged(paths)
+    by_uri = {path.absolute().as_uri(): path for path in paths if path not in faults}
     offered: dict[str, Path] = {}
-    refused: list[tuple[Path, str]] = []
+    refused = list(faults.items())
     batches = [list(by_uri)] if by_uri else []
     while batches:
         batch = batches.pop()
