@@ -214,8 +214,6 @@ def _with_dip(readings: Readings, earth: EarthField, settings: MagneticSettings)
     """The fit against a model's field, or the best of all dips."""
     if earth.is_modelled:
         return _solved(readings, earth, settings)
-    from scipy.optimize import minimize_scalar  # half a second, which a log that is only checked need not wait
-
     strength = float(np.hypot(earth.horizontal_nt, earth.down_nt))
 
     def of_dip(dip_deg: float) -> EarthField:
