@@ -9,7 +9,8 @@ from typer.testing import CliRunner
 
 from groundstation.base.errors import SettingsError, UsageError
 from groundstation.base.findings import Finding
-from groundstation.chapters.acceptance import front, sections
+from groundstation.chapters.acceptance import sections
+from groundstation.chapters.acceptance_front import front
 from groundstation.cli.main import app
 from groundstation.estimators.fleet.acceptance import CORRELATION_CONFIDENCE, judge
 from groundstation.estimators.fleet.confidence import (
@@ -40,10 +41,10 @@ def flights_of(rates: list[float], units: list[str] | None = None, hours: float 
 def test_59_flights_with_none_over_are_enough_and_58_are_not() -> None:
     """Order statistics: 1 - 0.95^59 = 0.9515, 1 - 0.95^58 = 0.9490."""
     enough = judge(flights_of([1.0] * 58 + [1.9]), LIMIT, Standard("s", "t"))
-    assert enough.decision == "pass" and enough.bound95 == pytest.approx(0.95)
+    assert enough.decision == "pass" and enough.share_bound == pytest.approx(0.95)
     assert enough.share_low == pytest.approx(0.05 ** (1 / 59), abs=1e-9)
     short = judge(flights_of([1.0] * 58), LIMIT, Standard("s", "t"))
-    assert short.decision == "not enough flights" and short.more_with_none_over == 1 and short.bound95 is None
+    assert short.decision == "not enough flights" and short.more_with_none_over == 1 and short.share_bound is None
 
 
 def test_one_over_asks_for_93_and_many_over_fail() -> None:
@@ -73,7 +74,7 @@ def test_bound_of_the_share_and_the_decision_agree() -> None:
         count = int(rng.integers(40, 200))
         units = [f"S-{one}" for one in rng.integers(0, max(count // 2, 1), count)]
         one = judge(flights_of(np.exp(0.35 * rng.normal(size=count)).tolist(), units), LIMIT, Standard("s", "t"))
-        assert (one.decision == "pass") == (one.bound95 is not None and one.bound95 <= 1.0)
+        assert (one.decision == "pass") == (one.share_bound is not None and one.share_bound <= 1.0)
         decisions.add(one.decision)
     assert decisions >= {"pass", "not enough flights"}
 

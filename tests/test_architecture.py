@@ -19,7 +19,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "chapters": {"base", "results"},
     "estimators": {"base", "tables", "results"},
     "simulation": {"base", "tables", "readers"},
-    "studies": {"base", "tables", "results", "estimators", "simulation"},
+    "studies": {"base", "tables", "results", "chapters", "estimators", "simulation"},
     "viewer": {"base", "tables", "results", "chapters"},
     "reports": {"base", "tables", "results", "chapters"},
     "exports": {"base", "readers", "tables", "results"},

@@ -27,12 +27,11 @@ from groundstation.estimators.fleet.moments import moments_of
 from groundstation.estimators.fleet.skill import SkillMerger, SkillOfFlight
 from groundstation.pipeline.many_flights.fleet import gather
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
-from groundstation.pipeline.many_flights.fleet_rows import flights_table
-from groundstation.reports.fleet import densities
+from groundstation.reports.fleet import densities, flights
 from groundstation.reports.fleet_report import MOST_ROWS_ON_PAPER, PAGE, write_fleet_report
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import FleetResults, NotInFleet
-from tests.fleet_example import DAY_NS, START_NS, save_flight, skill
+from tests.fleet_example import DAY_NS, START_NS, flights_table, save_flight, skill
 from tests.test_fleet_statistics import EMPTY
 from tests.test_reports import HOSTILE, Page
 
@@ -172,6 +171,18 @@ def html(usual: FleetResults, tmp_path_factory: pytest.TempPathFactory) -> str:
     out = tmp_path_factory.mktemp("fleet")
     page_of(out, usual)
     return (out / PAGE).read_text(encoding="utf-8")
+
+
+def test_the_table_of_a_large_fleet_has_what_is_of_note_and_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    fleet = fleet_of(40)
+    noted = {name for name, marks in flights.remarks_of(fleet).items() if any(one.tone != "plain" for one in marks)}
+    assert 0 < len(noted) < 12 and len(flights.lines(fleet)) == 40 and flights.caption_of(fleet) == flights.CAPTION
+    monkeypatch.setattr(flights, "MOST_LINES", 12)
+    names = [line.cells[0] for line in flights.lines(fleet)]
+    assert len(names) == 12 and noted <= set(names) and names == sorted(names)
+    others = [name for name in fleet.flights["flight_id"].tolist() if name not in noted]
+    assert set(names) - noted == set(others[len(noted) - 12 :])
+    assert "12 of 40 flights: those of note" in flights.caption_of(fleet)
 
 
 def test_every_flight_has_a_row_with_its_figures(usual: FleetResults, html: str) -> None:

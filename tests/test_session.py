@@ -35,6 +35,7 @@ from tests.session_example import SEED, SHORT, simulated
 
 IDENTITY = "20180305T120000Z_session_A-B-C"
 SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
+EPOCHS = round(SHORT.duration_s) + 1  # of a second each
 SAME_M = 0.01  # what 0.1 mm and 0.01 mm/s of the logs, and 0.1 mm of a range, leave of positions
 
 
@@ -357,7 +358,7 @@ def test_the_recording_has_both_timelines_and_every_aircraft(contents: Contents)
     assert contents.timelines == {"utc", "flight_time"}
     for name in "ABC":
         for entity in (f"/space/{name}/now", f"/space/{name}/ellipsoid", f"/cooperative/errors/{name}/a_band"):
-            assert sum(batch.num_rows for batch in contents.batches[entity]) == 31, entity
+            assert sum(batch.num_rows for batch in contents.batches[entity]) == EPOCHS, entity
         assert f"/space/{name}/track" in contents.fixed
     assert "/space/stations" in contents.fixed
 
@@ -388,7 +389,7 @@ def test_ellipsoids_are_those_of_two_sigma(contents: Contents, results: FlightRe
 def test_links_are_drawn_at_every_second_and_have_lanes(contents: Contents, answer: CooperativeResult) -> None:
     strips = contents.batches["/space/links"]
     rows = [len(row) for batch in strips for row in batch.column("LineStrips3D:strips").to_pylist()]
-    assert len(rows) == 31
+    assert len(rows) == EPOCHS
     assert set(rows[:-1]) == {len([row for row in answer.links if row.kind != "satellite"])}
     assert rows[-1] == 0, "behind the last range nothing is drawn"
     assert len([entity for entity in contents.batches if entity.startswith("/cooperative/links/")]) == 12

@@ -368,10 +368,10 @@ def test_logs_that_do_not_overlap_and_a_peer_without_a_log(
     copied: Path, configuration: Configuration, tmp_path: Path
 ) -> None:
     def begin(_heads: list[str], rows: Rows) -> None:
-        rows[:] = [row for row in rows if float(row[0]) < 10.0]
+        rows[:] = [row for row in rows if float(row[0]) < 6.0]
 
     def end(_heads: list[str], rows: Rows) -> None:
-        rows[:] = [row for row in rows if float(row[0]) > 20.0]
+        rows[:] = [row for row in rows if float(row[0]) > 14.0]
 
     (copied / "example-C.csv").unlink()
     edited(copied / "example-A.csv", begin)

@@ -37,7 +37,7 @@ def acceptance(
     out: Path, standard: str, output: Path | None, fail_on: FailOnMode, *, with_pdf: bool, quiet: bool, json: bool
 ) -> int:
     """Write the acceptance of the INS of a folder and print its front; 4 where ``fail_on`` is reached."""
-    from groundstation.chapters.acceptance import front
+    from groundstation.chapters.acceptance_front import front
     from groundstation.chapters.wording import NARROW_SPACE
     from groundstation.cli.text import as_json, printable
     from groundstation.pipeline.many_flights.acceptance import accept_to

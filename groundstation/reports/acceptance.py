@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from groundstation.chapters import acceptance as chapters
+from groundstation.chapters.acceptance_front import front
 from groundstation.chapters.parts import Document, Figure, Part, Section
+from groundstation.chapters.wording import percent
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -36,7 +38,7 @@ def write_acceptance_report(page: Path, found: Acceptance, *, with_pdf: bool = T
 def acceptance_document(found: Acceptance) -> Document:
     """Put the report of an acceptance together, its figures drawn."""
     sections = tuple(_drawn(section, found) for section in chapters.sections(found))
-    return Document(ACCEPTANCE, f"{ACCEPTANCE} {found.name}", chapters.front(found), sections)
+    return Document(ACCEPTANCE, f"{ACCEPTANCE} {found.name}", front(found), sections)
 
 
 def _drawn(section: Section, found: Acceptance) -> Section:
@@ -98,7 +100,7 @@ def _rates(found: Acceptance) -> Part:
     flights = sorted(found.included, key=lambda flight: flight.values[RATE])
     rate = np.array([flight.values[RATE] for flight in flights])
     share = np.arange(1, len(rate) + 1) / len(rate)
-    limits = found.standard.limits
+    limits = _single(found, RATE)
     over = np.array(
         [
             any(one.is_for(flight.hours) and (one.part(flight.values) or 0.0) > 1.0 for one in limits)
@@ -110,14 +112,15 @@ def _rates(found: Acceptance) -> Part:
         axes = layout.place(figure, 16, 12, 174, 64)
         d.line(axes, rate, share, d.INS, 0.6, drawstyle="steps-post")
         d.dots(axes, rate[~over], share[~over], d.USED, 3.4, label="within")
-        d.dots(axes, rate[over], share[over], d.GNSS, 3.4, label="over a limit")
-        for limit in _single(found, RATE):
+        d.dots(axes, rate[over], share[over], d.GNSS, 3.4, label="over")
+        for limit in limits:
             layout.limit_line(axes, limit.bounds[0].at_most, d.label(f"limit: {limit.title}"), vertical=True)
             layout.limit_line(axes, limit.share, "", colour=d.FAINT)
         for one in found.judgements:
-            if one.ins == ENSEMBLE and one.bound95 is not None and found.limit(one.limit) in _single(found, RATE):
-                bound = one.bound95 * found.limit(one.limit).bounds[0].at_most
-                layout.limit_line(axes, bound, "95 % stay below", vertical=True, colour=d.INK)
+            limit = found.limit(one.limit)
+            if one.ins == ENSEMBLE and one.share_bound is not None and limit in limits:
+                bound, told = one.share_bound * limit.bounds[0].at_most, f"{percent(limit.share)} stay below"
+                layout.limit_line(axes, bound, told, vertical=True, colour=d.INK)
         axes.set_xlim(left=0.0)
         axes.set_ylim(0.0, 1.03)
         axes.set_xlabel("radial error rate by time-position fit, nmi/h")

@@ -203,7 +203,7 @@ class Judgement:
         One-sided limits of the share of flights within, each at the confidence of the standard.
     share_low_these : float
         ``share_low`` if only these INS are meant: their flights taken as independent.
-    bound95 : float or None
+    share_bound : float or None
         Upper limit, at that confidence, of what the share asked for stays below: an order statistic of the flights,
         as a part of the limit; None where there are too few flights for any.
     more_with_none_over : int
@@ -225,7 +225,7 @@ class Judgement:
     share_low: float
     share_high: float
     share_low_these: float
-    bound95: float | None
+    share_bound: float | None
     more_with_none_over: int
     more_at_present_share: int | None
     accuracy_ratio: float | None

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path, PurePath
 
 from groundstation.base.errors import UnclaimedLogError, UsageError
+from groundstation.pipeline.many_flights.fleet_store import Scan, refresh, scan
 from groundstation.pipeline.many_flights.found_sessions import (
     STATIONS_TOML,
     Asked,
@@ -17,7 +18,8 @@ from groundstation.pipeline.many_flights.found_sessions import (
     find_sessions,
     run_sessions,
 )
-from groundstation.pipeline.many_flights.inputs import collect, flight_folders, is_ours, session_folders
+from groundstation.pipeline.many_flights.inputs import collect, is_ours, session_folders
+from groundstation.pipeline.many_flights.known_flights import KnownFlights
 from groundstation.pipeline.many_flights.out_folder import alone_in, clear_unfinished, prepare, refuse_foreign
 from groundstation.pipeline.many_flights.output import LocalOutput, RemoteOutput
 from groundstation.pipeline.many_flights.placement import Placement
@@ -31,7 +33,6 @@ from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
-from groundstation.pipeline.one_flight.resume import Finished, finished_flights
 
 PLANS: Mapping[str, str] = {
     "everything": "to run",
@@ -100,7 +101,8 @@ def run_many(
         ]
         return _run_remote(remote, asked, crew, force, listen)
     near = [make(Path(one.url), Path(out), is_named=one.is_named) for one in inputs]
-    return _run_here(near, asked, crew, force, listen)
+    refresher = _crew(scheduler, jobs or cores(), TASKS_PER_PROCESS + 1, listen)
+    return _run_here(near, asked, crew, force, listen, refresher)
 
 
 def run_together(
@@ -145,12 +147,14 @@ def run_together(
         return _run_here([job], asked, partial(in_turn, listen=listen), force, listen)
 
 
-def _run_here(work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen: Listener) -> tuple[Outcome, ...]:
+def _run_here(
+    work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen: Listener, refresher: Crew | None = None
+) -> tuple[Outcome, ...]:
     out = asked.out
     refuse_foreign(out, force)
     with alone_in(out):
         prepare(out)
-        known = {} if asked.redo else finished_flights(flight_folders(out))
+        known = KnownFlights(None if asked.redo else scan(out))
         placement = Placement(LocalOutput(out), [job.log for job in work])
 
         def left() -> Iterator[tuple[int, Job]]:
@@ -166,16 +170,25 @@ def _run_here(work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen
 
         _run_into(placement, out, left(), run_flight, suffixed, crew, listen)
         clear_unfinished(out)  # of processes that died or took too long
-        sessions = _run_sessions(placement, asked, crew, listen)
+        found, unwritten = _swept(placement, out, refresher)
+        sessions = _run_sessions(placement, asked, found, crew, listen)
         outcomes = (*placement.outcomes(), *sessions)
-        return (*outcomes, *write_beside(out, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results))
+        found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
+        problems = write_beside(out, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found)
+        return (*outcomes, *unwritten, *problems)
 
 
-def _run_sessions(placement: Placement, asked: Asked, crew: Crew, listen: Listener) -> tuple[Outcome, ...]:
+def _swept(placement: Placement, out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, ...]]:
+    """Bring the dataset of flights up to date, flights that these logs have no longer being removed."""
+    found, unwritten = refresh(out, crew)
+    return refresh(out) if placement.sweep(found) else (found, unwritten)
+
+
+def _run_sessions(placement: Placement, asked: Asked, among: Scan, crew: Crew, listen: Listener) -> tuple[Outcome, ...]:
     """Run the sessions among the flights that are in place; interrupted, the index at least is written."""
     flights = placement.outcomes()
     try:
-        found = find_sessions(asked, {one.flight_id for one in flights if one.flight_id})
+        found = find_sessions(asked, among, {one.flight_id for one in flights if one.flight_id})
         if found.jobs:
             listen(Event("begin", total=len(flights) + len(found.jobs)))
         return run_sessions(found, crew, listen)
@@ -200,9 +213,14 @@ def _run_remote(
             is_whole = False
             try:
                 _run_into(placement, copy, _once(work, placement, crew, listen), run_remote, suffixed, crew, listen)
-                sessions = _run_remote_sessions(placement, output, asked, listen)
+                found, unwritten = _swept(placement, copy)
+                sessions = _run_remote_sessions(placement, output, asked, found, listen)
                 outcomes = (*placement.outcomes(), *sessions)
-                problems = write_beside(copy, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results)
+                found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
+                beside = write_beside(
+                    copy, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found
+                )
+                problems = (*unwritten, *beside)
                 is_whole = True
             finally:
                 lease.require()
@@ -234,12 +252,12 @@ def _once(
 
 
 def _run_remote_sessions(
-    placement: Placement, output: RemoteOutput, asked: Asked, listen: Listener
+    placement: Placement, output: RemoteOutput, asked: Asked, among: Scan, listen: Listener
 ) -> tuple[Outcome, ...]:
     """Run the sessions in the copy of an OUT elsewhere, in this process, where the MCAPs are fetched to."""
     before = session_folders(output.root)
     here = replace(asked, out=output.root, mcap_in=output.mcap_in)
-    outcomes = _run_sessions(placement, here, partial(in_turn, listen=listen), listen)
+    outcomes = _run_sessions(placement, here, among, partial(in_turn, listen=listen), listen)
     sent = []
     for outcome in outcomes:
         if outcome.folder:
@@ -271,7 +289,6 @@ def _run_into(
             with closing(crew(((number, suffixed(number)) for number in clashing), run)) as ended:
                 for number, outcome in ended:
                     placement.put_again(number, outcome)
-        placement.sweep()
     except BaseException:
         write_index_of(out, placement.outcomes())
         raise
@@ -309,7 +326,8 @@ def plan_many(
         raise UsageError("--dry-run", "logs or results elsewhere", "local ones")
     inputs, out = _inputs(paths, out, configuration), Path(out)
     refuse_foreign(out, force=True)
-    known = {} if redo or not out.is_dir() else finished_flights(flight_folders(out))
+    before = scan(out)
+    known = KnownFlights(None if redo else before)
     make = partial(Job, out=out, configuration=configuration, with_pdf=with_pdf, only_results=only_results)
     work = [make(Path(one.url), is_named=one.is_named) for one in inputs]
     outcomes = []
@@ -320,7 +338,7 @@ def plan_many(
             outcomes.append(_planned(job))
     ground = None if stations is None else load_stations(stations)
     asked = Asked(out, configuration, ground, "none", with_pdf, redo, only_results=only_results)
-    return (*outcomes, *_planned_sessions(asked, outcomes))
+    return (*outcomes, *_planned_sessions(asked, before, outcomes))
 
 
 def _planned(job: Job) -> Outcome:
@@ -337,10 +355,10 @@ def _planned(job: Job) -> Outcome:
     return Outcome(job.log, "done", PLANS[job.step])
 
 
-def _planned_sessions(asked: Asked, planned: Sequence[Outcome]) -> list[Outcome]:
+def _planned_sessions(asked: Asked, among: Scan, planned: Sequence[Outcome]) -> list[Outcome]:
     """Sessions among the finished flights; that those of unread logs are looked for, where stations are given."""
     flight_ids = {one.flight_id for one in planned if one.flight_id}
-    found = find_sessions(asked, flight_ids) if flight_ids else FoundSessions()
+    found = find_sessions(asked, among, flight_ids) if flight_ids else FoundSessions()
     sessions = [*map(planned_session, found.jobs), *(one for one in found.told if one.state == "failed")]
     logs = [one for one in planned if one.state == "done"]
     unread = [one.source for one in logs if one.text == PLANS["everything"]]
@@ -365,18 +383,16 @@ def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configu
     return tuple(log for _, log in sorted(found.items()))
 
 
-def _with_steps(jobs: Sequence[Job], known: Mapping[str, Finished]) -> Iterator[tuple[int, Job, int | None]]:
+def _with_steps(jobs: Sequence[Job], known: KnownFlights) -> Iterator[tuple[int, Job, int | None]]:
     """Jobs by number, with what is to be done of each, and the number of an earlier one with the same finished log."""
     first: dict[str, int] = {}
     for number, job in enumerate(jobs):
-        planned = _with_step(job, known) if known else job
+        planned = _with_step(job, known) if len(known) else job
         kept = first.setdefault(planned.finished.sha256, number) if planned.finished else number
         yield number, planned, kept if kept != number else None
 
 
-def _with_step(job: Job, known: Mapping[str, Finished]) -> Job:
+def _with_step(job: Job, known: KnownFlights) -> Job:
     asked = job.asked()
-    if asked is None or asked[0] not in known:
-        return job
-    sha256, keys = asked
-    return job.going_on(known[sha256], keys)
+    found = None if asked is None else known.of(asked[0])
+    return job if asked is None or found is None else job.going_on(found, asked[1])

@@ -168,7 +168,8 @@ class Configuration:
         return settings
 
     def _table(self, name: str, kind: type[S]) -> S:
-        return settings_from(kind, self.tables.get(name, {}), self._file_of(name), name)
+        table = self.tables.get(name)
+        return settings_from(kind, table, self._file_of(name), name) if table else kind()
 
     def _file_of(self, table: str) -> str:
         return self.files.get(table, "settings")

@@ -8,7 +8,7 @@ reports whether there is a PDF.
 import hashlib
 import json
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib import metadata as installed
@@ -158,12 +158,6 @@ def remember_reports(flight: "Finished", *, with_pdf: bool) -> None:
     if manifest.resume is not None:
         keys = replace(manifest.resume.keys, reports=_digest(flight.keys.analysis, with_pdf))
         save_manifest(flight.folder, replace(manifest, resume=replace(manifest.resume, keys=keys)))
-
-
-def finished_flights(folders: Iterable[Path]) -> dict[str, Finished]:
-    """Whole flights among flight folders, by the digest of the log they came from."""
-    found = (finished(folder) for folder in folders)
-    return {one.sha256: one for one in found if one is not None}
 
 
 def finished(folder: Path) -> Finished | None:

@@ -5,6 +5,8 @@ import zlib
 
 _SENTENCE = re.compile(rb"[$!]([A-Z][A-Z0-9]{2,9},[ -#%-)+-~]{0,500})(?:\*([0-9A-Fa-f]{2}))?(?=[\r\n]|$)")
 
+_NOVATEL_TEXT = re.compile(rb"[#%]([A-Z][A-Z0-9_]*A,[ -)+-~]{0,8000};[ -)+-~]{0,8000})\*([0-9A-Fa-f]{8})")
+
 
 def is_sentence(data: bytes, at: int) -> bool:
     """Whether a sentence of NMEA 0183 stands at a place; one without a checksum ends with its line.
@@ -21,6 +23,19 @@ def is_sentence(data: bytes, at: int) -> bool:
     for byte in match[1]:
         total ^= byte
     return match[2] is None or int(match[2], 16) == total
+
+
+def is_novatel_text(data: bytes, at: int) -> bool:
+    """Whether a NovAtel log in text stands at a place, its checksum right.
+
+    Examples
+    --------
+    >>> log = b"#TIMEA,COM1,0,0.0,FINE,2417,1.0;VALID*"
+    >>> is_novatel_text(log + b"%08x" % (zlib.crc32(log[1:-1], 0xFFFFFFFF) ^ 0xFFFFFFFF), 0), is_novatel_text(log, 0)
+    (True, False)
+    """
+    match = _NOVATEL_TEXT.match(data, at)
+    return match is not None and int(match[2], 16) == zlib.crc32(match[1], 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
 def binary_frame_at(data: bytes, at: int) -> bool:

@@ -15,7 +15,7 @@ from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
 from groundstation.base.timescales import gps_week_to_utc_ns
 from groundstation.readers.layout import velocity_from_track
-from groundstation.readers.receiver import scan
+from groundstation.readers.receiver import novatel_text, scan
 from groundstation.readers.receiver.layouts import layout
 from groundstation.readers.receiver.messages import Block, Columns, Messages, occupied
 from groundstation.readers.receiver.novatel_messages import LAYOUTS, VELOCITY_OF, name_of
@@ -97,14 +97,23 @@ def messages_of(frames: Frames) -> Iterator[Timed]:
         number, answer = divmod(key, 2)
         rows = np.flatnonzero((longs["number"] == number) & (is_answer == bool(answer)))
         name = name_of(number) + ("-answer" if answer else "")
-        known = layout(LAYOUTS[name]) if name in LAYOUTS else None
-        yield from _by_size(name, frames, at[rows], at[rows] + header[rows], sizes[rows], known)
+        yield from _by_size(name, frames, at[rows], at[rows] + header[rows], sizes[rows])
+    yield from _of_text(novatel_text.as_binary(frames))
 
 
-def _by_size(
-    name: str, frames: Frames, at: Int64Array, payload_at: Int64Array, sizes: Int64Array, known: Any
-) -> Iterator[Timed]:
+def _of_text(logs: novatel_text.TextLogs | None) -> Iterator[Timed]:
+    """Logs that are text, by name."""
+    if logs is None:
+        return
+    names = np.array(logs.names)
+    for name in np.unique(names).tolist():
+        rows = np.flatnonzero(names == name)
+        yield from _by_size(name, logs.frames, logs.offsets[rows], logs.payload_at[rows], logs.sizes[rows])
+
+
+def _by_size(name: str, frames: Frames, at: Int64Array, payload_at: Int64Array, sizes: Int64Array) -> Iterator[Timed]:
     """Messages with a layout whose payloads are shorter than it apart from the others."""
+    known = layout(LAYOUTS[name]) if name in LAYOUTS else None
     is_short = sizes < (known.size if known is not None else 0)
     for size in (*np.unique(sizes[is_short]).tolist(), None):
         rows = np.flatnonzero(~is_short if size is None else is_short & (sizes == size))
@@ -114,12 +123,18 @@ def _by_size(
 
 def epoch_start(frames: Frames) -> int:
     """Number of the first message of the last epoch in a block, ``len(frames)`` where there is none."""
-    which = frames.of(scan.NOVATEL)
+    which = frames.of(scan.NOVATEL, scan.NOVATEL_TEXT)
     if not len(which):
         return len(frames)
-    week_ms = frames.records(frames.offsets[which], LONG)["week_ms"]
-    earlier = np.flatnonzero(week_ms != week_ms[-1])
-    return int(which[earlier[-1] + 1]) if len(earlier) else int(which[0])
+    week_ms = frames.records(frames.offsets[which], LONG)["week_ms"].astype(np.int64)
+    is_text = frames.kinds[which] == scan.NOVATEL_TEXT
+    last_ms = -1
+    for first in range(len(which) - 1, -1, -1):
+        found = novatel_text.week_ms_of(frames, int(which[first])) if is_text[first] else int(week_ms[first])
+        last_ms = found if last_ms < 0 else last_ms
+        if found != last_ms:
+            return int(which[first + 1])
+    return int(which[0])
 
 
 def gnss_batch(block: Block, leader: str) -> RecordBatch | None:

@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 
 from groundstation.base.compile import in_place, inlined
 
-UBX, NMEA, RTCM, NOVATEL, NOVATEL_SHORT, BARE_NMEA = 1, 2, 3, 4, 5, 6
+UBX, NMEA, RTCM, NOVATEL, NOVATEL_SHORT, BARE_NMEA, NOVATEL_TEXT = 1, 2, 3, 4, 5, 6, 7
 UBX_EXTRA, RTCM_EXTRA, CRC_BYTES = 8, 6, 4
 NOVATEL_SHORT_HEADER = 12
+TEXT_CRC_BYTES = 9  # of a NovAtel log as text: an asterisk and eight digits
+SHORTEST_TEXT = 28  # bytes of such a log, which are those of the binary header
 LONGEST = 66_000  # bytes of the longest frame that any protocol can write
 LONGEST_SENTENCE = 1_024
-DOLLAR, BANG, STAR, COMMA, CR, LF = 36, 33, 42, 44, 13, 10
+DOLLAR, BANG, STAR, COMMA, CR, LF, HASH, PERCENT, SEMICOLON = 36, 33, 42, 44, 13, 10, 35, 37, 59
 NO_FRAME, PENDING = 0, -1
 
 # Places in the state array.
@@ -143,6 +145,29 @@ def _novatel(data: Any, at: int, table: Any) -> int:
 
 
 @in_place
+def _novatel_text(data: Any, at: int, table: Any) -> int:
+    """Length of the NovAtel log in text at a place if its checksum is right."""
+    crc, end, has_body = 0, min(at + LONGEST, len(data)), False
+    for k in range(at + 1, end):
+        byte = data[k]
+        if byte == STAR:
+            if k + TEXT_CRC_BYTES > len(data):
+                return PENDING
+            told, digits = 0, 0
+            for d in range(k + 1, k + TEXT_CRC_BYTES):
+                digit = _hexadecimal(data[d])
+                digits += digit >= 0
+                told = 16 * told + digit
+            is_right = has_body and digits == TEXT_CRC_BYTES - 1 and told == crc
+            return k + TEXT_CRC_BYTES - at if is_right and k + TEXT_CRC_BYTES - at >= SHORTEST_TEXT else NO_FRAME
+        if byte < 32 or byte > 126 or (k == at + 1 and not 65 <= byte <= 90):
+            return NO_FRAME
+        has_body |= byte == SEMICOLON
+        crc = (crc >> 8) ^ table[(crc ^ byte) & 255]
+    return PENDING if end == len(data) else NO_FRAME
+
+
+@in_place
 def _declared(data: Any, at: int) -> int:
     """Length that a binary frame at a place says it has, 0 where none begins."""
     left, byte = len(data) - at, data[at]
@@ -166,6 +191,8 @@ def _frame(data: Any, at: int, bare: bool, rtcm: Any, novatel: Any) -> tuple[int
         if length == NO_FRAME and bare and _is_address(data, at):
             return BARE_NMEA, _bare_sentence(data, at)
         return NMEA, length
+    if byte in (HASH, PERCENT):
+        return NOVATEL_TEXT, _novatel_text(data, at, novatel)
     if byte == 0xD3:
         return RTCM, _rtcm(data, at, rtcm) if left >= RTCM_EXTRA else PENDING
     if byte == 0xAA and left >= 16 and data[at + 1] == 0x44 and (data[at + 2] == 0x12 or data[at + 2] == 0x13):
@@ -176,7 +203,7 @@ def _frame(data: Any, at: int, bare: bool, rtcm: Any, novatel: Any) -> tuple[int
 @in_place
 def is_cut(data: Any, at: int) -> bool:
     """Whether a frame begins at a place that the end of the data cuts off."""
-    if data[at] == DOLLAR or data[at] == BANG:
+    if data[at] == DOLLAR or data[at] == BANG or data[at] == HASH or data[at] == PERCENT:
         is_text = True
         for k in range(at + 1, len(data)):
             is_text &= 32 <= data[k] <= 126

@@ -216,9 +216,9 @@ def leads_on(data: Any, at: int, end: int, least: Any, most: Any) -> bool:
         strength = _strength(data, at, end, least, most)
         stop = at + 3 + _u16(data, at)
         if strength == NONE and data[at + 2] != 0x44 and _is_known_type(data[at + 2]):
-            return end < stop <= at + LONGEST_WEAK  # cut by the end
+            return bool(end < stop <= at + LONGEST_WEAK)  # cut by the end
         if strength != WEAK:
-            return strength == STRONG or _is_cut(data, at, end, least, most)
+            return bool(strength == STRONG or _is_cut(data, at, end, least, most))
         if stop - at > LONGEST_STEP or _swallows(data, at + 3, stop, least, most):
             return False
         at = stop
