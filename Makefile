@@ -6,8 +6,12 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 RUNTIME := $(VENV)/.runtime
 DEV     := $(VENV)/.dev
+# Bytecode is kept: the tests start hundreds of processes. pip would make it on one processor; for the demo it comes with
+# the first import, for the tests from all processors at once, as warnings while they import are errors.
+PIP     := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check slow fuzz schemas bench clean help
+.PHONY: demo test check slow fuzz schemas bench lock newest sbom clean help
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -18,11 +22,12 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(RUNTIME): pyproject.toml | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	$(PIP) -e .
 	@touch $@
 
 $(DEV): pyproject.toml | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	$(PIP) -e '.[dev]'
+	@$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib || true
 	@touch $@ $(RUNTIME)
 
 demo: $(RUNTIME) ## run the main job on sample_logs/ into demo_results/
@@ -51,8 +56,32 @@ schemas: $(DEV) ## make the package's descriptor set from schemas/*.proto, schem
 	$(BIN)/python -m groundstation.pipeline.verbs.schema schemas/summary.schema.json
 
 bench: $(RUNTIME) ## benchmarks against peers, printed as ratios
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[bench]'
+	$(PIP) -e '.[bench]'
 	for file in benchmarks/bench_*.py; do $(BIN)/python $$file || exit 1; done
+
+TOOLS := build/tools
+COMPILE := $(TOOLS)/bin/uv pip compile pyproject.toml --universal --python-version 3.11 --no-emit-index-url --quiet
+
+$(TOOLS)/.made: | $(BIN)/python
+	$(BIN)/python -m venv $(TOOLS)
+	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check 'uv>=0.9,<1' 'cyclonedx-bom>=7,<8'
+	@touch $@
+
+lock: $(TOOLS)/.made ## requirements.lock: the newest versions that the ranges and the tests allow, with hashes
+	$(COMPILE) --all-extras --output-file build/everything.txt
+	$(COMPILE) --constraint build/everything.txt --generate-hashes --no-annotate --upgrade \
+		--custom-compile-command 'make lock' --output-file requirements.lock
+
+newest: ## the suite against the newest versions of everything, upper limits of the ranges left out
+	$(PYTHON) .ci/newest $(VENV)-newest
+
+sbom: $(TOOLS)/.made ## dist/groundstation.cdx.json: what requirements.lock installs, with licences (CycloneDX)
+	$(TOOLS)/bin/uv venv --quiet --clear --python $(BIN)/python build/locked
+	$(TOOLS)/bin/uv pip install --quiet --python build/locked --require-hashes -r requirements.lock
+	$(TOOLS)/bin/uv pip install --quiet --python build/locked --no-deps .
+	mkdir -p dist
+	$(TOOLS)/bin/cyclonedx-py environment build/locked/bin/python --pyproject pyproject.toml --output-reproducible \
+		--of JSON -o dist/groundstation.cdx.json
 
 clean: ## remove what the targets made
 	rm -rf $(VENV) demo_results .mypy_cache .ruff_cache .pytest_cache build dist

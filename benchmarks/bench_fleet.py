@@ -1,16 +1,20 @@
 """Many flights: one and two worker processes, a Dask cluster beside them, memory of a worker, killed runs continued.
 
-``bench_fleet.py [FLIGHTS]``, 500 without it. Wall seconds; other programs slow all of them.
+``bench_fleet.py [FLIGHTS]``, 500 without it; ``bench_fleet.py FLIGHTS stages`` tells what one process spends on a
+flight, by stage, with everything and with results alone. Wall seconds; other programs slow all of them.
 """
 
 import filecmp
 import os
 import random
+import re
+import resource
 import signal
 import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -23,6 +27,7 @@ COMMAND = [sys.executable, "-m", "groundstation"]
 FLIGHTS, DAMAGED_SHARE, AIRCRAFT = 500, 0.03, 5
 SCENARIOS = ("taxi-good", "taxi-short", "taxi-drift")
 KILLS, FLIGHTS_KILLED = 10, 20
+STAGE = re.compile(r"([a-z][a-zA-Z ]+) ([0-9.]+) s")
 IDENTICAL = {".html", ".pdf", ".csv"}
 IDENTICAL_NAMES = {"summary.json", "index.json"}
 
@@ -70,6 +75,22 @@ def timed(arguments: list[str]) -> tuple[float, float, str]:
         seconds = time.perf_counter() - started
         told.seek(0)
         return seconds, peak / 1e6, told.read().decode().strip().splitlines()[-1]
+
+
+def stages(logs: Path, root: Path, flights: int) -> None:
+    """Print seconds a flight by stage, and processor seconds a flight of the whole process, on one core."""
+    for name, more in (("everything", []), ("results alone", ["--only", "results"])):
+        command = [*COMMAND, "run", str(logs), "-o", str(root / name[:3]), "-j", "1", "-v", *more]
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        done = subprocess.run(command, check=False, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        processor_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        spent: Counter[str] = Counter()
+        for line in done.stderr.splitlines():
+            if line.startswith("  "):
+                spent.update({stage: float(seconds) for stage, seconds in STAGE.findall(line)})
+        told = ", ".join(f"{stage} {seconds / flights:.3f}" for stage, seconds in spent.items())
+        print(f"{name}: {processor_s / flights:.2f} s of processor time a flight; by the clock {told}", flush=True)
 
 
 def largest_bytes(process: psutil.Process) -> int:
@@ -120,6 +141,9 @@ def main() -> None:
         root = Path(folder)
         size = make_logs(root / "logs", flights)
         print(f"{flights} flights, {size / 1e6:.0f} MB, {DAMAGED_SHARE:.0%} damaged", flush=True)
+        if sys.argv[2:] == ["stages"]:
+            stages(root / "logs", root, flights)
+            return
         seconds = {}
         for jobs in (1, 2):
             arguments = ["run", str(root / "logs"), "-o", str(root / f"j{jobs}"), "-j", str(jobs)]

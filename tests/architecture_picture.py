@@ -5,6 +5,7 @@ says the same.
 """
 
 import ast
+from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1] / "groundstation"
@@ -13,13 +14,19 @@ WIDTH, BOX, HEIGHT, GAP, ROW = 900, 116, 34, 18, 92
 INK, LINE, FILL = "#1c2530", "#8d97a3", "#d3e7f5"
 
 
+@cache
+def import_nodes(path: Path) -> tuple[ast.Import | ast.ImportFrom, ...]:
+    """The imports of a file, inside functions too."""
+    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    return tuple(node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom))
+
+
 def imports_between_rooms() -> set[tuple[str, str]]:
     """Which room imports which."""
     found: set[tuple[str, str]] = set()
     for path in sorted(PACKAGE.glob("*/**/*.py")):
         room = path.relative_to(PACKAGE).parts[0]
-        nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        names = [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
+        names = [node.module or "" for node in import_nodes(path) if isinstance(node, ast.ImportFrom)]
         parts = [name.split(".") for name in names if name.startswith("groundstation.")]
         found |= {(room, part[1]) for part in parts if part[1] != room}
     return found

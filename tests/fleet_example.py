@@ -1,6 +1,6 @@
 """Folders of flights for the tests of the fleet: saved results with plausible figures, made without logs."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -10,6 +10,8 @@ import numpy as np
 
 from groundstation.base.timescales import utc_ns_to_stamp
 from groundstation.base.units import NS_PER_S
+from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
+from groundstation.results.figures import FigureData
 from groundstation.results.files import save
 from groundstation.results.forecast import ForecastResult, SkillRow
 from groundstation.results.heading import HeadingResult
@@ -17,6 +19,13 @@ from tests.report_example import MANIFEST, example, figure, heading_result
 
 START_NS = 1_777_874_400_000_000_000  # 2026-05-04T06:00:00Z
 DAY_NS = 86_400 * NS_PER_S
+
+
+def flights_table(columns: Mapping[str, Sequence[Any]]) -> FigureData:
+    """The table of flights from lists of typed values."""
+    kinds = {"number": np.float64, "count": np.float64, "flag": np.bool_, "time": "datetime64[ns]"}
+    found = {one.name: np.array(columns[one.name], dtype=kinds.get(one.kind, np.str_)) for one in FLIGHT_COLUMNS}
+    return FigureData("flights", found, {})
 
 
 @cache

@@ -21,7 +21,7 @@ from tests.cooperative_example import GLOBAL, LOCAL, POINTS
 
 SEED = 9100
 WITH_POINTS = replace(GLOBAL, points=POINTS)
-SHORT = replace(WITH_POINTS, duration_s=30.0)
+SHORT = replace(WITH_POINTS, duration_s=20.0)
 
 
 @cache

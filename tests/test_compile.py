@@ -1,6 +1,7 @@
 """Compiled loops: the answers of the plain functions, kept as machine code that needs no numba to be found again."""
 
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -130,6 +131,23 @@ def test_numbers_that_the_machine_code_does_not_take_are_never_misread(kept_here
     assert sign(2**63) == 1.0 and sign(np.uint64(2**64 - 1)) == 1.0 and sign(np.bool_(True)) == 1.0
     assert forms_of((np.zeros(3).astype(np.dtype("f8").newbyteorder()),)) is None
     assert not list(kept_here.glob("*.machine_code"))
+
+
+def test_an_array_that_is_only_read_may_be_read_only_and_one_that_is_written_may_not(kept_here: Path) -> None:
+    table, out = np.ones((2, 2), np.int64), np.zeros(2)
+    table.flags.writeable = False
+    assert total(table, 0, out) == 4 * WEIGHT and out.tolist() == [2.0, 2.0]
+    out.flags.writeable = False
+    with pytest.raises(Exception, match="readonly"):
+        total(table, 0, out)
+    assert out.tolist() == [2.0, 2.0]
+    highs = np.full(4, 9.0)
+    highs.flags.writeable = False
+    assert inside(highs - 1.0, Limits(2.0, highs, (1,))) == 4
+
+
+def test_a_loop_is_pickled_by_its_name(kept_here: Path) -> None:
+    assert pickle.loads(pickle.dumps(total)) is total
 
 
 def test_kept_code_is_found_without_numba(tmp_path: Path) -> None:

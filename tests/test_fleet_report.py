@@ -27,12 +27,11 @@ from groundstation.estimators.fleet.moments import moments_of
 from groundstation.estimators.fleet.skill import SkillMerger, SkillOfFlight
 from groundstation.pipeline.many_flights.fleet import gather
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
-from groundstation.pipeline.many_flights.fleet_rows import flights_table
-from groundstation.reports.fleet import densities
+from groundstation.reports.fleet import densities, flights
 from groundstation.reports.fleet_report import MOST_ROWS_ON_PAPER, PAGE, write_fleet_report
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import FleetResults, NotInFleet
-from tests.fleet_example import DAY_NS, START_NS, save_flight, skill
+from tests.fleet_example import DAY_NS, START_NS, flights_table, save_flight, skill
 from tests.test_fleet_statistics import EMPTY
 from tests.test_reports import HOSTILE, Page
 
@@ -145,10 +144,11 @@ def page_of(out: Path, fleet: FleetResults) -> Page:
     return Page((out / PAGE).read_text(encoding="utf-8"))
 
 
-def paper_of(out: Path, fleet: FleetResults) -> str:
+def page_and_paper_of(out: Path, fleet: FleetResults) -> tuple[Page, str]:
     written = write_fleet_report(out, fleet)
     assert not written.problem
-    return " ".join(" ".join(page.extract_text() for page in PdfReader(written.paths[1]).pages).split())
+    paper = " ".join(" ".join(page.extract_text() for page in PdfReader(written.paths[1]).pages).split())
+    return Page((out / PAGE).read_text(encoding="utf-8")), paper
 
 
 def cells(html: str) -> list[list[str]]:
@@ -171,6 +171,18 @@ def html(usual: FleetResults, tmp_path_factory: pytest.TempPathFactory) -> str:
     out = tmp_path_factory.mktemp("fleet")
     page_of(out, usual)
     return (out / PAGE).read_text(encoding="utf-8")
+
+
+def test_the_table_of_a_large_fleet_has_what_is_of_note_and_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    fleet = fleet_of(40)
+    noted = {name for name, marks in flights.remarks_of(fleet).items() if any(one.tone != "plain" for one in marks)}
+    assert 0 < len(noted) < 12 and len(flights.lines(fleet)) == 40 and flights.caption_of(fleet) == flights.CAPTION
+    monkeypatch.setattr(flights, "MOST_LINES", 12)
+    names = [line.cells[0] for line in flights.lines(fleet)]
+    assert len(names) == 12 and noted <= set(names) and names == sorted(names)
+    others = [name for name in fleet.flights["flight_id"].tolist() if name not in noted]
+    assert set(names) - noted == set(others[len(noted) - 12 :])
+    assert "12 of 40 flights: those of note" in flights.caption_of(fleet)
 
 
 def test_every_flight_has_a_row_with_its_figures(usual: FleetResults, html: str) -> None:
@@ -227,10 +239,10 @@ def test_nothing_from_a_log_is_markup(tmp_path: Path) -> None:
     fleet = fleet_of(40, names, not_in_fleet=(NotInFleet("failed", HOSTILE, HOSTILE * 20),))
     columns = dict(fleet.flights.columns) | {"verdict_reason": np.full(40, HOSTILE), "report": np.full(40, HOSTILE)}
     fleet = replace(fleet, flights=FigureData("flights", columns, {}))
-    page = page_of(tmp_path, fleet)
+    page, paper = page_and_paper_of(tmp_path, fleet)
     assert page.tags.count("script") == 1 and "img" not in page.tags
     assert HOSTILE in page.text and "{{7*7}}" in page.text
-    assert "alert(1)" in paper_of(tmp_path, fleet)
+    assert "alert(1)" in paper
 
 
 def test_the_same_fleet_gives_the_same_bytes_wherever_it_is_made(usual: FleetResults, tmp_path: Path) -> None:
@@ -265,11 +277,10 @@ ODD: dict[str, Any] = {
 @pytest.mark.parametrize("name", ODD)
 def test_every_fleet_gets_its_report(tmp_path: Path, name: str) -> None:
     fleet = ODD[name]()
-    page = page_of(tmp_path, fleet)
+    page, paper = page_and_paper_of(tmp_path, fleet)
     assert not {"nan", "inf", "nat"} & {word for text in page.texts for word in re.split(r"[^a-z]+", text.lower())}
     if len(fleet):
         assert len(cells((tmp_path / PAGE).read_text(encoding="utf-8"))) == len(fleet)
-    paper = paper_of(tmp_path, fleet)
     assert ("No flights" if not len(fleet) else f"{len(fleet)} flight") in paper
     assert "How it was computed" in paper
 
@@ -277,7 +288,7 @@ def test_every_fleet_gets_its_report(tmp_path: Path, name: str) -> None:
 def test_paper_lists_what_is_of_note_and_says_how_many_more(tmp_path: Path) -> None:
     missing = [NotInFleet("failed", f"log-{number:03d}.csv", "empty") for number in range(MOST_ROWS_ON_PAPER + 40)]
     fleet = fleet_of(200, not_in_fleet=missing, samples=20, findings_fail=[0.0] * 199 + [2.0])
-    paper = paper_of(tmp_path, fleet)
+    _, paper = page_and_paper_of(tmp_path, fleet)
     shown = set(re.findall(r"log-\d{3}\.csv", paper))
     assert len(shown) == MOST_ROWS_ON_PAPER and "The first 60; 40 more in summary.html." in paper
     rejected = fleet.flights["flight_id"][fleet.flights["verdict"] == "reject"].tolist()

@@ -15,8 +15,8 @@ from groundstation.estimators.fleet.moments import Moments, merged, moments_of
 from groundstation.estimators.fleet.outliers import find_outliers
 from groundstation.estimators.fleet.skill import SkillMerger, SkillOfFlight
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
-from groundstation.pipeline.many_flights.fleet_rows import flights_table
 from groundstation.results.figures import FigureData
+from tests.fleet_example import flights_table
 
 LUCK_SIGMAS = 4.0  # of a share counted over simulated series: a right rate is outside once in sixteen thousand tests
 DAY_NS = 86_400_000_000_000

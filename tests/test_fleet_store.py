@@ -5,7 +5,11 @@ import json
 import os
 import re
 import shutil
+import subprocess
+import sys
 import tracemalloc
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +20,16 @@ import pytest
 
 from groundstation.base.errors import UsageError
 from groundstation.estimators.fleet.moments import merged, moments_of
+from groundstation.pipeline.many_flights import fleet_share
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET, gather, write_fleet
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
-from groundstation.pipeline.many_flights.fleet_samples import MEANINGS, SAMPLES, partition
+from groundstation.pipeline.many_flights.fleet_samples import MEANINGS, SAMPLES, SampleStore, partition
+from groundstation.pipeline.many_flights.fleet_share import FlightShare
+from groundstation.pipeline.many_flights.fleet_store import FLIGHTS, refresh
+from groundstation.pipeline.many_flights.publishing import write_beside
 from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.fleet import FleetResults
 from groundstation.results.heading import OnboardComparison, RunwayCheck
 from tests.fleet_example import START_NS, save_flight, skill
@@ -31,8 +40,9 @@ HOSTILE = "Як-130 №7/../=1+1%41 \udcff"
 
 
 def write(out: Path) -> FleetResults:
-    results, problems = write_fleet(out)
-    assert problems == ()
+    found, unwritten = refresh(out)
+    results, problems = write_fleet(out, found)
+    assert unwritten == problems == ()
     return results
 
 
@@ -41,7 +51,7 @@ def sample_files(out: Path) -> dict[str, Path]:
 
 
 def contents(out: Path) -> dict[str, bytes]:
-    files = [out / FLEET_PARQUET, *(out / SAMPLES).rglob("*")]
+    files = [out / FLEET_PARQUET, *(out / FLIGHTS).rglob("*"), *(out / SAMPLES).rglob("*")]
     return {str(path.relative_to(out)): path.read_bytes() for path in files if path.is_file()}
 
 
@@ -126,6 +136,90 @@ def test_only_what_changed_is_written_and_what_is_gone_is_removed(tmp_path: Path
     assert left == sorted(
         ["aircraft=A0", "aircraft=A1", "aircraft=B2", "notes.txt", *(f"{name}.parquet" for name in after)]
     )
+
+
+def test_a_known_flight_is_not_read_again_by_another_process(tmp_path: Path) -> None:
+    for number in range(3):
+        save_flight(tmp_path, 20 * number)
+    write(tmp_path)
+    program = (
+        "import sys; from pathlib import Path;"
+        "from groundstation.pipeline.many_flights.fleet_store import scan;"
+        "found = scan(Path(sys.argv[1])); print(len(found.fresh), len(found.stale), len(found.months))"
+    )
+    told = subprocess.run([sys.executable, "-c", program, str(tmp_path)], capture_output=True, text=True, check=True)
+    assert told.stdout.split() == ["3", "0", "2"]
+
+
+def test_a_month_is_written_again_by_what_changed_in_it_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folders = [save_flight(tmp_path, 10 * number) for number in range(6)]
+    write(tmp_path)
+    read: list[str] = []
+    before = {path.name: path.stat().st_mtime_ns for path in (tmp_path / FLIGHTS).iterdir()}
+
+    def share_of(folder: Path, store: SampleStore | None = None) -> FlightShare:
+        read.append(folder.name)
+        return fleet_share.share_of(folder, store)
+
+    monkeypatch.setattr("groundstation.pipeline.many_flights.fleet_store.share_of", share_of)
+    write(tmp_path)
+    assert read == []
+    save_flight(tmp_path, 10, error_deg=4.0)
+    shutil.rmtree(folders[0])
+    save_flight(tmp_path, 100)
+    write(tmp_path)
+    assert read == [folders[1].name, "20260812T060000Z_100"]
+    after = {path.name: path.stat().st_mtime_ns for path in (tmp_path / FLIGHTS).iterdir()}
+    assert [name for name in before if after[name] != before[name]] == ["2026-05.parquet"]
+    assert sorted(after) == ["2026-05.parquet", "2026-06.parquet", "2026-08.parquet"]
+    for month, damaged in (("2026-05", b""), ("2026-06", b"PAR1")):
+        (tmp_path / ".flights" / f"{month}.parquet").write_bytes(damaged)
+    (tmp_path / FLIGHTS / "2026-08.parquet").unlink()
+    kept = contents(tmp_path)
+    write(tmp_path)  # all is made again, and as it was
+    assert {name: kept[name] for name in kept} == {name: contents(tmp_path)[name] for name in kept}
+    shutil.rmtree(tmp_path / "20260812T060000Z_100")
+    write(tmp_path)
+    assert not (tmp_path / FLIGHTS / "2026-08.parquet").exists()
+
+
+def test_a_large_fleet_says_where_its_rows_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for number in range(4):
+        save_flight(tmp_path, number)
+    write_beside(tmp_path, (), with_pdf=False)
+    assert len(json.loads((tmp_path / "index.json").read_text())["rows"]) == 4
+    for module in ("fleet", "publishing"):
+        monkeypatch.setattr(f"groundstation.pipeline.many_flights.{module}.MOST_LISTED", 3)
+    write_beside(tmp_path, (Outcome("broken.csv", "failed", "no header"),), with_pdf=False)
+    index = json.loads((tmp_path / "index.json").read_text())
+    assert index["elsewhere"] == "4 flights: flights.parquet/"
+    assert [row["source"] for row in index["rows"]] == ["broken.csv"]
+    assert (tmp_path / "index.csv").read_text().startswith("# 4 flights: flights.parquet/\nkind,")
+    assert not (tmp_path / FLEET_PARQUET).exists()
+    rows = pq.read_table(tmp_path / FLIGHTS)
+    assert rows["flight_id"].to_pylist() == sorted(path.parent.name for path in tmp_path.glob("*/summary.json"))
+
+
+def test_a_refresh_that_is_killed_is_done_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for number in range(4):
+        save_flight(tmp_path / "whole", 20 * number)
+        save_flight(tmp_path / "killed", 20 * number)
+    write(tmp_path / "whole")
+    for moment in range(1, 10):
+        with monkeypatch.context() as patched:
+            left = iter(range(moment))
+
+            def killed(self: Path, target: Path, left: Iterator[int] = left, replace: Any = Path.replace) -> Path:
+                if next(left, None) is None:
+                    raise KeyboardInterrupt
+                return Path(replace(self, target))
+
+            patched.setattr(Path, "replace", killed)
+            with suppress(KeyboardInterrupt):
+                refresh(tmp_path / "killed")
+        save_flight(tmp_path / "killed", 20 * (moment % 4))
+    write(tmp_path / "killed")
+    assert contents(tmp_path / "killed") == contents(tmp_path / "whole")
 
 
 def test_the_same_flights_give_the_same_bytes(fleet: Path, tmp_path: Path) -> None:
@@ -216,7 +310,9 @@ def test_a_full_disk_is_told_and_leaves_the_old_file(tmp_path: Path, monkeypatch
     save_flight(tmp_path, 1, error_deg=3.0)
     with monkeypatch.context() as patched:
         patched.setattr(Path, "replace", lambda self, target: (_ for _ in ()).throw(OSError(28, "No space left")))
-        results, problems = write_fleet(tmp_path)
+        found, problems = refresh(tmp_path)
+        results, unwritten = write_fleet(tmp_path, found)
+        problems += unwritten
     assert len(results) == 1 and contents(tmp_path) == old
     assert [problem.state for problem in problems] == ["failed", "failed"]
     assert all("No space left" in problem.text and "\n" not in problem.text for problem in problems)

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.dataflash_writer import flight_log
+from tests.telemetry_writer import telemetry
 from tests.ulog_writer import small_flight
 
 SAMPLE = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv"
@@ -53,10 +54,11 @@ def test_a_log_is_opened_without_what_it_does_not_need() -> None:
     assert loaded(BY_OPEN, str(SAMPLE), names=(*NOT_NEEDED, "pyarrow.csv", "typer")) == []
 
 
-@pytest.mark.parametrize("suffix", ["ulg", "BIN"])
+@pytest.mark.parametrize("suffix", ["ulg", "BIN", "tlog"])
 def test_compiled_loops_are_found_again_without_their_compiler(suffix: str, tmp_path: Path) -> None:
     log = tmp_path / f"flight.{suffix}"
-    log.write_bytes(small_flight().data if suffix == "ulg" else flight_log().content)
+    made = {"ulg": lambda: small_flight().data, "BIN": lambda: flight_log().content, "tlog": lambda: telemetry().data}
+    log.write_bytes(made[suffix]())
     convert = ["convert", str(log), "-q", "--force", "-o", str(tmp_path / "out.mcap")]
     loaded(BY_VERB, *convert)  # compiles, where that was not done before
     assert loaded(BY_VERB, *convert, names=(*NOT_NEEDED, "pyarrow")) == []

@@ -325,10 +325,11 @@ def test_a_heading_that_the_ins_logs_is_corrected_by_the_curve(first: Path, pair
     assert "found for magnetometer: right only where that is the same sensor" in told
 
 
-def test_another_aircraft_and_a_worse_heading_are_warned_of(pair: tuple[Simulated, Simulated]) -> None:
-    flown, results = pair[1].flight, analysed(pair[1].flight)
+def test_another_aircraft_and_a_worse_heading_are_warned_of(
+    pair: tuple[Simulated, Simulated], second_results: FlightResults
+) -> None:
     wrong = Apply(deviation_from_csv(table_text(30.0, aircraft="OTHER"), "x.csv"), "ab" * 32)
-    done = applied_to(flown, wrong, results)
+    done = applied_to(pair[1].flight, wrong, second_results)
     assert codes(done.results)["magnetic.other_aircraft"] == "warn"
     assert codes(done.results)["magnetic.applied_worse"] == "warn"
 
@@ -336,7 +337,9 @@ def test_another_aircraft_and_a_worse_heading_are_warned_of(pair: tuple[Simulate
 # ---------------------------------------------------------------------------------------------- what is not applied
 
 
-def test_a_rejected_deviation_is_not_applied(first: Path, tmp_path: Path, pair: tuple[Simulated, Simulated]) -> None:
+def test_a_rejected_deviation_is_not_applied(
+    first: Path, tmp_path: Path, pair: tuple[Simulated, Simulated], second_results: FlightResults
+) -> None:
     summary = json.loads((first / SUMMARY).read_text(encoding="utf-8"))
     summary["results"]["magnetic"] |= {"verdict": "reject", "verdict_reason": "coverage: 0.9, at least 0.98"}
     path = tmp_path / SUMMARY
@@ -346,7 +349,7 @@ def test_a_rejected_deviation_is_not_applied(first: Path, tmp_path: Path, pair: 
     for file, reason in ((path, "is rejected (coverage: 0.9, at least 0.98)"), (table, "is rejected")):
         asked = asked_for(str(file))
         assert asked is not None
-        done = applied_to(pair[1].flight, asked, analysed(pair[1].flight))
+        done = applied_to(pair[1].flight, asked, second_results)
         assert (done.corrected, codes(done.results)[NOT_APPLIED]) == (None, "warn")
         (finding,) = (one for one in done.results.findings if one.code == NOT_APPLIED)
         assert finding.text.endswith(reason)

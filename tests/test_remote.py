@@ -91,13 +91,14 @@ def test_what_is_finished_elsewhere_is_not_done_again(
 ) -> None:
     out, source = f"{memory}out", f"{memory}logs"
     RemoteFolder(source).write(SHORT.name, SHORT.read_bytes())
-    run_many([source], out, Configuration(), jobs=1)
     told: list[str] = []
 
     def listen(event: Event) -> None:
         told.append(event.text if event.kind == "stage" else "")
 
-    (again,) = run_many([source], out, Configuration(), jobs=1, listen=listen)
+    with sketching():
+        run_many([source], out, Configuration(), jobs=1, with_pdf=False)
+        (again,) = run_many([source], out, Configuration(), jobs=1, with_pdf=False, listen=listen)
     assert again.state == "done" and set(told) == {""}
     run_many([source], out, SETTINGS, jobs=1, listen=listen)
     assert "estimating" in told and "converting" not in told

@@ -14,8 +14,10 @@ from pathlib import Path
 
 import pytest
 from filelock import FileLock
+from typer.testing import CliRunner
 
 from groundstation.base.errors import UsageError
+from groundstation.cli.main import app
 from groundstation.pipeline.many_flights.batch import _crew, plan_many, run_many
 from groundstation.pipeline.many_flights.out_folder import LOCK
 from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, _teller, in_turn, side_by_side
@@ -102,6 +104,33 @@ def test_a_changed_setting_keeps_the_mcap_and_gives_what_a_new_run_gives(
     assert mcap.stat().st_ino == before
     assert_equal_runs(out, Path(finished_run(SHORT.stem, SETTINGS).folder).parent)
     assert plan_many([SHORT], out, SETTINGS)[0].text == "finished, nothing to do"
+
+
+def test_results_alone_are_those_of_a_whole_run_which_makes_the_rest_later(finished: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = ["run", str(SHORT), "-o", str(out), "--only", "results", "-q"]
+    assert CliRunner().invoke(app, command).exit_code == 0
+    made, whole = promised_files(out), promised_files(finished)
+    assert {path.suffix for path in out.rglob("*.*")}.isdisjoint({".rrd", ".html", ".pdf"})
+    listed = {"index.json", "index.csv"}  # they link to what there is
+    for name in made.keys() - listed:
+        assert made[name] == whole[name], name
+    assert whole.keys() - made.keys() == {name for name in whole if "/report." in name}
+    (row,), (row_of_whole,) = (json.loads(files["index.json"])["rows"] for files in (made, whole))
+    assert row_of_whole | {"report": None, "recording": None} == row
+    assert plan_many([SHORT], out, Configuration(), only_results=True)[0].text == "finished, nothing to do"
+    _outcome, told = stages([SHORT], out, Configuration())
+    assert {"recording", "reporting"} <= told and "converting" not in told
+    assert_equal_runs(out, finished)
+
+
+def test_results_alone_leave_no_pages_of_other_results(finished: Path, tmp_path: Path) -> None:
+    out = copied(finished, tmp_path / "out")
+    assert plan_many([SHORT], out, Configuration(), only_results=True)[0].text == "finished, nothing to do"
+    (flight_in(out) / "notes.txt").touch()
+    (outcome,) = run_many([SHORT], out, SETTINGS, only_results=True)
+    assert outcome.state == "done" and (flight_in(out) / "notes.txt").exists()
+    assert {path.suffix for path in out.rglob("*.*")}.isdisjoint({".rrd", ".html", ".pdf"})
 
 
 def test_a_limit_of_the_ledger_redoes_everything(finished: Path) -> None:

@@ -25,6 +25,7 @@ from tests.real_logs import real_log
 from tests.saved import load
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
+SEEDS = [*range(3), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 6))]
 BYTE_IDENTICAL = ("summary.json", "report.html", "report.pdf", "tables")
 
 
@@ -168,7 +169,7 @@ def mutated(data: bytes, rng: np.random.Generator) -> bytes:
     return bytes(changed)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_damaged_log_ends_in_one_line_or_in_results(tmp_path: Path, seed: int) -> None:
     rng = np.random.default_rng(seed)
     log = tmp_path / "log.csv"
@@ -178,7 +179,7 @@ def test_a_damaged_log_ends_in_one_line_or_in_results(tmp_path: Path, seed: int)
     assert "internal error" not in outcome.text and "\n" not in outcome.text
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_damaged_mcap_ends_in_one_line_or_in_results(good: Outcome, tmp_path: Path, seed: int) -> None:
     rng = np.random.default_rng(100 + seed)
     path = tmp_path / "flight.mcap"
@@ -195,22 +196,24 @@ def test_convert_writes_one_file_or_a_folder(tmp_path: Path) -> None:
     assert (tmp_path / "one.mcap").read_bytes() == (tmp_path / "many/taxi-good.mcap").read_bytes()
 
 
+@pytest.mark.usefixtures("unpainted")
 @pytest.mark.real_log
 @pytest.mark.parametrize(
     "name",
     ["g1000/log_220416_161856_LFQA.csv", "g1000/log_220502_135932_EGPN.csv"],
 )
 def test_a_taxi_that_never_reaches_the_speed_gate_is_not_assessable(tmp_path: Path, name: str) -> None:
-    outcome = run_flight(Job(real_log(name), tmp_path, Configuration()))
+    outcome = run_flight(Job(real_log(name), tmp_path, Configuration(), with_pdf=False))
     entries = load(Path(outcome.folder)).summary["not_assessable"]
     reasons = {entry["analysis"]: entry["reason"] for entry in entries}
     assert "6" in reasons["heading"] and "m/s" in reasons["heading"]
 
 
+@pytest.mark.usefixtures("unpainted")
 @pytest.mark.real_log
 @pytest.mark.parametrize("name", ["g1000/log_210623_141501_TEST1.csv", "g1000/log_220417_125002_LFQA.csv"])
 def test_a_real_light_aircraft_is_not_accepted(tmp_path: Path, name: str) -> None:
-    outcome = run_flight(Job(real_log(name), tmp_path, Configuration()))
+    outcome = run_flight(Job(real_log(name), tmp_path, Configuration(), with_pdf=False))
     heading = load(Path(outcome.folder)).summary["results"]["heading"]
     assert heading["verdict"] in ("reject", "undecided")
     assert heading["precision_deg"] > 0.05

@@ -35,6 +35,7 @@ from tests.session_example import SEED, SHORT, simulated
 
 IDENTITY = "20180305T120000Z_session_A-B-C"
 SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
+EPOCHS = round(SHORT.duration_s) + 1  # of a second each
 SAME_M = 0.01  # what 0.1 mm and 0.01 mm/s of the logs, and 0.1 mm of a range, leave of positions
 
 
@@ -135,6 +136,7 @@ def test_a_finished_session_is_not_run_again(
     assert "3 aircraft, centralised: 2 sigma_r" in told["text"]
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_another_setting_runs_it_again_in_its_place(out: Path, logs: Path, tmp_path: Path) -> None:
     copy = tmp_path / "out"
     shutil.copytree(out, copy)
@@ -150,6 +152,7 @@ def test_another_setting_runs_it_again_in_its_place(out: Path, logs: Path, tmp_p
     assert not (copy / IDENTITY / "report.pdf").exists()
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_mcaps_go_in_by_reference_in_any_order(out: Path, logs: Path, tmp_path: Path) -> None:
     mcaps = sorted((out / IDENTITY / "mcap").glob("*.mcap"), reverse=True)
     configuration = load_configuration(logs / "settings.toml")
@@ -183,6 +186,7 @@ def test_wrong_input_is_told_in_a_line(logs: Path, tmp_path: Path, capsys: pytes
     assert not (tmp_path / "a").exists()
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_a_log_that_cannot_be_read_stops_no_other(logs: Path, tmp_path: Path) -> None:
     bad = tmp_path / "C.csv"
     bad.write_bytes(b"\x00\x01nothing")
@@ -195,6 +199,7 @@ def test_a_log_that_cannot_be_read_stops_no_other(logs: Path, tmp_path: Path) ->
     assert ("session.unknown_source", "link.C") in codes
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_a_cut_log_loses_data_and_says_so(logs: Path, tmp_path: Path) -> None:
     first, second, third = csvs(logs)
     cut = tmp_path / third.name
@@ -353,7 +358,7 @@ def test_the_recording_has_both_timelines_and_every_aircraft(contents: Contents)
     assert contents.timelines == {"utc", "flight_time"}
     for name in "ABC":
         for entity in (f"/space/{name}/now", f"/space/{name}/ellipsoid", f"/cooperative/errors/{name}/a_band"):
-            assert sum(batch.num_rows for batch in contents.batches[entity]) == 31, entity
+            assert sum(batch.num_rows for batch in contents.batches[entity]) == EPOCHS, entity
         assert f"/space/{name}/track" in contents.fixed
     assert "/space/stations" in contents.fixed
 
@@ -384,7 +389,7 @@ def test_ellipsoids_are_those_of_two_sigma(contents: Contents, results: FlightRe
 def test_links_are_drawn_at_every_second_and_have_lanes(contents: Contents, answer: CooperativeResult) -> None:
     strips = contents.batches["/space/links"]
     rows = [len(row) for batch in strips for row in batch.column("LineStrips3D:strips").to_pylist()]
-    assert len(rows) == 31
+    assert len(rows) == EPOCHS
     assert set(rows[:-1]) == {len([row for row in answer.links if row.kind != "satellite"])}
     assert rows[-1] == 0, "behind the last range nothing is drawn"
     assert len([entity for entity in contents.batches if entity.startswith("/cooperative/links/")]) == 12
@@ -466,6 +471,7 @@ def test_a_station_a_little_off_is_named_by_its_ranges() -> None:
     assert named(1000.0) == [simulated(SHORT).session.points[0].name]
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_run_into_the_same_folder_leaves_the_session_be(out: Path, tmp_path: Path) -> None:
     copy = tmp_path / "out"
     shutil.copytree(out, copy)

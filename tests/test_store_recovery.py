@@ -31,6 +31,7 @@ ROWS = {"ins": 200, "gnss": 150, "raw.x": 120, "event": 130}
 DERIVED = ("location_fix.", "pose.", "log")  # what topics of channels made of others begin with
 INFO = StoreInfo(source_name="a.csv", metadata={"aircraft": "T-1"}, has_utc=True)
 FLIPS = 60
+EVERY = [3, pytest.param(1, marks=pytest.mark.slow)]  # place of a sweep that rereads the file at each
 MUTATIONS = 100
 EXTREMES = (0, 1, 2**31, 2**40, 2**63, 2**64 - 1)
 PEAK_BYTES = 16 << 20  # a file of 100 kB needs no more; a trusted length would
@@ -133,8 +134,11 @@ def test_sample_has_several_chunks_of_every_topic(sample: Sample) -> None:
     }
 
 
-def test_flipped_bit_loses_no_more_than_its_chunk_and_the_loss_is_stated(sample: Sample, tmp_path: Path) -> None:
-    for place, bit in flip_places(sample):
+@pytest.mark.parametrize("every", EVERY)
+def test_flipped_bit_loses_no_more_than_its_chunk_and_the_loss_is_stated(
+    sample: Sample, tmp_path: Path, every: int
+) -> None:
+    for place, bit in flip_places(sample)[::every]:
         found, damages = recovered(tmp_path / "a.mcap", flipped(sample.data, place, bit), sample)
         lost = missing(found)
         hit = [chunk for chunk in sample.chunks if chunk.start <= place < chunk.end]
@@ -193,9 +197,10 @@ def test_file_cut_before_anything_can_be_known_is_one_line(sample: Sample, tmp_p
             list(read(path))
 
 
-def test_without_a_summary_a_flipped_bit_still_loses_only_its_chunk(sample: Sample, tmp_path: Path) -> None:
+@pytest.mark.parametrize("every", EVERY)
+def test_without_a_summary_a_flipped_bit_still_loses_only_its_chunk(sample: Sample, tmp_path: Path, every: int) -> None:
     cut = sample.data[: sample.data_end]
-    for place, bit in flip_places(sample):
+    for place, bit in flip_places(sample)[::every]:
         if not sample.chunks[0].start <= place < sample.data_end:
             continue
         found, damages = recovered(tmp_path / "a.mcap", flipped(cut, place, bit), sample)
@@ -213,9 +218,10 @@ def test_without_a_summary_the_message_index_tells_what_was_lost(sample: Sample,
         assert (lost.topic, lost.count) == (chunk.topic, len(chunk.rows))
 
 
-def test_definitions_lost_with_the_summary_never_give_wrong_columns(sample: Sample, tmp_path: Path) -> None:
+@pytest.mark.parametrize("every", EVERY)
+def test_definitions_lost_with_the_summary_never_give_wrong_columns(sample: Sample, tmp_path: Path, every: int) -> None:
     cut = sample.data[: sample.data_end]
-    for place in range(100, sample.chunks[0].start, 37):
+    for place in range(100, sample.chunks[0].start, 37 * every):
         found, damages = recovered(tmp_path / "a.mcap", flipped(cut, place, place % 8), sample)
         if missing(found):
             assert any(damage.loses_data and damage.kind != "truncated" for damage in damages), place
@@ -236,9 +242,10 @@ def test_overwritten_block_loses_only_the_chunks_it_touches(sample: Sample, tmp_
             assert bool(missing(found)) == any(damage.loses_data for damage in damages)
 
 
-def test_removed_and_inserted_bytes_lose_only_the_chunks_they_touch(sample: Sample, tmp_path: Path) -> None:
+@pytest.mark.parametrize("every", EVERY)
+def test_removed_and_inserted_bytes_lose_only_the_chunks_they_touch(sample: Sample, tmp_path: Path, every: int) -> None:
     rng = np.random.default_rng(3)
-    for start in range(sample.chunks[0].start + 10, sample.data_end, 1_777):
+    for start in range(sample.chunks[0].start + 10, sample.data_end, 1_777 * every):
         before, after = sample.data[:start], sample.data[start:]
         for data in (before + after[7:], before + rng.bytes(9) + after):
             found, _ = recovered(tmp_path / "a.mcap", data, sample)

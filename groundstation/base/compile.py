@@ -114,7 +114,14 @@ class Loop:
             with _LOCK:
                 if forms not in self._linked:
                     self._linked[forms] = self._found(forms)
-        return (self._linked[forms] or self._called)(*arguments)
+        linked = self._linked[forms]
+        if linked is None or linked.would_write(arguments):  # to an array that is read-only: numba refuses it by name
+            return self._called(*arguments)
+        return linked(*arguments)
+
+    def __reduce__(self) -> str:
+        """A loop is pickled as functions are, by its name in its module."""
+        return self.py_func.__qualname__
 
     def _found(self, forms: tuple[Form, ...]) -> Linked | None:
         """Machine code for such arguments, kept before or compiled now; None where there cannot be any."""
@@ -150,7 +157,7 @@ class Loop:
         options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
         entry = _njit(numba)(tuple(types), nogil=True, error_model="numpy", **options)(names["entry"])
         ((signature, compiled),) = entry.overloads.items()
-        return object_file(entry.inspect_llvm(signature), compiled.fndesc.llvm_func_name)
+        return object_file(entry.inspect_llvm(signature), compiled.fndesc.llvm_func_name, forms)
 
 
 def compiled(function: Function) -> Function:

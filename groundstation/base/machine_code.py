@@ -23,6 +23,8 @@ INTEGER, NUMBER = "integer", "number"
 _DTYPES = ["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64", "bool"]
 ARRAY_DTYPES = {np.dtype(name): name for name in _DTYPES}  # in the byte order of this machine
 ENTRY, SUFFIX = "groundstation_entry", ".machine_code"
+LAYOUT = 2  # of what is kept
+OWN_ARGUMENTS = 3  # of an entry, before those of its loop: numba's answer and error, and where the result goes
 _RESULTS: dict[Any, type] = {int: ctypes.c_int64, bool: ctypes.c_int64, float: ctypes.c_double, None: ctypes.c_int64}
 _NUMBERS = count()  # every library has a name of its own
 _HARMLESS = frozenset(("memset", "memcpy", "memmove", "memcmp", "sqrt", "sin", "cos", "exp", "log", "pow", "atan2"))
@@ -43,8 +45,6 @@ Form = str | tuple[str, int] | Group  # of an argument: INTEGER, NUMBER, dtype a
 def forms_of(arguments: Sequence[Any]) -> tuple[Form, ...] | None:
     """Forms of what a loop is handed; None where it is more than numbers of 64 bits, arrays without gaps in the byte
     order of this machine, and tuples of those.
-
-    Whether an array is read-only does not matter: a loop that writes to one that is would do it.
 
     Examples
     --------
@@ -131,7 +131,9 @@ def digest_of(function: Callable[..., Any], forms: Sequence[Form]) -> bytes:
 
     from llvmlite import __version__, binding
 
-    told = hashlib.sha256(repr((forms, entry_source(function, forms)[0], version("numba"), __version__)).encode())
+    told = hashlib.sha256(
+        repr((LAYOUT, forms, entry_source(function, forms)[0], version("numba"), __version__)).encode()
+    )
     told.update(f"{binding.get_host_cpu_name()} {binding.get_host_cpu_features().flatten()}".encode())
     told.update(binding.get_process_triple().encode())
     seen: set[int] = set()
@@ -194,8 +196,12 @@ def _linker() -> Any:
     return binding.create_lljit_compiler()
 
 
-def object_file(ir: str, entry: str) -> bytes | None:
-    """Object file of a module in LLVM's assembly; None where its entry may call what only numba's process has."""
+def object_file(ir: str, entry: str, forms: Sequence[Form]) -> bytes | None:
+    """What is kept of a module in LLVM's assembly; None where its entry may call what only numba's process has.
+
+    It is a byte for each number and array that the entry takes, 1 for an array that it may write to, and an object
+    file.
+    """
     from llvmlite import binding
 
     binding.initialize_native_target()
@@ -207,7 +213,18 @@ def object_file(ir: str, entry: str) -> bytes | None:
         cpu=binding.get_host_cpu_name(), features=binding.get_host_cpu_features().flatten(), opt=3, reloc="pic"
     )
     code: bytes = machine.emit_object(module)
-    return code
+    return _written(module, forms) + code
+
+
+def _written(module: Any, forms: Sequence[Form]) -> bytes:
+    """Which arrays LLVM could not prove to be only read, in the order of :func:`plain_forms`."""
+    arguments = list(module.get_function(ENTRY).arguments)[OWN_ARGUMENTS:]
+    may_write = []
+    for form in plain_forms(forms):
+        dimensions = 0 if isinstance(form, str) else form[1]
+        may_write.append(dimensions > 0 and b"readonly" not in arguments[0].attributes)
+        arguments = arguments[1 + dimensions :]
+    return bytes(may_write)
 
 
 def _calls_out(module: Any) -> bool:
@@ -226,24 +243,42 @@ def _calls_out(module: Any) -> bool:
     return bool(outside - _HARMLESS)
 
 
-def linked(code: bytes, function: Callable[..., Any], forms: Sequence[Form]) -> "Linked | None":
-    """Machine code ready to be called; None where it cannot be linked in this process."""
+def linked(kept: bytes, function: Callable[..., Any], forms: Sequence[Form]) -> "Linked | None":
+    """Machine code, as :func:`object_file` gives it, ready to be called; None where it cannot be linked here."""
     from llvmlite import binding
 
+    plain = tuple(plain_forms(forms))
+    code = kept[len(plain) :]
     library = binding.JITLibraryBuilder().add_object_img(code).export_symbol(ENTRY).add_current_process()
+    written = tuple(at for at, may_write in enumerate(kept[: len(plain)]) if may_write)
     try:
-        return Linked(library.link(_linker(), f"{ENTRY}_{next(_NUMBERS)}"), function, forms)
+        return Linked(library.link(_linker(), f"{ENTRY}_{next(_NUMBERS)}"), function, plain, written)
     except RuntimeError:
         return None
 
 
 class Linked:
-    """Machine code that can be called with what the loop takes."""
+    """Machine code that can be called with what the loop takes.
 
-    def __init__(self, library: Any, function: Callable[..., Any], forms: Sequence[Form]) -> None:
+    Parameters
+    ----------
+    library : object
+        Holds the code.
+    function : callable
+        The loop in Python.
+    plain : sequence of forms
+        Of its arguments, those in tuples in their place.
+    written : sequence of int
+        Which of them are arrays that it may write to.
+    """
+
+    def __init__(
+        self, library: Any, function: Callable[..., Any], plain: Sequence[str | tuple[str, int]], written: Sequence[int]
+    ) -> None:
         self._library = library  # the code lives as long as this
-        kinds: list[Any] = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]
-        for form in plain_forms(forms):
+        self._written = written
+        kinds: list[Any] = [ctypes.c_void_p] * OWN_ARGUMENTS
+        for form in plain:
             if isinstance(form, str):
                 kinds.append(ctypes.c_int64 if form == INTEGER else ctypes.c_double)
             else:
@@ -251,22 +286,31 @@ class Linked:
         self._entry = ctypes.CFUNCTYPE(ctypes.c_int32, *kinds)(self._library[ENTRY])
         self._result_type, self._annotation = _RESULTS[_annotation(function)], _annotation(function)
 
+    def would_write(self, arguments: Sequence[Any]) -> bool:
+        """Whether one of the arrays that the loop may write to is read-only."""
+        plain = _plain(arguments)
+        return not all(plain[at].flags.writeable for at in self._written)
+
     def __call__(self, *arguments: Any) -> Any:
-        """Run the loop."""
+        """Run the loop; the arrays that it writes to must be writable."""
         result, nothing, error = self._result_type(), ctypes.c_void_p(), ctypes.c_void_p()
         values: list[Any] = [ctypes.byref(nothing), ctypes.byref(error), ctypes.byref(result)]
-        _put(arguments, values)
+        for one in _plain(arguments):
+            if isinstance(one, np.ndarray):
+                values += (one.ctypes.data, *one.shape)
+            else:
+                values.append(one)
         if self._entry(*values):
             raise RuntimeError("a compiled loop has failed")
         return None if self._annotation is None else self._annotation(result.value)
 
 
-def _put(arguments: Sequence[Any], values: list[Any]) -> None:
-    """Append the C values of arguments."""
+def _plain(arguments: Sequence[Any]) -> list[Any]:
+    """Arguments, those in tuples in their place."""
+    plain: list[Any] = []
     for one in arguments:
-        if isinstance(one, np.ndarray):
-            values += (one.ctypes.data, *one.shape)
-        elif isinstance(one, tuple):
-            _put(one, values)
+        if isinstance(one, tuple):
+            plain += _plain(one)
         else:
-            values.append(one)
+            plain.append(one)
+    return plain

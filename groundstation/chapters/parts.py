@@ -94,6 +94,14 @@ class Note(Part):
     files: Sequence[str] = ()
 
 
+@dataclass(frozen=True)
+class Signatures(Part):
+    """Room for people to sign by hand: a line with name, signature and date for each role."""
+
+    kind: ClassVar[str] = "signatures"
+    roles: Sequence[str]
+
+
 def kept(parts: Iterable[Part | None]) -> tuple[Part, ...]:
     """The parts that there are."""
     return tuple(part for part in parts if part is not None)

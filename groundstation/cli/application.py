@@ -20,7 +20,22 @@ EXIT_CODES = (
 )
 
 VERBS = (
-    *("info", "check", "convert", "run", "report", "view", "clip", "export", "compare", "cooperative", "plan", "serve"),
+    *(
+        "info",
+        "check",
+        "convert",
+        "run",
+        "watch",
+        "report",
+        "view",
+        "clip",
+        "export",
+        "compare",
+        "cooperative",
+        "plan",
+        "rules",
+        "serve",
+    ),
     *("simulate", "study", "list"),
 )
 
@@ -33,18 +48,24 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "run flight3.ulg -o out",
         "run logs -o out --aircraft aircraft.toml --site airfield.toml",
         "run flight3.ulg --reference sbet_20250708.out -o out",
+        "run logs -o out --only results",
         "run logs -o out --dry-run",
     ),
-    "report": ("report out",),
+    "watch": ("watch incoming -o out", "watch incoming -o out --once --every 5"),
+    "report": ("report out", "report out --standard app-g -o acceptance"),
     "view": ("view out", "view flight3.ulg --web"),
     "export": (
         "export out/20260504T060000Z_SIM-1_101 -o flight.kml",
         "export flight3.ulg -o flight3.csv --track gnss",
         "export out/20260504T060000Z_SIM-1_101 -o tables --figures",
     ),
-    "clip": ("clip flight3.mcap --from +05:00 --to +12:30 -o part.mcap",),
+    "clip": (
+        "clip flight3.mcap --from +05:00 --to +12:30 -o part.mcap",
+        "clip flight3.ulg --anonymous --no-recording -o for_others.mcap",
+    ),
     "compare": ("compare out/first out/second -o comparison",),
     "cooperative": ("cooperative a.csv b.csv --stations stations.toml -o out",),
+    "rules": ("rules test stricter.toml --over out", "rules test stricter.toml --over out -o changes.csv"),
     "serve": ("serve out",),
     "simulate": ("simulate taxi-good -o logs",),
     "study": ("study heading -o tables --runs 50",),
@@ -92,6 +113,10 @@ Together = Annotated[
     typer.Option("--together", help="The logs are of one flight: put them on one clock, by GNSS time or by motion."),
 ]
 NoPdf = Annotated[bool, typer.Option("--no-pdf", help="Leave report.pdf and steer_card.pdf out.")]
+Only = Annotated[
+    Literal["results"] | None,
+    typer.Option("--only", help="results: no recording and no report, of a flight or of all; a later run makes them."),
+]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
 Profile = Annotated[
     Path | None,

@@ -1,11 +1,20 @@
-"""The verb on folders of flights: ``serve`` offers their recordings to a team."""
+"""The verbs on folders of flights: ``serve`` offers their recordings to a team, ``report --standard`` judges them."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from groundstation.cli.application import DONE, Verbose, answers_with_exit_code, app, examples, say
+from groundstation.cli.application import (
+    DONE,
+    LIMIT_REACHED,
+    FailOnMode,
+    Verbose,
+    answers_with_exit_code,
+    app,
+    examples,
+    say,
+)
 
 
 @app.command(epilog=examples("serve"))
@@ -22,3 +31,25 @@ def serve(
 
     offer(out, host=host, port=port, web=web, tell=typer.echo, say=say)
     return DONE
+
+
+def acceptance(
+    out: Path, standard: str, output: Path | None, fail_on: FailOnMode, *, with_pdf: bool, quiet: bool, json: bool
+) -> int:
+    """Write the acceptance of the INS of a folder and print its front; 4 where ``fail_on`` is reached."""
+    from groundstation.chapters.acceptance_front import front
+    from groundstation.chapters.wording import NARROW_SPACE
+    from groundstation.cli.text import as_json, printable
+    from groundstation.pipeline.many_flights.acceptance import accept_to
+
+    found, paths, problem = accept_to(out, standard, output, with_pdf=with_pdf)
+    if json:
+        typer.echo(as_json(found.to_dict() | {"written": [str(path) for path in paths]}))
+    elif not quiet:
+        top = front(found)
+        told = (line.replace(NARROW_SPACE, " ") for line in (top.line, *top.sentences))
+        typer.echo("\n".join(map(printable, (*told, *map(str, paths)))))
+    if problem:
+        say(f"warning: {problem}")
+    reached_at = {"fail": ("warn", "fail"), "not enough flights": ("warn",)}.get(found.decision, ())
+    return LIMIT_REACHED if fail_on in reached_at else DONE

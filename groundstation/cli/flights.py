@@ -44,6 +44,23 @@ def clip(
     topics: Annotated[
         list[str] | None, typer.Option("--topics", help="Topic or pattern to keep; may be repeated.", metavar="GLOB")
     ] = None,
+    anonymous: Annotated[
+        bool,
+        typer.Option(
+            "--anonymous",
+            help="Turn all longitudes by a secret angle, move dates by weeks, replace names, leave texts, raw topics, "
+            "magnetometer and satellites out. Latitude, height, time of day and the shape of the track stay: who knows "
+            "where such flights are flown may still find the place.",
+        ),
+    ] = False,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            "--seed",
+            help="Of --anonymous: the same for all logs of a session, and a secret like a password; left out: random.",
+            min=0,
+        ),
+    ] = None,
     no_recording: Annotated[bool, typer.Option("--no-recording", help="Leave the recording out.")] = False,
     config: ConfigFile = None,
     profile: Profile = None,
@@ -60,11 +77,13 @@ def clip(
     from groundstation.pipeline.verbs.clip import Wanted
     from groundstation.pipeline.verbs.clip import clip as cut
 
+    if seed is not None and not anonymous:
+        raise UsageError("--seed", "it without --anonymous", "both")
     with listener("none" if quiet else progress) as listen:
         outcome = cut(
             flight,
             output,
-            Wanted(start, end, tuple(topics or ())),
+            Wanted(start, end, tuple(topics or ()), anonymous, seed),
             configuration=load_configuration(config, profile=profile),
             with_recording=not no_recording,
             force=force,

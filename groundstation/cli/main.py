@@ -11,7 +11,7 @@ import typer
 
 from groundstation.base.errors import UsageError
 from groundstation.base.version import __version__
-from groundstation.cli import fleets, flights, plans
+from groundstation.cli import fleets, flights, plans, rules, watching
 from groundstation.cli.application import (
     DATA_LOST,
     DONE,
@@ -19,11 +19,13 @@ from groundstation.cli.application import (
     AircraftFile,
     ConfigFile,
     FailOn,
+    FailOnMode,
     Force,
     IcdFiles,
     IntervalsFile,
     Json,
     NoPdf,
+    Only,
     Profile,
     Progress,
     Quiet,
@@ -39,7 +41,7 @@ from groundstation.cli.application import (
     tell_written,
 )
 
-__all__ = ["app", "fleets", "flights", "main", "plans"]  # the modules hold more verbs
+__all__ = ["app", "fleets", "flights", "main", "plans", "rules", "watching"]  # the modules hold more verbs
 
 
 PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have an ``examine``; a test compares them
@@ -214,6 +216,7 @@ def run(
         ),
     ] = None,
     no_pdf: NoPdf = False,
+    only: Only = None,
     redo: Annotated[bool, typer.Option("--redo", help="Do again what an earlier run finished.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done; write nothing.")] = False,
     force: Force = False,
@@ -240,7 +243,8 @@ def run(
     if together and (dry_run or scheduler or stations is not None or timeout is not None):
         raise UsageError("--together", "--dry-run, --scheduler, --stations or --timeout beside it", "it without them")
     if dry_run:
-        planned = plan_many(paths, output, configuration, with_pdf=not no_pdf, redo=redo, stations=stations)
+        plan = partial(plan_many, with_pdf=not no_pdf, only_results=only == "results")
+        planned = plan(paths, output, configuration, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)
         return DONE
     timeout_s = math.inf if timeout is None else timeout
@@ -249,7 +253,14 @@ def run(
     try:
         with listener("none" if quiet else progress) as listen:
             outcomes = run_logs(
-                paths, output, configuration, force=force, fail_on=fail_on, with_pdf=not no_pdf, listen=listen
+                paths,
+                output,
+                configuration,
+                force=force,
+                fail_on=fail_on,
+                with_pdf=not no_pdf,
+                only_results=only == "results",
+                listen=listen,
             )
     except KeyboardInterrupt:
         say(f"interrupted: {output} keeps what is finished; the same command again goes on with the rest")
@@ -262,13 +273,38 @@ def run(
 @answers_with_exit_code
 def report(
     out: Annotated[Path, typer.Argument(help="A folder that `run` made, or one flight folder in it.", metavar="OUT")],
+    standard: Annotated[
+        str,
+        typer.Option(
+            "--standard",
+            help="Judge the INS of the flights by a standard instead, and write the acceptance: app-g, irig261, or a "
+            "file of limits (TOML).",
+            metavar="NAME|FILE",
+        ),
+    ] = "",
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Folder for the acceptance; left out: OUT.", metavar="DIR"),
+    ] = None,
+    fail_on: Annotated[
+        FailOnMode,
+        typer.Option(
+            "--fail-on",
+            help="With --standard: exit 4 where it is failed (fail), or not passed for want of flights (warn).",
+        ),
+    ] = "none",
     no_pdf: NoPdf = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
-    """Make the reports and the index again from the saved results, without the logs."""
+    """Make the reports and the index again from the saved results, without the logs; or the acceptance of the INS."""
     from groundstation.cli import printing
+
+    if standard:
+        return fleets.acceptance(out, standard, output, fail_on, with_pdf=not no_pdf, quiet=quiet, json=json)
+    if output is not None or fail_on != "none":
+        raise UsageError("report", "-o or --fail-on without --standard", "--standard NAME beside it")
     from groundstation.pipeline.many_flights.publishing import report_again
 
     paths, problems = report_again(out, with_pdf=not no_pdf)

@@ -8,6 +8,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar, cast
 from groundstation.base.findings import Finding
 from groundstation.results.answer import Answer, Answers
 from groundstation.results.columns import AnswerColumn
+from groundstation.results.rules import Rejudged
 
 Data = TypeVar("Data", contravariant=True)  # a flight, or a session of several
 KnownT = TypeVar("KnownT", contravariant=True)
@@ -68,6 +69,18 @@ def _no_samples(_data: Any, _answer: Any) -> None:
 
 
 @dataclass(frozen=True)
+class Rules:
+    """How the gates of an answer are judged again under other limits, without the log.
+
+    ``limits`` are the settings that bound gates and choose no data; a change of any other one needs the log.
+    ``rejudge(answer, settings)`` gives each verdict before and after.
+    """
+
+    limits: frozenset[str]
+    rejudge: Callable[[Any, Any], tuple[Rejudged, ...]]
+
+
+@dataclass(frozen=True)
 class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     """An analysis of a flight or a session. What runs, lists or saves analyses loops over them.
 
@@ -107,6 +120,8 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     examine : callable, optional
         ``examine(data, known, settings)``: what the data lack, by the same selection of data as ``run`` makes; an
         analysis that has it is a purpose of ``check --for``.
+    rules : Rules, optional
+        Of an answer with gates.
     judges : bool
         Whether it is given the truth, by which it judges the others: it runs where there is one, and last; every other
         analysis is given a flight without it.
@@ -130,6 +145,7 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     check: Callable[[Any, Any], None] = _any_settings
     examine: Examine[Data, KnownT, SettingsT] | None = None
     judges: bool = False
+    rules: Rules | None = None
 
     def __post_init__(self) -> None:
         known = {field.name for field in dataclasses.fields(cast(Any, self.answer))}

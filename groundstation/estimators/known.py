@@ -39,6 +39,9 @@ class AircraftData:
         Class of its INS: noise of system 2, prior of the azimuth drift.
     ins_kind : str
         Whether GNSS corrects the INS already, ``gnss_aided`` or ``unaided``; empty: the log shows it.
+    ins_serial, ins_alignment : str
+        Which unit is installed and how it is aligned ("gyrocompass", "stored heading"): for the acceptance of many
+        flights; no estimator looks at them.
     always_on_ground : bool
         A car: nothing need prove ground contact.
     """
@@ -53,6 +56,8 @@ class AircraftData:
     gnss_latency_sigma_s: float = number(0.01, 0.0, 10.0)
     ins_class: str = ""
     ins_kind: Literal["", "unaided", "gnss_aided"] = ""
+    ins_serial: str = ""
+    ins_alignment: str = ""
     always_on_ground: bool = False
 
     def __post_init__(self) -> None:

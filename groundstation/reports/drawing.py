@@ -3,6 +3,7 @@
 matplotlib is used through its object-oriented interface alone: no pyplot, no global figure, safe in worker processes.
 """
 
+import gc
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -149,6 +150,18 @@ def report_style() -> Iterator[None]:
         yield
 
 
+@contextmanager
+def _collected_once() -> Iterator[None]:
+    """Let the collector wait for a figure: its thousands of objects are looked through once, when it is done."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
 def draw(key: str, height_mm: float, paint: Callable[[Any], None], width_mm: float = WIDTH_MM) -> Svg:
     """Paint a figure and return it as an SVG element that can stand in a page.
 
@@ -175,7 +188,7 @@ def draw(key: str, height_mm: float, paint: Callable[[Any], None], width_mm: flo
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-    with report_style():
+    with report_style(), _collected_once():
         figure = Figure(figsize=(width_mm / MM_PER_INCH, height_mm / MM_PER_INCH))
         FigureCanvasSVG(figure)
         paint(figure)
@@ -267,7 +280,8 @@ def _strokes(axes: Any, start: Any, end: Any, height: Any, **options: Any) -> No
     codes = np.tile([Path.MOVETO, Path.LINETO], len(start)).astype(np.uint8)
     path = Path(corners, codes)
     path.should_simplify = False  # simplifying drops short strokes
-    axes.add_patch(PathPatch(path, fill=False, snap=False, **options))  # snapped ends of a dot are one: no dot
+    axes.add_artist(PathPatch(path, fill=False, snap=False, **options))  # snapped ends of a dot are one: no dot
+    axes.update_datalim(corners)  # add_patch would look for the turning points of every stroke
     axes.autoscale_view()
 
 

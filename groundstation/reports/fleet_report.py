@@ -28,9 +28,9 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True)
 
     Notes
     -----
-    The page has a row for every flight; paper has at most 60 rows of any table, the flights of note first, and says how
-    many more there are. The page's one script sorts and filters the table of flights; without it the table stands as it
-    is.
+    The page has a row for every flight, of more than 10 000 for those of note and the last ones; paper has at most 60
+    rows of any table, the flights of note first, and says how many more there are. The page's one script sorts and
+    filters the table of flights; without it the table stands as it is.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def fleet_report_html(document: Document, fleet: FleetResults) -> str:
         table_key=flights.KEY,
         heads=flights.HEADS,
         lines=flights.lines(fleet),
-        table_caption=flights.CAPTION,
+        table_caption=flights.caption_of(fleet),
         script=script,
         script_digest=digest_of(script),
         style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),

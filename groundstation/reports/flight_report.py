@@ -19,8 +19,8 @@ from groundstation.results.files import SavedFlight, load, write_text
 
 REPORT = "report.html"
 PDF = "report.pdf"
-SESSION, PLAN = "Session report", "Plan"
-VERDICT_OF = {SESSION: "the session", PLAN: "the plan"}
+SESSION, PLAN, ACCEPTANCE = "Session report", "Plan", "Acceptance report"
+VERDICT_OF = {SESSION: "the session", PLAN: "the plan", ACCEPTANCE: "the INS against the standard"}
 _NOT_IN_AN_ID = re.compile(r"[^A-Za-z0-9_-]+")
 
 
@@ -78,8 +78,11 @@ def flight_document(saved: SavedFlight) -> Document:
     return Document(kind, saved.results.flight_id, front(saved.results), flight_sections(saved))
 
 
-def flight_report_html(document: Document) -> str:
-    """Render the report of a flight as a complete HTML document; its figures are drawn live where scripts may run."""
+def flight_report_html(document: Document, beside: str = "manifest.json") -> str:
+    """Render the report of a flight as a complete HTML document; its figures are drawn live where scripts may run.
+
+    ``beside`` is the file that the foot of the page leads to.
+    """
     parts = (part for section in document.sections for part in section.parts)
     drawn = [part.svg for part in parts if isinstance(part, Drawing)]
     live, pictures = [svg.panels for svg in drawn if svg.panels], [svg.frames for svg in drawn if svg.frames]
@@ -89,6 +92,7 @@ def flight_report_html(document: Document) -> str:
         label=document.label,
         front=document.front,
         sections=document.sections,
+        beside=beside,
         verdict_of=VERDICT_OF.get(document.kind, "the heading correction"),
         page_label=_NOT_IN_AN_ID.sub("-", document.label),  # stands inside a CSS string
         **live_figures(live, pictures),

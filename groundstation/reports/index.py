@@ -101,7 +101,7 @@ def failed_row(source: str, state: str, reason: str) -> IndexRow:
     return IndexRow(kind="skipped" if state == "skipped" else "failed", reason=reason, source=source)
 
 
-def write_index(out: Path, rows: Iterable[IndexRow], answers: Sequence[str] = ()) -> None:
+def write_index(out: Path, rows: Iterable[IndexRow], answers: Sequence[str] = (), *, elsewhere: str = "") -> None:
     """Write index.json and index.csv of a folder of flights.
 
     Parameters
@@ -112,12 +112,15 @@ def write_index(out: Path, rows: Iterable[IndexRow], answers: Sequence[str] = ()
         From :func:`index_row` and :func:`failed_row`, in any order: written flights first, then sessions, by id.
     answers : sequence of str
         Names of the columns of the analyses.
+    elsewhere : str
+        Where the rows of the flights are, if they are not among ``rows``: told in both files.
     """
     columns = columns_of(answers)
     told = [to_json_exactly(row) for row in sorted(rows, key=_place)]
     plain = [{name: (row["answers"] | row).get(name) for name in columns} for row in told]
-    write_text(out / INDEX_JSON, json_text({"schema_version": SCHEMA_VERSION, "rows": plain}))
-    lines = [",".join(columns)]
+    note = {"elsewhere": elsewhere} if elsewhere else {}
+    write_text(out / INDEX_JSON, json_text({"schema_version": SCHEMA_VERSION, **note, "rows": plain}))
+    lines = [*([f"# {elsewhere}"] if elsewhere else []), ",".join(columns)]
     lines += [",".join(_cell(name, row[name]) for name in columns) for row in plain]
     write_text(out / INDEX_CSV, "\n".join(lines) + "\n")
 

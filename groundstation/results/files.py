@@ -277,7 +277,9 @@ def csv_text(figure: FigureData, line_end: str = "\n") -> str:
         places = figure.digits.get(name, digits_of(name))
         if values.dtype.kind == "f":
             rounded = np.round(values.astype(np.float64), places) + 0.0
-            cells.append([f"{value:.{places}f}" if np.isfinite(value) else "" for value in rounded.tolist()])
+            pairs = zip(rounded.tolist(), np.isfinite(rounded).tolist(), strict=True)
+            form = f"%.{places}f"
+            cells.append([form % value if is_known else "" for value, is_known in pairs])
         elif values.dtype.kind == "b":
             cells.append(["1" if value else "0" for value in values.tolist()])
         else:

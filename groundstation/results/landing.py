@@ -90,12 +90,15 @@ class Established:
     vertical_rms_m: float | None
 
 
+StabilisedVerdict = Literal["stabilised", "not stabilised", "not measured"]
+
+
 @dataclass(frozen=True)
 class StabilisedAt:
     """The criteria of a stabilised approach from a height down to where the flare begins."""
 
     height_m: float
-    verdict: Literal["stabilised", "not stabilised", "not measured"]
+    verdict: StabilisedVerdict
     time_s: float | None
     gates: tuple[Gate, ...]
     reason: str = ""

@@ -81,7 +81,7 @@ def _from_magnetic(flight: Flight, table: Table, magnetic_deg: FloatArray) -> Tr
         raise NotAssessableError(
             "heading", "magnetic heading in a log without date", "true heading, or a date for the declination"
         )
-    source = _positions(flight, table)
+    source = positions_for(flight, table)
     altitude = source.values("altitude_ellipsoid_m")
     altitude = np.where(np.isfinite(altitude), altitude, source.values("altitude_msl_m"))
     along = declination_along(
@@ -101,8 +101,14 @@ def _from_magnetic(flight: Flight, table: Table, magnetic_deg: FloatArray) -> Tr
     )
 
 
-def _positions(flight: Flight, table: Table) -> Table:
-    """Samples with a position, of the unit itself or else of a satellite receiver."""
+def positions_for(flight: Flight, table: Table) -> Table:
+    """Samples with a position, of the unit itself or else of a satellite receiver.
+
+    Raises
+    ------
+    NotAssessableError
+        When there is none.
+    """
     for candidate in (table, *(flight[topic] for topic in topics_of_kind("gnss", flight.topics()))):
         known = candidate.valid("latitude_deg", "longitude_deg")
         if known.any():

@@ -8,7 +8,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.analysis import Analysis, Found, RestsOn, Shortfall
+from groundstation.estimators.analysis import Analysis, Found, RestsOn, Rules, Shortfall
 from groundstation.estimators.approaches.columns import COLUMNS
 from groundstation.estimators.approaches.figures import path_columns, path_figure, protection_figure
 from groundstation.estimators.approaches.finals import Final, ends_of, final_of
@@ -31,8 +31,8 @@ from groundstation.estimators.approaches.reference import (
     position_error,
     sensitivity_of,
 )
-from groundstation.estimators.approaches.settings import LandingSettings
-from groundstation.estimators.approaches.stabilised import stabilised
+from groundstation.estimators.approaches.settings import LIMITS, LandingSettings
+from groundstation.estimators.approaches.stabilised import rejudge, stabilised
 from groundstation.estimators.approaches.touchdown import touchdown_of
 from groundstation.estimators.known import Known
 from groundstation.results.answer import Answers, answer_of
@@ -333,5 +333,6 @@ LANDING = Analysis(
     rests_on=_rests_on,
     sentence=_sentence,
     columns=COLUMNS,
+    rules=Rules(LIMITS, rejudge),
     examine=_examine,
 )

@@ -11,6 +11,8 @@ from groundstation.base.toml_settings import check_ranges, number
 from groundstation.base.units import M_PER_FOOT, MPS_PER_KNOT
 
 Rounding = Literal["unknown", "nearest", "down"]
+# Settings that bound a criterion and choose no data: a change of them needs no log.
+LIMITS = frozenset({"deviation_max_dots", "sink_rate_max_mps", "bank_max_deg", "speed_above_max_mps"})
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,9 @@ from groundstation.base.angles import FloatArray
 from groundstation.estimators.approaches.geometry import Against
 from groundstation.estimators.approaches.path import FlightPath
 from groundstation.estimators.approaches.settings import LandingSettings
-from groundstation.results.heading import Gate
-from groundstation.results.landing import StabilisedAt
+from groundstation.results.heading import Bound, Gate, judged_gate
+from groundstation.results.landing import LandingResult, StabilisedAt, StabilisedVerdict
+from groundstation.results.rules import Rejudged
 
 LAST_SPEED_S = 10.0  # the speed of reference is that of so many seconds above the floor
 FEWEST = 3
@@ -36,17 +37,44 @@ def _from(path: FlightPath, near: Against, gate_m: float, settings: LandingSetti
         speed, speed_name = path.ground_speed_mps[rows], "ground speed"
     last = speed[(time_s >= time_s[-1] - LAST_SPEED_S) & np.isfinite(speed)] if len(time_s) else speed
     faster = speed - float(np.median(last)) if last.size else np.full(len(speed), np.nan)
-    limit = settings.deviation_max_dots
+    bounds = gate_bounds(settings)
     gates = (
-        _gate("lateral", "course deviation", np.abs(path.lateral_dots[rows]), limit, "dots"),
-        _gate("vertical", "glide path deviation", np.abs(path.vertical_dots[rows]), limit, "dots"),
-        _gate("sink_rate", "sink rate", path.sink_rate_mps[rows], settings.sink_rate_max_mps, "m/s"),
-        _gate("bank", "bank", np.abs(path.bank_deg[rows]), settings.bank_max_deg, "deg"),
-        _gate("speed", f"{speed_name} above that at the end", faster, settings.speed_above_max_mps, "m/s"),
+        _gate(bounds, "lateral", "course deviation", np.abs(path.lateral_dots[rows]), "dots"),
+        _gate(bounds, "vertical", "glide path deviation", np.abs(path.vertical_dots[rows]), "dots"),
+        _gate(bounds, "sink_rate", "sink rate", path.sink_rate_mps[rows], "m/s"),
+        _gate(bounds, "bank", "bank", np.abs(path.bank_deg[rows]), "deg"),
+        _gate(bounds, "speed", f"{speed_name} above that at the end", faster, "m/s"),
     )
+    return StabilisedAt(gate_m, decide(gates), float(time_s[0]) if len(time_s) else None, gates)
+
+
+def gate_bounds(settings: LandingSettings) -> dict[str, Bound]:
+    """Lowest and highest value with which each criterion is met."""
+    return {
+        "lateral": (None, settings.deviation_max_dots),
+        "vertical": (None, settings.deviation_max_dots),
+        "sink_rate": (None, settings.sink_rate_max_mps),
+        "bank": (None, settings.bank_max_deg),
+        "speed": (None, settings.speed_above_max_mps),
+    }
+
+
+def decide(gates: tuple[Gate, ...]) -> StabilisedVerdict:
+    """Not stabilised where a criterion failed, stabilised where any was met."""
     states = {gate.state for gate in gates}
-    verdict = "not stabilised" if "failed" in states else "stabilised" if "passed" in states else "not measured"
-    return StabilisedAt(gate_m, verdict, float(time_s[0]) if len(time_s) else None, gates)  # type: ignore[arg-type]
+    return "not stabilised" if "failed" in states else "stabilised" if "passed" in states else "not measured"
+
+
+def rejudge(answer: LandingResult, settings: LandingSettings) -> tuple[Rejudged, ...]:
+    """The criteria of every approach under other limits, from the worst values that they were judged by."""
+    bounds = gate_bounds(settings)
+    found = []
+    for place, approach in enumerate(answer.approaches, start=1):
+        for row in approach.stabilised:
+            after = tuple(gate.under(bounds[gate.name]) if gate.name in bounds else gate for gate in row.gates)
+            subject = f"approach {place} from {row.height_m:.0f} m"
+            found.append(Rejudged(subject, row.verdict, decide(after), row.gates, after))
+    return tuple(found)
 
 
 def _not_passed(height_m: FloatArray, gate_m: float) -> str:
@@ -58,8 +86,8 @@ def _not_passed(height_m: FloatArray, gate_m: float) -> str:
     return f"the lowest point is at {np.nanmin(height_m):.0f} m" if np.nanmin(height_m) >= gate_m else ""
 
 
-def _gate(name: str, title: str, values: FloatArray, limit: float, unit: str) -> Gate:
-    if np.isfinite(values).sum() < FEWEST:
-        return Gate(name, title, None, limit, unit, "not_measured", reason="not in the log")
-    value = float(np.nanmax(values))
-    return Gate(name, title, value, limit, unit, "passed" if value <= limit else "failed")
+def _gate(bounds: dict[str, Bound], name: str, title: str, values: FloatArray, unit: str) -> Gate:
+    value = float(np.nanmax(values)) if np.isfinite(values).sum() >= FEWEST else None
+    return judged_gate(
+        bounds[name], name, title, value, unit=unit, reason="" if value is not None else "not in the log"
+    )

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundstation.base.compile import in_place, part
+from groundstation.base.compile import in_place, inlined, part
 from groundstation.base.records import Int64Array
 from groundstation.estimators.cooperative.arrays import (
     HEIGHT,
@@ -127,26 +127,23 @@ def run_joint(
     """Work through a session."""
     size, before = len(joint.x), room.before[0]
     for item in range(len(items.vehicle)):
-        who = items.vehicle[item]
+        who, to_s = items.vehicle[item], items.time_s[item]
         if who >= 0:
-            _advance(fleet, joint, who, items.time_s[item], room)
+            if _is_behind(joint, who, to_s):
+                _advance(fleet, joint, who, to_s, room)
             _keep(fleet, joint, who, log)
-            continue
-        if not rules.uses_measurements:
-            continue
-        first, last = items.first[item], items.last[item]
-        for event in range(first, last):
-            _advance(fleet, joint, events.receiver[event], items.time_s[item], room)
-            if events.kind[event] == PEER:
-                _advance(fleet, joint, events.source[event], items.time_s[item], room)
-        for i in range(size):
-            before[i] = joint.x[i]
-        if rules.is_together:
-            _use_together(fleet, points, events, first, last, rules, joint, room, rows, lines, log)
-        else:
-            _use_one(fleet, points, events, first, rules, joint, room, rows, lines, log)
-        for i in range(0 if rules.innovates else size):
-            joint.x[i] = before[i]
+        elif rules.uses_measurements:
+            first, last = items.first[item], items.last[item]
+            for event in range(first, last):
+                for end in range(2 if events.kind[event] == PEER else 1):
+                    one = events.receiver[event] if end == 0 else events.source[event]
+                    if _is_behind(joint, one, to_s):
+                        _advance(fleet, joint, one, to_s, room)
+            for i in range(size):
+                before[i] = joint.x[i]
+            _use(fleet, points, events, first, last, rules, joint, room, rows, lines, log)
+            for i in range(0 if rules.innovates else size):
+                joint.x[i] = before[i]
 
 
 @part
@@ -160,32 +157,31 @@ def _keep(fleet: Fleet, joint: Joint, who: int, log: Log) -> None:
     log.counts[OUTPUTS] += 1
 
 
+@inlined
+def _is_behind(joint: Joint, who: int, to_s: float) -> bool:
+    """Whether a vehicle's block is to be moved on; asked before the call, which copies what it is handed."""
+    return bool(to_s > joint.time_s[who] + SAME_TIME_S)
+
+
 @part
 def _advance(fleet: Fleet, joint: Joint, who: int, to_s: float, room: Room) -> None:
     """Move one vehicle's block on."""
-    if to_s <= joint.time_s[who] + SAME_TIME_S:
-        return
     n, first = fleet.size[who], joint.first[who]
     x, phi, noise = room.x[0], room.phi[0], room.noise
     for i in range(n):
         x[i] = joint.x[first + i]
     step(fleet, who, x, joint.time_s[who], to_s, phi, noise, room.step)
     changed, starts, columns, values = room.changed, room.starts, room.columns, room.values
-    rows = count = 0
+    count = 0
     for i in range(n):
         joint.x[first + i] = x[i]
-        is_changed = phi[i, i] != 1.0
+        changed[i], starts[i] = first + i, count
         for j in range(n):
-            is_changed |= j != i and phi[i, j] != 0.0
-        if is_changed:
-            changed[rows], starts[rows] = first + i, count
-            rows += 1
-            for j in range(n):
-                if phi[i, j] != 0.0:
-                    columns[count], values[0, count] = first + j, phi[i, j]
-                    count += 1
-    starts[rows] = count
-    pattern = Pattern(changed[:rows], starts, columns)
+            if phi[i, j] != 0.0:
+                columns[count], values[0, count] = first + j, phi[i, j]
+                count += 1
+    starts[n] = count
+    pattern = Pattern(changed[:n], starts, columns)
     predict_covariance(room.states, pattern, values, 0, joint.P, room.wide)
     for i in range(n):
         for j in range(i, n):
@@ -195,7 +191,7 @@ def _advance(fleet: Fleet, joint: Joint, who: int, to_s: float, room: Room) -> N
     joint.time_s[who] = to_s
 
 
-@part
+@inlined
 def _look_at(fleet: Fleet, joint: Joint, who: int, at_s: float, end: int, room: Room) -> bool:
     """State of a vehicle at a time, its derivative by the state it has now, and its place; end 0 receives, 1 sends.
 
@@ -212,7 +208,7 @@ def _look_at(fleet: Fleet, joint: Joint, who: int, at_s: float, end: int, room: 
     return is_other
 
 
-@part
+@inlined
 def _linearise(
     fleet: Fleet,
     points: Points,
@@ -282,7 +278,7 @@ def _linearise(
     return count
 
 
-@part
+@inlined
 def _put(n: int, h: FloatArray, is_back: bool, phi: FloatArray, first: int, lines: Lines, entry: int) -> int:
     """Write the derivative by a vehicle's states now, h phi, where it is not zero; return the next free entry."""
     for j in range(n):
@@ -330,7 +326,7 @@ def _refer(fleet: Fleet, joint: Joint, who: int, source: int, arm_m: FloatArray,
             about[axis] = arm_m[axis] + here[axis] - room.line[0, axis]
 
 
-@part
+@inlined
 def _judge(
     fleet: Fleet, events: Events, event: int, rules: Rules, joint: Joint, lines: Lines, at: int, log: Log
 ) -> bool:
@@ -347,7 +343,7 @@ def _judge(
     return not is_gated
 
 
-@part
+@inlined
 def _correct(joint: Joint, room: Room, lines: Lines, at: int, innovation: float) -> None:
     """One scalar measurement with the optimal gain, in the symmetric form of the Kalman core."""
     size = len(joint.x)
@@ -367,28 +363,8 @@ def _correct(joint: Joint, room: Room, lines: Lines, at: int, innovation: float)
         joint.x[i] += room.gain[i] * innovation
 
 
-@part
-def _use_one(
-    fleet: Fleet,
-    points: Points,
-    events: Events,
-    event: int,
-    rules: Rules,
-    joint: Joint,
-    room: Room,
-    rows: Rows,
-    lines: Lines,
-    log: Log,
-) -> None:
-    """One measurement in an update of its own."""
-    if _linearise(fleet, points, events, event, rules, joint, room, rows, lines, 0) == 0:
-        log.counts[LOST] += 1
-    elif _judge(fleet, events, event, rules, joint, lines, 0, log):
-        _correct(joint, room, lines, 0, lines.innovation[0])
-
-
-@part
-def _use_together(
+@inlined
+def _use(
     fleet: Fleet,
     points: Points,
     events: Events,
@@ -406,6 +382,8 @@ def _use_together(
     count = 0
     for event in range(first, last):
         found = _linearise(fleet, points, events, event, rules, joint, room, rows, lines, count)
+        if found == 0:
+            log.counts[LOST] += 1
         for at in range(count, count + found):
             if not _judge(fleet, events, event, rules, joint, lines, at, log):
                 lines.innovation[at] = np.nan
@@ -416,6 +394,6 @@ def _use_together(
     for at in range(count):
         innovation = lines.innovation[at]
         if np.isfinite(innovation):
-            for e in range(lines.starts[at], lines.starts[at + 1]):
+            for e in range(lines.starts[at], lines.starts[at + 1] if at > 0 else 0):  # the first finds nothing moved
                 innovation -= lines.values[e] * (joint.x[lines.columns[e]] - before[lines.columns[e]])
             _correct(joint, room, lines, at, innovation)

@@ -28,7 +28,7 @@ from groundstation.estimators.cooperative.arrays import (
 
 TERMS, FEWEST_TERMS = 40, 4
 SMALLEST = 1e-16  # of a term of the transition: its largest entry is 1 or more
-SAME_TIME_S = 1e-9
+SAME_TIME_S, SAME_STEP_S = 1e-9, 1e-12
 ROOMS = 11  # matrices of n by n that a step works in; the last three keep the last step of aircraft in a local frame
 KEPT_STEP, KEPT_PHI, KEPT_NOISE = 8, 9, 10  # all aircraft of a session have one model there
 
@@ -237,7 +237,7 @@ def step(
     if fleet.model[who] == GLOBAL:
         _over_epochs(fleet, who, from_s, to_s, phi, noise, room)
     else:
-        if room[KEPT_STEP, 0, 0] != to_s - from_s or to_s == from_s:
+        if abs(room[KEPT_STEP, 0, 0] - (to_s - from_s)) > SAME_STEP_S or to_s == from_s:
             fill_dynamics(fleet, who, fleet.first[who], F)
             discretise(n, F, fleet.density[who], to_s - from_s, room[KEPT_PHI], room[KEPT_NOISE], room)
             room[KEPT_STEP, 0, 0] = to_s - from_s

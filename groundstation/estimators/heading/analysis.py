@@ -3,13 +3,14 @@
 from typing import TYPE_CHECKING
 
 from groundstation.base.findings import Finding
-from groundstation.estimators.analysis import Analysis, Found, RestsOn, Shortfall
+from groundstation.estimators.analysis import Analysis, Found, RestsOn, Rules, Shortfall
 from groundstation.estimators.heading.columns import COLUMNS
-from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.estimators.heading.settings import LIMITS, HeadingRequest, HeadingSettings
 from groundstation.estimators.known import Known
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.heading import HeadingResult
 from groundstation.results.latency import Latencies
+from groundstation.results.rules import Rejudged
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight
@@ -94,6 +95,12 @@ def _sentence(answers: Answers) -> str:
     return f"{text} ({heading.verdict_reason})"
 
 
+def _rejudge(answer: HeadingResult, settings: HeadingSettings) -> tuple[Rejudged, ...]:
+    from groundstation.estimators.heading.verdict import rejudge
+
+    return rejudge(answer, settings)
+
+
 HEADING = Analysis(
     name="heading",
     title="INS heading error and correction from GNSS on straight taxi (Markelov et al. 2015)",
@@ -108,4 +115,5 @@ HEADING = Analysis(
     sentence=_sentence,
     columns=COLUMNS,
     examine=_examine,
+    rules=Rules(LIMITS, _rejudge),
 )

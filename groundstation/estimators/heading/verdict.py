@@ -1,6 +1,7 @@
 """Gates with figure and limit, the verdict that follows from them, and the number to type."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,11 +12,13 @@ from groundstation.estimators.heading.normality import Normality, normality_limi
 from groundstation.estimators.heading.samples import Samples
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.wording import told
-from groundstation.results.heading import Gate, HeadingStep, Sense, Standstill, Verdict
+from groundstation.results.heading import Bound, Gate, HeadingResult, HeadingStep, Standstill, Verdict, judged_gate
+from groundstation.results.rules import Rejudged
 
 # Required gates whose failure more data may cure; the failure of any other required gate rejects.
 CURED_BY_MORE_DATA = frozenset({"standstill_duration", "taxi_seconds", "precision", "half_width", "whole_half_width"})
 STANDSTILL_GATE = "standstill_speed_of_mean"
+Bounds = Mapping[str, Bound]
 
 
 @dataclass(frozen=True)
@@ -37,41 +40,57 @@ class Figures:
     steps: tuple[HeadingStep, ...]
 
 
-def _gate(
-    name: str,
-    title: str,
-    value: float | None,
-    *,
-    low: float | None = None,
-    high: float | None = None,
-    unit: str = "",
-    reason: str = "",
-    required: bool = True,
-) -> Gate:
-    """A gate that passes where low <= value <= high; its limit is the one bound given, or both."""
-    bounds = tuple(bound for bound in (low, high) if bound is not None)
-    limit = bounds[0] if len(bounds) == 1 else (bounds[0], bounds[1])
-    sense: Sense = "between" if len(bounds) == 2 else "at_most" if low is None else "at_least"
-    if value is None or not np.isfinite(value):
-        return Gate(name, title, None, limit, unit, "not_measured", required, reason or "not measurable", sense)
-    passed = (low is None or value >= low) and (high is None or value <= high)
-    return Gate(name, title, float(value), limit, unit, "passed" if passed else "failed", required, reason, sense)
+def gate_bounds(settings: HeadingSettings, samples: int) -> dict[str, Bound]:
+    """Lowest and highest value with which each gate passes, of those whose limits are settings."""
+    skewness, kurtosis, distance = normality_limits(settings, max(samples, 1))
+    return {
+        "geometry": (settings.geometry_share_min, None),
+        "integrity": (settings.integrity_share_min, None),
+        "standstill_duration": (settings.standstill_min_s, None),
+        STANDSTILL_GATE: (None, settings.speed_of_mean_max_mps),
+        "standstill_bound97": (None, settings.speed_of_mean_max_mps),
+        "taxi_seconds": (settings.taxi_min_s, None),
+        "outliers": (None, settings.outlier_share_max),
+        "precision": (None, settings.precision_max_deg),
+        "quality": (None, settings.quality_max_deg),
+        "half_width": (None, settings.half_width_max_deg),
+        "whole_half_width": (None, settings.whole_half_width_max_deg),
+        "skewness": (None, skewness),
+        "kurtosis": kurtosis,
+        "normal_distance": (None, distance),
+        "variance_ratio": settings.variance_ratio_range,
+        "drift": (None, settings.drift_sigmas_max),
+    }
+
+
+def rejudge(answer: HeadingResult, settings: HeadingSettings) -> tuple[Rejudged, ...]:
+    """The gates and the verdict of an answer under other limits, from the values that it was judged by."""
+    bounds = gate_bounds(settings, answer.samples)
+    after = tuple(gate.under(bounds[gate.name]) if gate.name in bounds else gate for gate in answer.gates)
+    after = tuple(
+        replace(gate, required=settings.whole_decides) if gate.name == "whole_half_width" else gate for gate in after
+    )
+    verdict, _ = decide(after, answer.standstill, settings)
+    return (Rejudged("heading", answer.verdict, verdict, answer.gates, after),)
 
 
 def build_gates(
     samples: Samples, standstill: Standstill | None, figures: Figures, settings: HeadingSettings
 ) -> tuple[Gate, ...]:
     """Every gate of the method in the order of the paper: throughout, standstill, taxi, acceptance."""
+    bounds = gate_bounds(settings, int(samples.is_used.sum()))
     return (
-        *_throughout_gates(samples, figures, settings),
-        *_standstill_gates(standstill, settings),
-        *_taxi_gates(samples, figures, settings),
-        *_normality_gates(figures.normality, int(samples.is_used.sum()), settings),
-        *_steadiness_gates(figures, settings),
+        *_throughout_gates(samples, figures, settings, bounds),
+        *_standstill_gates(standstill, bounds),
+        *_taxi_gates(samples, figures, settings, bounds),
+        *_normality_gates(figures.normality, bounds),
+        *_steadiness_gates(figures, bounds),
     )
 
 
-def _throughout_gates(samples: Samples, figures: Figures, settings: HeadingSettings) -> tuple[Gate, ...]:
+def _throughout_gates(
+    samples: Samples, figures: Figures, settings: HeadingSettings, bounds: Bounds
+) -> tuple[Gate, ...]:
     judged = is_straight_and_fast(samples, settings) & np.isin(
         samples.gate, ["used", "geometry", "integrity", "outlier"]
     )
@@ -80,66 +99,66 @@ def _throughout_gates(samples: Samples, figures: Figures, settings: HeadingSetti
     name = samples.geometry_name or "GDOP"
     changes = figures.mode_changes
     return (
-        _gate(
+        judged_gate(
+            bounds["geometry"],
             "geometry",
             f"share of straight taxi with {name} at most {settings.geometry_max:g}",
             float(np.mean(geometry <= settings.geometry_max)) if len(geometry) else None,
-            low=settings.geometry_share_min,
             reason=f"largest {np.max(geometry):.2f}" if len(geometry) else "no GDOP, PDOP or HDOP in the log",
         ),
-        _gate(
+        judged_gate(
+            bounds["integrity"],
             "integrity",
             "share of straight taxi with integrity good",
             float(np.mean(integrity > 0.5)) if len(integrity) else None,
-            low=settings.integrity_share_min,
             reason="" if len(integrity) else "integrity flag not in the log",
         ),
-        _gate(
+        judged_gate(
+            (1.0, None),
             "ground",
             "share of used samples with ground contact proven",
             float(np.mean(samples.on_ground[samples.is_used])) if samples.ground_method else None,
-            low=1.0,
             reason=samples.ground_method or "nothing in the log proves ground contact",
         ),
-        _gate(
+        judged_gate(
+            (None, 0.0),
             "ins_mode",
             "changes of INS mode from the end of standstill to the end of taxi",
             None if changes is None else float(changes),
-            high=0.0,
             reason="INS mode not in the log" if changes is None else "",
             required=changes is not None,
         ),
     )
 
 
-def _standstill_gates(standstill: Standstill | None, settings: HeadingSettings) -> tuple[Gate, ...]:
+def _standstill_gates(standstill: Standstill | None, bounds: Bounds) -> tuple[Gate, ...]:
     missing = "no standstill before taxi in the log" if standstill is None else ""
     seconds = None if standstill is None else standstill.end_s - standstill.start_s
     seen, unseen = standstill, missing
     if standstill is not None and standstill.velocity_is_held:
         seen, unseen = None, "the receiver holds its velocity when standing: its error cannot be seen"
     return (
-        _gate(
+        judged_gate(
+            bounds["standstill_duration"],
             "standstill_duration",
             "standstill assessed",
             seconds,
-            low=settings.standstill_min_s,
             unit="s",
             reason=missing,
         ),
-        _gate(
+        judged_gate(
+            bounds[STANDSTILL_GATE],
             STANDSTILL_GATE,
             "length of the mean GNSS velocity at standstill",
             None if seen is None else seen.speed_of_mean_mps,
-            high=settings.speed_of_mean_max_mps,
             unit="m/s",
             reason=unseen or f"over {seconds:.0f} s",
         ),
-        _gate(
+        judged_gate(
+            bounds["standstill_bound97"],
             "standstill_bound97",
             "0.97 bound of the mean speed at standstill",
             None if seen is None else seen.speed_bound97_mps,
-            high=settings.speed_of_mean_max_mps,
             unit="m/s",
             reason=unseen,
             required=False,
@@ -147,62 +166,62 @@ def _standstill_gates(standstill: Standstill | None, settings: HeadingSettings) 
     )
 
 
-def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings) -> tuple[Gate, ...]:
+def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings, bounds: Bounds) -> tuple[Gate, ...]:
     outliers, used = int(np.sum(samples.gate == "outlier")), int(samples.is_used.sum())
     later = int(samples.is_after_lift_off[samples.is_used].sum())
     run = is_straight_and_fast(samples, settings) & np.isin(samples.gate, NOT_TAXI)
     return (
-        _gate(
+        judged_gate(
+            (None, 1.0),
             "not_taxi",
             "share of straight epochs in take-off run and landing roll",
             float(run.sum()) / max(int(run.sum()) + used, 1),
-            high=1.0,
             reason=f"{run.sum()} epochs" if run.any() else "",
             required=False,
         ),
-        _gate(
+        judged_gate(
+            (1.0, None),
             "before_take_off",
             "share of used samples before take-off",
             (used - later) / max(used, 1),
-            low=1.0,
             reason=f"{later} of {used} are from after the flight: too little straight taxi before it" if later else "",
         ),
-        _gate("taxi_seconds", "straight taxi", figures.taxi_seconds, low=settings.taxi_min_s, unit="s"),
-        _gate(
+        judged_gate(bounds["taxi_seconds"], "taxi_seconds", "straight taxi", figures.taxi_seconds, unit="s"),
+        judged_gate(
+            bounds["outliers"],
             "outliers",
             "share of outliers among straight samples",
             outliers / max(outliers + used, 1),
-            high=settings.outlier_share_max,
             reason=f"{outliers} of {outliers + used}",
         ),
-        _gate(
+        judged_gate(
+            (9.0, None),
             "gnss_rate",
             "GNSS rate (10 Hz in Markelov 2015)",
             1.0 / samples.interval_s if samples.interval_s > 0 else None,
-            low=9.0,
             unit="Hz",
             required=False,
         ),
-        _gate(
+        judged_gate(
+            bounds["precision"],
             "precision",
             "precision e of Markelov 2015",
             figures.precision_deg,
-            high=settings.precision_max_deg,
             unit="deg",
         ),
-        _gate("quality", "spread of the running mean", figures.quality_deg, high=settings.quality_max_deg, unit="deg"),
-        _gate(
+        judged_gate(bounds["quality"], "quality", "spread of the running mean", figures.quality_deg, unit="deg"),
+        judged_gate(
+            bounds["half_width"],
             "half_width",
             "half width of the 95 % interval by this taxi alone",
             figures.half_width_deg,
-            high=settings.half_width_max_deg,
             unit="deg",
         ),
-        _gate(
+        judged_gate(
+            bounds["whole_half_width"],
             "whole_half_width",
             "half width of the 95 % interval, steady sideslip and mounting in it",
             figures.whole_half_width_deg,
-            high=settings.whole_half_width_max_deg,
             unit="deg",
             reason=f"{NORMAL_95 * figures.steady_sigma_deg:.2f} deg of it steady: taxi the other way too, log the "
             "wind, or state the sigmas in the aircraft file",
@@ -211,74 +230,70 @@ def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings) -
     )
 
 
-def _normality_gates(normal: Normality | None, count: int, settings: HeadingSettings) -> tuple[Gate, ...]:
+def _normality_gates(normal: Normality | None, bounds: Bounds) -> tuple[Gate, ...]:
     few = "too few samples, or no spread"
 
     def p_value(value: float) -> str:
         return f"p = {value:.2g} for independent samples, not gated"
 
-    skewness, (low, high), distance = normality_limits(settings, max(count, 1))
     return (
-        _gate(
+        judged_gate(
+            bounds["skewness"],
             "skewness",
             "skewness of the differences, absolute",
             None if normal is None else abs(normal.skewness),
-            high=skewness,
             reason=few if normal is None else p_value(normal.skewness_p),
         ),
-        _gate(
+        judged_gate(
+            bounds["kurtosis"],
             "kurtosis",
             "excess kurtosis of the differences",
             None if normal is None else normal.excess_kurtosis,
-            low=low,
-            high=high,
             reason=few if normal is None else p_value(normal.kurtosis_p),
         ),
-        _gate(
+        judged_gate(
+            bounds["normal_distance"],
             "normal_distance",
             "distance to the fitted normal distribution",
             None if normal is None else normal.distance,
-            high=distance,
             reason=few if normal is None else p_value(normal.distance_p),
         ),
     )
 
 
-def _steadiness_gates(figures: Figures, settings: HeadingSettings) -> tuple[Gate, ...]:
+def _steadiness_gates(figures: Figures, bounds: Bounds) -> tuple[Gate, ...]:
     variance, parts = figures.variance, figures.disagreement
     drift, sigma = figures.drift_deg_per_h, figures.drift_sigma_deg_per_h
-    low, high = settings.variance_ratio_range
     return (
-        _gate(
+        judged_gate(
+            bounds["variance_ratio"],
             "variance_ratio",
             "variance of the differences over that of track and sway",
             None if variance is None else variance.ratio,
-            low=low,
-            high=high,
             reason="no standstill variance, or too few samples"
             if variance is None
             else f"95 % interval {variance.low:.2f} to {variance.high:.2f}",
         ),
-        _gate(
+        judged_gate(
+            bounds["drift"],
             "drift",
             "azimuth drift over its standard deviation",
             abs(drift) / sigma if drift is not None and sigma else None,
-            high=settings.drift_sigmas_max,
             reason="taxi too short" if drift is None else f"{drift:+.1f} +- {sigma:.1f} deg/h",
         ),
-        _gate(
+        judged_gate(
+            (None, 1.0 if parts is None else parts.limit),
             "segments",
             "disagreement of segments and minutes, chi-square per degree of freedom",
             None if parts is None else parts.chi2,
-            high=1.0 if parts is None else parts.limit,
             reason="one part" if parts is None else parts.told,
             required=parts is not None,
         ),
-        _gate(
+        judged_gate(
+            (None, 0.0),
             "steps",
             "steps of the INS heading",
             float(len(figures.steps)),
-            high=0.0,
             reason=", ".join(f"{step.size_deg:+.2f} deg at {step.time_s:.1f} s" for step in figures.steps),
         ),
     )

@@ -166,11 +166,11 @@ def update_covariance(
     g, K : ndarrays, shape (n,)
         Filled: room, and the gain.
 
-    With any gain K the covariance of the error is (I - K h) p (I - K h)' + K R K' (Joseph). Multiplied out that is
-    p - K t' - t K' with t = p h' - S K / 2: the form computed here. It holds for the gain as it stands, rounded or
-    partly set to zero, so an error of the gain enters p squared only; K_i t_j + t_i K_j is the same number for (j, i),
-    so p stays symmetric to the last bit; rows where both vectors vanish are not touched. Where h is a single state, its
-    row becomes p h' R / S: a product, which stays positive, where a difference of nearly equal numbers stood.
+    Where nothing is held the gain is the optimal one, and p becomes p - g g' / S: g_i g_j is the same number for
+    (j, i), so p stays symmetric to the last bit. With a gain partly set to zero the covariance of the error is
+    (I - K h) p (I - K h)' + K R K' (Joseph); multiplied out that is p - K t' - t K' with t = g - S K / 2, symmetric to
+    the last bit too. Rows where both vectors vanish are not touched. Where h is a single state, its row becomes
+    p h' R / S: a product, which stays positive, where a difference of nearly equal numbers stood.
 
     Source: Bucy and Joseph 1968; S. F. Schmidt, Application of state-space methods to navigation problems, 1966.
     """
@@ -184,21 +184,29 @@ def update_covariance(
     s = R
     for e in range(first, last):
         s += values[e] * g[columns[e]]
+    weight = 1.0 / s
     for i in range(n):
-        K[i] = g[i] / s
-    for e in range(len(held)):
-        K[held[e]] = 0.0
-    for i in range(n):
-        g[i] -= 0.5 * s * K[i]
-    for i in range(n):
-        a, b = K[i], g[i]
-        if a != 0.0 or b != 0.0:
-            for j in range(n):
-                p[i, j] -= a * g[j] + b * K[j]
+        K[i] = g[i] * weight
+    if len(held) == 0:
+        for i in range(n):
+            a = g[i]
+            if a != 0.0:
+                for j in range(n):
+                    p[i, j] -= a * g[j] * weight
+    else:
+        for e in range(len(held)):
+            K[held[e]] = 0.0
+        for i in range(n):
+            g[i] -= 0.5 * s * K[i]
+        for i in range(n):
+            a, b = K[i], g[i]
+            if a != 0.0 or b != 0.0:
+                for j in range(n):
+                    p[i, j] -= a * g[j] + b * K[j]
     r = columns[first]
     is_single = last - first == 1 and K[r] != 0.0
-    for i in range(n if is_single else 0):  # what is left of g: half of it, all of it for a state that is held
-        total = R * K[i] if K[i] != 0.0 else R / s * g[i]
+    for i in range(n if is_single else 0):
+        total = R * K[i] if len(held) == 0 or K[i] != 0.0 else R / s * g[i]  # all of g is left for a held state
         p[r, i] = total / values[first]
         p[i, r] = total / values[first]
     return s

@@ -4,18 +4,19 @@ from typing import TYPE_CHECKING
 
 from groundstation.base.findings import Finding
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.analysis import Analysis, Found, Shortfall
+from groundstation.estimators.analysis import Analysis, Found, Rules, Shortfall
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.known import Known
 from groundstation.estimators.magnetic.columns import COLUMNS
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
-from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.estimators.magnetic.settings import LIMITS, MagneticSettings
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
 from groundstation.results.magnetic_ground import GroundDeviation
+from groundstation.results.rules import Rejudged
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight
@@ -117,6 +118,12 @@ def _ground_sentence(answers: Answers) -> str:
     return "" if found is None else _ground_text(found)
 
 
+def _rejudge(answer: MagneticResult, settings: MagneticSettings) -> tuple[Rejudged, ...]:
+    from groundstation.estimators.magnetic.verdict import rejudge
+
+    return rejudge(answer, settings)
+
+
 MAGNETIC = Analysis(
     name="magnetic",
     title="magnetic deviation from opposite turns in flight, with its coefficients A to E",
@@ -131,6 +138,7 @@ MAGNETIC = Analysis(
     sentence=_sentence,
     columns=COLUMNS,
     examine=_examine,
+    rules=Rules(LIMITS, _rejudge),
 )
 MAGNETIC_GROUND = Analysis(
     name="magnetic_ground",

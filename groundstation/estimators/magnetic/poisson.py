@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.estimators.magnetic import harmonics
@@ -221,6 +220,8 @@ def _with_dip(readings: Readings, earth: EarthField, settings: MagneticSettings)
         dip_rad = np.deg2rad(dip_deg)
         horizontal, down = float(strength * np.cos(dip_rad)), float(strength * np.sin(dip_rad))
         return EarthField(earth.declination_deg, horizontal, down, is_modelled=False)
+
+    from scipy.optimize import minimize_scalar  # 0.15 s to import, which flights without a magnetometer are spared
 
     best = minimize_scalar(
         lambda dip_deg: float(np.mean(_solved(readings, of_dip(dip_deg), settings).residual_nt ** 2)),

@@ -4,6 +4,13 @@ from dataclasses import dataclass
 
 from groundstation.base.toml_settings import check_ranges, number
 
+LIMITS = frozenset(  # settings that bound a gate and choose no data: a change of them needs no log
+    {
+        *("alignment_sigma_max_deg", "held_out_rms_max_deg", "dip_sigmas_max"),
+        *("altitude_min_m", "repeat_rms_max_deg"),
+    }
+)
+
 
 @dataclass(frozen=True)
 class MagneticSettings:

@@ -1,17 +1,21 @@
 """Gates and verdict of the magnetic deviation."""
 
+from dataclasses import replace
+
 from groundstation.estimators.magnetic.settings import MagneticSettings
-from groundstation.results.heading import Gate, GateState, Sense
+from groundstation.results.heading import Bound, Gate, GateState, judged_gate
 from groundstation.results.magnetic import (
     Alignment,
     BankBias,
     Coverage,
+    MagneticResult,
     MagneticVerdict,
     MethodName,
     Residual,
     Swing,
     Turn,
 )
+from groundstation.results.rules import Rejudged
 
 
 def build_gates(
@@ -34,62 +38,78 @@ def build_gates(
     repeat = max((swing.difference_rms_deg for swing in swings if swing.difference_rms_deg is not None), default=None)
     unsteady = max(turn.bank_sd_deg for turn in turns)
     after = residual.after if residual else None
+    bounds = gate_bounds(settings)
     return (
-        _gate("coverage", "circle covered by both branches", coverage.share, settings.coverage_min, sense="at_least"),
-        _gate("bank_difference", "difference of opposite banks", unequal, settings.bank_difference_max_deg, "deg"),
-        _gate("bank_steadiness", "standard deviation of bank in a turn", unsteady, settings.bank_sd_max_deg, "deg"),
+        _gate(bounds, "coverage", "circle covered by both branches", coverage.share),
+        _gate(bounds, "bank_difference", "difference of opposite banks", unequal, "deg"),
+        _gate(bounds, "bank_steadiness", "standard deviation of bank in a turn", unsteady, "deg"),
+        _gate(bounds, "alignment", "sigma of the INS heading at the figure", alignment.sigma_deg, "deg"),
         _gate(
-            "alignment",
-            "sigma of the INS heading at the figure",
-            alignment.sigma_deg,
-            settings.alignment_sigma_max_deg,
-            "deg",
-        ),
-        _gate(
+            bounds,
             "held_out",
             "rms error after correction where no fit has seen",
             after,
-            settings.held_out_rms_max_deg,
             "deg",
             reason="no level flight beside the figure",
         ),
         _gate(
+            bounds,
             "bank_bias",
             "rms of the forecast bank bias of the average of branches",
             bias.rms_deg if bias else None,
-            settings.bank_bias_max_deg,
             "deg",
             is_required=method == "compass_table",
             reason="no iron fitted to forecast it from",
         ),
         _gate(
+            bounds,
             "dip",
             "dip of the field in the readings off the model's, in sigmas",
             dip_sigmas,
-            settings.dip_sigmas_max,
             is_required=dip_sigmas is not None,
             reason="no model of the field, or no iron fitted",
         ),
         _gate(
+            bounds,
             "altitude",
             "lowest mean altitude of a turn",
             altitude,
-            settings.altitude_min_m,
             "m",
-            "at_least",
             is_required=False,
             reason="no altitude in the log",
         ),
         _gate(
+            bounds,
             "repeatability",
             "rms difference of repeated figures",
             repeat,
-            settings.repeat_rms_max_deg,
             "deg",
             is_required=len(swings) > 1,
             reason="one figure alone",
         ),
     )
+
+
+def gate_bounds(settings: MagneticSettings) -> dict[str, Bound]:
+    """Lowest and highest value with which each gate passes."""
+    return {
+        "coverage": (settings.coverage_min, None),
+        "bank_difference": (None, settings.bank_difference_max_deg),
+        "bank_steadiness": (None, settings.bank_sd_max_deg),
+        "alignment": (None, settings.alignment_sigma_max_deg),
+        "held_out": (None, settings.held_out_rms_max_deg),
+        "bank_bias": (None, settings.bank_bias_max_deg),
+        "dip": (None, settings.dip_sigmas_max),
+        "altitude": (settings.altitude_min_m, None),
+        "repeatability": (None, settings.repeat_rms_max_deg),
+    }
+
+
+def rejudge(answer: MagneticResult, settings: MagneticSettings) -> tuple[Rejudged, ...]:
+    """The gates and the verdict of an answer under other limits, from the values that it was judged by."""
+    bounds = gate_bounds(settings)
+    after = tuple(_told(gate.under(bounds[gate.name])) if gate.name in bounds else gate for gate in answer.gates)
+    return (Rejudged("magnetic", answer.verdict, decide(after)[0], answer.gates, after),)
 
 
 def decide(gates: tuple[Gate, ...]) -> tuple[MagneticVerdict, str]:
@@ -103,19 +123,22 @@ def decide(gates: tuple[Gate, ...]) -> tuple[MagneticVerdict, str]:
 
 
 def _gate(
+    bounds: dict[str, Bound],
     name: str,
     title: str,
     value: float | None,
-    limit: float,
     unit: str = "",
-    sense: Sense = "at_most",
     *,
     is_required: bool = True,
-    reason: str = "",
+    reason: str = "not measured",
 ) -> Gate:
-    if value is None:
-        return Gate(name, title, None, limit, unit, "not_measured", is_required, reason or "not measured", sense)
-    is_good = value >= limit if sense == "at_least" else value <= limit
-    wanted = "at least" if sense == "at_least" else "at most"
-    reason = "" if is_good else f"{value:.3g} {unit}, {wanted} {limit:g}".replace(" ,", ",")
-    return Gate(name, title, value, limit, unit, "passed" if is_good else "failed", is_required, reason, sense)
+    return _told(judged_gate(bounds[name], name, title, value, unit=unit, required=is_required, reason=reason))
+
+
+def _told(gate: Gate) -> Gate:
+    """The gate with figure and limit for its reason where it failed, with none where it passed."""
+    if gate.value is None:
+        return gate
+    wanted = "at least" if gate.sense == "at_least" else "at most"
+    told = f"{gate.value:.3g} {gate.unit}, {wanted} {gate.limit:g}".replace(" ,", ",")
+    return replace(gate, reason=told if gate.state == "failed" else "")

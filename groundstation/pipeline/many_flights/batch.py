@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path, PurePath
 
 from groundstation.base.errors import UnclaimedLogError, UsageError
+from groundstation.pipeline.many_flights.fleet_store import Scan, refresh, scan
 from groundstation.pipeline.many_flights.found_sessions import (
     STATIONS_TOML,
     Asked,
@@ -17,7 +18,8 @@ from groundstation.pipeline.many_flights.found_sessions import (
     find_sessions,
     run_sessions,
 )
-from groundstation.pipeline.many_flights.inputs import collect, flight_folders, is_ours, session_folders
+from groundstation.pipeline.many_flights.inputs import collect, is_ours, session_folders
+from groundstation.pipeline.many_flights.known_flights import KnownFlights
 from groundstation.pipeline.many_flights.out_folder import alone_in, clear_unfinished, prepare, refuse_foreign
 from groundstation.pipeline.many_flights.output import LocalOutput, RemoteOutput
 from groundstation.pipeline.many_flights.placement import Placement
@@ -31,7 +33,6 @@ from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
-from groundstation.pipeline.one_flight.resume import Finished, finished_flights
 
 PLANS: Mapping[str, str] = {
     "everything": "to run",
@@ -53,6 +54,7 @@ def run_many(
     with_pdf: bool = True,
     redo: bool = False,
     stations: Path | None = None,
+    only_results: bool = False,
     timeout_s: float = math.inf,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
@@ -71,6 +73,8 @@ def run_many(
         Address of a Dask scheduler, whose workers do the work; they see local paths as this machine does.
     stations : Path, optional
         TOML file with the ground stations of the sessions; left out: stations.toml beside the logs of each.
+    only_results : bool
+        Neither recordings nor reports, of flights or of all; a later run without it makes them.
     timeout_s : float
         A log, or a session, that takes longer has failed, and the process that ran it is ended.
 
@@ -88,16 +92,17 @@ def run_many(
     ground = None if stations is None else load_stations(stations)
     inputs = _inputs(paths, out, configuration)
     crew = _crew(scheduler, jobs or cores(), len(inputs), listen, timeout_s)
-    make = partial(Job, configuration=configuration, fail_on=fail_on, with_pdf=with_pdf)
+    make = partial(Job, configuration=configuration, fail_on=fail_on, with_pdf=with_pdf, only_results=only_results)
     listen(Event("begin", total=len(inputs)))
-    asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo)
+    asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo, only_results=only_results)
     if any(is_remote(str(place)) for place in (out, *paths)):
         remote = [
             RemoteJob(make(Path(), Path(), is_named=one.is_named), one.url, str(out), redo, one.size) for one in inputs
         ]
         return _run_remote(remote, asked, crew, force, listen)
     near = [make(Path(one.url), Path(out), is_named=one.is_named) for one in inputs]
-    return _run_here(near, asked, crew, force, listen)
+    refresher = _crew(scheduler, jobs or cores(), TASKS_PER_PROCESS + 1, listen)
+    return _run_here(near, asked, crew, force, listen, refresher)
 
 
 def run_together(
@@ -108,6 +113,7 @@ def run_together(
     force: bool = False,
     fail_on: str = "none",
     with_pdf: bool = True,
+    only_results: bool = False,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
     """Run several logs of one flight as that flight; see :func:`groundstation.pipeline.one_flight.join.join_logs`.
@@ -136,17 +142,19 @@ def run_together(
             reason, trace = reason_of(named, error)
             listen(Event("end", named, reason))
             return (Outcome(named, "failed", reason, trace=trace),)
-        job = Job(mcap, Path(out), configuration, fail_on, with_pdf=with_pdf, url=named)
-        asked = Asked(Path(out), configuration, None, fail_on, with_pdf, redo=True)
+        job = Job(mcap, Path(out), configuration, fail_on, with_pdf=with_pdf, url=named, only_results=only_results)
+        asked = Asked(Path(out), configuration, None, fail_on, with_pdf, redo=True, only_results=only_results)
         return _run_here([job], asked, partial(in_turn, listen=listen), force, listen)
 
 
-def _run_here(work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen: Listener) -> tuple[Outcome, ...]:
+def _run_here(
+    work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen: Listener, refresher: Crew | None = None
+) -> tuple[Outcome, ...]:
     out = asked.out
     refuse_foreign(out, force)
     with alone_in(out):
         prepare(out)
-        known = {} if asked.redo else finished_flights(flight_folders(out))
+        known = KnownFlights(None if asked.redo else scan(out))
         placement = Placement(LocalOutput(out), [job.log for job in work])
 
         def left() -> Iterator[tuple[int, Job]]:
@@ -162,16 +170,25 @@ def _run_here(work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen
 
         _run_into(placement, out, left(), run_flight, suffixed, crew, listen)
         clear_unfinished(out)  # of processes that died or took too long
-        sessions = _run_sessions(placement, asked, crew, listen)
+        found, unwritten = _swept(placement, out, refresher)
+        sessions = _run_sessions(placement, asked, found, crew, listen)
         outcomes = (*placement.outcomes(), *sessions)
-        return (*outcomes, *write_beside(out, outcomes, with_pdf=asked.with_pdf))
+        found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
+        problems = write_beside(out, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found)
+        return (*outcomes, *unwritten, *problems)
 
 
-def _run_sessions(placement: Placement, asked: Asked, crew: Crew, listen: Listener) -> tuple[Outcome, ...]:
+def _swept(placement: Placement, out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, ...]]:
+    """Bring the dataset of flights up to date, flights that these logs have no longer being removed."""
+    found, unwritten = refresh(out, crew)
+    return refresh(out) if placement.sweep(found) else (found, unwritten)
+
+
+def _run_sessions(placement: Placement, asked: Asked, among: Scan, crew: Crew, listen: Listener) -> tuple[Outcome, ...]:
     """Run the sessions among the flights that are in place; interrupted, the index at least is written."""
     flights = placement.outcomes()
     try:
-        found = find_sessions(asked, {one.flight_id for one in flights if one.flight_id})
+        found = find_sessions(asked, among, {one.flight_id for one in flights if one.flight_id})
         if found.jobs:
             listen(Event("begin", total=len(flights) + len(found.jobs)))
         return run_sessions(found, crew, listen)
@@ -196,9 +213,14 @@ def _run_remote(
             is_whole = False
             try:
                 _run_into(placement, copy, _once(work, placement, crew, listen), run_remote, suffixed, crew, listen)
-                sessions = _run_remote_sessions(placement, output, asked, listen)
+                found, unwritten = _swept(placement, copy)
+                sessions = _run_remote_sessions(placement, output, asked, found, listen)
                 outcomes = (*placement.outcomes(), *sessions)
-                problems = write_beside(copy, outcomes, with_pdf=asked.with_pdf)
+                found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
+                beside = write_beside(
+                    copy, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found
+                )
+                problems = (*unwritten, *beside)
                 is_whole = True
             finally:
                 lease.require()
@@ -230,12 +252,12 @@ def _once(
 
 
 def _run_remote_sessions(
-    placement: Placement, output: RemoteOutput, asked: Asked, listen: Listener
+    placement: Placement, output: RemoteOutput, asked: Asked, among: Scan, listen: Listener
 ) -> tuple[Outcome, ...]:
     """Run the sessions in the copy of an OUT elsewhere, in this process, where the MCAPs are fetched to."""
     before = session_folders(output.root)
     here = replace(asked, out=output.root, mcap_in=output.mcap_in)
-    outcomes = _run_sessions(placement, here, partial(in_turn, listen=listen), listen)
+    outcomes = _run_sessions(placement, here, among, partial(in_turn, listen=listen), listen)
     sent = []
     for outcome in outcomes:
         if outcome.folder:
@@ -267,7 +289,6 @@ def _run_into(
             with closing(crew(((number, suffixed(number)) for number in clashing), run)) as ended:
                 for number, outcome in ended:
                     placement.put_again(number, outcome)
-        placement.sweep()
     except BaseException:
         write_index_of(out, placement.outcomes())
         raise
@@ -292,6 +313,7 @@ def plan_many(
     with_pdf: bool = True,
     redo: bool = False,
     stations: Path | None = None,
+    only_results: bool = False,
 ) -> tuple[Outcome, ...]:
     """Say what :func:`run_many` would do of each log, and of the sessions among finished flights; nothing is written.
 
@@ -304,8 +326,10 @@ def plan_many(
         raise UsageError("--dry-run", "logs or results elsewhere", "local ones")
     inputs, out = _inputs(paths, out, configuration), Path(out)
     refuse_foreign(out, force=True)
-    known = {} if redo or not out.is_dir() else finished_flights(flight_folders(out))
-    work = [Job(Path(one.url), out, configuration, is_named=one.is_named, with_pdf=with_pdf) for one in inputs]
+    before = scan(out)
+    known = KnownFlights(None if redo else before)
+    make = partial(Job, out=out, configuration=configuration, with_pdf=with_pdf, only_results=only_results)
+    work = [make(Path(one.url), is_named=one.is_named) for one in inputs]
     outcomes = []
     for _number, job, twin in _with_steps(work, known):
         if twin is not None:
@@ -313,8 +337,8 @@ def plan_many(
         else:
             outcomes.append(_planned(job))
     ground = None if stations is None else load_stations(stations)
-    asked = Asked(out, configuration, ground, "none", with_pdf, redo)
-    return (*outcomes, *_planned_sessions(asked, outcomes))
+    asked = Asked(out, configuration, ground, "none", with_pdf, redo, only_results=only_results)
+    return (*outcomes, *_planned_sessions(asked, before, outcomes))
 
 
 def _planned(job: Job) -> Outcome:
@@ -331,10 +355,10 @@ def _planned(job: Job) -> Outcome:
     return Outcome(job.log, "done", PLANS[job.step])
 
 
-def _planned_sessions(asked: Asked, planned: Sequence[Outcome]) -> list[Outcome]:
+def _planned_sessions(asked: Asked, among: Scan, planned: Sequence[Outcome]) -> list[Outcome]:
     """Sessions among the finished flights; that those of unread logs are looked for, where stations are given."""
     flight_ids = {one.flight_id for one in planned if one.flight_id}
-    found = find_sessions(asked, flight_ids) if flight_ids else FoundSessions()
+    found = find_sessions(asked, among, flight_ids) if flight_ids else FoundSessions()
     sessions = [*map(planned_session, found.jobs), *(one for one in found.told if one.state == "failed")]
     logs = [one for one in planned if one.state == "done"]
     unread = [one.source for one in logs if one.text == PLANS["everything"]]
@@ -359,18 +383,16 @@ def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configu
     return tuple(log for _, log in sorted(found.items()))
 
 
-def _with_steps(jobs: Sequence[Job], known: Mapping[str, Finished]) -> Iterator[tuple[int, Job, int | None]]:
+def _with_steps(jobs: Sequence[Job], known: KnownFlights) -> Iterator[tuple[int, Job, int | None]]:
     """Jobs by number, with what is to be done of each, and the number of an earlier one with the same finished log."""
     first: dict[str, int] = {}
     for number, job in enumerate(jobs):
-        planned = _with_step(job, known) if known else job
+        planned = _with_step(job, known) if len(known) else job
         kept = first.setdefault(planned.finished.sha256, number) if planned.finished else number
         yield number, planned, kept if kept != number else None
 
 
-def _with_step(job: Job, known: Mapping[str, Finished]) -> Job:
+def _with_step(job: Job, known: KnownFlights) -> Job:
     asked = job.asked()
-    if asked is None or asked[0] not in known:
-        return job
-    sha256, keys = asked
-    return job.going_on(known[sha256], keys)
+    found = None if asked is None else known.of(asked[0])
+    return job if asked is None or found is None else job.going_on(found, asked[1])

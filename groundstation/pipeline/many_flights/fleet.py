@@ -1,9 +1,7 @@
-"""A folder of flights as a fleet: its statistics, fleet.parquet and the dataset of samples."""
+"""A folder of flights as a fleet: its statistics, from what each flight adds, and fleet.parquet."""
 
-import io
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,30 +11,28 @@ from groundstation.base.errors import GroundstationError
 from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.fleet import answer
 from groundstation.estimators.fleet.changes import ChangeSettings
-from groundstation.estimators.fleet.density import SampleHistogram, densities_of
+from groundstation.estimators.fleet.density import densities_of
 from groundstation.estimators.fleet.deviation import deviations
 from groundstation.estimators.fleet.moments import Moments
 from groundstation.estimators.fleet.skill import SkillMerger
-from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
-from groundstation.pipeline.many_flights.fleet_rows import (
-    checks_of,
-    flight_row,
-    flights_table,
-    heading_samples,
-    session_row,
-    skill_of,
+from groundstation.pipeline.many_flights.fleet_rows import session_row
+from groundstation.pipeline.many_flights.fleet_share import (
+    check_rows_of,
+    fleet_parquet,
+    flights_of,
+    histograms_of,
+    share_of,
+    skill_rows_of,
+    to_arrow,
 )
-from groundstation.pipeline.many_flights.fleet_samples import SampleStore
-from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
+from groundstation.pipeline.many_flights.fleet_store import MOST_LISTED, Scan, scan
 from groundstation.pipeline.one_flight.outcome import Outcome
-from groundstation.results.columns import FlightColumn, Kind
 from groundstation.results.figures import FigureData
-from groundstation.results.file_names import INDEX_JSON
+from groundstation.results.file_names import INDEX_JSON, SUMMARY
 from groundstation.results.files import load, write_bytes
 from groundstation.results.fleet import FleetResults, NotInFleet, SessionRow
 
 FLEET_PARQUET = "fleet.parquet"
-TEXTS: tuple[Kind, ...] = ("text", "category")
 SKILL_COLUMNS = {
     "flight_id": "U",
     "aircraft": "U",
@@ -59,21 +55,6 @@ CHECK_COLUMNS = {
 }
 
 
-@dataclass
-class _Collected:
-    """What is kept of the flights while they are gone through: a few hundred numbers each, never their arrays."""
-
-    columns: dict[str, list[Any]] = field(default_factory=lambda: {column.name: [] for column in FLIGHT_COLUMNS})
-    sampled: list[tuple[str, str]] = field(default_factory=list)  # flight id, aircraft
-    moments: list[Moments] = field(default_factory=list)
-    histograms: list[SampleHistogram] = field(default_factory=list)
-    skill: SkillMerger = field(default_factory=SkillMerger)
-    skill_rows: list[tuple[Any, ...]] = field(default_factory=list)
-    checks: list[tuple[Any, ...]] = field(default_factory=list)
-    unread: list[NotInFleet] = field(default_factory=list)
-    sessions: list[SessionRow] = field(default_factory=list)
-
-
 def gather(out: Path) -> FleetResults:
     """Read what the flights of a folder say together.
 
@@ -87,108 +68,125 @@ def gather(out: Path) -> FleetResults:
     FleetResults
         The same for the same flights, in whatever order and by however many processes they were run. A flight folder
         that cannot be read is in ``not_in_fleet`` with the reason.
+
+    Raises
+    ------
+    GroundstationError
+        When a file of the dataset of flights cannot be read.
     """
-    return _results(out, _collect(out, None))
+    found = scan(out)
+    return _results(found, *_shares(found))
 
 
-def write_fleet(out: Path) -> tuple[FleetResults, tuple[Outcome, ...]]:
-    """Write fleet.parquet and samples.parquet/ of a folder of flights; call it once index.json is written.
+def write_fleet(out: Path, found: Scan) -> tuple[FleetResults, tuple[Outcome, ...]]:
+    """Write fleet.parquet of a folder of flights; call it once index.json is written.
 
-    Files of samples are written for flights that changed, and removed for flights that are gone. Each file is written
-    under a temporary name and moved into place.
+    It is written under a temporary name and moved into place. More than 20 000 flights have no such file: their rows
+    are in flights.parquet/ alone.
+
+    Parameters
+    ----------
+    out : Path
+    found : Scan
+        What :func:`groundstation.pipeline.many_flights.fleet_store.refresh` gave.
 
     Returns
     -------
     FleetResults, tuple of Outcome
         What :func:`gather` gives, and what could not be written.
     """
-    collected = _Collected()
-    problems: list[Outcome] = []
+    table, unread = _shares(found)
     try:
-        store = SampleStore(out)
-        collected = _collect(out, store)
-        store.sweep()
+        if len(found) > MOST_LISTED:
+            (out / FLEET_PARQUET).unlink(missing_ok=True)
+        else:
+            write_bytes(out / FLEET_PARQUET, fleet_parquet(table))
     except OSError as error:
-        problems.append(_unwritten(out, "the samples", error))
-        collected = _collect(out, None)
-    results = _results(out, collected)
-    try:
-        write_bytes(out / FLEET_PARQUET, fleet_parquet(results.flights))
-    except OSError as error:
-        problems.append(_unwritten(out, FLEET_PARQUET, error))
-    return results, tuple(problems)
+        problem = f"{out}: {FLEET_PARQUET} cannot be written ({error.strerror or error})"
+        return _results(found, table, unread), (Outcome(str(out), "failed", problem),)
+    return _results(found, table, unread), ()
 
 
-def _unwritten(out: Path, what: str, error: OSError) -> Outcome:
-    return Outcome(str(out), "failed", f"{out}: {what} cannot be written ({error.strerror or error})")
+def _shares(found: Scan) -> tuple[Any, list[NotInFleet]]:
+    """The shares of all flights that can be read, and those that cannot."""
+    import pyarrow as pa
 
-
-def _collect(out: Path, store: SampleStore | None) -> _Collected:
-    collected = _Collected()
-    for folder in flight_folders(out):
+    shares, unread = [], []
+    for name in found.stale:
         try:
-            _add(collected, folder, store)
+            shares.append(share_of(found.out / name))
         except GroundstationError as error:
-            collected.unread.append(NotInFleet("failed", str(folder), str(error)))
-            if store is not None:
-                store.keep(folder.name)
-    for folder in session_folders(out):
-        try:
-            collected.sessions.append(session_row(load(folder, ANSWER_TYPES)))
-        except GroundstationError as error:
-            collected.unread.append(NotInFleet("failed", str(folder), str(error)))
-    return collected
+            unread.append(NotInFleet("failed", str(found.out / name), str(error)))
+    columns = [name for name in to_arrow([]).column_names if name != "index"]
+    table = found.table(columns)
+    if shares:
+        table = pa.concat_tables([table, to_arrow(shares).select(table.column_names)]).sort_by("flight_id")
+    return table, unread
 
 
-def _add(collected: _Collected, folder: Path, store: SampleStore | None) -> None:
-    saved = load(folder, ANSWER_TYPES)
-    samples = heading_samples(saved)
-    row = flight_row(saved, samples)
-    for name, values in collected.columns.items():
-        values.append(row[name])
-    names = (row["flight_id"], row["aircraft"])
-    if samples is not None:
-        if samples.moments.count:
-            collected.sampled.append(names)
-            collected.moments.append(samples.moments)
-            collected.histograms.append(samples.histogram)
-        if store is not None:
-            store.put(row, samples)
-    for check in checks_of(saved):
-        told = (check.verdict, check.residual_deg, check.sigma_deg, check.z, check.is_inside)
-        collected.checks.append((check.quantity, *names, *told))
-    shipped, skill = skill_of(saved)
-    start = np.datetime64("NaT", "ns") if row["start_utc"] is None else np.datetime64(row["start_utc"], "ns")
-    for one in skill:
-        collected.skill.add(one)
-        if one.method == shipped:
-            figures = (one.horizon_min, one.starts, one.rms_m, one.coverage95)
-            collected.skill_rows.append((*names, start, one.method, *figures))
-
-
-def _results(out: Path, collected: _Collected) -> FleetResults:
+def _results(found: Scan, table: Any, unread: list[NotInFleet]) -> FleetResults:
     settings = ChangeSettings()
-    flights = flights_table(collected.columns)
-    ids, aircraft = zip(*collected.sampled, strict=True) if collected.sampled else ((), ())
+    flights = flights_of(table)
+    sampled = np.flatnonzero(flights["samples"] > 0)
+    moments = [
+        Moments(
+            int(flights["samples"][row]), *(float(flights[f"sample_{name}"][row]) for name in ("mean_deg", "m2_deg2"))
+        )
+        for row in sampled
+    ]
+    aircraft = flights["aircraft"][sampled].tolist()
+    histograms = list(histograms_of(table, sampled))
     trend, changes = answer.trends(flights, settings)
-    checks = _table("calibration_checks", CHECK_COLUMNS, collected.checks)
+    checks = _table("calibration_checks", CHECK_COLUMNS, _check_rows(table, flights))
+    merger, skill_rows = _skill(table, flights)
+    sessions: list[SessionRow] = []
+    for folder in found.sessions:
+        try:
+            sessions.append(session_row(load(folder, ANSWER_TYPES)))
+        except GroundstationError as error:
+            unread.append(NotInFleet("failed", str(folder), str(error)))
     return FleetResults(
         flights=flights,
-        densities=densities_of(ids, aircraft, collected.moments, collected.histograms),
-        normals=answer.normals_of(aircraft, collected.moments),
+        densities=densities_of(flights["flight_id"][sampled].tolist(), aircraft, moments, histograms),
+        normals=answer.normals_of(aircraft, moments),
         by_aircraft=answer.by_aircraft(flights),
         trend=trend,
         change_points=changes,
-        skill=collected.skill.rows(),
-        skill_flights=_table("skill_flights", SKILL_COLUMNS, collected.skill_rows),
+        skill=merger.rows(),
+        skill_flights=_table("skill_flights", SKILL_COLUMNS, skill_rows),
         calibration=answer.calibrations(checks),
         calibration_checks=checks,
         outliers=answer.outliers(flights),
-        not_in_fleet=_not_in_fleet(out, collected),
+        not_in_fleet=_not_in_fleet(found.out, unread),
         deviations=deviations(flights),
-        sessions=tuple(collected.sessions),
+        sessions=tuple(sessions),
         stated=answer.stated_rates(settings),
     )
+
+
+def _names(flights: FigureData) -> Iterator[tuple[str, str]]:
+    """Flight id and aircraft of each flight."""
+    return zip(flights["flight_id"].tolist(), flights["aircraft"].tolist(), strict=True)
+
+
+def _check_rows(table: Any, flights: FigureData) -> list[tuple[Any, ...]]:
+    return [
+        (check.quantity, *names, check.verdict, check.residual_deg, check.sigma_deg, check.z, check.is_inside)
+        for names, checks in zip(_names(flights), check_rows_of(table), strict=True)
+        for check in checks
+    ]
+
+
+def _skill(table: Any, flights: FigureData) -> tuple[SkillMerger, list[tuple[Any, ...]]]:
+    """Skill merged over the flights, and the rows of each flight's shipped method."""
+    merger, rows = SkillMerger(), []
+    for names, start, (shipped, skill) in zip(_names(flights), flights["start_utc"], skill_rows_of(table), strict=True):
+        for one in skill:
+            merger.add(one)
+            if one.method == shipped:
+                figures = (one.horizon_min, one.starts, one.rms_m, one.coverage95)
+                rows.append((*names, start, one.method, *figures))
+    return merger, rows
 
 
 def _table(name: str, types: Mapping[str, str], rows: list[tuple[Any, ...]]) -> FigureData:
@@ -197,11 +195,15 @@ def _table(name: str, types: Mapping[str, str], rows: list[tuple[Any, ...]]) -> 
     return FigureData(name, arrays, {})
 
 
-def _not_in_fleet(out: Path, collected: _Collected) -> tuple[NotInFleet, ...]:
+def _not_in_fleet(out: Path, unread: list[NotInFleet]) -> tuple[NotInFleet, ...]:
     """Logs without a flight, as the index remembers them, and flight folders that could not be read just now."""
-    folders = {str(folder) for folder in (*flight_folders(out), *session_folders(out))}
-    told = [*(one for one in _indexed(out) if one.source not in folders), *collected.unread]
+    told = [*(one for one in _indexed(out) if not _is_folder_of(out, one.source)), *unread]
     return tuple(sorted(told, key=lambda one: (one.kind, one.source, one.reason)))
+
+
+def _is_folder_of(out: Path, source: str) -> bool:
+    """Whether a row of the index is of a folder that could not be read then: it is looked at anew."""
+    return Path(source).parent == out and (out / Path(source).name / SUMMARY).is_file()
 
 
 def _indexed(out: Path) -> Iterator[NotInFleet]:
@@ -212,32 +214,3 @@ def _indexed(out: Path) -> Iterator[NotInFleet]:
     for row in rows if isinstance(rows, list) else ():
         if isinstance(row, dict) and row.get("kind") in ("failed", "skipped"):
             yield NotInFleet(row["kind"], str(row.get("source") or ""), str(row.get("reason") or ""))
-
-
-def fleet_parquet(flights: FigureData) -> bytes:
-    """Encode the table of flights: timestamps in UTC, dictionaries for categories, null for what is missing.
-
-    The schema's metadata has ``columns``, JSON of every column's meaning.
-    """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    arrays = {column.name: _arrow(column, flights) for column in FLIGHT_COLUMNS}
-    meanings = json.dumps({column.name: column.meaning for column in FLIGHT_COLUMNS})
-    buffer = io.BytesIO()
-    pq.write_table(pa.table(arrays).replace_schema_metadata({"columns": meanings}), buffer, compression="zstd")
-    return buffer.getvalue()
-
-
-def _arrow(column: FlightColumn, flights: FigureData) -> Any:
-    import pyarrow as pa
-
-    values = flights[column.name]
-    if column.kind == "time":
-        return pa.array(values.astype(np.int64), pa.timestamp("ns", tz="UTC"), mask=np.isnat(values))
-    if column.kind in TEXTS:
-        found = pa.array([text or None for text in values.tolist()], pa.string())
-        return found.dictionary_encode() if column.kind == "category" else found
-    if column.kind == "count":
-        return pa.array(np.nan_to_num(values).astype(np.int64), mask=np.isnan(values))
-    return pa.array(values, from_pandas=True)

@@ -1,7 +1,7 @@
 """What one flight adds to the fleet: its row, its checks, its forecast skill, its samples; from what it saved."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -99,18 +99,6 @@ def _typed(kind: Kind, value: Any) -> Any:
     if kind in ("flag", "time"):
         return value
     return "" if value is None else utf8_text(value)[:MAX_TEXT_CHARACTERS]
-
-
-def flights_table(columns: Mapping[str, Sequence[Any]]) -> FigureData:
-    """Turn lists of typed values into the table of flights."""
-    return FigureData("flights", {one.name: _column(one.kind, columns[one.name]) for one in FLIGHT_COLUMNS}, {})
-
-
-def _column(kind: Kind, values: Sequence[Any]) -> NDArray[Any]:
-    if kind == "time":
-        stamps = [np.datetime64("NaT", "ns") if value is None else np.datetime64(value, "ns") for value in values]
-        return np.array(stamps, dtype="datetime64[ns]")
-    return np.array(values, dtype={"number": np.float64, "count": np.float64, "flag": np.bool_}.get(kind, np.str_))
 
 
 def heading_samples(saved: SavedFlight) -> HeadingSamples | None:

@@ -3,7 +3,9 @@
 import hashlib
 import io
 import json
-from glob import escape
+import os
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -43,41 +45,39 @@ class SampleStore:
 
     def __init__(self, out: Path) -> None:
         self._root = out / SAMPLES
-        self._expected: set[Path] = set()
-        self.written = 0
 
-    def put(self, row: dict[str, Any], samples: HeadingSamples) -> None:
-        """Keep the samples of a flight; ``row`` is that of the table of flights.
+    def put(self, row: Mapping[str, Any], samples: HeadingSamples) -> str:
+        """Keep the samples of a flight; returns its file in the dataset. ``row`` is that of the table of flights.
 
         Raises
         ------
         OSError
             When the file cannot be written.
         """
-        folder = self._root / f"aircraft={partition(row['aircraft'])}" / f"month={row['month'] or UNKNOWN}"
-        path = folder / f"{row['flight_id']}.parquet"
-        self._expected.add(path)
-        digest = _digest(row, samples)
-        if _digest_in(path) == digest:
-            return
-        folder.mkdir(parents=True, exist_ok=True)
-        write_bytes(path, _encoded(row, samples, digest))
-        self.written += 1
+        name = f"aircraft={partition(row['aircraft'])}/month={row['month'] or UNKNOWN}/{row['flight_id']}.parquet"
+        path, digest = self._root / name, _digest(row, samples)
+        if _digest_in(path) != digest:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_bytes(path, _encoded(row, samples, digest))
+        return name
 
-    def keep(self, flight_id: str) -> None:
-        """Leave the file of a flight that cannot be read now as it is."""
-        self._expected |= set(self._root.glob(f"*/*/{escape(flight_id)}.parquet"))
+    def files(self) -> set[str]:
+        """The files of the dataset as :meth:`put` names them, with what a killed run left."""
+        found = set()
+        for folder, _folders, names in os.walk(self._root):
+            month = Path(folder).relative_to(self._root).as_posix()
+            if month.count("/") == 1:
+                found |= {f"{month}/{name}" for name in names if name.endswith((".parquet", ".partial"))}
+        return found
 
-    def sweep(self) -> None:
-        """Remove the files of flights that were not put, what a killed run left, and folders that are empty then."""
-        if not self._root.is_dir():
-            return
-        for path in sorted(self._root.glob("*/*/*")):
-            if path.is_file() and path not in self._expected and path.name.endswith((".parquet", ".partial")):
-                path.unlink()
-        for folder in (*self._root.glob("*/*"), *self._root.glob("*"), self._root):
-            if folder.is_dir() and not any(folder.iterdir()):
-                folder.rmdir()
+    def remove(self, names: Iterable[str]) -> None:
+        """Remove files, and folders that are empty then."""
+        for name in sorted(names):
+            path = self._root / name
+            path.unlink(missing_ok=True)
+            for folder in (*path.parents[:2], self._root):
+                with suppress(OSError):  # it is not empty
+                    folder.rmdir()
 
 
 def partition(aircraft: str) -> str:
@@ -95,7 +95,7 @@ def partition(aircraft: str) -> str:
     return f"{kept}-{hashlib.sha256(aircraft.encode()).hexdigest()[:8]}"
 
 
-def _digest(row: dict[str, Any], samples: HeadingSamples) -> str:
+def _digest(row: Mapping[str, Any], samples: HeadingSamples) -> str:
     told = hashlib.sha256(json.dumps([VERSION, row["flight_id"], row["start_utc"]]).encode())
     for name, values in samples.columns.items():
         told.update(f"{name} {values.dtype.str} {len(values)}".encode())
@@ -112,7 +112,7 @@ def _digest_in(path: Path) -> str:
         return ""
 
 
-def _encoded(row: dict[str, Any], samples: HeadingSamples, digest: str) -> bytes:
+def _encoded(row: Mapping[str, Any], samples: HeadingSamples, digest: str) -> bytes:
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, SettingsError
 from groundstation.base.findings import Finding
+from groundstation.pipeline.many_flights.fleet_store import Scan
 from groundstation.pipeline.many_flights.inputs import file_in
 from groundstation.pipeline.many_flights.remote import is_remote
 from groundstation.pipeline.many_flights.session import SessionJob, load_stations, run_one, sessions_of
@@ -39,6 +40,7 @@ class Asked:
     with_pdf: bool
     redo: bool = False
     mcap_in: Callable[[Path], Path] = lambda folder: file_in(folder, ".mcap")
+    only_results: bool = False
 
 
 @dataclass(frozen=True)
@@ -49,9 +51,9 @@ class FoundSessions:
     told: tuple[Outcome, ...] = ()
 
 
-def find_sessions(asked: Asked, flight_ids: AbstractSet[str]) -> FoundSessions:
+def find_sessions(asked: Asked, found: Scan, flight_ids: AbstractSet[str]) -> FoundSessions:
     """Find the sessions in which one of these flights takes part, with whatever other flight of the folder."""
-    members = members_of(asked.out)
+    members = members_of(found)
     if not any(one.hears and one.folder.name in flight_ids for one in members):
         return FoundSessions()
     groups, apart = sessions_among(members, lambda folder: _heard(asked.mcap_in, folder))
@@ -110,6 +112,7 @@ def _job(asked: Asked, group: Sequence[Member]) -> SessionJob:
         asked.redo,
         is_found=True,
         notes=notes,
+        only_results=asked.only_results,
     )
 
 

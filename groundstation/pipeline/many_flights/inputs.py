@@ -91,8 +91,12 @@ def file_in(folder: Path, ending: str, *others: str) -> Path:
 
 def flight_folders(out: Path) -> list[Path]:
     """Flight folders in an OUT, in the order of their names."""
-    marks = *SESSION_MARKS, PLAN_MARK
-    return [folder for folder in _finished_folders(out) if not any((folder / mark).is_file() for mark in marks)]
+    return list(filter(is_flight, _finished_folders(out)))
+
+
+def is_flight(folder: Path) -> bool:
+    """Whether a folder that holds a summary is that of a flight: neither a session nor a plan."""
+    return not any((folder / mark).is_file() for mark in (*SESSION_MARKS, PLAN_MARK))
 
 
 def session_folders(out: Path) -> list[Path]:

@@ -49,6 +49,5 @@ def prepare(out: Path) -> None:
 
 def clear_unfinished(out: Path) -> None:
     """Clear away what nobody writes any more: this run is alone in here, and none of its jobs is running."""
-    for left_over in out.iterdir():
-        if left_over.name.startswith(PARTIAL_PREFIX):
-            shutil.rmtree(left_over, ignore_errors=True)
+    for left_over in out.glob(f"{PARTIAL_PREFIX}*"):
+        shutil.rmtree(left_over, ignore_errors=True)

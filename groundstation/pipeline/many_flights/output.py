@@ -16,7 +16,7 @@ from groundstation.pipeline.many_flights.remote_runs import BY_LOG, STAGING, arr
 from groundstation.pipeline.one_flight.flight import is_made, place, remove
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports.flight_report import PDF, REPORT
-from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY
+from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 
 FLEET_ARRAYS = (
     "heading_samples.parquet",
@@ -144,7 +144,7 @@ class RemoteOutput:
     def send_session(self, session_id: str) -> None:
         """Send what was made of a session of the copy; files that stand there by name alone are there already."""
         folder = self.root / session_id
-        if (folder / f"{session_id}.rrd").stat().st_size:
+        if (folder / TABLES).is_dir():  # made just now: of what is there already the copy has no tables
             staged = f"{STAGING}/{session_id}-{uuid.uuid4().hex[:8]}"
             self._out.send(folder, staged)
             self._out.replace(staged, session_id, partial(is_made, identity=session_id))

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError
-from groundstation.pipeline.many_flights.inputs import flight_folders
+from groundstation.pipeline.many_flights.fleet_store import Scan
 from groundstation.pipeline.many_flights.output import Output
 from groundstation.pipeline.many_flights.remote import is_remote
 from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.file_names import MANIFEST
+from groundstation.results.files import utf8_text
 
 
 @dataclass(frozen=True)
@@ -99,18 +100,26 @@ class Placement:
             self._output.discard(former.folder)
         self._outcomes[number] = self._put_in_place(outcome) if outcome.flight_id else outcome
 
-    def sweep(self) -> None:
-        """Remove flights of these logs that stand under another id, and those of older versions of the logs."""
+    def sweep(self, found: Scan) -> bool:
+        """Remove flights of these logs that stand under another id, and those of older versions of the logs.
+
+        Returns whether there were any. ``found`` are the flights of the folder, with what is known of them.
+        """
         flights = [outcome for outcome in self._outcomes.values() if outcome.flight_id]
         now = {outcome.sha256: outcome.flight_id for outcome in flights}
-        versions = {(_place_of(outcome), plain_id(outcome.flight_id, outcome.sha256)) for outcome in flights}
-        for folder in flight_folders(self._output.root):
-            origin = _origin_of(folder)
-            if origin is None or now.get(origin.sha256) == folder.name:
+        versions = {(utf8_text(_place_of(one)), plain_id(one.flight_id, one.sha256)) for one in flights}
+        old = []
+        for name in found.names:
+            known = found.fresh.get(name)
+            origin = _origin_of(found.out / name) if known is None else _Origin(known.path, known.sha256)
+            if origin is None or now.get(origin.sha256) == name:
                 continue
-            if origin.sha256 in now or (origin.path, plain_id(folder.name, origin.sha256)) in versions:
-                with suppress(OSError, GroundstationError):  # the next run tries again
-                    self._output.discard(folder.name)
+            if origin.sha256 in now or (utf8_text(origin.path), plain_id(name, origin.sha256)) in versions:
+                old.append(name)
+        for name in old:
+            with suppress(OSError, GroundstationError):  # the next run tries again
+                self._output.discard(name)
+        return bool(old)
 
     def outcomes(self) -> tuple[Outcome, ...]:
         """What became of the logs put so far, in the order of the inputs."""

@@ -8,6 +8,8 @@ from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET, write_fleet
 from groundstation.pipeline.many_flights.fleet_columns import INDEXED, answer_values
 from groundstation.pipeline.many_flights.fleet_samples import SAMPLES
+from groundstation.pipeline.many_flights.fleet_share import index_rows_of
+from groundstation.pipeline.many_flights.fleet_store import FLIGHTS, MOST_LISTED, Scan, refresh, scan
 from groundstation.pipeline.many_flights.inputs import (
     FLIGHT_FOLDER_MARK,
     OUT_FOLDER_MARK,
@@ -23,22 +25,41 @@ from groundstation.reports.index import IndexRow, Kind
 from groundstation.results.file_names import INDEX_CSV, INDEX_JSON
 
 FLEET_RECORDING, FLEET_PDF = "fleet.rrd", str(Path(FLEET_PAGE).with_suffix(".pdf"))
-FLEET_FILES = (INDEX_JSON, INDEX_CSV, FLEET_PARQUET, SAMPLES, FLEET_RECORDING, FLEET_PAGE, FLEET_PDF)
+FLEET_FILES = (INDEX_JSON, INDEX_CSV, FLEET_PARQUET, FLIGHTS, SAMPLES, FLEET_RECORDING, FLEET_PAGE, FLEET_PDF)
 
 
 def write_beside(
-    out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[IndexRow] = (), *, with_pdf: bool = True
+    out: Path,
+    outcomes: Sequence[Outcome],
+    kept_rows: Sequence[IndexRow] = (),
+    *,
+    with_pdf: bool = True,
+    only_results: bool = False,
+    found: Scan | None = None,
 ) -> tuple[Outcome, ...]:
-    """Write everything that stands beside the flight folders; returns what could not be written or read."""
-    from groundstation.viewer.fleet import write_fleet_recording
+    """Write everything that stands beside the flight folders; returns what could not be written or read.
 
-    problems = list(write_index_of(out, outcomes, kept_rows))
-    fleet, unwritten = write_fleet(out)
-    problems += unwritten
+    ``found`` is what :func:`groundstation.pipeline.many_flights.fleet_store.refresh` gave, where it was called already.
+    With ``only_results`` the page and the recording of all flights are removed: they would tell of an earlier run.
+    """
+    problems: list[Outcome] = []
     try:
         with told_in_a_line(str(out)):
-            problem = write_fleet_report(out, fleet, with_pdf=with_pdf).problem
-            write_fleet_recording(out / FLEET_RECORDING, fleet)
+            if found is None:
+                found, unwritten = refresh(out)
+                problems += unwritten
+            problems += write_index_of(out, outcomes, kept_rows, found)
+            fleet, unwritten = write_fleet(out, found)
+            problems += unwritten
+            problem = None
+            if only_results:
+                for name in (FLEET_PAGE, FLEET_PDF, FLEET_RECORDING):
+                    (out / name).unlink(missing_ok=True)
+            else:
+                from groundstation.viewer.fleet import write_fleet_recording
+
+                problem = write_fleet_report(out, fleet, with_pdf=with_pdf).problem
+                write_fleet_recording(out / FLEET_RECORDING, fleet)
     except GroundstationError as error:  # the flights are done, and told of in any case
         problems.append(Outcome(str(out), "failed", str(error)))
     else:
@@ -46,18 +67,26 @@ def write_beside(
     return tuple(problems)
 
 
-def write_index_of(out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[IndexRow] = ()) -> tuple[Outcome, ...]:
+def write_index_of(
+    out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[IndexRow] = (), found: Scan | None = None
+) -> tuple[Outcome, ...]:
     """Write index.json and index.csv: every flight and session in ``out``, and the logs of this run that gave none.
 
-    Returns what could not be listed: folders that cannot be read, an index that cannot be written.
+    Of more than 20 000 flights they say where the rows are. Returns what could not be listed: folders that cannot be
+    read, an index that cannot be written.
     """
     from groundstation.reports.index import failed_row, index_row, write_index
     from groundstation.results.files import load
 
+    found = scan(out) if found is None else found
+    is_large = len(found) > MOST_LISTED
     problems: list[Outcome] = []
-    rows = list(kept_rows)
-    listed: tuple[tuple[Kind, list[Path]], ...] = (("flight", flight_folders(out)), ("session", session_folders(out)))
+    rows = [*kept_rows, *([] if is_large else index_rows_of(found.table(["index"])))]
+    unread = [out / name for name in found.stale]
+    listed: tuple[tuple[Kind, list[Path]], ...] = (("flight", unread), ("session", found.sessions))
     for kind, folder in ((kind, folder) for kind, folders in listed for folder in folders):
+        if is_large and kind == "flight" and len(unread) > MOST_LISTED:
+            continue
         try:
             saved = load(folder, ANSWER_TYPES)
             rows.append(index_row(saved, kind, answer_values(saved.results)))
@@ -66,7 +95,7 @@ def write_index_of(out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[I
     without_flight = [one for one in outcomes if not one.flight_id and not (one.is_session and one.state == "skipped")]
     rows += [failed_row(one.source, one.state, one.text) for one in (*without_flight, *problems)]
     try:
-        write_index(out, rows, INDEXED)
+        write_index(out, rows, INDEXED, elsewhere=f"{len(found)} flights: {FLIGHTS}/" if is_large else "")
     except OSError as error:
         problems.append(Outcome(str(out), "failed", f"{out}: the index cannot be written ({error.strerror or error})"))
     return tuple(problems)

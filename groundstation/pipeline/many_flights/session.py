@@ -68,6 +68,8 @@ class SessionJob:
         Whether a run found it among its flights; it then leaves what the verb ``cooperative`` made of these logs.
     notes : tuple of Finding
         What is known of it before its logs are read.
+    only_results : bool
+        Whether there is neither a recording nor a report.
     """
 
     logs: tuple[Log, ...]
@@ -79,6 +81,7 @@ class SessionJob:
     redo: bool = False
     is_found: bool = False
     notes: tuple[Finding, ...] = ()
+    only_results: bool = False
 
     @property
     def log(self) -> str:
@@ -170,17 +173,20 @@ class _Kept(NamedTuple):
 
 def _kept(job: SessionJob) -> _Kept | None:
     keys = job.keys()
-    wanted = (REPORT, PDF) if job.with_pdf else (REPORT,)
+    reports = (REPORT, PDF) if job.with_pdf else (REPORT,)
     for folder, manifest in sessions_of(job.out):
         resume = manifest.resume
         if resume is None or manifest.source.sha256 != job.sha256:
             continue
         is_of_the_verb = job.is_found and not manifest.is_found
-        is_whole = (folder / f"{folder.name}.rrd").is_file() and resume.keys.analysis == keys.analysis
+        is_whole = resume.keys.analysis == keys.analysis
+        if not job.only_results:
+            is_whole &= (folder / f"{folder.name}.rrd").is_file()
         if not is_of_the_verb and (job.redo or not is_whole):
             continue
         is_told = is_of_the_verb or resume.keys.reports == keys.reports
-        return _Kept(folder, manifest, resume, is_told and all((folder / name).is_file() for name in wanted))
+        has_reports = is_told and all((folder / name).is_file() for name in reports)
+        return _Kept(folder, manifest, resume, job.only_results or has_reports)
     return None
 
 
@@ -209,8 +215,6 @@ def planned_session(job: SessionJob) -> Outcome:
 
 
 def _run_into(partial: Path, job: SessionJob, watch: Stopwatch) -> Outcome:
-    from groundstation.viewer.session import write_session_recording
-
     with watch.stage("converting"):
         flights, logs, damaged = _flights(partial, job)
     with watch.stage("assembling"):
@@ -225,15 +229,22 @@ def _run_into(partial: Path, job: SessionJob, watch: Stopwatch) -> Outcome:
         text = _sentence(results)
         resume = Resume(job.keys(), text, bool(damaged))
         save(partial, results, _manifest(job, results, logs, resume))
-    with watch.stage("recording"):
-        write_session_recording(partial / f"{results.flight_id}.rrd", assembled, results)
-    with watch.stage("reporting"):
-        problem = write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf).problem
+    problem = "" if job.only_results else _show(partial, assembled, results, job, watch)
     target = job.out / results.flight_id
     shutil.rmtree(target / MCAPS, ignore_errors=True)
     place(partial, target)
     state = state_of(worst(results.findings), bool(damaged), job.fail_on)
     return _outcome(job, state, "; ".join(filter(None, (text, problem))), target, watch)
+
+
+def _show(partial: Path, assembled: AssembledSession, results: FlightResults, job: SessionJob, watch: Stopwatch) -> str:
+    """Write the recording and the reports of saved results; returns what went wrong."""
+    from groundstation.viewer.session import write_session_recording
+
+    with watch.stage("recording"):
+        write_session_recording(partial / f"{results.flight_id}.rrd", assembled, results)
+    with watch.stage("reporting"):
+        return write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf).problem
 
 
 def _flights(partial: Path, job: SessionJob) -> tuple[list[Flight], tuple[LogOfSession, ...], list[Finding]]:

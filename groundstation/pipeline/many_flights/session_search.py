@@ -17,7 +17,7 @@ from groundstation.base.records import RecordBatch
 from groundstation.base.signals import kind_of, topics_of_kind
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.many_flights.inputs import flight_folders
+from groundstation.pipeline.many_flights.fleet_store import Key, Scan
 from groundstation.results.files import load_document
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.session_clock import transmission_ns
@@ -55,15 +55,21 @@ class Apart:
     reason: str
 
 
-def members_of(out: Path) -> tuple[Member, ...]:
+def members_of(found: Scan) -> tuple[Member, ...]:
     """The flights of a folder, in the order of their names, those that cannot be read left out."""
-    found = []
-    for folder in flight_folders(out):
+    members = []
+    for name in found.names:
+        known = found.fresh.get(name)
         try:
-            found.append(_member(folder))
+            members.append(_member(found.out / name) if known is None else _known_member(found.out / name, known))
         except GroundstationError:  # the index tells of it
             continue
-    return tuple(found)
+    return tuple(members)
+
+
+def _known_member(folder: Path, known: Key) -> Member:
+    span_ns = None if known.start_ns is None or known.end_ns is None else (known.start_ns, known.end_ns)
+    return Member(folder, known.link_name, frozenset(filter(None, known.hears.split("\n"))), span_ns)
 
 
 def _member(folder: Path) -> Member:

@@ -38,7 +38,7 @@ def tables() -> tuple[str, ...]:
     from groundstation.estimators.analyses import FLIGHT_ANALYSES
 
     of_flights = dict.fromkeys(analysis.settings_table for analysis in FLIGHT_ANALYSES)
-    return (*of_flights, *session_tables(), "aircraft", "site", "thresholds")
+    return (*of_flights, *session_tables(), "aircraft", "site", "thresholds", "rules")
 
 
 @cache
@@ -54,6 +54,14 @@ class Interval:
     start: str
     end: str
     reason: str = ""
+
+
+@dataclass(frozen=True)
+class RulesLabel:
+    """What a settings file calls its limits: kept in the manifest, told by ``rules test``; it changes no result."""
+
+    version: str = ""
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -96,7 +104,8 @@ class Configuration:
     Parameters
     ----------
     tables : mapping
-        The TOML tables as written, by name: those of the analyses, ``aircraft``, ``site`` and ``thresholds``.
+        The TOML tables as written, by name: those of the analyses, ``aircraft``, ``site``, ``thresholds``
+        and ``rules``.
     exclude, force : tuple of Interval
     profile : str, optional
         Path of the layout of logs that no reader knows.
@@ -126,13 +135,19 @@ class Configuration:
 
     def __post_init__(self) -> None:
         self.thresholds  # noqa: B018 -- a slip is told now
-        if self.tables.keys() - {"thresholds"}:
+        self.rules  # noqa: B018
+        if self.tables.keys() - {"thresholds", "rules"}:
             self.settings  # noqa: B018
 
     @cached_property
     def thresholds(self) -> Thresholds:
         """Limits of the integrity ledger."""
         return thresholds_from(self.tables.get("thresholds", {}), self._file_of("thresholds"), "thresholds")
+
+    @cached_property
+    def rules(self) -> RulesLabel:
+        """Name of the limits."""
+        return self._table("rules", RulesLabel)
 
     @cached_property
     def settings(self) -> UserSettings:
@@ -153,7 +168,8 @@ class Configuration:
         return settings
 
     def _table(self, name: str, kind: type[S]) -> S:
-        return settings_from(kind, self.tables.get(name, {}), self._file_of(name), name)
+        table = self.tables.get(name)
+        return settings_from(kind, table, self._file_of(name), name) if table else kind()
 
     def _file_of(self, table: str) -> str:
         return self.files.get(table, "settings")

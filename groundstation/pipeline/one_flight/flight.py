@@ -24,6 +24,7 @@ from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, Keys, Step, keys_of, remember_reports
 from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
+from groundstation.reports.steer_card import write_exports
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
@@ -57,7 +58,8 @@ class Job:
     """One log to run; plain values, so that it travels to a worker process.
 
     ``add_suffix``: two flights of one id get ``_<sha8>`` of their logs; ``step`` is what has to be done, with what the
-    flight that is ``finished`` has for the rest; ``url`` is where the log is, if ``path`` is but a copy of it.
+    flight that is ``finished`` has for the rest; ``url`` is where the log is, if ``path`` is but a copy of it. With
+    ``only_results`` there is neither a recording nor a report.
     """
 
     path: Path
@@ -70,6 +72,7 @@ class Job:
     step: Step = "everything"
     finished: Finished | None = None
     url: str = ""
+    only_results: bool = False
 
     @property
     def log(self) -> str:
@@ -91,7 +94,7 @@ class Job:
 
     def going_on(self, finished: Finished, keys: Keys) -> "Job":
         """The job with what is left to do of it, its flight being finished."""
-        step = finished.step(keys, with_pdf=self.with_pdf)
+        step = finished.step(keys, with_pdf=self.with_pdf, only_results=self.only_results)
         return replace(self, step=step, finished=finished, add_suffix=step == "analysis" and finished.has_suffix)
 
 
@@ -137,7 +140,6 @@ def _require_unchanged(log: Log, version: tuple[int, int]) -> None:
 
 def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Stopwatch) -> Outcome:
     from groundstation.results.files import save
-    from groundstation.viewer.recording import write_recording
 
     mcap = partial / "flight.mcap"
     if job.step == "analysis" and job.finished is not None:
@@ -165,14 +167,11 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         resume = Resume(keys, text, converted.has_lost_data)
         path = job.url or str(log.path.absolute())
         save(partial, results, manifest_of(results, job.configuration.to_dict(), path=path, resume=resume))
-    with watch.stage("recording"):
-        write_recording(partial / f"{identity}.rrd", flight, results)
-    with watch.stage("reporting"):
-        written = write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf)
+    problem = _show(partial, flight, results, job, watch)
     return Outcome(
         job.log,
         state_of(worst(results.findings), converted.has_lost_data, job.fail_on),
-        "; ".join(filter(None, (text, written.problem))),
+        "; ".join(filter(None, (text, problem))),
         flight_id=identity,
         folder=str(partial),
         sha256=log.source.sha256,
@@ -180,10 +179,31 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
     )
 
 
+def _show(partial: Path, flight: Flight, results: FlightResults, job: Job, watch: Stopwatch) -> str:
+    """Write the recording and the reports of saved results, where they are asked for; returns what went wrong."""
+    if job.only_results:
+        return _export(partial)
+    from groundstation.viewer.recording import write_recording
+
+    with watch.stage("recording"):
+        write_recording(partial / f"{results.flight_id}.rrd", flight, results)
+    with watch.stage("reporting"):
+        return write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf).problem
+
+
+def _export(folder: Path) -> str:
+    """Write the tables that reports write beside them; returns what went wrong."""
+    from groundstation.results.files import load
+
+    return write_exports(load(folder, ANSWER_TYPES), with_pdf=False)[1]
+
+
 def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
     """The outcome of a flight that is finished, its reports made again where that is asked for."""
     problem = ""
-    if job.step == "reports":
+    if job.step == "reports" and job.only_results:
+        problem = _export(finished.folder)
+    elif job.step == "reports":
         with watch.stage("reporting"):
             problem = write_flight_report(finished.folder, ANSWER_TYPES, with_pdf=job.with_pdf).problem
             remember_reports(finished, with_pdf=job.with_pdf)
@@ -254,13 +274,13 @@ def is_made(name: str, identity: str) -> bool:
     >>> is_made("tables/heading.csv", "NOTIME_abababab"), is_made("notes.txt", "NOTIME_abababab")
     (True, False)
     """
-    made = SUMMARY, MANIFEST, ARRAYS, OLD_ARRAYS, TABLES, REPORT, f"{identity}.mcap", f"{identity}.rrd"
+    made = SUMMARY, MANIFEST, ARRAYS, OLD_ARRAYS, TABLES, f"{identity}.mcap"
     return PurePosixPath(name).parts[0] in (*made, *optional_files(identity))
 
 
 def optional_files(identity: str) -> tuple[str, ...]:
     """Files of a flight folder that not every run makes: those of an earlier one would tell of other results."""
-    return PDF, DEVIATION_CSV, STEER_CARD, corrected_name(identity)
+    return f"{identity}.rrd", REPORT, PDF, DEVIATION_CSV, STEER_CARD, corrected_name(identity)
 
 
 def remove(folder: Path) -> None:

@@ -8,7 +8,7 @@ reports whether there is a PDF.
 import hashlib
 import json
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib import metadata as installed
@@ -80,14 +80,22 @@ class Finished:
         """Whether the digest of the log was put into the id, because another flight had the same."""
         return plain_id(self.flight_id, self.sha256) != self.flight_id
 
-    def step(self, keys: Keys, *, with_pdf: bool) -> Step:
-        """What has to be done for the results to be those of ``keys``; a file that somebody took away is made again."""
+    def step(self, keys: Keys, *, with_pdf: bool, only_results: bool = False) -> Step:
+        """What has to be done for the results to be those of ``keys``; a file that somebody took away is made again.
+
+        With ``only_results`` neither recording nor reports are asked for; what there is of them stays.
+        """
         if keys.conversion != self.keys.conversion or self.mcap.name not in self.files:
             return "everything"
-        analysed = {f"{self.flight_id}.rrd", *([corrected_name(self.flight_id)] if self.has_applied else [])}
+        analysed = {corrected_name(self.flight_id)} if self.has_applied else set()
+        if not only_results:
+            analysed.add(f"{self.flight_id}.rrd")
         if keys.analysis != self.keys.analysis or not analysed <= self.files:
             return "analysis"
-        wanted = {REPORT, *([DEVIATION_CSV] if self.has_deviation else [])}
+        wanted = {DEVIATION_CSV} if self.has_deviation else set()
+        if only_results:
+            return "nothing" if wanted <= self.files else "reports"
+        wanted.add(REPORT)
         if with_pdf:
             wanted |= {PDF, *([STEER_CARD] if self.has_deviation else [])}
         return "nothing" if keys.reports == self.keys.reports and wanted <= self.files else "reports"
@@ -150,12 +158,6 @@ def remember_reports(flight: "Finished", *, with_pdf: bool) -> None:
     if manifest.resume is not None:
         keys = replace(manifest.resume.keys, reports=_digest(flight.keys.analysis, with_pdf))
         save_manifest(flight.folder, replace(manifest, resume=replace(manifest.resume, keys=keys)))
-
-
-def finished_flights(folders: Iterable[Path]) -> dict[str, Finished]:
-    """Whole flights among flight folders, by the digest of the log they came from."""
-    found = (finished(folder) for folder in folders)
-    return {one.sha256: one for one in found if one is not None}
 
 
 def finished(folder: Path) -> Finished | None:

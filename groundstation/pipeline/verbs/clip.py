@@ -24,6 +24,7 @@ from groundstation.pipeline.one_flight.intervals import flight_seconds
 from groundstation.pipeline.one_flight.log import Log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.pipeline.verbs.anonymous import disguise_of
 from groundstation.pipeline.verbs.describe import facts_of
 from groundstation.results.flight import Source
 
@@ -45,11 +46,17 @@ class Wanted:
         From ``start`` on and before ``end``: flight seconds, +mm:ss or ISO UTC; None: the flight's own end.
     topics : tuple of str
         Names or patterns (``*``, ``?``, ``[...]``); none: all topics.
+    anonymous : bool
+        Without what names the flight (:mod:`groundstation.pipeline.verbs.anonymous`).
+    seed : int, optional
+        Of the disguise; None: one that nobody knows.
     """
 
     start: str | None = None
     end: str | None = None
     topics: tuple[str, ...] = ()
+    anonymous: bool = False
+    seed: int | None = None
 
     @property
     def span(self) -> str:
@@ -144,26 +151,37 @@ def _cut(log: Log, mcap: Path, target: Path, wanted: Wanted, limits: Thresholds)
     zero_ns = _zero_ns(mcap, info)
     start_ns, end_ns = _span_ns(wanted, zero_ns, info.has_utc)
     part = Part(start_ns, end_ns, wanted.wants)
+    disguise = disguise_of(mcap, info, wanted.seed) if wanted.anonymous else None
     census, damages = census_of(info, limits), list[Damage]()
     first_ns: int | None = None
     with StoreWriter(target, info) as writer:
+        zero = None if disguise is None or wanted.start or wanted.topics else disguise.zero(zero_ns)
+        if zero is not None:
+            writer.write(zero)
+            census.add(zero)
         for item in read(mcap, part):
             if isinstance(item, RecordBatch):
                 assert item.time_ns is not None
                 time_ns = int(item.time_ns[0])
+                shown = item if disguise is None else disguise.batch(item)
+                if shown is None:
+                    continue
                 first_ns = time_ns if first_ns is None else min(first_ns, time_ns)
-                writer.write(item)
-                census.add(item)
+                writer.write(shown)
+                census.add(shown)
             elif isinstance(item, Damage):
-                damages.append(item)
+                damages.append(item if disguise is None else disguise.damage(item))
         if first_ns is None and damages:
             raise UnreadableLogError(log.path.name, f"no intact record from {wanted.span}", "", damages[0].what)
         if first_ns is None:
             raise _nothing_in(log, info, wanted)
+        first_ns = first_ns if zero is None else zero_ns
         inside = _inside(info, zero_ns, first_ns, part)
         metadata = {**info.metadata, **_origin(log.source, info, zero_ns, first_ns, part, wanted)}
         # Neither name nor digest of the log: the part is a log of its own, and two parts of one log are no twins.
-        cut = replace(inside, source_name=target.name, source_sha256="", start_ns=first_ns, metadata=metadata)
+        cut = replace(inside, start_ns=first_ns, metadata=metadata)
+        cut = cut if disguise is None else disguise.info(cut)
+        cut = replace(cut, source_name=target.name, source_sha256="")
         info = writer.info = recounted(cut, damages, census)
     return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages))
 
@@ -289,4 +307,5 @@ def _told(info: "StoreInfo") -> str:
     rows = sum(topic.rows for topic in topics.values())
     ends = [info.metadata.get(key) for key in ("clip.from_s", "clip.to_s")]
     start, end = (f"{float(text):.3f} s" if text else word for text, word in zip(ends, ("start", "end"), strict=True))
-    return f"{rows} records of {len(topics)} topics, {start} to {end} of {info.metadata[CUT_FROM]}"
+    origin = info.metadata.get(CUT_FROM, "a flight made anonymous")
+    return f"{rows} records of {len(topics)} topics, {start} to {end} of {origin}"

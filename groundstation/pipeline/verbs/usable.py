@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from groundstation.base.errors import NotAssessableError, SettingsError, UsageError
 from groundstation.base.findings import Finding
@@ -13,9 +13,10 @@ from groundstation.estimators.analysis import Analysis, Shortfall
 from groundstation.estimators.cooperative.analysis import SessionKnown
 from groundstation.pipeline.one_flight.analyse import known_of, seen_by_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.tables.session_assemble import session_from_flights
-from groundstation.tables.session_settings import Stations
 from groundstation.tables.table import Flight
+
+if TYPE_CHECKING:
+    from groundstation.tables.session_settings import Stations
 
 LISTED = 3  # spans told of a shortfall
 
@@ -77,9 +78,11 @@ def usability_of_flight(purpose: str, flight: Flight, configuration: Configurati
 
 
 def usability_of_session(
-    purpose: str, flights: Sequence[Flight], configuration: Configuration, stations: Stations
+    purpose: str, flights: Sequence[Flight], configuration: Configuration, stations: "Stations"
 ) -> Usability:
     """Say whether flights together serve an analysis of sessions; as in ``run``, some of them must range to others."""
+    from groundstation.tables.session_assemble import session_from_flights
+
     analysis = SESSION_PURPOSES[purpose]
     heard = {topic.partition(".")[2] for flight in flights for topic in topics_of_kind("link", flight.topics())}
     if not heard:

@@ -20,11 +20,12 @@ from groundstation.readers.bags.messages import Block, Connection, Part
 from groundstation.readers.source import Source
 
 MAGIC = b"SQLite format 3\0"
-ROWS = 2_000  # taken at once
+ROWS, BLOCK_BYTES = 2_000, 32 << 20  # taken at once, at most
+STEPS, LOOKS = 1_000, 2_000  # of sqlite's machine between two looks, and looks at most: damaged pages lead in circles
 MAX_MESSAGE_BYTES = 64 << 20
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _COPY_BYTES = 1 << 20
-_FAILURES = (sqlite3.Error, OverflowError, UnicodeDecodeError)
+_FAILURES = (sqlite3.Error, OverflowError, UnicodeDecodeError, MemoryError)  # of lengths that are none, too
 
 
 class Ros2Sqlite:
@@ -50,7 +51,7 @@ class Ros2Sqlite:
     def _messages(self, database: sqlite3.Connection, connections: dict[int, Connection]) -> Iterator[Part]:
         last, unknown, lost_at, jump = -1, 0, "", 1
         try:
-            newest = int(database.execute("SELECT max(id) FROM messages").fetchone()[0] or 0)
+            newest = int(_bounded(database).execute("SELECT max(id) FROM messages").fetchone()[0] or 0)
         except (*_FAILURES, TypeError, ValueError):
             newest = 0
         failures = missing = 0
@@ -106,27 +107,37 @@ def _payload(data: Any) -> bytes:
 
 
 def _next_rows(database: sqlite3.Connection, last: int) -> tuple[list[Any], bool]:
-    """The rows behind message ``last``, and whether reading failed behind them."""
-    rows: list[Any] = []
+    """The rows behind message ``last``, and whether reading failed behind them, or what is there is not in order."""
     query = "SELECT id, topic_id, timestamp, data FROM messages WHERE id > ? AND {} ORDER BY id LIMIT ?"
     query = query.format("typeof(topic_id) = 'integer' AND typeof(timestamp) = 'integer'")
+    rows: list[Any] = []
+    size = 0
     try:
-        return database.execute(query, (last, ROWS)).fetchall(), False
-    except _FAILURES:
-        pass  # those before the place that cannot be read, one by one
-    try:
-        cursor = database.execute(query, (last, ROWS))
-        while (row := cursor.fetchone()) is not None:
+        for row in _bounded(database).execute(query, (last, ROWS)):
+            if row[0] <= last:
+                return rows, True
             rows.append(row)
+            last, size = row[0], size + (len(row[3]) if isinstance(row[3], bytes) else 0)
+            if size > BLOCK_BYTES:
+                break
     except _FAILURES:
         return rows, True
     return rows, False
 
 
+def _bounded(database: sqlite3.Connection) -> sqlite3.Connection:
+    """The database, in which the next query ends after a bounded number of steps."""
+    looks = iter(range(LOOKS))
+    database.set_progress_handler(lambda: next(looks, None) is None, STEPS)
+    return database
+
+
 def _connections(database: sqlite3.Connection) -> dict[int, Connection]:
-    topics = database.execute("SELECT id, name, type, serialization_format FROM topics").fetchall()
+    topics = _bounded(database).execute("SELECT id, name, type, serialization_format FROM topics").fetchall()
     try:
-        found = database.execute("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
+        found = _bounded(database).execute(
+            "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+        )
         schemas = {str(row[0]): (str(row[1]), str(row[2]).encode()) for row in found.fetchall()}
     except _FAILURES:
         schemas = {}  # before schema version 4
@@ -155,7 +166,9 @@ def _connected(source: Source) -> Iterator[sqlite3.Connection]:
 
 def _open(path: Path, name: str) -> sqlite3.Connection:
     try:
+        size = path.stat().st_size
         database = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)
+        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(max(size, 1 << 20), 1 << 30))  # no value exceeds its file
         database.execute("PRAGMA writable_schema=ON")  # else a file shorter than its header says is refused
         database.text_factory = lambda text: text.decode("utf-8", "replace")
     except _FAILURES as error:

@@ -47,11 +47,12 @@ class _Frames:
                 more = np.frombuffer(stream.read(BLOCK_BYTES), np.uint8)
                 is_last = len(more) < BLOCK_BYTES
                 data = np.concatenate((data, more))
-                found, skipped = scan.room(len(data))
+                found, skipped, told = scan.room(len(data))
                 at, begun = 0, base
                 while at < len(data):
                     view = data[at:]
-                    frames, spans, done, unknown = scan.scan(view, is_last, crc_extras(), found, skipped)
+                    frames = scan.scan(view, is_last, crc_extras(), found, skipped, told)
+                    spans, done, unknown = told.tolist()
                     self.unknown += unknown
                     self._note(view, skipped[:spans], begun + at, count, is_last and at + done == len(data))
                     if frames:

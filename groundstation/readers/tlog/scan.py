@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.compile import compiled
+from groundstation.base.compile import in_place
 
 LONGEST = 8 + 10 + 255 + 2 + 13
 # Columns of a frame that was found.
 TIME_US, NUMBER, SYSTEM, PAYLOAD_AT, PAYLOAD_BYTES, COLUMNS = 0, 1, 2, 3, 4, 5
+SPANS, DONE, UNKNOWN = 0, 1, 2  # places in what a scan tells
 
 
-@compiled
+@in_place
 def _checksum(data: Any, start: int, end: int, extra: int) -> int:
     crc = 0xFFFF
     for at in range(start, end + 1):
@@ -27,7 +28,7 @@ def _checksum(data: Any, start: int, end: int, extra: int) -> int:
     return crc
 
 
-@compiled
+@in_place
 def _frame_end(data: Any, at: int, limit: int) -> int:
     """Where the frame behind the time at ``at`` ends; 0 when none begins, -1 when it ends behind the data."""
     if at + 10 > limit:
@@ -44,13 +45,14 @@ def _frame_end(data: Any, at: int, limit: int) -> int:
     return end if end <= limit else -1
 
 
-@compiled
-def scan(data: Any, is_last: bool, extras: Any, frames: Any, skipped: Any) -> tuple[int, int, int, int]:
-    """Find frames; returns how many, how many stretches belong to none, where to go on, and how many are unknown.
+@in_place
+def scan(data: Any, is_last: bool, extras: Any, frames: Any, skipped: Any, told: Any) -> int:
+    """Find frames; returns how many.
 
     ``frames`` (m, 5) receives time, number of message, system x 256 + component, place and bytes of the payload;
-    ``skipped`` (k, 3) first byte, the first behind, and the frames before. A frame of an unknown number has no checksum
-    that can be computed: it is passed over if another begins where it ends.
+    ``skipped`` (k, 3) first byte, the first behind, and the frames before; ``told`` (3,) how many stretches were
+    skipped, where to go on, and how many frames are unknown. A frame of an unknown number has no checksum that can be
+    computed: it is passed over if another begins where it ends.
     """
     limit, at, count, spans, unknown, lost_from = len(data), 0, 0, 0, 0, -1
     while at < limit and count < len(frames) and spans < len(skipped) - 1:
@@ -100,9 +102,10 @@ def scan(data: Any, is_last: bool, extras: Any, frames: Any, skipped: Any) -> tu
     if lost_from >= 0:
         skipped[spans, 0], skipped[spans, 1], skipped[spans, 2] = lost_from, at, count
         spans += 1
-    return count, spans, at, unknown
+    told[SPANS], told[DONE], told[UNKNOWN] = spans, at, unknown
+    return count
 
 
-def room(size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Arrays for the frames and skipped stretches of so many bytes."""
-    return np.empty((size // 16 + 1, COLUMNS), dtype=np.int64), np.empty((4_096, 3), dtype=np.int64)
+def room(size: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Arrays for the frames and skipped stretches of so many bytes, and for what is told of them."""
+    return np.empty((size // 16 + 1, COLUMNS), np.int64), np.empty((4_096, 3), np.int64), np.empty(3, np.int64)

@@ -16,6 +16,7 @@ from groundstation.readers.ulog.formats import Flattener, Format, Layout, parse_
 from groundstation.readers.ulog.messages import FILE_HEADER_BYTES, FlagBits, flag_bits, text_of
 
 BLOCK_BYTES = 8 << 20
+KEPT_BYTES = 32 << 20  # of a log whose blocks may all be kept, for a second pass
 MAX_TOPICS = 30_000  # numbers of topics have 16 bits
 DEFINITIONS_SHOWN = 20  # bad definitions told one by one; the others are told together
 SLACK = 7  # bytes behind the data, so that a row may be rounded up to a multiple of eight
@@ -171,6 +172,11 @@ class Walk:
         self._index = 0
         self._capacity = max(1024, BLOCK_BYTES // 16)
 
+    @property
+    def may_be_kept(self) -> bool:
+        """Whether blocks stay as they are when those behind them are read; else each is good until the next."""
+        return self._source.size <= KEPT_BYTES
+
     def __iter__(self) -> Iterator[Block]:
         with self._source.open() as stream:
             flags = flags_of(self._source)
@@ -202,7 +208,10 @@ class Walk:
         while not is_end:
             done = int(state[scan.POSITION])
             base, filled, state[scan.POSITION] = base + done, filled - done, 0
-            buffer[:filled] = buffer[done : done + filled]
+            before = buffer
+            if self.may_be_kept and base > start:
+                buffer = np.zeros(room + SLACK, dtype=np.uint8)  # the one before is that of the blocks before
+            buffer[:filled] = before[done : done + filled]
             if state[scan.SKIP_START] != scan.NOWHERE:
                 state[scan.SKIP_START] -= done
             fresh = self._read(stream, base + filled, buffer[filled : min(room, end - base)])

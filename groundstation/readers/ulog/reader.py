@@ -1,6 +1,7 @@
 """The second pass over a ULog: batches of every topic, raw and canonical, then remarks and damages."""
 
 import re
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,7 +23,7 @@ from groundstation.base.signals import EVENT_SEPARATOR
 from groundstation.readers.mapping import mapped
 from groundstation.readers.parts import Part, bounded, merged, occupied
 from groundstation.readers.source import Source
-from groundstation.readers.ulog.blocks import NOT_SUBSCRIBED, Topic, Walk
+from groundstation.readers.ulog.blocks import NOT_SUBSCRIBED, Block, Topic, Walk
 from groundstation.readers.ulog.canonical import MODE_NAMES, MODES, Rows
 from groundstation.readers.ulog.formats import TIMESTAMP
 from groundstation.readers.ulog.survey import Overview, overview
@@ -54,13 +55,17 @@ class _Losses:
 
 def items(source: Source, reader_name: str, start_us: int) -> Iterator[Item]:
     """Items of a log; ``start_us`` is when its header says that logging began."""
-    found = overview(source)
+    walk = Walk(source)
+    kept = deque(walk) if walk.may_be_kept else None
+    found = overview(walk if kept is None else kept, walk.definitions)
     yield LogHeader(reader_name, found.metadata, found.utc_of_zero_ns, has_counting_clock=True)
-    walk, losses = Walk(source), _Losses()
+    if kept is None:
+        walk = Walk(source)
+    losses = _Losses()
     texts = TextTopics(start_us if start_us <= MAX_TIME_US else 0)
     raw, canonical = _RawTopics(losses, found.odd_flags), _CanonicalTopics(losses, found)
     newest_us = 0
-    for block in walk:
+    for block in walk if kept is None else _let_go(kept):
         messages_us = np.zeros(len(block.at), dtype=np.uint64)
         for topic, which in block.groups():
             if topic.layout is None:
@@ -86,6 +91,12 @@ def items(source: Source, reader_name: str, start_us: int) -> Iterator[Item]:
     yield from walk.damages()
     yield from losses.damages()
     yield from texts.damages()
+
+
+def _let_go(blocks: deque[Block]) -> Iterator[Block]:
+    """Blocks, each free once it is done with."""
+    while blocks:
+        yield blocks.popleft()
 
 
 def _newest_before(places: Int64Array, messages_us: NDArray[np.uint64], newest_us: int) -> Int64Array:

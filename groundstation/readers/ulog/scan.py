@@ -208,7 +208,7 @@ def _is_cut(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
 
 
 @in_place
-def leads_on(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
+def leads_on(data: Any, at: int, end: int, least: Any, most: Any) -> bool:
     """Whether a strong message begins at a place, or behind at most three weak ones; the end of the data is as good."""
     for _ in range(4):
         if at + 3 > end:
@@ -216,9 +216,9 @@ def leads_on(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
         strength = _strength(data, at, end, least, most)
         stop = at + 3 + _u16(data, at)
         if strength == NONE and data[at + 2] != 0x44 and _is_known_type(data[at + 2]):
-            return end < stop <= at + LONGEST_WEAK  # cut by the end
+            return bool(end < stop <= at + LONGEST_WEAK)  # cut by the end
         if strength != WEAK:
-            return strength == STRONG or _is_cut(data, at, end, least, most)
+            return bool(strength == STRONG or _is_cut(data, at, end, least, most))
         if stop - at > LONGEST_STEP or _swallows(data, at + 3, stop, least, most):
             return False
         at = stop

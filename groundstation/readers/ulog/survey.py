@@ -1,5 +1,6 @@
 """The first pass over a ULog: what the header must tell before the first batch, and which rule serves which signal."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -7,9 +8,8 @@ import numpy as np
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Int64Array, Remark
 from groundstation.readers.mapping import Assignment, Offer, assigned
-from groundstation.readers.source import Source
 from groundstation.readers.start import told_at_zero
-from groundstation.readers.ulog.blocks import Block, Topic, Walk
+from groundstation.readers.ulog.blocks import Block, Definitions, Topic
 from groundstation.readers.ulog.canonical import ARMING, FIX_3D, ROLES, UTC_SOURCES
 from groundstation.readers.ulog.messages import Keyed, keyed, release_text
 
@@ -44,13 +44,12 @@ class Overview:
     odd_flags: set[tuple[int, str]] = field(default_factory=set)
 
 
-def overview(source: Source) -> Overview:
-    """Go through a log once."""
-    walk = Walk(source)
+def overview(blocks: Iterable[Block], definitions: Definitions) -> Overview:
+    """Go through the blocks of a log once; ``definitions`` are those of their walk."""
     with_data: set[int] = set()
     clocks: dict[str, list[Int64Array]] = {}  # (UTC, device time) of messages, microseconds
     found = Overview()
-    for block in walk:
+    for block in blocks:
         occurring = np.flatnonzero(np.bincount(block.topic[block.topic >= 0])).tolist()
         with_data.update(occurring)
         for topic in (block.topics[number] for number in occurring):
@@ -58,7 +57,7 @@ def overview(source: Source) -> Overview:
             if topic.name in UTC_SOURCES and topic.instance == 0 and _tells_utc(topic):
                 clocks.setdefault(topic.name, []).append(_utc_and_device_us(block, topic))
         _note_facts(block, found.metadata)
-    _assign(found, [topic for topic in walk.definitions.topics if topic.number in with_data])
+    _assign(found, [topic for topic in definitions.topics if topic.number in with_data])
     _relate_to_utc(found, clocks)
     _name_aircraft(found.metadata)
     return found

@@ -1,10 +1,11 @@
 """Chapter: every flight and what is out of the ordinary about it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Section, Tone
 from groundstation.chapters.verdict import VERDICTS
@@ -13,6 +14,7 @@ from groundstation.reports.fleet.common import aircraft_name, bounded, minute, p
 from groundstation.results.fleet import FleetResults
 
 KEY = "flights"
+MOST_LINES = 10_000  # of the table on the page: 7 MB
 LEAD = "Every flight of the fleet, with what is out of the ordinary about it."
 GRAVITY: tuple[Tone, ...] = ("bad", "warn", "plain")
 HEADS = (
@@ -38,12 +40,32 @@ class FlightLine:
 
 
 def lines(fleet: FleetResults) -> list[FlightLine]:
-    """Every flight in the order of the fleet."""
+    """Flights in the order of the fleet: every one, or of more than :data:`MOST_LINES` those of note, then the last."""
     noted = remarks_of(fleet)
-    columns = {name: values.tolist() for name, values in fleet.flights.columns.items() if name != "start_utc"}
-    columns["start"] = [minute(time) for time in fleet.flights["start_utc"]]
-    rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
-    return [_line(row, noted.get(row["flight_id"], ())) for row in rows]
+    rows = _shown(fleet, noted)
+    columns = {name: values[rows].tolist() for name, values in fleet.flights.columns.items() if name != "start_utc"}
+    columns["start"] = [minute(time) for time in fleet.flights["start_utc"][rows]]
+    told = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
+    return [_line(row, noted.get(row["flight_id"], ())) for row in told]
+
+
+def caption_of(fleet: FleetResults) -> str:
+    """What stands above the table: what its columns mean, and which flights are not in it."""
+    if len(fleet) <= MOST_LINES:
+        return CAPTION
+    some = (
+        f"{number(MOST_LINES, 0)} of {plural(len(fleet), 'flight')}: those of note, the gravest first, then the last."
+    )
+    return f"{CAPTION} {some} All of them are in flights.parquet."
+
+
+def _shown(fleet: FleetResults, noted: Mapping[str, Sequence[Mark]]) -> NDArray[np.intp]:
+    """Rows of the flights in the table."""
+    every = np.arange(len(fleet))
+    if len(fleet) <= MOST_LINES:
+        return every
+    gravity = np.array([_gravest(noted.get(name, ())) for name in fleet.flights["flight_id"].tolist()])
+    return np.asarray(np.sort(np.lexsort((-every, gravity))[:MOST_LINES]))
 
 
 def _line(row: dict[str, Any], remarks: Sequence[Mark]) -> FlightLine:
@@ -96,7 +118,7 @@ def build(fleet: FleetResults) -> Section:
     if not len(fleet):
         return Section(KEY, "Flights", LEAD, (Note("No log gave a flight.", "unknown"),))
     every = sorted(lines(fleet), key=_gravity)
-    noted = sum(_gravity(line) < GRAVITY.index("plain") for line in every)
+    noted = sum(_gravest(marks) < GRAVITY.index("plain") for marks in remarks_of(fleet).values())
     shown = (0, 2, 3, 4, 5)
     heads = (*(HEADS[place] for place in shown), HEADS[-1])
     rows = [(*(line.cells[place] for place in shown), _joined(line.remarks)) for line in every]
@@ -108,7 +130,11 @@ def build(fleet: FleetResults) -> Section:
 
 
 def _gravity(line: FlightLine) -> int:
-    return min((GRAVITY.index(mark.tone) for mark in line.remarks), default=len(GRAVITY))
+    return _gravest(line.remarks)
+
+
+def _gravest(marks: Sequence[Mark]) -> int:
+    return min((GRAVITY.index(mark.tone) for mark in marks), default=len(GRAVITY))
 
 
 def _joined(remarks: Sequence[Mark]) -> str:

@@ -205,7 +205,10 @@ def _use_together(
 ) -> None:
     kept = []
     for event in events:
-        for row, h in joint.rows(event):
+        rows = joint.rows(event)
+        if not rows:
+            recorder.counts["lost"] += 1
+        for row, h in rows:
             gated, total = _is_gated(joint, event, row, h, settings)
             recorder.judge(event, row.innovation, total, not gated)
             _count_rejections(joint, event, gated, rejected, recorder)

@@ -1,0 +1,147 @@
+"""The decision of an acceptance in words: what stands on top of its page."""
+
+from collections.abc import Sequence
+
+from groundstation.base.timescales import utc_ns_to_iso
+from groundstation.chapters.parts import Cell, Front, Mark
+from groundstation.chapters.wording import ABSENT, clean, number, number_with_unit, percent, significant
+from groundstation.results.acceptance import (
+    ENSEMBLE,
+    QUANTITIES,
+    Acceptance,
+    Bound,
+    Decision,
+    FlightError,
+    InsRow,
+    Judgement,
+    Limit,
+)
+
+MARKS: dict[Decision, Mark] = {
+    "pass": Mark("good", "Pass"),
+    "fail": Mark("bad", "Fail"),
+    "not enough flights": Mark("warn", "Not enough flights"),
+    "not flown": Mark("unknown", "Not flown"),
+    "no limit": Mark("unknown", "No limit"),
+}
+
+
+def front(found: Acceptance) -> Front:
+    """What stands on top: the decision, what it rests on, key figures."""
+    whole, included = _whole(found), found.included
+    aircraft = sorted({flight.aircraft for flight in included if flight.aircraft})
+    pairs: tuple[tuple[str, Cell], ...] = (
+        ("Flights", f"{number(len(included), 0)} of {number(len(found.flights), 0)}"),
+        ("INS", number(len({flight.ins for flight in included}), 0)),
+        ("Aircraft", clean(", ".join(aircraft[:4]) + (" …" if len(aircraft) > 4 else "")) or ABSENT),
+        ("Hours", number(whole.hours if whole else 0.0, 1)),
+        ("Span, UTC", _span(included)),
+        ("Standard", f"{found.name}, SHA-256 {found.standard_sha256[:16]}"),
+        ("groundstation", found.version),
+    )
+    judged = [one for one in found.judgements if one.ins == ENSEMBLE]
+    told = [_told(found, one) for one in judged]
+    return Front(
+        found.standard.title,
+        pairs,
+        verdict=MARKS[found.decision],
+        headline=headline(found),
+        sentences=told or ("The standard states no limit: errors are told, nothing is judged.",),
+        figures=_figures(found, whole),
+    )
+
+
+def headline(found: Acceptance) -> str:
+    """What was decided, in a line."""
+    if not found.included:
+        return "No flight can be judged"
+    judged = [one for one in found.judgements if one.ins == ENSEMBLE and one.decision != "not flown"]
+    if not judged:
+        return "Nothing is judged"
+    worst = next(one for one in judged if one.decision == found.decision)
+    limit, sure = found.limit(worst.limit), percent(found.standard.confidence)
+    if worst.decision == "pass":
+        return f"{percent(limit.share)} of flights within the limits: shown at {sure} confidence"
+    if worst.decision == "fail":
+        return f"{clean(limit.title)}: fewer than {percent(limit.share)} of flights within, at {sure} confidence"
+    return f"{clean(limit.title)}: {number(worst.more_with_none_over, 0)} more flights needed, none over"
+
+
+def _told(found: Acceptance, one: Judgement) -> str:
+    limit = found.limit(one.limit)
+    if one.decision == "not flown":
+        return f"{clean(limit.title)}: none flown, nothing is said of them."
+    flown = f"{number(one.over, 0)} of {number(one.flights, 0)} flights of {number(one.ins_units, 0)} INS over"
+    worth = f" (worth {number(one.effective_flights, 1)} independent flights)" if is_worth_less(one) else ""
+    told = (
+        f"{clean(limit.title)}: {flown}, wanted {wanted(limit)} on {percent(limit.share)}. At "
+        f"{percent(found.standard.confidence)} confidence at least {percent(one.share_low, 1)} are within{worth}."
+    )
+    return f"{told} {_missing(one)}".strip()
+
+
+def is_worth_less(one: Judgement) -> bool:
+    """Whether the flights count as fewer independent ones."""
+    return one.effective_flights < one.flights - 0.05
+
+
+def _missing(one: Judgement) -> str:
+    if one.decision != "not enough flights":
+        return ""
+    more = f"Missing: {number(one.more_with_none_over, 0)} more independent flights with none over"
+    if not one.over:
+        return f"{more}."
+    at_share = (
+        "at the present share none would do"
+        if one.more_at_present_share is None
+        else f"{number(one.more_at_present_share, 0)} at the present share"
+    )
+    return f"{more}, {at_share}."
+
+
+def wanted(limit: Limit) -> str:
+    """The bounds of a limit in words.
+
+    Examples
+    --------
+    >>> wanted(Limit("a", "", (Bound("radial_rate_fit_nmiph", 2.0),)))
+    'radial error rate, time-position fit ≤ 2\u202fnmi/h'
+    """
+    return " and ".join(f"{QUANTITIES[one.quantity].title} ≤ {_of_bound(one, one.at_most)}" for one in limit.bounds)
+
+
+def _of_bound(bound: Bound, value: float) -> str:
+    return number_with_unit(significant(value, 3), QUANTITIES[bound.quantity].unit)
+
+
+def bound_text(limit: Limit, one: Judgement) -> str:
+    """What the share stays below, in the unit of the limit where it has one bound."""
+    if one.share_bound is None:
+        return ABSENT
+    if len(limit.bounds) == 1:
+        return _of_bound(limit.bounds[0], one.share_bound * limit.bounds[0].at_most)
+    return f"{significant(one.share_bound, 3)} of the limit"
+
+
+def _figures(found: Acceptance, whole: InsRow | None) -> tuple[tuple[str, str, str], ...]:
+    if whole is None or not whole.flights:
+        return ()
+    heading = f"95 % over {number(whole.heading_flights, 0)} flights"
+    return (
+        ("CEP50", number(whole.cep50_rate_nmiph, 2, "nmi/h"), "half of the flights, time-position fit"),
+        ("R95", number(whole.r95_rate_nmiph, 2, "nmi/h"), "95 % of the flights, time-position fit"),
+        ("Velocity error", number(whole.velocity_rms_mps, 2, "m/s"), "root mean square"),
+        ("Heading error", number(whole.heading95_deg, 2, "°"), heading),
+    )
+
+
+def _whole(found: Acceptance) -> InsRow | None:
+    return next((row for row in found.rows if row.ins == ENSEMBLE), None)
+
+
+def _span(flights: Sequence[FlightError]) -> str:
+    known = [flight.start_utc_ns for flight in flights if flight.start_utc_ns is not None]
+    if not known:
+        return ABSENT
+    first, last = (utc_ns_to_iso(time)[:10] for time in (min(known), max(known)))
+    return first if first == last else f"{first} … {last}"

@@ -1,0 +1,106 @@
+"""The verb on a folder that logs arrive in: ``watch`` runs them, and keeps the page of the fleet current."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from groundstation.cli.application import (
+    DONE,
+    AircraftFile,
+    ConfigFile,
+    FailOn,
+    Force,
+    IcdFiles,
+    Json,
+    NoPdf,
+    Profile,
+    Progress,
+    Quiet,
+    ReferenceFiles,
+    SiteFile,
+    ThresholdsFile,
+    Verbose,
+    answers_with_exit_code,
+    app,
+    examples,
+    say,
+)
+
+if TYPE_CHECKING:
+    from groundstation.pipeline.one_flight.outcome import Outcome
+
+
+@app.command(epilog=examples("watch"))
+@answers_with_exit_code
+def watch(
+    folder: Annotated[
+        Path, typer.Argument(help="Folder that logs arrive in, with its sub-folders.", metavar="FOLDER", readable=False)
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.", metavar="OUT")],
+    every: Annotated[
+        float,
+        typer.Option(
+            "--every",
+            help="Seconds between two looks; a log is run when two of them find it unchanged.",
+            metavar="SECONDS",
+            min=0.1,
+            max=86_400.0,
+        ),
+    ] = 30.0,
+    once: Annotated[bool, typer.Option("--once", help="Look twice, run what is ready, and end.")] = False,
+    config: ConfigFile = None,
+    aircraft: AircraftFile = None,
+    site: SiteFile = None,
+    thresholds: ThresholdsFile = None,
+    profile: Profile = None,
+    icd: IcdFiles = None,
+    reference: ReferenceFiles = None,
+    stations: Annotated[
+        Path | None,
+        typer.Option("--stations", help="Ground stations of the sessions (TOML).", metavar="FILE", readable=False),
+    ] = None,
+    jobs: Annotated[int, typer.Option("-j", "--jobs", help="Processes; 0: one per core.", min=0)] = 0,
+    fail_on: FailOn = "none",
+    no_pdf: NoPdf = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+    progress: Progress = "auto",
+) -> int | None:
+    """Run what arrives in a folder, once it has stopped growing, until Ctrl-C; index and fleet page stay current.
+
+    It may be killed at any moment: the same command again goes on with what is not finished.
+    """
+    from groundstation.cli import printing
+    from groundstation.cli.progress import listener
+    from groundstation.pipeline.many_flights.references import judged_by
+    from groundstation.pipeline.many_flights.watching import fresh
+    from groundstation.pipeline.many_flights.watching import watch as looked_at
+    from groundstation.pipeline.one_flight.configuration import load_configuration
+
+    settings = load_configuration(config, aircraft, site, profile=profile, thresholds=thresholds, icds=icd)
+    configuration = judged_by(settings, reference or (), is_one_log=False)
+    every_outcome: list[Outcome] = []
+    with listener("none" if quiet else progress) as listen:
+        batches = looked_at(
+            *(folder, output, configuration),
+            every_s=every,
+            once=once,
+            jobs=jobs,
+            fail_on=fail_on,
+            with_pdf=not no_pdf,
+            stations=stations,
+            force=force,
+            say=say,
+            listen=listen,
+        )
+        try:
+            for outcomes in batches:
+                printing.outcomes(fresh(outcomes), as_json_text=json, quiet=quiet, with_times=verbose)
+                every_outcome += outcomes if once else ()
+        except KeyboardInterrupt:
+            say(f"stopped: {output} keeps what is finished; the same command goes on with the rest")
+            return DONE
+    return printing.worst_code(tuple(every_outcome))

@@ -1,0 +1,159 @@
+"""Errors of an INS over the hours it navigates: what one flight shows, and the errors of many flights together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.geodesy import curvature_radii_m
+from groundstation.base.records import frozen
+from groundstation.base.units import M_PER_NAUTICAL_MILE
+
+FloatArray = NDArray[np.float64]
+MOVING_MPS = 10.0  # slower, the track does not say which way is along
+STEP_H = 1.0 / 12.0  # of the curves of many flights
+LONGEST_GAP_H = 1.0 / 6.0  # across which an error is interpolated
+FEWEST = 3  # flights that a curve of many needs
+S_PER_H = 3600.0
+
+
+@dataclass(frozen=True)
+class InsErrors:
+    """Position errors of one flight, INS minus reference, at the moments when both are known, shapes (n,).
+
+    ``hours`` count from the first of them; ``along_nmi`` and ``cross_nmi`` are NaN where the aircraft hardly moves.
+    """
+
+    hours: FloatArray
+    radial_nmi: FloatArray
+    along_nmi: FloatArray
+    cross_nmi: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("hours", "radial_nmi", "along_nmi", "cross_nmi"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def values(self) -> dict[str, float]:
+        """The figures of the flight that a limit may bound, by name; those that cannot be had are left out."""
+        hours, radial = self.hours, self.radial_nmi
+        found = {
+            "radial_rate_fit_nmiph": slope_through_origin(hours, radial, np.ones(len(hours))),
+            "radial_rate_final_nmiph": float(radial[-1] / hours[-1]),
+            "radial_final_nmi": float(radial[-1]),
+            "radial_largest_nmi": float(radial.max()),
+        }
+        if np.isfinite(self.along_nmi).any():
+            found["along_largest_nmi"] = float(np.nanmax(np.abs(self.along_nmi)))
+            found["cross_largest_nmi"] = float(np.nanmax(np.abs(self.cross_nmi)))
+        return found
+
+
+def slope_through_origin(hours: FloatArray, error: FloatArray, weight: FloatArray) -> float:
+    """Time-position fit: error = slope times hours by least squares.
+
+    Examples
+    --------
+    >>> slope_through_origin(np.array([1.0, 2.0]), np.array([0.5, 1.0]), np.ones(2))
+    0.5
+    """
+    return float(np.sum(weight * hours * error) / np.sum(weight * hours**2))
+
+
+def ins_errors(
+    time_s: FloatArray,
+    north_error_m: FloatArray,
+    east_error_m: FloatArray,
+    latitude_deg: FloatArray,
+    longitude_deg: FloatArray,
+) -> InsErrors | None:
+    """Errors of a flight over its hours; None where fewer than two positions are compared.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (n,)
+        Flight seconds, increasing.
+    north_error_m, east_error_m : ndarray, shape (n,)
+        INS minus reference, NaN where the reference is missing.
+    latitude_deg, longitude_deg : ndarray, shape (n,)
+        Of the INS: the way it flew says which direction is along.
+    """
+    known = np.isfinite(north_error_m) & np.isfinite(east_error_m)
+    if known.sum() < 2 or not np.ptp(time_s[known]) > 0.0:
+        return None
+    along_north, along_east = _direction(time_s, latitude_deg, longitude_deg)
+    along = north_error_m * along_north + east_error_m * along_east
+    cross = east_error_m * along_north - north_error_m * along_east
+    nmi = [values[known] / M_PER_NAUTICAL_MILE for values in (np.hypot(north_error_m, east_error_m), along, cross)]
+    return InsErrors((time_s[known] - time_s[known][0]) / S_PER_H, *nmi)
+
+
+def _direction(
+    time_s: FloatArray, latitude_deg: FloatArray, longitude_deg: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Unit vector along the track, north and east; NaN where the aircraft hardly moves or its place is not known."""
+    meridian, prime_vertical = curvature_radii_m(latitude_deg)
+    north = np.gradient(np.deg2rad(latitude_deg), time_s) * meridian
+    turned = np.rad2deg(np.unwrap(np.deg2rad(np.where(np.isfinite(longitude_deg), longitude_deg, 0.0))))
+    turned = np.where(np.isfinite(longitude_deg), turned, np.nan)
+    east = np.gradient(np.deg2rad(turned), time_s) * prime_vertical * np.cos(np.deg2rad(latitude_deg))
+    speed = np.hypot(north, east)
+    speed = np.where(speed > MOVING_MPS, speed, np.nan)
+    return north / speed, east / speed
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Radial errors of many flights at the same hours of navigation.
+
+    ``radial_nmi`` has shape (flights, n), NaN where a flight has no position; a flight counts while it lasts.
+    """
+
+    hours: FloatArray
+    radial_nmi: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "hours", frozen(self.hours))
+        object.__setattr__(self, "radial_nmi", frozen(self.radial_nmi))
+
+    @property
+    def flights(self) -> FloatArray:
+        """Flights that there are at each of the hours."""
+        return np.asarray(np.isfinite(self.radial_nmi).sum(axis=0), dtype=np.float64)
+
+    def of(self, rows: NDArray[np.intp]) -> "Growth":
+        """The same of some flights."""
+        return Growth(self.hours, self.radial_nmi[rows])
+
+    def within(self, share: float) -> FloatArray:
+        """What so many of the flights stay within, NaN where there are fewer than three."""
+        found = np.full(len(self.hours), np.nan)
+        enough = self.flights >= FEWEST
+        found[enough] = np.nanquantile(self.radial_nmi[:, enough], share, axis=0) if enough.any() else np.nan
+        return found
+
+    def two_drms(self) -> FloatArray:
+        """Twice the root mean square, NaN where there are fewer than three flights."""
+        count = self.flights
+        squares = np.nansum(self.radial_nmi**2, axis=0) / np.maximum(count, 1.0)
+        return np.where(count >= FEWEST, 2.0 * np.sqrt(squares), np.nan)
+
+    def rate(self, error_nmi: FloatArray) -> float | None:
+        """Time-position fit of a curve of these hours, every flight of each counting; None where it has no point."""
+        known = np.isfinite(error_nmi)
+        if not known.any():
+            return None
+        return slope_through_origin(self.hours[known], error_nmi[known], self.flights[known])
+
+
+def growth_of(flights: Sequence[InsErrors]) -> Growth:
+    """Radial errors at every five minutes, between moments that are no more than ten minutes apart."""
+    longest = max((float(flight.hours[-1]) for flight in flights), default=0.0)
+    hours = STEP_H * np.arange(1, int(longest / STEP_H + 1e-9) + 1, dtype=np.float64)
+    radial = np.full((len(flights), len(hours)), np.nan)
+    for row, flight in enumerate(flights):
+        after = np.clip(np.searchsorted(flight.hours, hours), 1, len(flight.hours) - 1)
+        gap = flight.hours[after] - flight.hours[after - 1]
+        is_known = (hours <= flight.hours[-1] + 1e-9) & (gap <= LONGEST_GAP_H)
+        radial[row, is_known] = np.interp(hours, flight.hours, flight.radial_nmi)[is_known]
+    return Growth(hours, radial)

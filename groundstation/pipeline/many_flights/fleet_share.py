@@ -1,0 +1,224 @@
+"""What one flight adds to the fleet, as the dataset of flights keeps it: its folder is read once, when it changes."""
+
+import io
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.serial import from_json, to_json_exactly
+from groundstation.base.signals import topics_of_kind
+from groundstation.estimators.analyses import ANSWER_TYPES
+from groundstation.estimators.fleet.density import SampleHistogram
+from groundstation.estimators.fleet.skill import SkillOfFlight
+from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, answer_values
+from groundstation.pipeline.many_flights.fleet_rows import Check, checks_of, flight_row, heading_samples, skill_of
+from groundstation.pipeline.many_flights.fleet_samples import SampleStore
+from groundstation.reports.index import IndexRow, index_row
+from groundstation.results.columns import FlightColumn
+from groundstation.results.figures import FigureData
+from groundstation.results.files import load, utf8_text
+from groundstation.tables.session_tracks import aircraft_named
+
+TEXTS = ("text", "category")
+TEXTS_AT_ONCE = 1000
+MOST_WIDE_CHARACTERS = 10_000_000  # of a column of texts as wide as its longest; beyond it each is an object
+DETAILS = {
+    "index": "JSON: the flight's row of index.json",
+    "forecast": "JSON: the shipped method, and the skill of each method and horizon",
+    "checks": "JSON: what independent thing each estimate was compared with",
+    "sample_cell": "cells of 0.01 deg that hold used heading samples",
+    "sample_count": "how many samples each of them holds",
+}
+
+
+@dataclass(frozen=True)
+class FlightShare:
+    """What one flight adds to the fleet, and what a run must know of it when it does not touch it.
+
+    Parameters
+    ----------
+    row : mapping
+        A value for each of :data:`FLIGHT_COLUMNS`.
+    index : IndexRow
+    histogram : SampleHistogram
+        Of its used heading samples.
+    shipped, skill
+        The shipped method of the forecast, and the skill of each.
+    checks : sequence of Check
+    path : str
+        Of its log.
+    link_name, hears : str, tuple of str
+        Name of its aircraft on the data link, and of those whom it heard.
+    samples : str
+        File of its heading samples in the dataset of samples; empty without any.
+    """
+
+    row: Mapping[str, Any]
+    index: IndexRow
+    histogram: SampleHistogram
+    shipped: str
+    skill: Sequence[SkillOfFlight]
+    checks: Sequence[Check]
+    path: str
+    link_name: str
+    hears: tuple[str, ...]
+    samples: str
+
+
+def share_of(folder: Path, store: SampleStore | None = None) -> FlightShare:
+    """Read a flight folder; with ``store`` its heading samples are put there.
+
+    Raises
+    ------
+    GroundstationError
+        When the folder cannot be read.
+    OSError
+        When the samples cannot be written.
+    """
+    saved = load(folder, ANSWER_TYPES)
+    results, samples = saved.results, heading_samples(saved)
+    row = flight_row(saved, samples)
+    empty = SampleHistogram(np.zeros(0, np.int32), np.zeros(0, np.int32))
+    return FlightShare(
+        row,
+        index_row(saved, "flight", answer_values(results)),
+        samples.histogram if samples is not None else empty,
+        *skill_of(saved),
+        checks_of(saved),
+        saved.manifest.source.path,
+        aircraft_named(results.metadata, results.source.name),
+        tuple(topic.partition(".")[2] for topic in topics_of_kind("link", tuple(results.ledger.topics))),
+        store.put(row, samples) if samples is not None and store is not None else "",
+    )
+
+
+def to_arrow(shares: Sequence[FlightShare]) -> Any:
+    """Put shares into a table of Arrow; its metadata ``columns`` tells the meanings."""
+    import pyarrow as pa
+
+    arrays = {column.name: _arrow(column, [share.row[column.name] for share in shares]) for column in FLIGHT_COLUMNS}
+    forecasts = [[share.shipped, [_finite(one) for one in share.skill]] for share in shares]
+    arrays["index"] = pa.array([_json(to_json_exactly(share.index)) for share in shares], pa.string())
+    arrays["forecast"] = pa.array(list(map(_json, forecasts)), pa.string())
+    arrays["checks"] = pa.array([_json([_finite(one) for one in share.checks]) for share in shares], pa.string())
+    for name, part in (("sample_cell", "cell"), ("sample_count", "count")):
+        counts = [getattr(share.histogram, part) for share in shares]
+        arrays[name] = pa.array(counts, pa.list_(pa.field("element", pa.int32())))  # as Parquet names it
+    meanings = {column.name: column.meaning for column in FLIGHT_COLUMNS} | DETAILS
+    return pa.table(arrays).replace_schema_metadata({"columns": json.dumps(meanings)})
+
+
+def flights_of(table: Any) -> FigureData:
+    """The table of flights in a table of shares."""
+    columns = {column.name: _numpy(column, table.column(column.name)) for column in FLIGHT_COLUMNS}
+    return FigureData("flights", columns, {})
+
+
+def index_rows_of(table: Any) -> list[IndexRow]:
+    """The rows of the index in a table of shares."""
+    return [from_json(IndexRow, json.loads(text)) for text in table.column("index").to_pylist()]
+
+
+def skill_rows_of(table: Any) -> Iterator[tuple[str, list[SkillOfFlight]]]:
+    """The shipped method and the skill of each flight in a table of shares."""
+    for text in _texts(table, "forecast"):
+        shipped, rows = json.loads(text)
+        yield shipped, [SkillOfFlight(**({"coverage95": math.nan} | row)) for row in rows]
+
+
+def check_rows_of(table: Any) -> Iterator[list[Check]]:
+    """The checks of each flight in a table of shares."""
+    for text in _texts(table, "checks"):
+        yield [Check(**row) for row in json.loads(text)]
+
+
+def histograms_of(table: Any, rows: NDArray[np.intp]) -> Iterator[SampleHistogram]:
+    """The histogram of the used samples of some flights in a table of shares."""
+    yield from map(
+        SampleHistogram, *(_lists(table.column(name).take(rows)) for name in ("sample_cell", "sample_count"))
+    )
+
+
+def _texts(table: Any, name: str) -> Iterator[str]:
+    """The texts of a column, a few at a time."""
+    column = table.column(name)
+    for start in range(0, len(column), TEXTS_AT_ONCE):
+        yield from column.slice(start, TEXTS_AT_ONCE).to_pylist()
+
+
+def fleet_parquet(table: Any) -> bytes:
+    """Encode the flights of a table of shares: times in UTC, dictionaries for categories, null for what is missing.
+
+    The schema's metadata has ``columns``, JSON of every column's meaning.
+    """
+    meanings = json.dumps({column.name: column.meaning for column in FLIGHT_COLUMNS})
+    flights = table.select([column.name for column in FLIGHT_COLUMNS])
+    return parquet_bytes(flights.replace_schema_metadata({"columns": meanings}))
+
+
+def parquet_bytes(table: Any) -> bytes:
+    """Encode a table: the same rows in the same order give the same bytes, whatever they were put together from."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    for place, one in enumerate(table.schema):
+        if pa.types.is_dictionary(one.type):
+            again = table.column(place).cast(pa.string()).combine_chunks().dictionary_encode()
+            table = table.set_column(place, pa.field(one.name, again.type), again)
+    buffer = io.BytesIO()
+    pq.write_table(table.combine_chunks(), buffer, compression="zstd")
+    return buffer.getvalue()
+
+
+def _finite(row: Any) -> dict[str, Any]:
+    """The fields of a row that are numbers, texts or flags; JSON knows no NaN."""
+    return {name: value for name, value in asdict(row).items() if value == value}
+
+
+def _json(document: Any) -> str:
+    return utf8_text(json.dumps(document, ensure_ascii=False, separators=(",", ":")))
+
+
+def _arrow(column: FlightColumn, values: list[Any]) -> Any:
+    import pyarrow as pa
+
+    if column.kind == "time":
+        return pa.array(values, pa.int64()).cast(pa.timestamp("ns", tz="UTC"))
+    if column.kind in TEXTS:
+        found = pa.array([text or None for text in values], pa.string())
+        return found.dictionary_encode() if column.kind == "category" else found
+    if column.kind == "count":
+        return pa.array([None if value != value else int(value) for value in values], pa.int64())
+    if column.kind == "flag":
+        return pa.array(list(map(bool, values)), pa.bool_())
+    return pa.array(values, pa.float64(), from_pandas=True)
+
+
+def _numpy(column: FlightColumn, array: Any) -> NDArray[Any]:
+    import pyarrow as pa
+
+    if column.kind == "time":
+        missing = np.iinfo(np.int64).min  # NaT
+        return np.asarray(array.cast(pa.int64()).fill_null(missing).to_numpy()).view("datetime64[ns]")
+    if column.kind in TEXTS:
+        texts = array.cast(pa.string()).fill_null("").to_pylist()
+        is_wide = len(texts) * max(map(len, texts), default=0) > MOST_WIDE_CHARACTERS
+        return np.array(texts, dtype=object if is_wide else np.str_)
+    if column.kind == "flag":
+        return np.asarray(array.to_numpy().astype(np.bool_))
+    return np.asarray(array.cast(pa.float64()).fill_null(math.nan).to_numpy())
+
+
+def _lists(array: Any) -> list[NDArray[np.int32]]:
+    whole = array.combine_chunks()
+    if len(whole) == 0:
+        return []
+    offsets, values = whole.offsets.to_numpy(), whole.values.to_numpy()
+    return [values[start:end] for start, end in pairwise(offsets.tolist())]
