@@ -183,6 +183,19 @@ def test_a_month_is_written_again_by_what_changed_in_it_alone(tmp_path: Path, mo
     assert not (tmp_path / FLIGHTS / "2026-08.parquet").exists()
 
 
+@pytest.mark.parametrize("content", [b"", b"PAR1 no PAR1", None], ids=repr)
+def test_a_damaged_file_of_the_dataset_is_told(tmp_path: Path, content: bytes | None) -> None:
+    for number in range(2):
+        save_flight(tmp_path, 30 * number)
+    write(tmp_path)
+    path = tmp_path / FLIGHTS / "2026-05.parquet"
+    path.write_bytes((tmp_path / FLIGHTS / "2026-06.parquet").read_bytes() if content is None else content)
+    (problem,) = write_beside(tmp_path, (), with_pdf=False)
+    assert problem.state == "failed" and "remove it: `report OUT` makes it again" in problem.text
+    path.unlink()
+    assert write_beside(tmp_path, (), with_pdf=False) == () and len(gather(tmp_path)) == 2
+
+
 def test_a_large_fleet_says_where_its_rows_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for number in range(4):
         save_flight(tmp_path, number)

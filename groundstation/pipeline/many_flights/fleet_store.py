@@ -31,7 +31,7 @@ UNKNOWN = "unknown"
 _COLUMNS = [(column.name, column.kind, column.meaning) for column in FLIGHT_COLUMNS]
 VERSION = repr((__version__, _COLUMNS, DETAILS))  # with another one everything is read again
 STAMPED = ("", SUMMARY, MANIFEST, f"{ARRAYS}/heading_samples.parquet")  # "": the folder, whose time its names change
-MOST_LISTED = 20_000  # flights: of more there is no index.json of rows, fleet.parquet or page with each of them
+MOST_LISTED = 20_000  # flights: of more there is no index.json with a row of each, and no fleet.parquet
 MOST_READ_HERE = 300  # flights, by the process that leads a run
 _VERSION = int.from_bytes(blake2b(VERSION.encode(), digest_size=8).digest(), "big")
 
@@ -97,17 +97,18 @@ class Scan:
 
         months = sorted({month_of(name) for name in self.fresh})
         wanted = None if columns is None else list(dict.fromkeys(("flight_id", *columns)))
-        tables = []
-        for month in months:
-            path = _path(self.out, month)
-            try:
-                with pq.ParquetFile(path) as file:
+        tables = [to_arrow([]) if wanted is None else to_arrow([]).select(wanted)]
+        place, hint = str(self.out / FLIGHTS), "remove it: `report OUT` makes it again"
+        try:
+            for month in months:
+                with pq.ParquetFile(_path(self.out, month)) as file:
                     tables.append(file.read(wanted))
-            except (OSError, ValueError) as error:
-                hint = "remove it: `report OUT` makes it again"
-                raise GroundstationError(str(path), type(error).__name__, "a file of a run", hint) from error
-        whole = pa.concat_tables([*tables, to_arrow([]) if wanted is None else to_arrow([]).select(wanted)])
-        return _chosen(whole, self.fresh)
+            found = _chosen(pa.concat_tables(tables), self.fresh)
+        except (OSError, ValueError) as error:
+            raise GroundstationError(place, type(error).__name__, "files of a run", hint) from error
+        if len(found) != len(self.fresh):
+            raise GroundstationError(place, f"{len(found)} flights", f"{len(self.fresh)}", hint)
+        return found
 
 
 def month_of(flight_id: str) -> str:
