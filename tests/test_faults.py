@@ -154,7 +154,7 @@ def members(group: int) -> list[str]:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no /proc to look for processes")
-@pytest.mark.parametrize("moment_s", [0.5, 2.0, 4.0, 8.0])
+@pytest.mark.parametrize("moment_s", [0.5, 2.0, 4.0])
 def test_ctrl_c_ends_two_workers_without_a_traceback(tmp_path: Path, moment_s: float) -> None:
     out = tmp_path / "out"
     command = [sys.executable, "-m", "groundstation", "run", str(SAMPLES), "-o", str(out), "-j", "2", "--no-pdf"]

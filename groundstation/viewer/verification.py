@@ -7,8 +7,8 @@ from pathlib import Path
 
 from groundstation.viewer.launch import viewer_executable
 
-MOST_AT_ONCE = 200  # paths on one command line
-PATIENCE_S = 300.0  # for so many; 2 MB take 0.04 s
+MOST_AT_ONCE = 50  # paths on one command line
+PATIENCE_S = 60.0  # for so many; 2 MB take 0.04 s
 
 
 def damaged(recordings: Sequence[Path]) -> dict[Path, str]:
