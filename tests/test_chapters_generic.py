@@ -152,7 +152,7 @@ def test_the_verdict_stands_first_and_in_the_headline(verdict: str, tone: str) -
     assert section.headline == f"Wind: {verdict}"
     assert notes(section) == [f"{verdict.capitalize()}: Gusts: 12.0, at most 8 m/s.", "Few turns."]
     assert tones(section)[0] == tone
-    assert markdown(section).startswith(f"# Wind\\: {verdict}\n\n**")
+    assert markdown(section).startswith(f"# Wind: {verdict}\n\n**")
 
 
 def test_gates_and_settings_are_told_as_in_every_chapter() -> None:

@@ -1,10 +1,11 @@
 """Sections as Markdown: the text panels of the recording."""
 
 import pytest
+from markdown_it import MarkdownIt
 
 from groundstation.chapters.front import front
 from groundstation.chapters.heading import heading
-from groundstation.chapters.markdown import front_markdown, markdown, part_markdown
+from groundstation.chapters.markdown import escaped, front_markdown, markdown, part_markdown
 from groundstation.chapters.parts import Cell, Facts, Figure, Front, Grid, Head, Mark, Note, Section
 from groundstation.results.flight import NotAssessable
 from tests.report_example import example, heading_result
@@ -12,6 +13,7 @@ from tests.report_example import example, heading_result
 HEADS = (Head("State"), Head("Gate"), Head("Figure", True), Head("Reason"))
 LONG = "a remark that is far longer than a cell of a panel that does not wrap"
 HOSTILE = "<script>|![x](http://y)\x00\u202e`*_#"
+MARKDOWN = MarkdownIt("commonmark").enable("table")
 
 
 def lines(*parts: Note | Facts | Grid | Figure) -> list[str]:
@@ -31,10 +33,10 @@ def test_states_are_symbols_and_words() -> None:
     rows: list[tuple[Cell, ...]] = [(Mark("warn", "failed"), "Kurtosis", "2.4", "gusts")]
     assert lines(Grid("Gates", HEADS, rows, "Caption"))[1:] == [
         "## Gates",
-        "| State | Gate | Figure | Reason |\n|---|---|---|---|\n| **▲ failed** | Kurtosis | 2\\.4 | gusts |",
+        "| State | Gate | Figure | Reason |\n|---|---|---|---|\n| **▲ failed** | Kurtosis | 2.4 | gusts |",
         "*Caption*",
     ]
-    assert lines(Note("Lost.", "bad"), Note("Said."))[1:] == ["**✗** Lost\\.", "Said\\."]
+    assert lines(Note("Lost.", "bad"), Note("Said."))[1:] == ["**✗** Lost.", "Said."]
 
 
 def test_long_remarks_stand_below_the_table_under_the_name_of_their_row() -> None:
@@ -79,13 +81,32 @@ def test_nothing_from_a_log_is_markup() -> None:
     section = Section("key", HOSTILE, "", (Note(HOSTILE), facts, Grid(HOSTILE, HEADS, rows, HOSTILE)), HOSTILE)
     for text in (markdown(section), front_markdown(Front(HOSTILE, [(HOSTILE, HOSTILE)], None, HOSTILE, [HOSTILE]))):
         assert not [mark for mark in "\x00\u202e" if mark in text]
-        assert "<" not in text.replace("\\<", "") and "](" not in text and "|!" not in text
+        found = {token.type for token in MARKDOWN.parse(text)}
+        found |= {part.type for token in MARKDOWN.parse(text) for part in token.children or ()}
+        assert not found & {
+            "link_open",
+            "image",
+            "html_inline",
+            "html_block",
+            "code_inline",
+            "code_block",
+            "fence",
+            "hr",
+        }
+
+
+@pytest.mark.parametrize(
+    "text", ["# a", "- a", "+ a", "1. a", "12) a", "---", "===", "> a", "~~~", "    a", "<a@b.c>", "-", "1."]
+)
+def test_a_line_begins_no_markup(text: str) -> None:
+    blocks = [token.type for token in MARKDOWN.parse("before\n\n" + escaped(text.strip()) + "\n\nbehind")]
+    assert blocks == 3 * ["paragraph_open", "inline", "paragraph_close"]
 
 
 def test_a_front_tells_flight_verdict_and_why() -> None:
     text = front_markdown(front(example(heading_result()))).split("\n\n")
     assert text[0] == "# A12 · flight 17"
-    assert text[1] == "## ✓ Accept · Enter −1\\.05°" and text[3] == "Every required gate passed\\."
+    assert text[1] == "## ✓ Accept · Enter −1.05°" and text[3] == "Every required gate passed."
     assert "| Status | **✓ ok** |" in text[2]
     assert any("| Precision e |" in part for part in text)
     assert "## Not assessable" in text
