@@ -1,14 +1,12 @@
 """Many flights: one and two worker processes, a Dask cluster beside them, memory of a worker, killed runs continued.
 
-``bench_fleet.py [FLIGHTS]``, 500 without it; ``bench_fleet.py FLIGHTS stages`` tells what one process spends on a
-flight, by stage, with everything and with results alone. Wall seconds; other programs slow all of them.
+``bench_fleet.py [FLIGHTS]``, 500 without it: wall seconds; other programs slow all of them. ``bench_fleet.py FLIGHTS
+stages`` tells what one process spends on a flight, by stage, with everything and with results alone.
 """
 
 import filecmp
 import os
 import random
-import re
-import resource
 import signal
 import subprocess
 import sys
@@ -17,17 +15,19 @@ import time
 from collections import Counter
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from unittest import mock
 
 import psutil
 from distributed import LocalCluster
 
+from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.verbs.synthesis import simulate_to
 
 COMMAND = [sys.executable, "-m", "groundstation"]
 FLIGHTS, DAMAGED_SHARE, AIRCRAFT = 500, 0.03, 5
 SCENARIOS = ("taxi-good", "taxi-short", "taxi-drift")
 KILLS, FLIGHTS_KILLED = 10, 20
-STAGE = re.compile(r"([a-z][a-zA-Z ]+) ([0-9.]+) s")
 IDENTICAL = {".html", ".pdf", ".csv"}
 IDENTICAL_NAMES = {"summary.json", "index.json"}
 
@@ -78,19 +78,18 @@ def timed(arguments: list[str]) -> tuple[float, float, str]:
 
 
 def stages(logs: Path, root: Path, flights: int) -> None:
-    """Print seconds a flight by stage, and processor seconds a flight of the whole process, on one core."""
-    for name, more in (("everything", []), ("results alone", ["--only", "results"])):
-        command = [*COMMAND, "run", str(logs), "-o", str(root / name[:3]), "-j", "1", "-v", *more]
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        done = subprocess.run(command, check=False, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        processor_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    """Print processor seconds a flight by stage, in this process alone: everything, then results alone."""
+    for name, only_results in (("everything", False), ("results alone", True)):
+        started = time.process_time()
+        with mock.patch("time.perf_counter", time.process_time):  # what outcomes tell is then processor time
+            done = run_many([logs], root / name, Configuration(), jobs=1, only_results=only_results)
+        whole_s = time.process_time() - started
         spent: Counter[str] = Counter()
-        for line in done.stderr.splitlines():
-            if line.startswith("  "):
-                spent.update({stage: float(seconds) for stage, seconds in STAGE.findall(line)})
+        for outcome in done:
+            spent.update(outcome.times_s)
+        spent["beside the flights"] = whole_s - sum(spent.values())
         told = ", ".join(f"{stage} {seconds / flights:.3f}" for stage, seconds in spent.items())
-        print(f"{name}: {processor_s / flights:.2f} s of processor time a flight; by the clock {told}", flush=True)
+        print(f"{name}: {whole_s / flights:.2f} s of processor time a flight: {told}", flush=True)
 
 
 def largest_bytes(process: psutil.Process) -> int:

@@ -144,3 +144,31 @@ def novatel_log(seconds: int = 120) -> bytes:
         log += novatel("BESTVEL", ms, horizontal_speed=at / 10.0) + novatel("INSCOVS", ms, is_short=True, week=2417)
         log += novatel("INSPVAS", ms, is_short=True, week=2417, seconds=ms / 1e3, azimuth=at, ins_solution_status=3)
     return log
+
+
+def novatel_crc(text: bytes) -> bytes:
+    """CRC of a NovAtel log in text, as its digits."""
+    return b"%08x" % (zlib.crc32(text, 0xFFFFFFFF) ^ 0xFFFFFFFF)
+
+
+def novatel_text(header: str, body: str, mark: str = "#") -> bytes:
+    """A NovAtel log in text: its header, body and checksum."""
+    text = f"{header};{body}".encode()
+    return mark.encode() + text + b"*" + novatel_crc(text) + b"\r\n"
+
+
+_BESTPOS_TEXT = 'SOL_COMPUTED,SINGLE,{},37.5,120.0,15.0,WGS84,1.5,1.2,2.5,"",0.0,0.0,12,10,10,0,0,06,00,33'
+_BESTVEL_TEXT = "SOL_COMPUTED,DOPPLER_VELOCITY,0.15,0.0,10.0,90.0,-1.0,0.0"
+
+
+def novatel_text_log(seconds: int = 20) -> bytes:
+    """A drive as text; every INS solution has a short header."""
+    log = b""
+    for second in range(seconds):
+        header = f"COM1,0,80.0,FINESTEERING,2417,{129_618 + second}.000,02000020,1234,16809"
+        log += novatel_text(f"BESTPOSA,{header}", _BESTPOS_TEXT.format(55.0 + second / 1e4))
+        log += novatel_text(f"BESTVELA,{header}", _BESTVEL_TEXT)
+        time = f"2417,{129_618 + second}.000"
+        place = "55.0,37.5,135.0,0.0,10.0,1.0,1.5,-2.0,90.5"
+        log += novatel_text(f"INSPVASA,{time}", f"{time},{place},INS_SOLUTION_GOOD", "%")
+    return log

@@ -10,7 +10,7 @@ import pytest
 from groundstation.readers.receiver import stream
 from groundstation.readers.receiver.layouts import layout
 from groundstation.readers.receiver.novatel_messages import LAYOUTS, NAMES
-from tests.receiver_writer import nmea, novatel, novatel_frame, pvt
+from tests.receiver_writer import nmea, novatel, novatel_crc, novatel_frame, novatel_text, novatel_text_log, pvt
 from tests.test_receiver import Read
 
 NOON_MS = 129_618_000  # of GPS week 2417: 2026-05-04 12:00:00 UTC
@@ -138,15 +138,6 @@ def test_messages_that_are_not_known_and_answers_keep_their_bytes(tmp_path: Path
     assert len(read.batches("raw.BESTPOS-answer")) == 1 and not read.batches("raw.BESTPOS")
 
 
-def crc32(text: bytes) -> bytes:
-    return b"%08x" % (zlib.crc32(text, 0xFFFFFFFF) ^ 0xFFFFFFFF)
-
-
-def text_log(header: str, body: str, mark: str = "#") -> bytes:
-    text = f"{header};{body}".encode()
-    return mark.encode() + text + b"*" + crc32(text) + b"\r\n"
-
-
 def test_the_makers_text_gives_what_its_binary_form_gives(tmp_path: Path) -> None:
     """Every message with a layout, written as text by NovAtel's own encoder; digits of text are fewer."""
     oem = pytest.importorskip("novatel_edie.oem")
@@ -171,25 +162,8 @@ def test_the_makers_text_gives_what_its_binary_form_gives(tmp_path: Path) -> Non
     assert text.times("gnss") == binary.times("gnss") and text.times("ins") == binary.times("ins")
 
 
-BESTPOS = 'SOL_COMPUTED,SINGLE,{},37.5,120.0,15.0,WGS84,1.5,1.2,2.5,"",0.0,0.0,12,10,10,0,0,06,00,33'
-BESTVEL = "SOL_COMPUTED,DOPPLER_VELOCITY,0.15,0.0,10.0,90.0,-1.0,0.0"
-
-
-def drive(seconds: int = 20) -> bytes:
-    """A drive as text; every INS solution has a short header."""
-    log = b""
-    for second in range(seconds):
-        header = f"COM1,0,80.0,FINESTEERING,2417,{129_618 + second}.000,02000020,1234,16809"
-        log += text_log(f"BESTPOSA,{header}", BESTPOS.format(55.0 + second / 1e4))
-        log += text_log(f"BESTVELA,{header}", BESTVEL)
-        time = f"2417,{129_618 + second}.000"
-        place = "55.0,37.5,135.0,0.0,10.0,1.0,1.5,-2.0,90.5"
-        log += text_log(f"INSPVASA,{time}", f"{time},{place},INS_SOLUTION_GOOD", "%")
-    return log
-
-
 def test_a_drive_in_text_becomes_gnss_and_ins(tmp_path: Path) -> None:
-    read = Read(tmp_path, drive())
+    read = Read(tmp_path, novatel_text_log())
     assert read.values("gnss", "latitude_deg")[-1] == pytest.approx(55.0019)
     assert read.values("gnss", "altitude_ellipsoid_m")[0] == 135.0 and read.values("gnss", "fix")[0] == "3d"
     assert read.values("gnss", "velocity_east_mps")[0] == pytest.approx(10.0)
@@ -201,19 +175,19 @@ def test_a_drive_in_text_becomes_gnss_and_ins(tmp_path: Path) -> None:
 
 def test_epochs_of_text_come_together_whatever_the_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stream, "BLOCK_BYTES", 20_000)
-    whole = Read(tmp_path, drive(600))
+    whole = Read(tmp_path, novatel_text_log(600))
     assert len(whole.batches("gnss")) > 3
     assert len(whole.values("gnss", "velocity_east_mps")) == 600
     assert None not in whole.values("gnss", "velocity_east_mps")
 
 
 def test_damaged_text_is_skipped_and_odd_text_kept(tmp_path: Path) -> None:
-    sound = drive(10)
+    sound = novatel_text_log(10)
     damaged = sound.replace(b"55.0003,37.5", b"56.0003,37.5")
     read = Read(tmp_path, damaged)
     assert len(read.values("gnss", "latitude_deg")) == 9 and sum(one.count for one in read.damages) > 100
     header = "COM1,0,80.0,FINESTEERING,2417,129700.000,02000020,1234,16809"
-    odd = text_log(f"BESTPOSA,{header}", "WHAT,SINGLE,1.0") + text_log(f"ODDA,{header}", "1,2,3")
+    odd = novatel_text(f"BESTPOSA,{header}", "WHAT,SINGLE,1.0") + novatel_text(f"ODDA,{header}", "1,2,3")
     kept = Read(tmp_path, sound + odd)
     assert not kept.damages and len(kept.values("gnss", "latitude_deg")) == 10
     assert bytes.fromhex(kept.values("raw.ODD-text", "payload")[0]) == b"1,2,3"
@@ -233,5 +207,5 @@ def test_damaged_text_is_skipped_and_odd_text_kept(tmp_path: Path) -> None:
 )
 def test_hostile_text_raises_nothing(tmp_path: Path, text: bytes) -> None:
     body = text[1:]
-    read = Read(tmp_path, drive(3) + text + b"*" + crc32(body) + b"\r\n" + drive(3))
+    read = Read(tmp_path, novatel_text_log(3) + text + b"*" + novatel_crc(body) + b"\r\n" + novatel_text_log(3))
     assert len(read.values("gnss", "latitude_deg")) == 6

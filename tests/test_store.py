@@ -243,6 +243,20 @@ def test_equal_input_gives_equal_bytes(tmp_path: Path) -> None:
     assert one.read_bytes() == two.read_bytes()
 
 
+def test_what_is_kept_in_memory_and_laid_out_at_once_changes_no_byte(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    step = CHUNK_SPAN_NS // 700
+    shares = {"ins": 1.0, "gnss": 0.6, "raw.x": 0.6, "event": 1.0}
+    batches = [batch_of(topic, 2_000, share=share, step_ns=step) for topic, share in shares.items()]
+    before = written(tmp_path / "a.mcap", batches).read_bytes()
+    for most in (1, 20_000):  # bytes in memory before all go to the spool
+        monkeypatch.setattr("groundstation.store.writer.MEMORY_BYTES", most)
+        assert written(tmp_path / "b.mcap", batches).read_bytes() == before
+    monkeypatch.setattr("groundstation.store.channel._together", lambda pieces, _rows: ([piece] for piece in pieces))
+    assert written(tmp_path / "c.mcap", batches).read_bytes() == before
+
+
 OUTSIDE = OutOfRange(record=7, time="+0:01.0", range=(None, 90.0))
 STUCK = StuckStretch(record=3, start="+0:00.2", length_s=4.0, samples=40, value=1.25, why="gnss moves")
 TOPIC = TopicEntry(

@@ -31,7 +31,7 @@ ROWS = {"ins": 200, "gnss": 150, "raw.x": 120, "event": 130}
 DERIVED = ("location_fix.", "pose.", "log")  # what topics of channels made of others begin with
 INFO = StoreInfo(source_name="a.csv", metadata={"aircraft": "T-1"}, has_utc=True)
 FLIPS = 60
-EVERY = [3, pytest.param(1, marks=pytest.mark.slow)]  # place of a sweep that rereads the file at each
+EVERY = [3, pytest.param(1, marks=pytest.mark.slow)]  # third place of a sweep; the slow tests take all
 MUTATIONS = 100
 EXTREMES = (0, 1, 2**31, 2**40, 2**63, 2**64 - 1)
 PEAK_BYTES = 16 << 20  # a file of 100 kB needs no more; a trusted length would

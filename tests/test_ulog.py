@@ -154,11 +154,14 @@ def test_unknown_flags_are_refused_and_unknown_messages_skipped(tmp_path: Path) 
     assert found.rows("raw.vehicle_air_data") == 2 and not found.damages
 
 
-def test_block_borders_change_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("is_kept", [True, False])
+def test_block_borders_change_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_kept: bool) -> None:
     log = small_flight(6_000)
     whole = read(tmp_path, log)
     monkeypatch.setattr(blocks, "BLOCK_BYTES", 10_007)
     monkeypatch.setattr(blocks.scan, "LOOKAHEAD", 1_000)
+    if not is_kept:
+        monkeypatch.setattr(blocks, "KEPT_BYTES", 0)
     pieces = read(tmp_path, log)
     assert sum(isinstance(item, RecordBatch) for item in pieces.items) > 40
     for topic in whole.batches:

@@ -1,6 +1,7 @@
 """Sound logs that are mutated: written here, and the beginnings of recorded ones where those are."""
 
 import gzip
+import io
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -9,13 +10,14 @@ from pathlib import Path
 
 import numpy as np
 import zstandard
+from mcap.writer import CompressionType, Writer
 
 from tests.bag_writer import small_flight as small_flight_of_a_robot
 from tests.bag_writer import write_ros1, write_ros2
 from tests.dataflash_writer import MAGIC as DATAFLASH_MAGIC
 from tests.dataflash_writer import flight_log
 from tests.real_logs import REAL_LOGS
-from tests.receiver_writer import nmea_log, novatel_log, ubx_log
+from tests.receiver_writer import nmea_log, novatel_log, novatel_text_log, ubx_log
 from tests.telemetry_writer import telemetry
 from tests.trajectory_writer import PLACE, VELOCITY, pos_rows, sbet
 from tests.ulog_writer import GPS, GPS_CODE, small_flight
@@ -152,6 +154,19 @@ def mcap_starts(data: bytes) -> Iterator[int]:
         at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
 
 
+def flatbuffer() -> bytes:
+    """An MCAP without checksums of messages in FlatBuffers, every kind of value in them."""
+    stream, folder = io.BytesIO(), Path(__file__).parents[1] / "references" / "flatbuffers"
+    writer = Writer(stream, chunk_size=4_000, compression=CompressionType.NONE, enable_crcs=False)
+    writer.start()
+    schema = writer.register_schema("own.State", "flatbuffer", (folder / "every_kind.bfbs").read_bytes())
+    channel, message = writer.register_channel("/state", "flatbuffer", schema), (folder / "every_kind.bin").read_bytes()
+    for at in range(100):
+        writer.add_message(channel, 1_777_874_400_000_000_000 + at * 10**8, message, 0, at)
+    writer.finish()
+    return stream.getvalue()
+
+
 def chapter10() -> bytes:
     """The beginning of a simulated flight as Chapter 10: 1553, ARINC 429 and time, some 150 kB."""
     from groundstation.simulation.chapter10_writer import write_chapter10
@@ -207,6 +222,8 @@ _STARTS: dict[str, Callable[[bytes], Iterator[int]]] = {
     "ubx": starts_with(b"\xb5\x62"),
     "nmea": line_starts,
     "novatel": starts_with(b"\xaaD"),
+    "novatel-text": line_starts,
+    "flatbuffer": mcap_starts,
     "pos": line_starts,
     "sbet": lambda data: iter(range(0, len(data), 136)),
     "tlog": lambda data: iter(range(0, len(data), 48)),
@@ -227,6 +244,8 @@ _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
     "ubx": (ubx_log,),
     "nmea": (nmea_log,),
     "novatel": (novatel_log,),
+    "novatel-text": (novatel_text_log,),
+    "flatbuffer": (flatbuffer,),
     "pos": (pos,),
     "sbet": (lambda: sbet(count=300).tobytes(),),
     "tlog": (lambda: bytes(telemetry().data),),

@@ -76,6 +76,7 @@ def suffix_of(format_name: str) -> str:
         "chapter10": ".ch10",
         "mcap": ".mcap",
         "robot-mcap": ".mcap",
+        "flatbuffer": ".mcap",
         "ros1": ".bag",
         "sqlite3": ".db3",
         "gzip": ".gz",

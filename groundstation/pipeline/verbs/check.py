@@ -123,7 +123,11 @@ def _for_purpose(
 ) -> Checked:
     from groundstation.pipeline.verbs.usable import usability_of_flight
 
-    return checked.judged(usability_of_flight(purpose, flight, configuration), fail_on)
+    try:
+        return checked.judged(usability_of_flight(purpose, flight, configuration), fail_on)
+    except Exception as error:  # a defect of ours stops no other log
+        reason, trace = reason_of(Path(checked.outcome.source).name, error)
+        return replace(checked, outcome=replace(checked.outcome, state="failed", text=reason, trace=trace))
 
 
 def _for_session(

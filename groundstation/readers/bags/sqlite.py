@@ -142,9 +142,10 @@ def _connections(database: sqlite3.Connection) -> dict[int, Connection]:
     except _FAILURES:
         schemas = {}  # before schema version 4
     connections = {}
-    for number, (key, topic, kind, encoding) in enumerate(topics):
+    sound = [row for row in topics if isinstance(row[0], int)]  # messages of the others are counted as of no topic
+    for number, (key, topic, kind, encoding) in enumerate(sound):
         form, text = schemas.get(str(kind), ("", b""))
-        connections[int(key)] = Connection(number, str(topic), plain_name(str(kind)), str(encoding), form, text)
+        connections[key] = Connection(number, str(topic), plain_name(str(kind)), str(encoding), form, text)
     return connections
 
 
