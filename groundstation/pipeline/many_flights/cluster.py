@@ -7,7 +7,6 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future as Promise
 from concurrent.futures import wait
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING
 
@@ -73,22 +72,27 @@ def on_cluster(
                 raise GroundstationError(scheduler, "the scheduler is gone", "", hint)
             error = future.exception()
             result = future.result() if error is None else _failed(job, error)
-            if isinstance(result, _Hanging):
-                future.release()
-                _start_anew(client, result.worker)
+            future.release()  # what has been fetched is not computed again when its worker dies later
+            if isinstance(error, _HangingError):
+                _start_anew(client, error.worker)
                 result = overdue(job, timeout_s)
             yield number, result
             ended.update(handed_over(1))
 
 
-@dataclass(frozen=True)
-class _Hanging:
-    """What a worker gives back in place of an outcome when a job takes too long: its own address."""
+class _HangingError(Exception):
+    """What a worker raises when a job takes too long.
 
-    worker: str
+    It is no result: those are kept by their worker, and computed again by another one when that worker is started anew
+    before its scheduler hears that they were fetched. The job would hang there, too.
+    """
+
+    def __init__(self, worker: str) -> None:
+        super().__init__(worker)
+        self.worker = worker
 
 
-def _alone(run: Callable[[AnyJob, Listener], Outcome], job: AnyJob, timeout_s: float) -> Outcome | _Hanging:
+def _alone(run: Callable[[AnyJob, Listener], Outcome], job: AnyJob, timeout_s: float) -> Outcome:
     with _one_at_a_time:
         if math.isinf(timeout_s):
             return run(job, silent)
@@ -99,7 +103,7 @@ def _alone(run: Callable[[AnyJob, Listener], Outcome], job: AnyJob, timeout_s: f
             return promise.result()
     from distributed import get_worker
 
-    return _Hanging(get_worker().address)
+    raise _HangingError(get_worker().address)
 
 
 def _keep(promise: Promise[Outcome], run: Callable[[AnyJob, Listener], Outcome], job: AnyJob) -> None:
