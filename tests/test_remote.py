@@ -185,6 +185,11 @@ def test_one_run_at_a_time_writes_into_a_place_elsewhere(memory: str, monkeypatc
         with pytest.raises(GroundstationError, match=r"another run took over \(other\)"):
             lease.require()
     assert out.names(".lock") == ["8"]
+    out.remove(".lock/8")
+    with alone_elsewhere(out):  # lock 0; it ended, one took over and ended, and a third began
+        out.write(".lock/0", json.dumps({"token": "z", "owner": "third", "until_s": time.time() + 9.0}).encode())
+    assert out.names(".lock") == ["0"]
+    out.remove(".lock/0")
     out.write(".lock/8", b"not a lock")
     monkeypatch.setattr("groundstation.pipeline.many_flights.lease.RENEW_S", 0.05)
     with alone_elsewhere(out):
