@@ -200,6 +200,19 @@ def test_one_run_at_a_time_writes_into_a_place_elsewhere(memory: str, monkeypatc
             time.sleep(0.02)
 
 
+def test_a_run_that_another_one_overtook_puts_nothing_in_place(memory: str) -> None:
+    out = RemoteFolder(f"{memory}out")
+    other = json.dumps({"token": "y", "owner": "other", "until_s": time.time() + 600.0}).encode()
+
+    def overtake(event: Event) -> None:
+        if event.text == "estimating":
+            out.write(".lock/1", other)
+
+    with sketching(), pytest.raises(GroundstationError, match=r"another run took over \(other\)"):
+        run_many([SHORT], out.url, Configuration(), jobs=1, with_pdf=False, only_results=True, listen=overtake)
+    assert [name for name in out.names() if not name.startswith(".")] == [] and out.names(".lock") == ["1"]
+
+
 def begun_together(out: RemoteFolder, runs: int = 8) -> list[str]:
     """What becomes of runs that begin at the same moment in one place."""
     together, found = threading.Barrier(runs), []
