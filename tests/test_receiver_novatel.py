@@ -1,5 +1,6 @@
 """NovAtel OEM messages: fields against NovAtel's own decoder, canonical topics, times, damage."""
 
+import time
 import zlib
 from pathlib import Path
 from typing import Any
@@ -209,3 +210,11 @@ def test_hostile_text_raises_nothing(tmp_path: Path, text: bytes) -> None:
     body = text[1:]
     read = Read(tmp_path, novatel_text_log(3) + text + b"*" + novatel_crc(body) + b"\r\n" + novatel_text_log(3))
     assert len(read.values("gnss", "latitude_deg")) == 6
+
+
+def test_starts_without_an_end_are_followed_to_the_next_alone(tmp_path: Path) -> None:
+    """Were each followed to the end of the file, or as far as a log may reach, this took minutes."""
+    began = time.process_time()
+    read = Read(tmp_path, novatel_text_log(3) + b"#A;" * 500_000)
+    assert [(one.kind, one.count) for one in read.damages] == [("corrupt", 1_500_000)]
+    assert len(read.values("gnss", "latitude_deg")) == 3 and time.process_time() - began < 20.0

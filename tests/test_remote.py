@@ -185,6 +185,11 @@ def test_one_run_at_a_time_writes_into_a_place_elsewhere(memory: str, monkeypatc
         with pytest.raises(GroundstationError, match=r"another run took over \(other\)"):
             lease.require()
     assert out.names(".lock") == ["8"]
+    out.remove(".lock/8")
+    with alone_elsewhere(out):  # lock 0; it ended, one took over and ended, and a third began
+        out.write(".lock/0", json.dumps({"token": "z", "owner": "third", "until_s": time.time() + 9.0}).encode())
+    assert out.names(".lock") == ["0"]
+    out.remove(".lock/0")
     out.write(".lock/8", b"not a lock")
     monkeypatch.setattr("groundstation.pipeline.many_flights.lease.RENEW_S", 0.05)
     with alone_elsewhere(out):
@@ -193,6 +198,19 @@ def test_one_run_at_a_time_writes_into_a_place_elsewhere(memory: str, monkeypatc
         while json.loads(out.read(".lock/9") or b"")["until_s"] <= first:
             assert time.monotonic() < deadline
             time.sleep(0.02)
+
+
+def test_a_run_that_another_one_overtook_puts_nothing_in_place(memory: str) -> None:
+    out = RemoteFolder(f"{memory}out")
+    other = json.dumps({"token": "y", "owner": "other", "until_s": time.time() + 600.0}).encode()
+
+    def overtake(event: Event) -> None:
+        if event.text == "estimating":
+            out.write(".lock/1", other)
+
+    with sketching(), pytest.raises(GroundstationError, match=r"another run took over \(other\)"):
+        run_many([SHORT], out.url, Configuration(), jobs=1, with_pdf=False, only_results=True, listen=overtake)
+    assert [name for name in out.names() if not name.startswith(".")] == [] and out.names(".lock") == ["1"]
 
 
 def begun_together(out: RemoteFolder, runs: int = 8) -> list[str]:

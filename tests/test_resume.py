@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import wait
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ from typer.testing import CliRunner
 
 from groundstation.base.errors import UsageError
 from groundstation.cli.main import app
+from groundstation.pipeline.many_flights import workers
 from groundstation.pipeline.many_flights.batch import _crew, plan_many, run_many
 from groundstation.pipeline.many_flights.fleet_store import KEYS
 from groundstation.pipeline.many_flights.out_folder import LOCK
@@ -320,6 +322,19 @@ def test_a_log_that_takes_too_long_costs_itself_alone(tmp_path: Path) -> None:
     assert [ended[number].state for number in range(5)] == ["done", "failed", "done", "done", "done"]
     assert ended[1].text == "hang: not done within 2 s (--timeout), ended" and ended[1].code == 1
     assert time.monotonic() - began < 60.0 and ended_children()
+
+
+def test_logs_that_wait_are_run_when_all_but_a_late_one_ended_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def late_look(*arguments: object, **how: object) -> object:
+        time.sleep(3.0)  # as on a machine that is busy with other work
+        return wait(*arguments, **how)  # type: ignore[call-overload]
+
+    monkeypatch.setattr(workers, "wait", late_look)
+    jobs = [Job(Path(name), tmp_path, Configuration()) for name in ("hang", *"abcd")]
+    ended = dict(side_by_side(enumerate(jobs), hang_or_run, workers=2, listen=silent, timeout_s=2.0))
+    assert [ended[number].state for number in range(len(jobs))] == ["failed", *["done"] * 4]
 
 
 def ended_children() -> bool:

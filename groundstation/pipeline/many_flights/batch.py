@@ -207,7 +207,7 @@ def _run_remote(
         copy = Path(folder)
         output = RemoteOutput(work[0].out, copy)
         output.refuse_foreign(force=force)
-        with output.alone() as lease:
+        with output.alone():
             output.copy_all()
             placement = Placement(output, [one.log for one in work])
             is_whole = False
@@ -223,7 +223,6 @@ def _run_remote(
                 problems = (*unwritten, *beside)
                 is_whole = True
             finally:
-                lease.require()
                 output.publish(FLEET_FILES, is_whole=is_whole)
             return (*outcomes, *problems)
 

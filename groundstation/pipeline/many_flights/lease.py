@@ -46,11 +46,12 @@ class Lease:
             raise GroundstationError(self._folder.url, f"another run took over ({owner})", "", "run again")
 
     def release(self) -> None:
-        """Give the lock back."""
+        """Give the lock back; one that another run has by now under the same number stays."""
         self._ended.set()
         self._thread.join()
         with suppress(GroundstationError):  # then it ends by itself
-            self._folder.remove(f"{LOCKS}/{self._name}")
+            if _read(self._folder, self._name).token == self._token:
+                self._folder.remove(f"{LOCKS}/{self._name}")
 
     def _renew(self) -> None:
         while not self._ended.wait(RENEW_S):
@@ -107,12 +108,15 @@ def _numbers(folder: RemoteFolder) -> list[str]:
 
 
 def _held(folder: RemoteFolder) -> _Held | None:
-    """The lock that counts, None without any; one that cannot be read has ended."""
+    """The lock that counts, None without any."""
     numbers = _numbers(folder)
-    if not numbers:
-        return None
+    return _read(folder, numbers[-1]) if numbers else None
+
+
+def _read(folder: RemoteFolder, name: str) -> _Held:
+    """What a lock says; one that cannot be read has ended."""
     try:
-        told = json.loads(folder.read(f"{LOCKS}/{numbers[-1]}") or b"")
-        return _Held(numbers[-1], str(told["token"]), str(told["owner"]), float(told["until_s"]))
+        told = json.loads(folder.read(f"{LOCKS}/{name}") or b"")
+        return _Held(name, str(told["token"]), str(told["owner"]), float(told["until_s"]))
     except (ValueError, KeyError, TypeError):
-        return _Held(numbers[-1], "", "unknown", 0.0)
+        return _Held(name, "", "unknown", 0.0)

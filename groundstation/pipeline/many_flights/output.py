@@ -2,8 +2,8 @@
 
 import shutil
 import uuid
-from collections.abc import Collection, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -82,10 +82,17 @@ class RemoteOutput:
     def __init__(self, url: str, root: Path) -> None:
         self.root = root
         self._out = RemoteFolder(url)
+        self._lease: Lease | None = None
 
-    def alone(self) -> AbstractContextManager[Lease]:
-        """Keep other runs out while this one writes."""
-        return alone_elsewhere(self._out)
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Keep other runs out while this one writes; from when one took over nothing is written any more."""
+        with alone_elsewhere(self._out) as self._lease:
+            yield
+
+    def _require_alone(self) -> None:
+        if self._lease is not None:
+            self._lease.require()
 
     def refuse_foreign(self, *, force: bool) -> None:
         """Raise UsageError when something else is in the folder."""
@@ -129,6 +136,7 @@ class RemoteOutput:
 
     def place(self, outcome: Outcome) -> str:
         """Move a finished flight to its place, which is told."""
+        self._require_alone()
         self._out.replace(outcome.folder, outcome.flight_id, partial(is_made, identity=outcome.flight_id))
         self._out.write(f"{BY_LOG}/{outcome.sha256}", outcome.flight_id.encode())
         self._copy(outcome.flight_id)
@@ -143,6 +151,7 @@ class RemoteOutput:
 
     def send_session(self, session_id: str) -> None:
         """Send what was made of a session of the copy; files that stand there by name alone are there already."""
+        self._require_alone()
         folder = self.root / session_id
         if (folder / TABLES).is_dir():  # made just now: of what is there already the copy has no tables
             staged = f"{STAGING}/{session_id}-{uuid.uuid4().hex[:8]}"
@@ -158,6 +167,7 @@ class RemoteOutput:
         if folder.startswith("."):
             self._out.remove(folder)
         else:
+            self._require_alone()
             self._out.remove_where(folder, partial(is_made, identity=folder))
             shutil.rmtree(self.root / folder, ignore_errors=True)
 
@@ -166,6 +176,7 @@ class RemoteOutput:
 
         What a run that came to its end did not make is removed there too.
         """
+        self._require_alone()
         for name in names:
             path = self.root / name
             if path.is_dir():

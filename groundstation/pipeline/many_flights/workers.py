@@ -85,7 +85,7 @@ def side_by_side(
                 for number, job in broken:
                     reason = f"{job.name}: its process died (killed, or out of memory)"
                     yield number, Outcome(job.log, "failed", reason)
-            if not suspects and not queue.again:
+            if queue.is_empty:
                 return
 
 
@@ -96,9 +96,16 @@ class _Queue(Generic[AnyJob]):
     waiting: Iterator[tuple[int, AnyJob]]
     begun: dict[int, float] = field(default_factory=dict)
     again: deque[tuple[int, AnyJob]] = field(default_factory=deque)
+    is_empty: bool = False
 
     def next(self) -> tuple[int, AnyJob] | None:
-        return self.again.popleft() if self.again else next(self.waiting, None)
+        task = self.again.popleft() if self.again else next(self.waiting, None)
+        self.is_empty = task is None
+        return task
+
+    def put_back(self, tasks: Iterable[tuple[int, AnyJob]]) -> None:
+        self.again.extend(tasks)
+        self.is_empty &= not self.again
 
     def is_overdue(self, number: int, timeout_s: float) -> bool:
         return time.monotonic() - self.begun.get(number, math.inf) > timeout_s
@@ -139,6 +146,7 @@ def _until_broken(
         hand_over()
         while running:
             done, _ = wait(running, LOOK_EVERY_S if math.isfinite(timeout_s) else None, return_when=FIRST_COMPLETED)
+            late = {future for future in running.keys() - done if queue.is_overdue(running[future][0], timeout_s)}
             for future in done:
                 task = running.pop(future)
                 try:
@@ -147,11 +155,10 @@ def _until_broken(
                     broken.append(task)
                 else:
                     yield task[0], outcome
-            late = [task for task in running.values() if queue.is_overdue(task[0], timeout_s)]
             if late:
-                queue.again.extend(task for task in running.values() if task not in late)
+                queue.put_back(task for future, task in running.items() if future not in late)
                 _end(pool, at_once=True)
-                yield from ((number, overdue(job, timeout_s)) for number, job in late)
+                yield from ((running[future][0], overdue(running[future][1], timeout_s)) for future in late)
                 return
             hand_over()
     except BaseException:  # interrupted: nobody waits for the rest

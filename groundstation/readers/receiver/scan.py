@@ -146,7 +146,7 @@ def _novatel(data: Any, at: int, table: Any) -> int:
 
 @in_place
 def _novatel_text(data: Any, at: int, table: Any) -> int:
-    """Length of the NovAtel log in text at a place if its checksum is right."""
+    """Length of the NovAtel log in text at a place if its checksum is right; where another begins in it, it is none."""
     crc, end, has_body = 0, min(at + LONGEST, len(data)), False
     for k in range(at + 1, end):
         byte = data[k]
@@ -162,6 +162,8 @@ def _novatel_text(data: Any, at: int, table: Any) -> int:
             return k + TEXT_CRC_BYTES - at if is_right and k + TEXT_CRC_BYTES - at >= SHORTEST_TEXT else NO_FRAME
         if byte < 32 or byte > 126 or (k == at + 1 and not 65 <= byte <= 90):
             return NO_FRAME
+        if byte in (HASH, PERCENT) and k + 1 < end and 65 <= data[k + 1] <= 90:
+            return NO_FRAME  # else starts without an end would all be followed to the end
         has_body |= byte == SEMICOLON
         crc = (crc >> 8) ^ table[(crc ^ byte) & 255]
     return PENDING if end == len(data) else NO_FRAME
@@ -204,8 +206,8 @@ def _frame(data: Any, at: int, bare: bool, rtcm: Any, novatel: Any) -> tuple[int
 def is_cut(data: Any, at: int) -> bool:
     """Whether a frame begins at a place that the end of the data cuts off."""
     if data[at] == DOLLAR or data[at] == BANG or data[at] == HASH or data[at] == PERCENT:
-        is_text = True
-        for k in range(at + 1, len(data)):
+        is_text = len(data) - at <= LONGEST
+        for k in range(at + 1, len(data) if is_text else at):
             is_text &= 32 <= data[k] <= 126
         return is_text
     return _declared(data, at) > len(data) - at
