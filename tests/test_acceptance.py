@@ -183,6 +183,12 @@ def test_exit_code_is_that_of_a_limit_reached_only_where_asked(tmp_path: Path) -
     save_fleet(tmp_path / "few", [1.0])
     few = ["report", str(tmp_path / "few"), "--standard", "app-g", "--no-pdf", "--fail-on"]
     assert [run.invoke(app, [*few, level]).exit_code for level in ("fail", "warn")] == [0, 4]
+    short = save_flight(tmp_path / "short", 1, 1.0, hours=0.05)  # no flight counts: nothing is shown
+    none = ["report", str(short.parent), "--standard", "app-g", "--no-pdf", "--fail-on"]
+    assert [run.invoke(app, [*none, level]).exit_code for level in ("fail", "warn")] == [0, 4]
+    (short / "summary.json").write_text("{")
+    ended = run.invoke(app, [*none, "none"])
+    assert ended.exit_code == 1 and "cannot be read" in ended.stderr
     assert run.invoke(app, ["report", str(tmp_path), "--standard", "nothing"]).exit_code == 2
     assert run.invoke(app, ["report", str(tmp_path), "-o", str(tmp_path)]).exit_code == 2
 
@@ -196,6 +202,12 @@ def test_standards_say_where_they_are_from(tmp_path: Path) -> None:
         'title = "own"\nsource = "s"\n[[limits]]\nname = "a"\ntitle = "a"\nbounds = [{quantity = "x", at_most = 1}]\n'
     )
     with pytest.raises(SettingsError, match="quantity"):
+        read_standard(str(file))
+    file.write_text(
+        'title = "own"\nsource = "s"\n[[limits]]\nname = "a"\ntitle = "a"\nhours_over = 10\nhours_up_to = 2\n'
+        'bounds = [{quantity = "radial_final_nmi", at_most = 1}]\n'
+    )
+    with pytest.raises(SettingsError, match="hours_up_to"):  # it would be for no flight, and decide nothing
         read_standard(str(file))
     with pytest.raises(UsageError, match="no results"):
         accept(tmp_path, "app-g")

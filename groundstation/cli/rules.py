@@ -7,6 +7,7 @@ import typer
 
 from groundstation.cli.application import (
     DONE,
+    FAILED,
     LIMIT_REACHED,
     FailOnMode,
     Json,
@@ -63,9 +64,11 @@ def test(
     if json:
         typer.echo(as_json(found.to_dict()))
     elif not quiet:
-        typer.echo(printable(rules_text(found, everything=verbose)))
+        typer.echo("\n".join(map(printable, rules_text(found, everything=verbose).split("\n"))))
     for reason in found.unread:
-        say(f"warning: {reason}")
+        say(f"error: {reason}")
+    if found.unread:
+        return FAILED
     is_reached = {"warn": found.changed, "fail": found.no_longer_accepted}.get(fail_on, 0)
     return LIMIT_REACHED if is_reached else DONE
 

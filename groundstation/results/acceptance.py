@@ -66,6 +66,8 @@ class Limit:
         check_ranges(self)
         if not self.bounds:
             raise SettingsError("bounds", "none", "at least one")
+        if self.hours_up_to is not None and self.hours_up_to <= self.hours_over:
+            raise SettingsError("hours_up_to", f"{self.hours_up_to:g}", f"more than hours_over = {self.hours_over:g}")
 
     def is_for(self, hours: float) -> bool:
         """Whether a flight of so many hours is judged by it."""
@@ -127,6 +129,7 @@ class Standard:
 class FlightError:
     """INS errors of one flight; what is left out has a ``reason`` and perhaps no figures.
 
+    ``is_read`` is false where its results cannot be read: nobody knows what it would show.
     ``ins`` names the unit: its serial where the log or the aircraft file says one, else aircraft and topic.
     ``hours`` are those from the first position compared to the last; radial errors are INS minus reference.
     ``reference95`` is by what the reference itself may err in 95 % of cases, by quantity.
@@ -141,6 +144,7 @@ class FlightError:
     sha256: str
     made_by: str
     reason: str = ""
+    is_read: bool = True
     hours: float = 0.0
     epochs: int = 0
     values: Mapping[str, float] = field(default_factory=dict)

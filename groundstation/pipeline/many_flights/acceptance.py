@@ -129,7 +129,8 @@ def _flight_of(folder: Path, standard: Standard) -> tuple[FlightError, InsErrors
         saved = load(folder, ANSWER_TYPES)
         return _errors_of(saved, standard)
     except GroundstationError as error:
-        return FlightError(folder.name, "", "", "", None, "", "", "", f"cannot be read: {error}"), None, {}
+        reason = f"cannot be read: {error}"
+        return FlightError(folder.name, "", "", "", None, "", "", "", reason, is_read=False), None, {}
 
 
 def _errors_of(saved: SavedFlight, standard: Standard) -> tuple[FlightError, InsErrors | None, Mapping[str, Any]]:
