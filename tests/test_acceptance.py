@@ -1,6 +1,7 @@
 """Acceptance: errors of flights against limits, the confidence of the claim, what is left out, pages and exit codes."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from groundstation.estimators.fleet.confidence import (
 )
 from groundstation.estimators.fleet.ins_errors import growth_of, ins_errors
 from groundstation.pipeline.many_flights.acceptance import STANDARDS, accept, accept_to, read_standard
-from groundstation.results.acceptance import Bound, FlightError, Limit, Standard
+from groundstation.results.acceptance import ENSEMBLE, UNKNOWN_INS, Bound, FlightError, Limit, Standard
 from tests.acceptance_example import save_fleet, save_flight
 
 LIMIT = Limit("rate", "Rate", (Bound("radial_rate_fit_nmiph", 2.0),))
@@ -147,6 +148,26 @@ def test_a_folder_is_accepted_and_what_does_not_count_says_why(tmp_path: Path) -
     ratio = found.judgements[0].accuracy_ratio  # 2 nmi/h over 3 h against 5 m of either axis
     assert ratio == pytest.approx(2.0 * 3.0 * 1852.0 / (2.4477 * 5.0), rel=1e-3)
     assert found.judgements[1].decision == "not flown" and "none flown" in " ".join(front(found).sentences)
+
+
+def test_flights_of_unknown_ins_are_taken_as_of_one(tmp_path: Path) -> None:
+    """Without serial and aircraft 60 flights may all be of one INS: they show nothing of its type."""
+    for number in range(60):
+        folder = save_flight(tmp_path, number, 0.5)
+        document = json.loads((folder / "summary.json").read_text())
+        document["flight"]["metadata"] = {}
+        (folder / "summary.json").write_text(json.dumps(document))
+    found = accept(tmp_path, "app-g")
+    assert {flight.ins for flight in found.flights} == {UNKNOWN_INS}
+    assert found.decision == "not enough flights" and found.judgements[0].effective_flights == pytest.approx(1.0)
+    assert {one.ins for one in found.judgements} == {ENSEMBLE}, "nobody knows that they are of one"
+
+
+def test_flights_of_which_a_figure_is_missing_are_told() -> None:
+    slow = [replace(flight, values={}) for flight in flights_of([1.0] * 4)]
+    one = judge([*flights_of([1.0] * 70), *slow], LIMIT, Standard("s", "t"))
+    assert (one.flights, one.not_measured) == (70, 4)
+    assert judge(slow, LIMIT, Standard("s", "t")).decision == "not flown"
 
 
 def test_a_reset_of_the_ins_leaves_the_flight_out(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from groundstation.results.acceptance import ENSEMBLE, Acceptance, InsRow, Judge
 
 CLAIMS = {
     "type": "The claim is on all INS of the kind flown. Flights of one INS are alike: they count by their correlation.",
-    "units": "The claim is on all INS of the kind flown. Every INS counts once, however often it flew.",
+    "units": "The claim is on all INS of the kind flown. Every INS counts once at most, however often it flew.",
     "these": "The claim is on the INS flown alone. Each of their flights counts.",
 }
 ROLES = ("Prepared", "Checked", "Approved")

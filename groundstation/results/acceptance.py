@@ -11,6 +11,7 @@ from groundstation.results.figures import FigureData
 Claim = Literal["type", "units", "these"]
 Decision = Literal["pass", "fail", "not enough flights", "not flown", "no limit"]
 ENSEMBLE = ""  # where an INS is named and all of them are meant
+UNKNOWN_INS = "unknown"  # flights of which no one says which INS it was: they may be of one, and are taken so
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,8 @@ class FlightError:
     """INS errors of one flight; what is left out has a ``reason`` and perhaps no figures.
 
     ``is_read`` is false where its results cannot be read: nobody knows what it would show.
-    ``ins`` names the unit: its serial where the log or the aircraft file says one, else aircraft and topic.
+    ``ins`` names the unit: its serial where the log or the aircraft file says one, else aircraft and topic, else
+    :data:`UNKNOWN_INS`.
     ``hours`` are those from the first position compared to the last; radial errors are INS minus reference.
     ``reference95`` is by what the reference itself may err in 95 % of cases, by quantity.
     """
@@ -199,6 +201,8 @@ class Judgement:
     ----------
     flights, over, ins_units : int
         Flights judged, those over the limit, distinct INS.
+    not_measured : int
+        Flights that the limit is for, but of which a figure that it bounds is missing: they are not judged.
     effective_flights : float
         Independent flights that they are worth: flights of one INS are alike.
     correlation : float
@@ -224,6 +228,7 @@ class Judgement:
     flights: int
     over: int
     ins_units: int
+    not_measured: int
     effective_flights: float
     correlation: float
     share_low: float

@@ -29,7 +29,7 @@ from groundstation.estimators.fleet.ins_errors import InsErrors, growth_of, ins_
 from groundstation.pipeline.many_flights.inputs import flight_folders, is_ours
 from groundstation.pipeline.one_flight.identity import safe_part
 from groundstation.reports.acceptance import write_acceptance_report
-from groundstation.results.acceptance import QUANTITIES, Acceptance, FlightError, Standard
+from groundstation.results.acceptance import QUANTITIES, UNKNOWN_INS, Acceptance, FlightError, Standard
 from groundstation.results.figures import FigureData, numbers
 from groundstation.results.files import SavedFlight, csv_text, json_text, load, mapping, write_text
 from groundstation.results.heading import HeadingResult
@@ -227,12 +227,12 @@ def _sure_enough(flight: FlightError, standard: Standard) -> FlightError:
 
 
 def _unit_of(saved: SavedFlight, topic: str) -> str:
-    """Name of the INS: its serial, else the aircraft and the topic; the flight itself where neither is known."""
+    """Name of the INS: its serial, else the aircraft and the topic; where neither is known it may be any."""
     serial = _said(saved, "ins_serial")
     if serial:
         return serial
     aircraft = saved.results.metadata.get("aircraft", "")
-    return f"{aircraft} {topic}".strip() if aircraft else f"unknown ({saved.folder.name})"
+    return f"{aircraft} {topic}".strip() if aircraft else UNKNOWN_INS
 
 
 def _said(saved: SavedFlight, key: str) -> str:
