@@ -167,7 +167,9 @@ def test_flights_of_which_a_figure_is_missing_are_told() -> None:
     slow = [replace(flight, values={}) for flight in flights_of([1.0] * 4)]
     one = judge([*flights_of([1.0] * 70), *slow], LIMIT, Standard("s", "t"))
     assert (one.flights, one.not_measured) == (70, 4)
-    assert judge(slow, LIMIT, Standard("s", "t")).decision == "not flown"
+    none = judge(slow, LIMIT, Standard("s", "t"))  # flown, and nothing is known of it: it must not pass beside others
+    assert (none.decision, none.flights, none.more_with_none_over) == ("not enough flights", 0, 59)
+    assert judge(slow, replace(LIMIT, hours_over=50.0), Standard("s", "t")).decision == "not flown"
 
 
 def test_a_reset_of_the_ins_leaves_the_flight_out(tmp_path: Path) -> None:

@@ -38,10 +38,9 @@ def _acceptance(found: Acceptance) -> tuple[Section, ...]:
 
 def _irig261(found: Acceptance) -> tuple[Section, ...]:
     left_out = len(found.flights) - len(found.included)
-    functional = (
-        f"{number(len(found.included), 0)} flights gave errors of a free INS, {number(left_out, 0)} did not: the table "
-        "of flights left out has the reasons."
-    )
+    functional = f"{number(len(found.included), 0)} flights gave errors of a free INS"
+    if left_out:
+        functional += f", {number(left_out, 0)} did not: the table of flights left out has the reasons"
     judged = kept((_limits(found), *_notes(found)))
     conclusions = (Note(headline(found) + ".", MARKS[found.decision].tone), *judged)
     return (
@@ -51,7 +50,7 @@ def _irig261(found: Acceptance) -> tuple[Section, ...]:
         Section(
             "description", "Test description", "", kept((_included(found), _excluded(found), *_configuration(found)))
         ),
-        Section("functional", "System functional results summary", "", (Note(functional),)),
+        Section("functional", "System functional results summary", "", (Note(f"{functional}."),)),
         Section("position", "Position accuracy summary", "", (_rates(found), *_drawings(found))),
         Section("velocity", "Velocity and attitude accuracy summary", "", (_others(found), Note(NOT_MEASURED))),
         Section("conclusions", "Conclusions", "", kept((*conclusions, _limits_by_ins(found)))),

@@ -70,12 +70,16 @@ def headline(found: Acceptance) -> str:
 def _told(found: Acceptance, one: Judgement) -> str:
     limit = found.limit(one.limit)
     if one.decision == "not flown":
-        none = "what it bounds was measured on none" if one.not_measured else "none flown"
-        return f"{clean(limit.title)}: {none}, nothing is said of them."
+        return f"{clean(limit.title)}: none flown, nothing is said of them."
+    asked = f"wanted {wanted(limit)} on {percent(limit.share)}"
+    if not one.flights:
+        return (
+            f"{clean(limit.title)}: measured on none of {number(one.not_measured, 0)} flights, {asked}. {_missing(one)}"
+        )
     flown = f"{number(one.over, 0)} of {number(one.flights, 0)} flights of {number(one.ins_units, 0)} INS over"
     worth = f" (worth {number(one.effective_flights, 1)} independent flights)" if is_worth_less(one) else ""
     told = (
-        f"{clean(limit.title)}: {flown}, wanted {wanted(limit)} on {percent(limit.share)}. At "
+        f"{clean(limit.title)}: {flown}, {asked}. At "
         f"{percent(found.standard.confidence)} confidence at least {percent(one.share_low, 1)} are within{worth}."
     )
     if one.not_measured:

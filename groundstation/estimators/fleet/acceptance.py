@@ -63,7 +63,7 @@ def judge(flights: Sequence[FlightError], limit: Limit, standard: Standard, ins:
     ratios = [ratio for flight, _ in judged if (ratio := accuracy_ratio(flight, limit)) is not None]
     is_shown = count > 0 and low >= limit.share
     decision: Decision = (
-        "not flown" if not count else "pass" if is_shown else "fail" if high < limit.share else "not enough flights"
+        "not flown" if not meant else "pass" if is_shown else "fail" if high < limit.share else "not enough flights"
     )
     at_share = flights_needed_at_share(over / count, limit.share, standard.confidence) if count else None
     needed = flights_needed(over * worth, limit.share, standard.confidence)
