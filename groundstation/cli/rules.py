@@ -10,6 +10,7 @@ from groundstation.cli.application import (
     FAILED,
     LIMIT_REACHED,
     FailOnMode,
+    Force,
     Json,
     Quiet,
     Verbose,
@@ -45,6 +46,7 @@ def test(
             "--fail-on", help="Exit 4 where a verdict changes (warn), or one that was accepted no longer is (fail)."
         ),
     ] = "none",
+    force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
@@ -56,8 +58,11 @@ def test(
     With -v every gate with another limit is listed, not those of changed verdicts alone.
     """
     from groundstation.cli.text import as_json, printable
+    from groundstation.pipeline.verbs.export import require_place
     from groundstation.pipeline.verbs.rules import rules_test, write_rules
 
+    if output is not None:
+        require_place(new, output, force)
     found = rules_test(new, over)
     if output is not None:
         write_rules(found, output)

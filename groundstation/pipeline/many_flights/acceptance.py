@@ -97,9 +97,16 @@ def accept_to(
     -------
     Acceptance, list of Path, str
         What was found, what was written, and why there is no PDF where one was asked for.
+
+    Raises
+    ------
+    UsageError, SettingsError
+        As :func:`accept`; when ``folder`` is a file.
     """
-    found = accept(out, standard)
     target = out if folder is None else folder
+    if target.exists() and not target.is_dir():
+        raise UsageError(str(target), "a file", "a folder for the acceptance")
+    found = accept(out, standard)
     target.mkdir(parents=True, exist_ok=True)
     stem = f"acceptance_{safe_part(found.name) or 'standard'}"
     written = write_acceptance_report(target / f"{stem}.html", found, with_pdf=with_pdf)
