@@ -214,6 +214,7 @@ def test_exit_code_is_that_of_a_limit_reached_only_where_asked(tmp_path: Path) -
     assert ended.exit_code == 1 and "cannot be read" in ended.stderr
     assert run.invoke(app, ["report", str(tmp_path), "--standard", "nothing"]).exit_code == 2
     assert run.invoke(app, ["report", str(tmp_path), "-o", str(tmp_path)]).exit_code == 2
+    assert run.invoke(app, ["report", str(short), "--standard", "app-g"]).exit_code == 2  # one flight is no fleet
     assert run.invoke(app, [*call, "-o", str(short / "manifest.json")]).exit_code == 2
 
 

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from groundstation.chapters.acceptance_front import MARKS, bound_text, headline, is_worth_less, wanted
+from groundstation.chapters.acceptance_front import MARKS, at_least, bound_text, headline, is_worth_less, stated, wanted
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Note, Part, Section, Signatures, kept
-from groundstation.chapters.wording import ABSENT, clean, number, percent, sentence
+from groundstation.chapters.wording import ABSENT, clean, number, sentence
 from groundstation.results.acceptance import ENSEMBLE, Acceptance, InsRow, Judgement, Limit
 
 CLAIMS = {
@@ -74,7 +74,7 @@ def _standard(found: Acceptance) -> Part:
         ("Claim", CLAIMS[standard.claim], ""),
         (
             "Confidence",
-            percent(standard.confidence),
+            stated(standard.confidence),
             "one-sided, exact binomial limits of effective numbers of flights",
         ),
     ]
@@ -83,7 +83,7 @@ def _standard(found: Acceptance) -> Part:
 
 def _objective(found: Acceptance) -> str:
     told = [
-        f"{clean(limit.title)}: {wanted(limit)} on {percent(limit.share)} of flights" for limit in found.standard.limits
+        f"{clean(limit.title)}: {wanted(limit)} on {stated(limit.share)} of flights" for limit in found.standard.limits
     ]
     return f"{'; '.join(told)}." if told else "Errors of the INS against GNSS are reported; no limit is set."
 
@@ -118,7 +118,7 @@ def _judged(limit: Limit, one: Judgement) -> tuple[Cell, ...]:
     return (
         *(number(count, 0) for count in (one.flights, one.over, one.ins_units)),
         number(one.effective_flights, 1),
-        percent(one.share_low, 1) if one.flights else ABSENT,
+        at_least(one.share_low) if one.flights else ABSENT,
         bound_text(limit, one),
         number(one.accuracy_ratio, 0),
         ABSENT if one.decision == "not flown" else more,
@@ -134,7 +134,7 @@ def _notes(found: Acceptance) -> tuple[Part, ...]:
                 f"{clean(found.limit(one.limit).title)}: {number(one.flights, 0)} flights of "
                 f"{number(one.ins_units, 0)} INS count as {number(one.effective_flights, 1)}: the correlation within "
                 f"an INS is taken as {number(one.correlation, 2)}. Of these INS alone, every flight counted, at least "
-                f"{percent(one.share_low_these, 1)} of flights are within."
+                f"{at_least(one.share_low_these)} of flights are within."
             )
             notes.append(Note(told, "unknown"))
     return tuple(notes)

@@ -26,7 +26,7 @@ from groundstation.estimators.fleet.acceptance import (
     judgements,
 )
 from groundstation.estimators.fleet.ins_errors import InsErrors, growth_of, ins_errors
-from groundstation.pipeline.many_flights.inputs import flight_folders, is_ours
+from groundstation.pipeline.many_flights.inputs import saved_flights
 from groundstation.pipeline.one_flight.identity import safe_part
 from groundstation.reports.acceptance import write_acceptance_report
 from groundstation.results.acceptance import QUANTITIES, UNKNOWN_INS, Acceptance, FlightError, Standard
@@ -64,9 +64,7 @@ def accept(out: Path, standard: str) -> Acceptance:
         For a standard that cannot be used.
     """
     limits, file = read_standard(standard)
-    folders = flight_folders(out) if out.is_dir() else []
-    if not folders and not (out.is_dir() and is_ours(out)):
-        raise UsageError(str(out), "no results", "a folder that `run` made")
+    folders = saved_flights(out)
     found = _without_twins([_flight_of(folder, limits) for folder in folders])
     flights = [flight for flight, _, _ in found]
     kept = [(flight, errors) for flight, errors, _ in found if flight.is_included and errors is not None]
