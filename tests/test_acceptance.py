@@ -1,6 +1,7 @@
 """Acceptance: errors of flights against limits, the confidence of the claim, what is left out, pages and exit codes."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from groundstation.estimators.fleet.confidence import (
 )
 from groundstation.estimators.fleet.ins_errors import growth_of, ins_errors
 from groundstation.pipeline.many_flights.acceptance import STANDARDS, accept, accept_to, read_standard
-from groundstation.results.acceptance import Bound, FlightError, Limit, Standard
+from groundstation.results.acceptance import ENSEMBLE, UNKNOWN_INS, Bound, FlightError, Limit, Standard
 from tests.acceptance_example import save_fleet, save_flight
 
 LIMIT = Limit("rate", "Rate", (Bound("radial_rate_fit_nmiph", 2.0),))
@@ -149,6 +150,28 @@ def test_a_folder_is_accepted_and_what_does_not_count_says_why(tmp_path: Path) -
     assert found.judgements[1].decision == "not flown" and "none flown" in " ".join(front(found).sentences)
 
 
+def test_flights_of_unknown_ins_are_taken_as_of_one(tmp_path: Path) -> None:
+    """Without serial and aircraft 60 flights may all be of one INS: they show nothing of its type."""
+    for number in range(60):
+        folder = save_flight(tmp_path, number, 0.5)
+        document = json.loads((folder / "summary.json").read_text())
+        document["flight"]["metadata"] = {}
+        (folder / "summary.json").write_text(json.dumps(document))
+    found = accept(tmp_path, "app-g")
+    assert {flight.ins for flight in found.flights} == {UNKNOWN_INS}
+    assert found.decision == "not enough flights" and found.judgements[0].effective_flights == pytest.approx(1.0)
+    assert {one.ins for one in found.judgements} == {ENSEMBLE}, "nobody knows that they are of one"
+
+
+def test_flights_of_which_a_figure_is_missing_are_told() -> None:
+    slow = [replace(flight, values={}) for flight in flights_of([1.0] * 4)]
+    one = judge([*flights_of([1.0] * 70), *slow], LIMIT, Standard("s", "t"))
+    assert (one.flights, one.not_measured) == (70, 4)
+    none = judge(slow, LIMIT, Standard("s", "t"))  # flown, and nothing is known of it: it must not pass beside others
+    assert (none.decision, none.flights, none.more_with_none_over) == ("not enough flights", 0, 59)
+    assert judge(slow, replace(LIMIT, hours_over=50.0), Standard("s", "t")).decision == "not flown"
+
+
 def test_a_reset_of_the_ins_leaves_the_flight_out(tmp_path: Path) -> None:
     folder = save_flight(tmp_path, 1, 0.5)
     document = json.loads((folder / "summary.json").read_text())
@@ -183,8 +206,16 @@ def test_exit_code_is_that_of_a_limit_reached_only_where_asked(tmp_path: Path) -
     save_fleet(tmp_path / "few", [1.0])
     few = ["report", str(tmp_path / "few"), "--standard", "app-g", "--no-pdf", "--fail-on"]
     assert [run.invoke(app, [*few, level]).exit_code for level in ("fail", "warn")] == [0, 4]
+    short = save_flight(tmp_path / "short", 1, 1.0, hours=0.05)  # no flight counts: nothing is shown
+    none = ["report", str(short.parent), "--standard", "app-g", "--no-pdf", "--fail-on"]
+    assert [run.invoke(app, [*none, level]).exit_code for level in ("fail", "warn")] == [0, 4]
+    (short / "summary.json").write_text("{")
+    ended = run.invoke(app, [*none, "none"])
+    assert ended.exit_code == 1 and "cannot be read" in ended.stderr
     assert run.invoke(app, ["report", str(tmp_path), "--standard", "nothing"]).exit_code == 2
     assert run.invoke(app, ["report", str(tmp_path), "-o", str(tmp_path)]).exit_code == 2
+    assert run.invoke(app, ["report", str(short), "--standard", "app-g"]).exit_code == 2  # one flight is no fleet
+    assert run.invoke(app, [*call, "-o", str(short / "manifest.json")]).exit_code == 2
 
 
 def test_standards_say_where_they_are_from(tmp_path: Path) -> None:
@@ -196,6 +227,12 @@ def test_standards_say_where_they_are_from(tmp_path: Path) -> None:
         'title = "own"\nsource = "s"\n[[limits]]\nname = "a"\ntitle = "a"\nbounds = [{quantity = "x", at_most = 1}]\n'
     )
     with pytest.raises(SettingsError, match="quantity"):
+        read_standard(str(file))
+    file.write_text(
+        'title = "own"\nsource = "s"\n[[limits]]\nname = "a"\ntitle = "a"\nhours_over = 10\nhours_up_to = 2\n'
+        'bounds = [{quantity = "radial_final_nmi", at_most = 1}]\n'
+    )
+    with pytest.raises(SettingsError, match="hours_up_to"):  # it would be for no flight, and decide nothing
         read_standard(str(file))
     with pytest.raises(UsageError, match="no results"):
         accept(tmp_path, "app-g")

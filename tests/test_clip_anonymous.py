@@ -143,6 +143,7 @@ def test_what_names_the_flight_is_gone(taxi: tuple[Path, Path]) -> None:
     told = json.dumps({**part.to_strings({})})
     for word in (*named, whole.source_name, whole.source_sha256, "2026-05", "taxi-good"):
         assert word and word not in told
+    assert taxi[1].stem not in told, "a file that is renamed would still tell its first name"
     assert not any(topic.startswith("raw.") for topic in part.ledger.topics)
 
 

@@ -110,10 +110,13 @@ def test_every_analysis_with_gates_has_rules_and_its_limits_are_settings() -> No
 def test_the_verb_writes_a_table_and_answers_by_its_exit_code(out: Path, tmp_path: Path) -> None:
     new, table = tmp_path / "new.toml", tmp_path / "changes.csv"
     new.write_text("[heading]\nhalf_width_max_deg = 0.001\n")
-    run, call = CliRunner(), ["rules", "test", str(new), "--over", str(out), "-o", str(table)]
+    run, call = CliRunner(), ["rules", "test", str(new), "--over", str(out), "-o", str(table), "-f"]
     assert [run.invoke(app, [*call, "--fail-on", level]).exit_code for level in ("none", "warn", "fail")] == [0, 4, 4]
     rows = list(csv.DictReader(table.read_text().splitlines()))
     assert {row["gate"] for row in rows} == {"half_width"} and {row["limit_after"] for row in rows} == {"<= 0.001"}
+    lines = run.invoke(app, call).stdout.splitlines()  # a line for each changed verdict, their heads, the totals
+    assert len(lines) == rules_test(new, out).changed + 2 and "?" not in "".join(lines)
+    assert run.invoke(app, call[:-1]).exit_code == 2  # the table is there already
     told = json.loads(run.invoke(app, [*call, "--json"]).stdout)
     assert told["changed"] == rules_test(new, out).changed
     new.write_text("[heading]\nhalf_width_max_degrees = 0.001\n")
@@ -128,6 +131,8 @@ def test_a_flight_that_cannot_be_read_stops_nothing(out: Path, tmp_path: Path) -
     (broken / "summary.json").write_text("{")
     found = under(copy, "", tmp_path)
     assert len(found.unread) == 1 and broken.name in found.unread[0]
+    ended = CliRunner().invoke(app, ["rules", "test", str(tmp_path / "new.toml"), "--over", str(copy)])
+    assert ended.exit_code == 1 and f"{len(list(copy.iterdir()))} flights" in ended.stdout
     with pytest.raises(UsageError, match="no results"):
         rules_test(tmp_path / "new.toml", tmp_path / "nothing")
     with pytest.raises(SettingsError, match="rules"):

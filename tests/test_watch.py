@@ -99,6 +99,23 @@ def test_what_was_refused_is_tried_again_and_told_once(tmp_path: Path, monkeypat
     assert looks.said == ["another run"]
 
 
+def test_a_look_that_could_run_nothing_has_failed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.csv").write_text("1")
+    looks, out = Looks(tmp_path, monkeypatch, refused=("another run",)), tmp_path / "out"
+    (found,) = watch(tmp_path, out, Configuration(), every_s=0.0, once=True, say=looks.said.append, wait=lambda _: None)
+    assert [(one.state, one.text) for one in found] == [("failed", "another run")]
+    assert not looks.said  # it is told as what became of the look, not twice
+
+
+def test_a_folder_of_others_is_refused_before_the_first_log_arrives(tmp_path: Path) -> None:
+    incoming, out = tmp_path / "in", tmp_path / "out"
+    for folder in (incoming, out):
+        folder.mkdir()
+    (out / "letter.txt").write_text("not ours")
+    with pytest.raises(UsageError, match="did not make"):
+        next(watch(incoming, out, Configuration(), every_s=0.1, say=print))
+
+
 def test_a_share_that_goes_and_comes_back_is_no_reason_to_run_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 
-from groundstation.chapters.acceptance_front import MARKS, bound_text, headline, is_worth_less, wanted
+from groundstation.chapters.acceptance_front import MARKS, at_least, bound_text, headline, is_worth_less, stated, wanted
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Note, Part, Section, Signatures, kept
-from groundstation.chapters.wording import ABSENT, clean, number, percent, sentence
+from groundstation.chapters.wording import ABSENT, clean, number, sentence
 from groundstation.results.acceptance import ENSEMBLE, Acceptance, InsRow, Judgement, Limit
 
 CLAIMS = {
     "type": "The claim is on all INS of the kind flown. Flights of one INS are alike: they count by their correlation.",
-    "units": "The claim is on all INS of the kind flown. Every INS counts once, however often it flew.",
+    "units": "The claim is on all INS of the kind flown. Every INS counts once at most, however often it flew.",
     "these": "The claim is on the INS flown alone. Each of their flights counts.",
 }
 ROLES = ("Prepared", "Checked", "Approved")
@@ -38,10 +38,9 @@ def _acceptance(found: Acceptance) -> tuple[Section, ...]:
 
 def _irig261(found: Acceptance) -> tuple[Section, ...]:
     left_out = len(found.flights) - len(found.included)
-    functional = (
-        f"{number(len(found.included), 0)} flights gave errors of a free INS, {number(left_out, 0)} did not: the table "
-        "of flights left out has the reasons."
-    )
+    functional = f"{number(len(found.included), 0)} flights gave errors of a free INS"
+    if left_out:
+        functional += f", {number(left_out, 0)} did not: the table of flights left out has the reasons"
     judged = kept((_limits(found), *_notes(found)))
     conclusions = (Note(headline(found) + ".", MARKS[found.decision].tone), *judged)
     return (
@@ -51,7 +50,7 @@ def _irig261(found: Acceptance) -> tuple[Section, ...]:
         Section(
             "description", "Test description", "", kept((_included(found), _excluded(found), *_configuration(found)))
         ),
-        Section("functional", "System functional results summary", "", (Note(functional),)),
+        Section("functional", "System functional results summary", "", (Note(f"{functional}."),)),
         Section("position", "Position accuracy summary", "", (_rates(found), *_drawings(found))),
         Section("velocity", "Velocity and attitude accuracy summary", "", (_others(found), Note(NOT_MEASURED))),
         Section("conclusions", "Conclusions", "", kept((*conclusions, _limits_by_ins(found)))),
@@ -75,7 +74,7 @@ def _standard(found: Acceptance) -> Part:
         ("Claim", CLAIMS[standard.claim], ""),
         (
             "Confidence",
-            percent(standard.confidence),
+            stated(standard.confidence),
             "one-sided, exact binomial limits of effective numbers of flights",
         ),
     ]
@@ -84,7 +83,7 @@ def _standard(found: Acceptance) -> Part:
 
 def _objective(found: Acceptance) -> str:
     told = [
-        f"{clean(limit.title)}: {wanted(limit)} on {percent(limit.share)} of flights" for limit in found.standard.limits
+        f"{clean(limit.title)}: {wanted(limit)} on {stated(limit.share)} of flights" for limit in found.standard.limits
     ]
     return f"{'; '.join(told)}." if told else "Errors of the INS against GNSS are reported; no limit is set."
 
@@ -119,7 +118,7 @@ def _judged(limit: Limit, one: Judgement) -> tuple[Cell, ...]:
     return (
         *(number(count, 0) for count in (one.flights, one.over, one.ins_units)),
         number(one.effective_flights, 1),
-        percent(one.share_low, 1) if one.flights else ABSENT,
+        at_least(one.share_low) if one.flights else ABSENT,
         bound_text(limit, one),
         number(one.accuracy_ratio, 0),
         ABSENT if one.decision == "not flown" else more,
@@ -135,7 +134,7 @@ def _notes(found: Acceptance) -> tuple[Part, ...]:
                 f"{clean(found.limit(one.limit).title)}: {number(one.flights, 0)} flights of "
                 f"{number(one.ins_units, 0)} INS count as {number(one.effective_flights, 1)}: the correlation within "
                 f"an INS is taken as {number(one.correlation, 2)}. Of these INS alone, every flight counted, at least "
-                f"{percent(one.share_low_these, 1)} of flights are within."
+                f"{at_least(one.share_low_these)} of flights are within."
             )
             notes.append(Note(told, "unknown"))
     return tuple(notes)

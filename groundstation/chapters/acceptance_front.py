@@ -1,5 +1,6 @@
 """The decision of an acceptance in words: what stands on top of its page."""
 
+import math
 from collections.abc import Sequence
 
 from groundstation.base.timescales import utc_ns_to_iso
@@ -59,11 +60,11 @@ def headline(found: Acceptance) -> str:
     if not judged:
         return "Nothing is judged"
     worst = next(one for one in judged if one.decision == found.decision)
-    limit, sure = found.limit(worst.limit), percent(found.standard.confidence)
+    limit, sure = found.limit(worst.limit), stated(found.standard.confidence)
     if worst.decision == "pass":
-        return f"{percent(limit.share)} of flights within the limits: shown at {sure} confidence"
+        return f"{stated(limit.share)} of flights within the limits: shown at {sure} confidence"
     if worst.decision == "fail":
-        return f"{clean(limit.title)}: fewer than {percent(limit.share)} of flights within, at {sure} confidence"
+        return f"{clean(limit.title)}: fewer than {stated(limit.share)} of flights within, at {sure} confidence"
     return f"{clean(limit.title)}: {number(worst.more_with_none_over, 0)} more flights needed, none over"
 
 
@@ -71,13 +72,43 @@ def _told(found: Acceptance, one: Judgement) -> str:
     limit = found.limit(one.limit)
     if one.decision == "not flown":
         return f"{clean(limit.title)}: none flown, nothing is said of them."
+    asked = f"wanted {wanted(limit)} on {stated(limit.share)}"
+    if not one.flights:
+        return (
+            f"{clean(limit.title)}: measured on none of {number(one.not_measured, 0)} flights, {asked}. {_missing(one)}"
+        )
     flown = f"{number(one.over, 0)} of {number(one.flights, 0)} flights of {number(one.ins_units, 0)} INS over"
     worth = f" (worth {number(one.effective_flights, 1)} independent flights)" if is_worth_less(one) else ""
     told = (
-        f"{clean(limit.title)}: {flown}, wanted {wanted(limit)} on {percent(limit.share)}. At "
-        f"{percent(found.standard.confidence)} confidence at least {percent(one.share_low, 1)} are within{worth}."
+        f"{clean(limit.title)}: {flown}, {asked}. At "
+        f"{stated(found.standard.confidence)} confidence at least {at_least(one.share_low)} are within{worth}."
     )
+    if one.not_measured:
+        told += f" On {number(one.not_measured, 0)} more what it bounds was not measured: they are not judged."
     return f"{told} {_missing(one)}".strip()
+
+
+def stated(share: float) -> str:
+    """A share as the standard states it, not rounded: 99.99 % is not 100 %.
+
+    Examples
+    --------
+    >>> stated(0.95), stated(0.995), stated(0.9999)
+    ('95%', '99.5%', '99.99%')
+    """
+    places = next((some for some in range(4) if abs(round(100.0 * share, some) - 100.0 * share) < 1e-9), 4)
+    return percent(share, places)
+
+
+def at_least(share: float) -> str:
+    """A lower limit, rounded down: one that just misses 95 % must not read 95.0 %.
+
+    Examples
+    --------
+    >>> at_least(0.9499), at_least(0.95), at_least(0.95051)
+    ('94.9%', '95.0%', '95.0%')
+    """
+    return percent(math.floor(1000.0 * share + 1e-9) / 1000.0, 1)
 
 
 def is_worth_less(one: Judgement) -> bool:

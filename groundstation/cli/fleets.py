@@ -7,6 +7,7 @@ import typer
 
 from groundstation.cli.application import (
     DONE,
+    FAILED,
     LIMIT_REACHED,
     FailOnMode,
     Verbose,
@@ -36,7 +37,10 @@ def serve(
 def acceptance(
     out: Path, standard: str, output: Path | None, fail_on: FailOnMode, *, with_pdf: bool, quiet: bool, json: bool
 ) -> int:
-    """Write the acceptance of the INS of a folder and print its front; 4 where ``fail_on`` is reached."""
+    """Write the acceptance of the INS of a folder and print its front; 1 where a flight cannot be read.
+
+    Else 4 where ``fail_on`` is reached: with ``warn`` also where nothing was judged that the standard asks for.
+    """
     from groundstation.chapters.acceptance_front import front
     from groundstation.chapters.wording import NARROW_SPACE
     from groundstation.cli.text import as_json, printable
@@ -51,5 +55,10 @@ def acceptance(
         typer.echo("\n".join(map(printable, (*told, *map(str, paths)))))
     if problem:
         say(f"warning: {problem}")
-    reached_at = {"fail": ("warn", "fail"), "not enough flights": ("warn",)}.get(found.decision, ())
-    return LIMIT_REACHED if fail_on in reached_at else DONE
+    unread = [flight for flight in found.flights if not flight.is_read]
+    for flight in unread:
+        say(f"error: {flight.flight_id}: {flight.reason}")
+    if unread:
+        return FAILED
+    reached_at = {"fail": ("warn", "fail"), "not enough flights": ("warn",), "not flown": ("warn",)}
+    return LIMIT_REACHED if fail_on in reached_at.get(found.decision, ()) else DONE

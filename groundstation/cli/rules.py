@@ -7,8 +7,10 @@ import typer
 
 from groundstation.cli.application import (
     DONE,
+    FAILED,
     LIMIT_REACHED,
     FailOnMode,
+    Force,
     Json,
     Quiet,
     Verbose,
@@ -44,6 +46,7 @@ def test(
             "--fail-on", help="Exit 4 where a verdict changes (warn), or one that was accepted no longer is (fail)."
         ),
     ] = "none",
+    force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
@@ -55,17 +58,22 @@ def test(
     With -v every gate with another limit is listed, not those of changed verdicts alone.
     """
     from groundstation.cli.text import as_json, printable
+    from groundstation.pipeline.verbs.export import require_place
     from groundstation.pipeline.verbs.rules import rules_test, write_rules
 
+    if output is not None:
+        require_place(new, output, force)
     found = rules_test(new, over)
     if output is not None:
         write_rules(found, output)
     if json:
         typer.echo(as_json(found.to_dict()))
     elif not quiet:
-        typer.echo(printable(rules_text(found, everything=verbose)))
+        typer.echo("\n".join(map(printable, rules_text(found, everything=verbose).split("\n"))))
     for reason in found.unread:
-        say(f"warning: {reason}")
+        say(f"error: {reason}")
+    if found.unread:
+        return FAILED
     is_reached = {"warn": found.changed, "fail": found.no_longer_accepted}.get(fail_on, 0)
     return LIMIT_REACHED if is_reached else DONE
 

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from groundstation.chapters import acceptance as chapters
-from groundstation.chapters.acceptance_front import front
+from groundstation.chapters.acceptance_front import front, stated
 from groundstation.chapters.parts import Document, Figure, Part, Section
-from groundstation.chapters.wording import percent
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -119,7 +118,7 @@ def _rates(found: Acceptance) -> Part:
         for one in found.judgements:
             limit = found.limit(one.limit)
             if one.ins == ENSEMBLE and one.share_bound is not None and limit in limits:
-                bound, told = one.share_bound * limit.bounds[0].at_most, f"{percent(limit.share)} stay below"
+                bound, told = one.share_bound * limit.bounds[0].at_most, f"{stated(limit.share)} stay below"
                 layout.limit_line(axes, bound, told, vertical=True, colour=d.INK)
         axes.set_xlim(left=0.0)
         axes.set_ylim(0.0, 1.03)

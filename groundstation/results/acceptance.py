@@ -11,6 +11,7 @@ from groundstation.results.figures import FigureData
 Claim = Literal["type", "units", "these"]
 Decision = Literal["pass", "fail", "not enough flights", "not flown", "no limit"]
 ENSEMBLE = ""  # where an INS is named and all of them are meant
+UNKNOWN_INS = "unknown"  # flights of which no one says which INS it was: they may be of one, and are taken so
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,8 @@ class Limit:
         check_ranges(self)
         if not self.bounds:
             raise SettingsError("bounds", "none", "at least one")
+        if self.hours_up_to is not None and self.hours_up_to <= self.hours_over:
+            raise SettingsError("hours_up_to", f"{self.hours_up_to:g}", f"more than hours_over = {self.hours_over:g}")
 
     def is_for(self, hours: float) -> bool:
         """Whether a flight of so many hours is judged by it."""
@@ -127,7 +130,9 @@ class Standard:
 class FlightError:
     """INS errors of one flight; what is left out has a ``reason`` and perhaps no figures.
 
-    ``ins`` names the unit: its serial where the log or the aircraft file says one, else aircraft and topic.
+    ``is_read`` is false where its results cannot be read: nobody knows what it would show.
+    ``ins`` names the unit: its serial where the log or the aircraft file says one, else aircraft and topic, else
+    :data:`UNKNOWN_INS`.
     ``hours`` are those from the first position compared to the last; radial errors are INS minus reference.
     ``reference95`` is by what the reference itself may err in 95 % of cases, by quantity.
     """
@@ -141,6 +146,7 @@ class FlightError:
     sha256: str
     made_by: str
     reason: str = ""
+    is_read: bool = True
     hours: float = 0.0
     epochs: int = 0
     values: Mapping[str, float] = field(default_factory=dict)
@@ -195,6 +201,8 @@ class Judgement:
     ----------
     flights, over, ins_units : int
         Flights judged, those over the limit, distinct INS.
+    not_measured : int
+        Flights that the limit is for, but of which a figure that it bounds is missing: they are not judged.
     effective_flights : float
         Independent flights that they are worth: flights of one INS are alike.
     correlation : float
@@ -220,6 +228,7 @@ class Judgement:
     flights: int
     over: int
     ins_units: int
+    not_measured: int
     effective_flights: float
     correlation: float
     share_low: float

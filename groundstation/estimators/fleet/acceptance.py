@@ -18,6 +18,7 @@ from groundstation.estimators.fleet.confidence import (
 from groundstation.estimators.fleet.ins_errors import FEWEST, Growth, InsErrors
 from groundstation.results.acceptance import (
     ENSEMBLE,
+    UNKNOWN_INS,
     Decision,
     FlightError,
     InsRow,
@@ -50,11 +51,8 @@ def judge(flights: Sequence[FlightError], limit: Limit, standard: Standard, ins:
     Flights of one INS are taken as independent given the INS; a claim on all of a type counts them by their
     correlation. The exact binomial limit of the share from effective numbers decides (Korn and Graubard, 1998).
     """
-    judged = [
-        (flight, part)
-        for flight in flights
-        if limit.is_for(flight.hours) and (part := limit.part(flight.values)) is not None
-    ]
+    meant = [flight for flight in flights if limit.is_for(flight.hours)]
+    judged = [(flight, part) for flight in meant if (part := limit.part(flight.values)) is not None]
     parts = np.array([part for _, part in judged], dtype=np.float64)
     units = [flight.ins for flight, _ in judged]
     count, over = len(judged), int(np.sum(parts > 1.0))
@@ -65,7 +63,7 @@ def judge(flights: Sequence[FlightError], limit: Limit, standard: Standard, ins:
     ratios = [ratio for flight, _ in judged if (ratio := accuracy_ratio(flight, limit)) is not None]
     is_shown = count > 0 and low >= limit.share
     decision: Decision = (
-        "not flown" if not count else "pass" if is_shown else "fail" if high < limit.share else "not enough flights"
+        "not flown" if not meant else "pass" if is_shown else "fail" if high < limit.share else "not enough flights"
     )
     at_share = flights_needed_at_share(over / count, limit.share, standard.confidence) if count else None
     needed = flights_needed(over * worth, limit.share, standard.confidence)
@@ -76,6 +74,7 @@ def judge(flights: Sequence[FlightError], limit: Limit, standard: Standard, ins:
         flights=count,
         over=over,
         ins_units=len(set(units)),
+        not_measured=len(meant) - count,
         effective_flights=effective,
         correlation=correlation,
         share_low=low,
@@ -101,9 +100,9 @@ def _correlation(parts: FloatArray, units: Sequence[str], standard: Standard, *,
 
 
 def judgements(flights: Sequence[FlightError], standard: Standard) -> tuple[Judgement, ...]:
-    """Every limit against all flights, then against those of each INS that it is for."""
+    """Every limit against all flights, then against those of each INS that is known and that it is for."""
     found = [judge(flights, limit, standard) for limit in standard.limits]
-    for ins in sorted({flight.ins for flight in flights}):
+    for ins in sorted({flight.ins for flight in flights} - {UNKNOWN_INS}):
         own = [flight for flight in flights if flight.ins == ins]
         each = (judge(own, limit, standard, ins) for limit in standard.limits)
         found += [one for one in each if one.decision != "not flown"]

@@ -130,9 +130,10 @@ def correlation_within(values: FloatArray, groups: Sequence[str], confidence: fl
 
 
 def effective_flights(groups: Sequence[str], correlation: float) -> float:
-    """Independent flights that flights of some INS are worth, those of one INS correlated; never fewer than INS.
+    """Independent flights that flights of some INS are worth, those of one INS correlated.
 
-    n / (1 + (m - 1) correlation), m the mean number of flights of the INS of a flight.
+    n / (1 + (m - 1) correlation), m the mean number of flights of the INS of a flight. With a correlation of one it is
+    the number of INS if each flew as often, and fewer if some flew more than others.
 
     Source: Kish, Survey Sampling (1965), design effect; Korn, Graubard, Survey Methodology 24 (1998), 193-201, for
     exact limits of a share from the effective number.
@@ -141,6 +142,8 @@ def effective_flights(groups: Sequence[str], correlation: float) -> float:
     --------
     >>> effective_flights(["a"] * 10 + ["b"] * 10, 0.0), effective_flights(["a"] * 10 + ["b"] * 10, 1.0)
     (20.0, 2.0)
+    >>> round(effective_flights(["a"] * 9 + ["b"], 1.0), 2)
+    1.22
     """
     sizes = np.unique(np.asarray(groups), return_counts=True)[1].astype(np.float64)
     if not len(sizes):

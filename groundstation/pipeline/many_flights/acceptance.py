@@ -26,10 +26,10 @@ from groundstation.estimators.fleet.acceptance import (
     judgements,
 )
 from groundstation.estimators.fleet.ins_errors import InsErrors, growth_of, ins_errors
-from groundstation.pipeline.many_flights.inputs import flight_folders, is_ours
+from groundstation.pipeline.many_flights.inputs import saved_flights
 from groundstation.pipeline.one_flight.identity import safe_part
 from groundstation.reports.acceptance import write_acceptance_report
-from groundstation.results.acceptance import QUANTITIES, Acceptance, FlightError, Standard
+from groundstation.results.acceptance import QUANTITIES, UNKNOWN_INS, Acceptance, FlightError, Standard
 from groundstation.results.figures import FigureData, numbers
 from groundstation.results.files import SavedFlight, csv_text, json_text, load, mapping, write_text
 from groundstation.results.heading import HeadingResult
@@ -64,9 +64,7 @@ def accept(out: Path, standard: str) -> Acceptance:
         For a standard that cannot be used.
     """
     limits, file = read_standard(standard)
-    folders = flight_folders(out) if out.is_dir() else []
-    if not folders and not (out.is_dir() and is_ours(out)):
-        raise UsageError(str(out), "no results", "a folder that `run` made")
+    folders = saved_flights(out)
     found = _without_twins([_flight_of(folder, limits) for folder in folders])
     flights = [flight for flight, _, _ in found]
     kept = [(flight, errors) for flight, errors, _ in found if flight.is_included and errors is not None]
@@ -97,9 +95,16 @@ def accept_to(
     -------
     Acceptance, list of Path, str
         What was found, what was written, and why there is no PDF where one was asked for.
+
+    Raises
+    ------
+    UsageError, SettingsError
+        As :func:`accept`; when ``folder`` is a file.
     """
-    found = accept(out, standard)
     target = out if folder is None else folder
+    if target.exists() and not target.is_dir():
+        raise UsageError(str(target), "a file", "a folder for the acceptance")
+    found = accept(out, standard)
     target.mkdir(parents=True, exist_ok=True)
     stem = f"acceptance_{safe_part(found.name) or 'standard'}"
     written = write_acceptance_report(target / f"{stem}.html", found, with_pdf=with_pdf)
@@ -129,7 +134,8 @@ def _flight_of(folder: Path, standard: Standard) -> tuple[FlightError, InsErrors
         saved = load(folder, ANSWER_TYPES)
         return _errors_of(saved, standard)
     except GroundstationError as error:
-        return FlightError(folder.name, "", "", "", None, "", "", "", f"cannot be read: {error}"), None, {}
+        reason = f"cannot be read: {error}"
+        return FlightError(folder.name, "", "", "", None, "", "", "", reason, is_read=False), None, {}
 
 
 def _errors_of(saved: SavedFlight, standard: Standard) -> tuple[FlightError, InsErrors | None, Mapping[str, Any]]:
@@ -226,12 +232,12 @@ def _sure_enough(flight: FlightError, standard: Standard) -> FlightError:
 
 
 def _unit_of(saved: SavedFlight, topic: str) -> str:
-    """Name of the INS: its serial, else the aircraft and the topic; the flight itself where neither is known."""
+    """Name of the INS: its serial, else the aircraft and the topic; where neither is known it may be any."""
     serial = _said(saved, "ins_serial")
     if serial:
         return serial
     aircraft = saved.results.metadata.get("aircraft", "")
-    return f"{aircraft} {topic}".strip() if aircraft else f"unknown ({saved.folder.name})"
+    return f"{aircraft} {topic}".strip() if aircraft else UNKNOWN_INS
 
 
 def _said(saved: SavedFlight, key: str) -> str:

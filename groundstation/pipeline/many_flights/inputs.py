@@ -94,6 +94,23 @@ def flight_folders(out: Path) -> list[Path]:
     return list(filter(is_flight, _finished_folders(out)))
 
 
+def saved_flights(out: Path) -> list[Path]:
+    """Flight folders in an OUT that is asked about; it may have none.
+
+    Raises
+    ------
+    UsageError
+        When the folder is not one that ``run`` made, or is that of a flight.
+    """
+    expected = "a folder that `run` made"
+    if (out / FLIGHT_FOLDER_MARK).is_file():
+        raise UsageError(str(out), "the folder of a flight", expected, f"name {out.parent}")
+    folders = flight_folders(out) if out.is_dir() else []
+    if not folders and not (out.is_dir() and is_ours(out)):
+        raise UsageError(str(out), "no results", expected)
+    return folders
+
+
 def is_flight(folder: Path) -> bool:
     """Whether a folder that holds a summary is that of a flight: neither a session nor a plan."""
     return not any((folder / mark).is_file() for mark in (*SESSION_MARKS, PLAN_MARK))

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.many_flights.inputs import collect
+from groundstation.pipeline.many_flights.out_folder import refuse_foreign
 from groundstation.pipeline.many_flights.watched_batch import Batch, run_batch
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
@@ -81,7 +82,7 @@ def watch(
     folder, out : Path
         Of this machine, or of a share that it sees as a folder.
     once : bool
-        Look twice, run what is ready, and end.
+        Look twice, run what is ready, and end; what kept it from that is then an outcome that failed.
     say : callable
         Is given what is not about a log: that the folder cannot be reached, that another run writes into ``out``.
     wait : callable
@@ -90,14 +91,15 @@ def watch(
     Raises
     ------
     UsageError
-        When the folder does not exist, or is ``out``.
+        When the folder does not exist, or is ``out``; when ``out`` is a folder of others and ``force`` is not given.
     """
     if not folder.is_dir():
         raise UsageError(str(folder), "no such folder", "a folder that logs arrive in")
     if folder.resolve() == out.resolve():
         raise UsageError(str(out), "the folder that is watched", "another one for the results")
+    refuse_foreign(out, force)
     batch = Batch((), out, configuration, fail_on, with_pdf, jobs, stations, force, is_first=True)
-    watched, trouble = Watched(), _Trouble(say)
+    watched, trouble = Watched(), _Trouble((lambda _: None) if once else say)
     watched.ready(_look(folder, out, configuration, trouble))
     while True:
         wait(every_s)
@@ -113,6 +115,8 @@ def watch(
                 trouble.end()
                 yield found
         if once:
+            if trouble.told:
+                yield (Outcome(str(out), "failed", trouble.told),)
             return
 
 

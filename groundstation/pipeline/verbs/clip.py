@@ -24,7 +24,7 @@ from groundstation.pipeline.one_flight.intervals import flight_seconds
 from groundstation.pipeline.one_flight.log import Log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
-from groundstation.pipeline.verbs.anonymous import disguise_of
+from groundstation.pipeline.verbs.anonymous import ANONYMOUS, disguise_of
 from groundstation.pipeline.verbs.describe import facts_of
 from groundstation.results.flight import Source
 
@@ -181,7 +181,8 @@ def _cut(log: Log, mcap: Path, target: Path, wanted: Wanted, limits: Thresholds)
         # Neither name nor digest of the log: the part is a log of its own, and two parts of one log are no twins.
         cut = replace(inside, start_ns=first_ns, metadata=metadata)
         cut = cut if disguise is None else disguise.info(cut)
-        cut = replace(cut, source_name=target.name, source_sha256="")
+        # Not the file's name either where it is to tell nothing: renamed, it would still stand inside.
+        cut = replace(cut, source_name=target.name if disguise is None else f"{ANONYMOUS}.mcap", source_sha256="")
         info = writer.info = recounted(cut, damages, census)
     return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages))
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.base.errors import GroundstationError
 from groundstation.base.serial import to_json
 from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES
-from groundstation.pipeline.many_flights.inputs import flight_folders, is_ours
+from groundstation.pipeline.many_flights.inputs import saved_flights
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, csv_text, load, mapping, write_text
@@ -82,9 +82,7 @@ def rules_test(new: Path, out: Path) -> RulesTest:
         For a settings file that cannot be used.
     """
     configuration = load_configuration(new)
-    folders = flight_folders(out) if out.is_dir() else []
-    if not folders and not (out.is_dir() and is_ours(out)):
-        raise UsageError(str(out), "no results", "a folder that `run` made")
+    folders = saved_flights(out)
     told: list[RulesRow] = []
     unread: list[str] = []
     judged: list[tuple[Rejudged, str]] = []
