@@ -68,7 +68,7 @@ def hostile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def cluster(bucket: str, hostile: Path) -> Iterator[str]:
     """The scheduler of two workers, which inherit what reaches the bucket and where the reader is."""
-    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as found:
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0") as found:
         yield found.scheduler_address
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from groundstation.pipeline.many_flights.fleet_store import scan
 from groundstation.pipeline.many_flights.output import LocalOutput
 from groundstation.pipeline.many_flights.placement import Placement
 from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX, remove
@@ -37,7 +38,7 @@ def run(out: Path, *outcomes: Outcome, again: bool = True) -> list[Outcome]:
         flight_id = f"{FLIGHT}_{one.sha256[:8]}"
         anew = finished(out, one.source, one.sha256, flight_id) if again else Outcome(one.source, "failed", "no memory")
         placement.put_again(number, anew)
-    placement.sweep()
+    placement.sweep(scan(out))
     return list(placement.outcomes())
 
 
@@ -112,7 +113,7 @@ def test_a_flight_that_clashed_before_is_put_where_it_was(tmp_path: Path) -> Non
     placement = Placement(LocalOutput(tmp_path), ["a", "b"])
     for number, outcome in enumerate(anew):
         placement.put(number, outcome)
-    placement.sweep()
+    placement.sweep(scan(tmp_path))
     assert placement.clashing() == () and names(tmp_path) == list(SUFFIXED)
 
 

@@ -12,7 +12,7 @@ def markdown_text(text: str, limit: int = 400) -> str:
     Examples
     --------
     >>> print(markdown_text("a|b ![x](http://y)"))
-    a\\|b \\!\\[x\\]\\(http\\://y\\)
+    a\\|b !\\[x\\](http\\://y)
     """
     return escaped(clean_text(text, limit))
 
