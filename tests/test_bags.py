@@ -273,6 +273,21 @@ def test_types_that_a_file_does_not_define(tmp_path: Path) -> None:
     assert len(flight_of(folder, tmp_path)["ins"]) == 50, "common types are known"
 
 
+def test_messages_without_a_number_are_left_out(tmp_path: Path) -> None:
+    import sqlite3
+
+    folder = write_ros2(tmp_path / "bag", small_flight(rows=50), "sqlite3")
+    database = sqlite3.connect(next(folder.glob("*.db3")))
+    with database:
+        database.execute("CREATE TABLE copied AS SELECT * FROM messages")
+        database.execute("DROP TABLE messages")
+        database.execute("ALTER TABLE copied RENAME TO messages")
+        count = database.execute("UPDATE messages SET id = 'x' || id WHERE id IN (3, 4)").rowcount
+        whole = int(database.execute("SELECT count(*) FROM messages").fetchone()[0])
+    database.close()
+    assert count == 2 and rows_of(folder / METADATA)[0] == whole - count
+
+
 def test_definitions_that_hold_themselves_or_lack_a_part_are_refused() -> None:
     for text in ("a/B x", "a/C x\n===\nMSG: a/C\na/B y", "float64", "nothing/Here x", "===\n"):
         with pytest.raises(definitions.DefinitionError):

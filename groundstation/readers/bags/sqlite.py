@@ -109,7 +109,7 @@ def _payload(data: Any) -> bytes:
 def _next_rows(database: sqlite3.Connection, last: int) -> tuple[list[Any], bool]:
     """The rows behind message ``last``, and whether reading failed behind them, or what is there is not in order."""
     query = "SELECT id, topic_id, timestamp, data FROM messages WHERE id > ? AND {} ORDER BY id LIMIT ?"
-    query = query.format("typeof(topic_id) = 'integer' AND typeof(timestamp) = 'integer'")
+    query = query.format(" AND ".join(f"typeof({name}) = 'integer'" for name in ("id", "topic_id", "timestamp")))
     rows: list[Any] = []
     size = 0
     try:
