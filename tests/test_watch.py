@@ -86,7 +86,7 @@ def test_a_log_that_is_replaced_is_run_again_and_alone(tmp_path: Path, monkeypat
 
 
 def test_what_is_no_log_yet_or_never_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("a.csv.part", ".a.csv.x8Gh", "aircraft.toml", "out/index.json"):
+    for name in ("a.csv.part", ".a.csv.x8Gh", "aircraft.toml", "out/index.json", "out/index.csv"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text("1")
     assert Looks(tmp_path, monkeypatch).play(nothing, nothing) == []
