@@ -251,7 +251,7 @@ def test_a_cluster_loses_nothing_when_a_worker_is_killed(bucket: str, logs: Path
 
     source, out = sent(logs, f"{bucket}/logs"), f"{bucket}/out"
     killed = threading.Event()
-    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0") as cluster:
 
         def kill_when_busy() -> None:
             while not any(worker.processing for worker in cluster.scheduler.workers.values()):
