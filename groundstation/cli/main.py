@@ -247,6 +247,8 @@ def run(
         planned = plan(paths, output, configuration, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)
         return DONE
+    if timeout is not None and math.isnan(timeout):
+        raise UsageError("--timeout nan", "no number", "seconds")
     timeout_s = math.inf if timeout is None else timeout
     run_apart = partial(run_many, jobs=jobs, scheduler=scheduler, redo=redo, stations=stations, timeout_s=timeout_s)
     run_logs = run_together if together else run_apart  # logs are joined anew at every run, in this process
