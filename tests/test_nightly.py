@@ -87,7 +87,8 @@ def make_logs(folder: Path, count: int) -> dict[str, str]:
                     damaged[rng.randrange(len(damaged))] ^= 1 << rng.randrange(8)
                 content = bytes(damaged)
             else:
-                content = content[: len(content) // 2] if kinds[name] == "cut" else b"time_s,ins.true_heading_deg\n"
+                is_cut, header = kinds[name] == "cut", b"# flight: %d\ntime_s,ins.true_heading_deg\n" % number
+                content = content[: len(content) // 2] if is_cut else header
         (folder / name).write_bytes(content)
     (folder / "hangs.csv").write_bytes(HANGS)
     (folder / "kills.csv").write_bytes(KILLS + b"\n" + SHORT.read_bytes())
