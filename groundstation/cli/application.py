@@ -108,6 +108,7 @@ Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more; show w
 Json = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
 FailOn = Annotated[FailOnMode, typer.Option("--fail-on", help="Exit 4 at a finding this severe or worse.")]
 Force = Annotated[bool, typer.Option("-f", "--force", help="Overwrite what is there.")]
+Jobs = Annotated[int, typer.Option("-j", "--jobs", help="Processes; 0: one per core.", min=0)]
 Together = Annotated[
     bool,
     typer.Option("--together", help="The logs are of one flight: put them on one clock, by GNSS time or by motion."),

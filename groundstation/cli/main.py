@@ -5,13 +5,13 @@ import math
 import sys
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import typer
 
 from groundstation.base.errors import UsageError
 from groundstation.base.version import __version__
-from groundstation.cli import fleets, flights, plans, rules, watching
+from groundstation.cli import fleets, flights, plans, rules, simulated, watching
 from groundstation.cli.application import (
     DATA_LOST,
     DONE,
@@ -23,6 +23,7 @@ from groundstation.cli.application import (
     Force,
     IcdFiles,
     IntervalsFile,
+    Jobs,
     Json,
     NoPdf,
     Only,
@@ -41,7 +42,7 @@ from groundstation.cli.application import (
     tell_written,
 )
 
-__all__ = ["app", "fleets", "flights", "main", "plans", "rules", "watching"]  # the modules hold more verbs
+__all__ = ["app", "fleets", "flights", "main", "plans", "rules", "simulated", "watching"]  # the modules hold more verbs
 
 
 PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have an ``examine``; a test compares them
@@ -182,7 +183,7 @@ def run(
     profile: Profile = None,
     icd: IcdFiles = None,
     reference: ReferenceFiles = None,
-    jobs: Annotated[int, typer.Option("-j", "--jobs", help="Processes; 0: one per core.", min=0)] = 0,
+    jobs: Jobs = 0,
     scheduler: Annotated[
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
     ] = "",
@@ -340,63 +341,6 @@ def view(
     from groundstation.pipeline.verbs.view import look_at
 
     look_at(flight, web=web, host=host, port=port, profile=profile, say=say)
-    return DONE
-
-
-@app.command(epilog=examples("simulate"))
-@answers_with_exit_code
-def simulate(
-    scenario: Annotated[str, typer.Argument(help="Name of a shipped scenario, or a TOML file.", metavar="SCENARIO")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the log.", metavar="DIR")],
-    seed: Annotated[int | None, typer.Option("--seed", help="Seed in place of the scenario's own.")] = None,
-    form: Annotated[
-        Literal["csv", "ch10"], typer.Option("--format", help="csv, or ch10: IRIG 106 Chapter 10 with its ICD.")
-    ] = "csv",
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    json: Json = False,
-) -> int | None:
-    """Simulate a flight as a flat CSV, with the truth beside it. `groundstation list` names the scenarios."""
-    from groundstation.pipeline.verbs.synthesis import simulate_to
-
-    tell_written(simulate_to(scenario, output, seed=seed, form=form, force=force), as_json_text=json, quiet=quiet)
-    return DONE
-
-
-@app.command(epilog=examples("study"))
-@answers_with_exit_code
-def study(
-    name: Annotated[
-        Literal["heading", "forecast", "magnetic", "cooperative", "control", "landing", "approach"],
-        typer.Argument(help="heading, forecast, magnetic, cooperative, control, landing or approach.", metavar="NAME"),
-    ],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the tables.", metavar="DIR")],
-    runs: Annotated[int, typer.Option("--runs", help="Simulated runs of each family or case.", min=10)] = 200,
-    seed: Annotated[int, typer.Option("--seed", help="Seed; families and cases take those that follow from it.")] = 71,
-    recorded: Annotated[
-        Path | None,
-        typer.Option("--recorded", help="Folder of recorded robots (cooperative only): run on them.", metavar="FOLDER"),
-    ] = None,
-    minutes: Annotated[
-        float | None,
-        typer.Option("--minutes", help="End after so long (heading only); the same command goes on.", min=0.1),
-    ] = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    progress: Progress = "auto",
-) -> int | None:
-    """Monte Carlo behind the published figures, with ours beside them; or every algorithm on recorded robots."""
-    from groundstation.cli.progress import listener
-    from groundstation.pipeline.verbs.synthesis import study_to
-
-    with listener("none" if quiet else progress) as listen:
-        text = study_to(
-            name, output, runs=runs, seed=seed, force=force, listen=listen, recorded=recorded, minutes=minutes
-        )
-    if not quiet:
-        typer.echo(text)
     return DONE
 
 

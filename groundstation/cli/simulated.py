@@ -1,0 +1,76 @@
+"""The verbs on simulated flights: ``simulate`` writes them as logs, ``study`` judges the estimators by them."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from groundstation.cli.application import (
+    DONE,
+    Force,
+    Json,
+    Progress,
+    Quiet,
+    Verbose,
+    answers_with_exit_code,
+    app,
+    examples,
+    tell_written,
+)
+
+
+@app.command(epilog=examples("simulate"))
+@answers_with_exit_code
+def simulate(
+    scenario: Annotated[str, typer.Argument(help="Name of a shipped scenario, or a TOML file.", metavar="SCENARIO")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the log.", metavar="DIR")],
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed in place of the scenario's own.")] = None,
+    form: Annotated[
+        Literal["csv", "ch10"], typer.Option("--format", help="csv, or ch10: IRIG 106 Chapter 10 with its ICD.")
+    ] = "csv",
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+) -> int | None:
+    """Simulate a flight as a flat CSV, with the truth beside it. `groundstation list` names the scenarios."""
+    from groundstation.pipeline.verbs.synthesis import simulate_to
+
+    tell_written(simulate_to(scenario, output, seed=seed, form=form, force=force), as_json_text=json, quiet=quiet)
+    return DONE
+
+
+@app.command(epilog=examples("study"))
+@answers_with_exit_code
+def study(
+    name: Annotated[
+        Literal["heading", "forecast", "magnetic", "cooperative", "control", "landing", "approach"],
+        typer.Argument(help="heading, forecast, magnetic, cooperative, control, landing or approach.", metavar="NAME"),
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the tables.", metavar="DIR")],
+    runs: Annotated[int, typer.Option("--runs", help="Simulated runs of each family or case.", min=10)] = 200,
+    seed: Annotated[int, typer.Option("--seed", help="Seed; families and cases take those that follow from it.")] = 71,
+    recorded: Annotated[
+        Path | None,
+        typer.Option("--recorded", help="Folder of recorded robots (cooperative only): run on them.", metavar="FOLDER"),
+    ] = None,
+    minutes: Annotated[
+        float | None,
+        typer.Option("--minutes", help="End after so long (heading only); the same command goes on.", min=0.1),
+    ] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    progress: Progress = "auto",
+) -> int | None:
+    """Monte Carlo behind the published figures, with ours beside them; or every algorithm on recorded robots."""
+    from groundstation.cli.progress import listener
+    from groundstation.pipeline.verbs.synthesis import study_to
+
+    with listener("none" if quiet else progress) as listen:
+        text = study_to(
+            name, output, runs=runs, seed=seed, force=force, listen=listen, recorded=recorded, minutes=minutes
+        )
+    if not quiet:
+        typer.echo(text)
+    return DONE
