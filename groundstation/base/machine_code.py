@@ -306,7 +306,7 @@ class Linked:
         return None if self._annotation is None else self._annotation(result.value)
 
 
-def _address(array: np.ndarray[Any, Any]) -> int:
+def _address(array: Any) -> int:
     """Where an array's values begin; ``array.ctypes.data`` takes two to three times as long."""
     if array.flags.writeable:
         return ctypes.addressof(_NO_BYTES.from_buffer(array))
