@@ -5,7 +5,7 @@ do those that they belong with. Where UTC puts a flight beside nobody whom it he
 clock that is wrong, or none at all, does not hide a session.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -55,11 +55,13 @@ class Apart:
     reason: str
 
 
-def members_of(found: Scan) -> tuple[Member, ...]:
-    """The flights of a folder, in the order of their names, those that cannot be read left out."""
+def members_of(found: Scan, flight_ids: Set[str] | None = None) -> tuple[Member, ...]:
+    """The flights of a folder, or some of them, in the order of their names, those that cannot be read left out."""
     members = []
-    for name in found.names:
+    for name in found.names if flight_ids is None else sorted(flight_ids):
         known = found.fresh.get(name)
+        if known is None and name not in found.stale:
+            continue
         try:
             members.append(_member(found.out / name) if known is None else _known_member(found.out / name, known))
         except GroundstationError:  # the index tells of it
