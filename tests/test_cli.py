@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from groundstation.cli.application import EXAMPLES, VERBS, examples
 from groundstation.cli.main import app
+from tests.dataflash_writer import flight_log
 
 HEAVY = (
     "cattrs",
@@ -87,6 +88,20 @@ def test_what_no_reader_claims_is_exit_1_in_one_line(tmp_path: Path, content: by
         code, _, err = groundstation(*arguments)
         assert code == 1, err
         assert len(err.strip().splitlines()) == 1 and "odd.bin" in err and "Traceback" not in err
+
+
+def test_a_log_in_which_nothing_survives_has_one_answer(tmp_path: Path) -> None:
+    log = tmp_path / "flight.BIN"
+    log.write_bytes(flight_log(1).content[: 3 * 89])  # definitions alone
+    for verb in (
+        ["info"],
+        ["check"],
+        ["convert", "-o", str(tmp_path / "a.mcap")],
+        ["run", "-o", str(tmp_path / "out")],
+    ):
+        code, out, err = groundstation(*verb, str(log))
+        assert code == 1 and err.startswith("error: flight.BIN: no record that could be read"), (verb, code, err)
+        assert err.count("\n") == 1 and ("format:" in out) == (verb == ["info"])
 
 
 def test_a_foreign_file_in_a_folder_is_skipped_and_listed(tmp_path: Path) -> None:

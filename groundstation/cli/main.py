@@ -15,6 +15,7 @@ from groundstation.cli import fleets, flights, plans, rules, simulated, watching
 from groundstation.cli.application import (
     DATA_LOST,
     DONE,
+    FAILED,
     INTERRUPTED,
     AircraftFile,
     ConfigFile,
@@ -86,6 +87,9 @@ def info(
     description = describe.describe(log, profile, tuple(icd or ()))
     shown = printing.as_json(description.to_dict()) if json else printing.description(description, everything=verbose)
     typer.echo(shown)
+    if not description.has_records:
+        say(f"error: {log.name}: no record that could be read")
+        return FAILED
     return DATA_LOST if description.has_lost_data else DONE
 
 
