@@ -45,10 +45,13 @@ class Watch:
             if writes and isinstance(path, (str, bytes)):
                 self._note(event, path)
         elif event in ("os.rename", "os.mkdir", "os.remove", "os.rmdir", "os.link", "os.symlink"):
-            self._note(event, values[1] if event in ("os.rename", "os.link", "os.symlink") else values[0])
+            self._note(event, values[1] if event in ("os.rename", "os.link", "os.symlink") else values[0], values[-1])
 
-    def _note(self, event: str, path: Any) -> None:
-        name = os.path.realpath(os.fsdecode(path))
+    def _note(self, event: str, path: Any, folder: Any = None) -> None:
+        named = os.fsdecode(path)
+        if isinstance(folder, int) and folder >= 0:  # relative to an open folder
+            named = os.path.join(os.readlink(f"/proc/self/fd/{folder}"), named)
+        name = os.path.realpath(named)
         if not (name + "/").startswith(self.folder + "/") and "/__pycache__" not in name and "numba" not in name:
             self.seen.append(f"{event} {name}")
 
