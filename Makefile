@@ -11,7 +11,7 @@ DEV     := $(VENV)/.dev
 PIP     := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check slow fuzz schemas bench lock newest sbom clean help
+.PHONY: demo test check types style slow fuzz schemas bench lock newest sbom clean help
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -39,9 +39,14 @@ test: $(DEV) ## the whole suite: tests and doctests
 	$(BIN)/python -m pytest -q -n auto --dist worksteal
 
 check: $(DEV) ## in half a minute: format, lint, types, the import rules between rooms
+	@$(MAKE) --no-print-directory -j 2 types style
+
+types:
+	$(BIN)/mypy
+
+style:
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/mypy
 	$(BIN)/python -m pytest -q tests/test_architecture.py
 
 slow: $(DEV) ## the long Monte Carlo tests

@@ -1,6 +1,7 @@
 """The fleet of 100 000 flights: leading process, one flight added, report, recording; with synthetic results.
 
-``python -m benchmarks.bench_fleet_store [FLIGHTS]`` prints the figures.
+``python -m benchmarks.bench_fleet_store [FLIGHTS [months]]`` prints the figures; with ``months`` there is the dataset
+alone, without flight folders.
 """
 
 import multiprocessing
@@ -12,18 +13,29 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.fleet import write_fleet
 from groundstation.pipeline.many_flights.fleet_share import share_of, to_arrow
-from groundstation.pipeline.many_flights.fleet_store import key_of, month_of, put_month, refresh, scan, stamp_of
+from groundstation.pipeline.many_flights.fleet_store import (
+    Scan,
+    month_of,
+    put_month,
+    refresh,
+    remembered,
+    scan,
+    stamp_of,
+)
+from groundstation.pipeline.many_flights.flight_keys import Key, Keys
 from groundstation.pipeline.many_flights.known_flights import KnownFlights
+from groundstation.pipeline.many_flights.output import LocalOutput
+from groundstation.pipeline.many_flights.placement import Placement
 from groundstation.pipeline.many_flights.publishing import write_index_of
 from groundstation.pipeline.many_flights.session_search import members_of
 from groundstation.reports.fleet_report import write_fleet_report
@@ -49,30 +61,39 @@ def make_flight(out: Path, identity: str, template: Path) -> None:
         os.link(template / name, out / identity / name)
 
 
-def make_fleet(out: Path, templates: list[Path], flights: int) -> None:
+def make_fleet(out: Path, templates: list[Path], flights: int, with_folders: bool) -> None:
     """Make a folder of flights, and what workers put into the dataset of them, as if they had read them."""
-    shares = [share_of(template) for template in templates]
+    shares = to_arrow([share_of(template) for template in templates])
     rng = np.random.default_rng(7)
     months: dict[str, list[int]] = {}
     for number in range(flights):
         months.setdefault(month_of(identity_of(number, flights)), []).append(number)
     for month, numbers in months.items():
-        made, keys = [], []
-        for number in numbers:
-            identity, share = identity_of(number, flights), shares[number % TEMPLATES]
-            make_flight(out, identity, templates[number % TEMPLATES])
-            start = datetime.strptime(identity[:16], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
-            own = {
-                "flight_id": identity,
-                "aircraft": f"A{number % AIRCRAFT:02d}",
-                "start_utc": int(start.timestamp()) * NS_PER_S,
-                "month": f"{start:%Y-%m}",
-                "error_deg": round(float(rng.normal(0.02 * (number % AIRCRAFT), 0.2)), 4),
-            }
-            index = replace(share.index, flight_id=identity, aircraft=own["aircraft"], sha256=f"{number:064x}")
-            made.append(replace(share, row=share.row | own, index=index, path=f"/logs/{number}.ulg"))
-            keys.append(key_of(made[-1], stamp_of(out, identity) or 0))
-        put_month(out, month, to_arrow(made), keys)
+        names = [identity_of(number, flights) for number in numbers]
+        for number, name in zip(numbers if with_folders else (), names, strict=False):
+            make_flight(out, name, templates[number % TEMPLATES])
+        table = shares.take(np.array(numbers) % TEMPLATES)
+        number = np.array(numbers)
+        starts = [int(datetime.strptime(one[:16], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC).timestamp()) for one in names]
+        own = {
+            "flight_id": names,
+            "aircraft": [f"A{one % AIRCRAFT:02d}" for one in numbers],
+            "start_utc": np.array(starts) * NS_PER_S,
+            "month": [month] * len(names),
+            "error_deg": np.round(rng.normal(0.02 * (number % AIRCRAFT), 0.2), 4),
+            "sha256": [f"{one:064x}" for one in numbers],
+        }
+        for key, values in own.items():
+            place = table.schema.get_field_index(key)
+            kind = table.schema.field(key).type
+            array = pa.array(values)
+            array = array.dictionary_encode() if pa.types.is_dictionary(kind) else array.cast(kind)
+            table = table.set_column(place, key, array)
+        keys = [
+            Key(name, stamp_of(out, name) or 0, f"/logs/{one}.ulg", f"{one:064x}", "", "", start * NS_PER_S, None, "")
+            for one, name, start in zip(numbers, names, starts, strict=True)
+        ]
+        put_month(out, month, table, Keys.of(keys))
 
 
 def timed(what: str, work: Callable[[], Any]) -> Any:
@@ -85,11 +106,12 @@ def timed(what: str, work: Callable[[], Any]) -> Any:
     return found
 
 
-def one_more(out: Path) -> None:
+def one_more(out: Path, identity: str) -> None:
     """What a run does beside the flight itself when it adds one."""
-    KnownFlights(scan(out))
+    KnownFlights(out)
     found, problems = refresh(out)
-    members_of(found)
+    Placement(LocalOutput(out), []).sweep(found)
+    members_of(found, {identity})
     assert not problems and not found.stale
     write_index_of(out, (), (), found)
 
@@ -97,6 +119,7 @@ def one_more(out: Path) -> None:
 def main() -> None:
     """Print all figures."""
     flights = int(sys.argv[1]) if len(sys.argv) > 1 else FLIGHTS
+    with_folders = sys.argv[2:] != ["months"]
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"
         out.mkdir()
@@ -105,26 +128,36 @@ def main() -> None:
             for number in range(TEMPLATES)
         ]
         timed(f"{TEMPLATES} flights read by a worker", lambda: refresh(Path(folder)))
-        maker = multiprocessing.get_context("spawn").Process(target=make_fleet, args=(out, templates, flights))
+        arguments = (out, templates, flights, with_folders)
+        maker = multiprocessing.get_context("spawn").Process(target=make_fleet, args=arguments)
         maker.start()  # its memory is not that of the process that leads a run
         maker.join()
-        found = scan(out)
+        if with_folders:
+            one_flight(out, templates, flights)
+            found = scan(out)
+        else:
+            keys = timed("keys", lambda: remembered(out))
+            found = Scan(out, keys, (), (), {})
         assert len(found) == len(found.fresh) == flights
-        run(out, templates, flights)
+        together(out, found)
 
 
-def run(out: Path, templates: list[Path], flights: int) -> None:
-    """What a run, ``report`` and users do with such a folder."""
+def one_flight(out: Path, templates: list[Path], flights: int) -> None:
+    """What a run does when a flight is gone, and when one comes."""
     last = identity_of(flights - 1, flights)
     shutil.rmtree(out / last)
-    timed("one flight gone", lambda: one_more(out))
+    timed("one flight gone", lambda: one_more(out, last))
     (out / last).mkdir()
     shutil.copytree(templates[0], out / last, dirs_exist_ok=True)
-    timed("one flight added", lambda: one_more(out))
-    fleet, _problems = timed("fleet put together", lambda: write_fleet(out, scan(out)))
+    timed("one flight added", lambda: one_more(out, last))
+
+
+def together(out: Path, found: Scan) -> None:
+    """What a run, ``report`` and users do with all flights."""
+    fleet, _problems = timed("fleet put together", lambda: write_fleet(out, found))
     timed("summary.html", lambda: write_fleet_report(out, fleet, with_pdf=False))
     timed("fleet.rrd", lambda: write_fleet_recording(out / "fleet.rrd", fleet))
-    for name in ("index.json", "index.csv", "summary.html", "fleet.rrd"):
+    for name in ("summary.html", "fleet.rrd"):
         print(f"{name:<50}{(out / name).stat().st_size / 1e6:8.1f} MB")
     files = list((out / "flights.parquet").iterdir())
     print(f"{'flights.parquet':<50}{sum(one.stat().st_size for one in files) / 1e6:8.1f} MB in {len(files)} files")

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from groundstation.cli.application import EXAMPLES, VERBS, examples
 from groundstation.cli.main import app
+from tests.dataflash_writer import flight_log
 
 HEAVY = (
     "cattrs",
@@ -89,6 +90,20 @@ def test_what_no_reader_claims_is_exit_1_in_one_line(tmp_path: Path, content: by
         assert len(err.strip().splitlines()) == 1 and "odd.bin" in err and "Traceback" not in err
 
 
+def test_a_log_in_which_nothing_survives_has_one_answer(tmp_path: Path) -> None:
+    log = tmp_path / "flight.BIN"
+    log.write_bytes(flight_log(1).content[: 3 * 89])  # definitions alone
+    for verb in (
+        ["info"],
+        ["check"],
+        ["convert", "-o", str(tmp_path / "a.mcap")],
+        ["run", "-o", str(tmp_path / "out")],
+    ):
+        code, out, err = groundstation(*verb, str(log))
+        assert code == 1 and err.startswith("error: flight.BIN: no record that could be read"), (verb, code, err)
+        assert err.count("\n") == 1 and ("format:" in out) == (verb == ["info"])
+
+
 def test_a_foreign_file_in_a_folder_is_skipped_and_listed(tmp_path: Path) -> None:
     (tmp_path / "logs").mkdir()
     (tmp_path / "logs/readme.txt").write_text("notes", encoding="utf-8")
@@ -98,6 +113,7 @@ def test_a_foreign_file_in_a_folder_is_skipped_and_listed(tmp_path: Path) -> Non
     assert "readme.txt" in (tmp_path / "out/index.csv").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_settings_beside_logs_are_no_logs_and_what_is_skipped_is_told_by_reason(tmp_path: Path) -> None:
     logs = tmp_path / "logs"
     logs.mkdir()

@@ -45,8 +45,8 @@ def fitted(true_s: FloatArray, recorder_s: FloatArray, **settings: float) -> Fit
     ("count", "step_s", "sigma_s", "memory_s", "drift_ppm"),
     [
         (750, 0.8, 0.005, 0.0, 50.0),
-        (750, 0.8, 0.005, 2.0, 50.0),
-        (600, 1.0, 0.02, 5.0, -12.0),
+        pytest.param(750, 0.8, 0.005, 2.0, 50.0, marks=pytest.mark.slow),
+        pytest.param(600, 1.0, 0.02, 5.0, -12.0, marks=pytest.mark.slow),
         (600, 1.0, 0.02, 20.0, -12.0),
         (100, 1.0, 0.005, 0.0, 0.0),
         (40, 1.0, 0.001, 0.0, 5.0),

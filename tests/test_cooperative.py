@@ -8,6 +8,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.stats import chi2
 
+from groundstation.base.compile import Loop
 from groundstation.estimators.cooperative import plain
 from groundstation.estimators.cooperative.aircraft import Aircraft, aircraft_of, fleet_of
 from groundstation.estimators.cooperative.algorithms import run_algorithm
@@ -31,18 +32,19 @@ from groundstation.estimators.cooperative.settings import (
 from groundstation.estimators.cooperative.tracks import AlgorithmRun
 from groundstation.estimators.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.simulation.session import simulate_session
-from groundstation.simulation.session_scenario import load_session
+from groundstation.simulation.session_scenario import SessionScenario, load_session
 from groundstation.tables.session import NO_SLOT, DeadReckoning, GroundPoint, Heights, Odometry, Ranges, Session
 from tests.cooperative_example import GLOBAL, LOCAL, believed, full_nees, truth_of
 
 SEEDS = range(7000, 7024)  # written down before the first run; no other is used here
 TAIL = 0.0005  # either side: seven tests of this kind fail by chance once in a hundred and fifty suites
 BRIEF = replace(LOCAL, duration_s=20.0)  # every algorithm hears every neighbour and point many times
+INTERPRETED_S = 4.0  # of a flight in loops that are not compiled
 ROUNDING_M = 1e-6  # of positions of 6e6 m, through subtractions
 ROUNDING_SIGMAS = 1e-5  # rounding the measurements alone moves a plain filter that trusts its neighbours by 1.4e-6
 
 
-def test_transition_against_the_matrix_exponential() -> None:
+def test_transition_against_the_matrix_exponential(interpreted: None) -> None:
     """Local frame: x, y, vx, vy, height, clock offset, clock frequency."""
     belief = InsBelief(
         velocity_mps=10.0, velocity_s=100.0, baro_m=5.0, baro_s=50.0, clock_mps=np.sqrt(5.0), clock_s=20.0
@@ -66,13 +68,14 @@ def test_transition_against_the_matrix_exponential() -> None:
     assert forth @ back == pytest.approx(np.eye(7), abs=1e-13)
 
 
-def test_global_transition_is_that_of_the_error_propagation_of_the_simulation() -> None:
+def test_global_transition_is_that_of_the_error_propagation_of_the_simulation(request: pytest.FixtureRequest) -> None:
     """Two independent writings of the same physics: the simulation's Runge-Kutta and the filter's matrices."""
     errors = replace(GLOBAL.errors, gyro_s=1e12, clock_s=1e12, baro_s=1e12)
     scenario = replace(GLOBAL, errors=errors, duration_s=600.0)
     simulated = simulate_session(scenario, 3)
     exact = simulate_session(scenario, 3, scale=0.0)  # dead reckoning without errors: the matrices along the truth
     settings = believed(scenario)
+    request.getfixturevalue("interpreted")  # from here on: the simulation's loops are compiled for other tests too
     for track, truth in zip(exact.session.vehicles, simulated.truth, strict=True):
         assert isinstance(track, DeadReckoning)
         end = aircraft_of(track, "ecef", settings).step(truth.states[0], 0.0, 600.0)[0]
@@ -118,7 +121,7 @@ def lines_of(
 
 
 @pytest.mark.parametrize("kind", [*KINDS, "bearing"])
-def test_derivatives_against_central_differences(kind: str) -> None:
+def test_derivatives_against_central_differences(interpreted: None, kind: str) -> None:
     is_bearing = kind == "bearing"
     vehicle = wheeled() if is_bearing else inertial("ecef" if kind in ("satellite", "peer") else "local")
     rng = np.random.default_rng(4)
@@ -165,21 +168,28 @@ def in_plain(prepared: Prepared, settings: CooperativeSettings, algorithm: str) 
     return plain.run_decentralised(prepared, settings, algorithm)
 
 
-def test_the_compiled_loop_of_the_centralised_filter_is_the_plain_one() -> None:
-    for session in PLAIN:
-        compiled_is_plain(session, "centralised")
+@pytest.fixture
+def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Loops that are to be compiled run as they are written: compiling those of the filters takes most of a minute."""
+    monkeypatch.setattr(Loop, "__call__", lambda loop, *arguments: loop.py_func(*arguments))
+
+
+@pytest.mark.parametrize("session", PLAIN)
+def test_the_loop_of_the_centralised_filter_is_the_plain_one(interpreted: None, session: str) -> None:
+    compiled_is_plain(session, "centralised", INTERPRETED_S)
 
 
 @pytest.mark.slow
 def test_compiled_loops_are_the_plain_filters() -> None:
     """One test for all of them: whoever runs it compiles the loops, which takes longer than all the rest here."""
     for session, algorithm in product(PLAIN, ALGORITHMS):
-        if algorithm not in ("dead_reckoning", "centralised"):
+        if algorithm != "dead_reckoning":
             compiled_is_plain(session, algorithm)
 
 
-def compiled_is_plain(session: str, algorithm: str) -> None:
+def compiled_is_plain(session: str, algorithm: str, longest_s: float = np.inf) -> None:
     scenario, changes = PLAIN[session]
+    scenario = replace(scenario, duration_s=min(scenario.duration_s, longest_s))
     settings = believed(scenario, **changes)  # type: ignore[arg-type]
     flown = simulate_session(scenario, 5).session
     arms = 20.0 * np.random.default_rng(6).standard_normal((len(flown.ranges), 3))
@@ -229,47 +239,57 @@ def test_without_errors_every_algorithm_is_right_to_rounding(algorithm: str, sce
     assert not run.counts.get("gated")
 
 
-@pytest.mark.parametrize("update", ["sequential", "simultaneous"])
-def test_centralised_nees_local(update: str) -> None:
-    check_nees(LOCAL, believed(LOCAL, update=update), "centralised", 7)
+def test_centralised_nees() -> None:
+    """In plain numpy and fewer flights than in the slow test below."""
+    short = replace(LOCAL, duration_s=20.0)
+    check_nees(short, believed(short), "centralised", 7, SEEDS[:12], is_repeated=False)
 
 
-def test_centralised_nees_global() -> None:
+def test_dead_reckoning_nees() -> None:
+    check_nees(LOCAL, believed(LOCAL), "dead_reckoning", 7, is_repeated=False)
+
+
+@pytest.mark.slow
+def test_centralised_nees_in_compiled_loops() -> None:
+    check_nees(LOCAL, believed(LOCAL), "centralised", 7)
+    check_nees(LOCAL, believed(LOCAL, update="simultaneous"), "centralised", 7)
     check_nees(replace(GLOBAL, duration_s=40.0), believed(GLOBAL), "centralised", 13)
-
-
-def test_centralised_nees_with_an_uncertain_controller_and_separate_clocks() -> None:
     controller = replace(LOCAL, points=(replace(LOCAL.points[0], position_sigma_m=200.0),))
     check_nees(controller, believed(controller), "centralised", 7)
     separate = replace(GLOBAL, duration_s=20.0, errors=replace(GLOBAL.errors, has_separate_clocks=True))
     check_nees(separate, believed(separate), "centralised", 15)
 
 
-def test_dead_reckoning_nees() -> None:
-    check_nees(LOCAL, believed(LOCAL), "dead_reckoning", 7)
-
-
-def check_nees(scenario: object, settings: CooperativeSettings, algorithm: str, states: int) -> None:
-    """Aircraft A at the end of every run, in the compiled loops: independent draws, all states."""
+def check_nees(
+    scenario: SessionScenario,
+    settings: CooperativeSettings,
+    algorithm: str,
+    states: int,
+    seeds: range = SEEDS,
+    *,
+    is_repeated: bool = True,
+) -> None:
+    """Aircraft A at the end of every run: independent draws, all states."""
     total = 0.0
-    for seed in SEEDS:
-        simulated = simulate_session(scenario, seed)  # type: ignore[arg-type]
-        run = run_algorithm(prepare(simulated.session, settings), settings, algorithm, is_repeated=True)
+    for seed in seeds:
+        simulated = simulate_session(scenario, seed)
+        run = run_algorithm(prepare(simulated.session, settings), settings, algorithm, is_repeated=is_repeated)
         total += full_nees(run.tracks[0].state, run.tracks[0].covariance, simulated.truth[0])
-    low, high = chi2.ppf([TAIL, 1.0 - TAIL], states * len(SEEDS))
+    low, high = chi2.ppf([TAIL, 1.0 - TAIL], states * len(seeds))
     assert low < total < high
 
 
 def test_split_intersection_is_never_too_sure_where_the_exact_neighbour_is() -> None:
     alone = replace(LOCAL, points=(), duration_s=30.0)
     totals = {"split_intersection": 0.0, "neighbour_exact": 0.0}
-    for seed in SEEDS:
+    seeds = SEEDS[:12]
+    for seed in seeds:
         simulated = simulate_session(alone, seed)
         for name in totals:
             run = run_algorithm(prepare(simulated.session, believed(alone)), believed(alone), name)
             error = run.tracks[0].state[-1, :2] - simulated.truth[0].states[-1, :2]
             totals[name] += float(error @ np.linalg.solve(run.tracks[0].horizontal_m2[-1], error))
-    high = chi2.ppf(1.0 - TAIL, 2 * len(SEEDS))
+    high = chi2.ppf(1.0 - TAIL, 2 * len(seeds))
     assert totals["split_intersection"] < high < totals["neighbour_exact"] / 10.0
 
 
@@ -589,6 +609,7 @@ def test_wheeled_vehicles_and_bearings() -> None:
     assert np.interp(at[-1], track_found.time_s, track_found.position_m[:, 1]) == pytest.approx(east[-1], abs=0.02)
 
 
+@pytest.mark.slow
 def test_aircraft_in_line_keep_their_estimates_near_their_reckoning() -> None:
     """Ranges say next to nothing across the line; both runs overflowed while the directions alone stood still."""
     scenario = load_session("local-three-in-line")

@@ -15,7 +15,7 @@ from tests.architecture_picture import PACKAGE, import_nodes
 
 ROOT = PACKAGE.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-EXTRAS_OF_USERS = ("notebook", "tlog", "cluster")
+EXTRAS_OF_USERS = ("notebook", "tlog", "cluster", "delta")
 LGPL_ALLOWED = {"pymavlink"}  # the extra tlog, imported and not copied; README and docs/tlog.md tell it
 FOR_TYPES_ALONE = {"_typeshed"}  # of the type checker, below TYPE_CHECKING
 

@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from groundstation.base.errors import UsageError
+from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.estimators.fleet.moments import merged, moments_of
 from groundstation.pipeline.many_flights import fleet_share
 from groundstation.pipeline.many_flights.batch import run_many
@@ -183,17 +183,24 @@ def test_a_month_is_written_again_by_what_changed_in_it_alone(tmp_path: Path, mo
     assert not (tmp_path / FLIGHTS / "2026-08.parquet").exists()
 
 
-@pytest.mark.parametrize("content", [b"", b"PAR1 no PAR1", None], ids=repr)
-def test_a_damaged_file_of_the_dataset_is_told(tmp_path: Path, content: bytes | None) -> None:
+@pytest.mark.parametrize("damage", ["empty", "no parquet", "another month", "a byte"])
+def test_a_damaged_file_of_the_dataset_is_told_and_made_again(tmp_path: Path, damage: str) -> None:
     for number in range(2):
         save_flight(tmp_path, 30 * number)
     write(tmp_path)
-    path = tmp_path / FLIGHTS / "2026-05.parquet"
-    path.write_bytes((tmp_path / FLIGHTS / "2026-06.parquet").read_bytes() if content is None else content)
-    (problem,) = write_beside(tmp_path, (), with_pdf=False)
-    assert problem.state == "failed" and "remove it: `report OUT` makes it again" in problem.text
-    path.unlink()
-    assert write_beside(tmp_path, (), with_pdf=False) == () and len(gather(tmp_path)) == 2
+    path, whole = tmp_path / FLIGHTS / "2026-05.parquet", contents(tmp_path)
+    sound = path.read_bytes()
+    column = pq.read_metadata(path).row_group(0).column(0)
+    middle = column.dictionary_page_offset + column.total_compressed_size - 1
+    other = (tmp_path / FLIGHTS / "2026-06.parquet").read_bytes()
+    turned = sound[:middle] + bytes([sound[middle] ^ 0xFF]) + sound[middle + 1 :]
+    path.write_bytes({"empty": b"", "no parquet": b"PAR1 no PAR1", "another month": other, "a byte": turned}[damage])
+    with pytest.raises(GroundstationError, match=r"`report OUT`, makes it again"):
+        gather(tmp_path)
+    (told,) = write_beside(tmp_path, (), with_pdf=False, only_results=True)
+    assert told.state == "skipped" and re.search(r"2026-05.parquet: damaged \(.+\), made again", told.text)
+    assert contents(tmp_path) == whole and len(gather(tmp_path)) == 2
+    assert write_beside(tmp_path, (), with_pdf=False, only_results=True) == ()
 
 
 def test_a_large_fleet_says_where_its_rows_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -444,6 +451,7 @@ def _rows(name: str, answer: Any) -> list[tuple[Any, ...]]:
     return [(*key, row["count"], row["mean"], row["std"]) for key, row in answer.iterrows() if row["count"]]
 
 
+@pytest.mark.usefixtures("unpainted")
 @pytest.mark.usefixtures("unpainted")
 def test_simulated_logs_become_a_fleet(tmp_path: Path) -> None:
     logs = [REPOSITORY / "sample_logs" / f"taxi-{name}.csv" for name in ("good", "short")]

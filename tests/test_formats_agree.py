@@ -15,6 +15,9 @@ import pytest
 from groundstation.base.angles import wrap_180
 from groundstation.base.timescales import GPS_EPOCH_NS, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.estimators.heading.analysis import HEADING
+from groundstation.pipeline.one_flight.analyse import known_of, run_analyses
+from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.log import open_log
@@ -422,18 +425,20 @@ def test_tables_are_equal_within_the_formats_step(flights: dict[str, Flight], fo
     assert np.abs(difference).max() <= RESOLUTION[form][signal]
 
 
-@pytest.mark.parametrize("form", sorted(ANSWER_DEG))
-def test_the_heading_error_is_the_same(flights: dict[str, Flight], form: str) -> None:
-    from groundstation.estimators.heading.analysis import HEADING
-    from groundstation.pipeline.one_flight.analyse import known_of, run_analyses
-    from groundstation.pipeline.one_flight.configuration import Configuration
-
-    expected, found = (
-        run_analyses((HEADING,), flights[name], known_of(flights[name], Configuration())).answers["heading"]
-        for name in ("csv", form)
-    )
-    assert isinstance(expected, HeadingResult)
+def heading_of(flight: Flight) -> HeadingResult:
+    found = run_analyses((HEADING,), flight, known_of(flight, Configuration())).answers["heading"]
     assert isinstance(found, HeadingResult)
+    return found
+
+
+@pytest.fixture(scope="module")
+def expected(flights: dict[str, Flight]) -> HeadingResult:
+    return heading_of(flights["csv"])
+
+
+@pytest.mark.parametrize("form", sorted(ANSWER_DEG))
+def test_the_heading_error_is_the_same(flights: dict[str, Flight], expected: HeadingResult, form: str) -> None:
+    found = heading_of(flights[form])
     assert found.paper_error_deg == pytest.approx(expected.paper_error_deg, abs=10 * ANSWER_DEG[form])
     assert found.confidence95_deg[0] < expected.error_deg < found.confidence95_deg[1]
 

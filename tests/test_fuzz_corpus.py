@@ -9,13 +9,15 @@ import pytest
 
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.pipeline.one_flight.log import open_log
+from tests.fuzz import __main__ as every_format
 from tests.fuzz.bases import FORMATS, base_named, bases
 from tests.fuzz.mutation import KINDS, Mutant
 from tests.fuzz.trial import Case, Watch, edits_of, run_case, suffix_of, try_file
+from tests.fuzz.verbs import Answer, disagreements, faults_of
 
 CORPUS = Path(__file__).parent / "fuzz" / "corpus" / "found.jsonl"
 FOUND = [json.loads(line) for line in CORPUS.read_text(encoding="utf-8").splitlines()]
-SEEDS = 18  # of each format, in the suite
+SEEDS = 9  # of each format, in the suite
 
 
 @pytest.fixture(scope="module")
@@ -72,3 +74,32 @@ def test_a_mutant_knows_what_was_not_touched() -> None:
     mutant = Mutant(b"0123456789", b"abc", [("splice", 2, 0, 2, False), ("flip", 6, 0), ("truncate", 10)])
     assert mutant.content == b"01ab235567"
     assert [mutant.is_kept(at, at + 1) for at in range(10)] == [True] * 4 + [False] + [True] * 3 + [False] * 2
+
+
+def test_without_names_every_format_is_taken(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["tests.fuzz", "--cases", "0"])
+    assert every_format.main() == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(FORMATS)
+
+
+@pytest.mark.parametrize(
+    ("answer", "count"),
+    [
+        (Answer(0, "flight", "", 0.1), 0),
+        (Answer(1, "", "error: a.csv: no record that could be read\n", 0.1), 0),
+        (Answer(1, "", "error: a.csv: internal error (IndexError: 0); please report it\n", 0.1), 1),
+        (Answer(1, "", "error: a.csv: one\nerror: two\n", 0.1), 1),
+        (Answer(3, "", "x.py:1: RuntimeWarning: overflow\n", 0.1), 1),
+        (Answer(2, "", "error: a.csv: no such file\n", 0.1), 2),
+    ],
+)
+def test_what_a_verb_must_never_do_is_seen(answer: Answer, count: int) -> None:
+    assert len(list(faults_of("run", answer))) == count
+
+
+def test_verbs_that_differ_are_seen() -> None:
+    lost, done = Answer(3, "", "", 0.1), Answer(0, "", "", 0.1)
+    assert not list(disagreements({"check": lost, "run": lost}))
+    assert len(list(disagreements({"check": lost, "run": done}))) == 1

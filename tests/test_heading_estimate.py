@@ -83,7 +83,7 @@ def result(flight: Flight) -> HeadingResult:
 # Truth
 
 
-@pytest.mark.parametrize("error_deg", [0.8, -3.0, 179.9])
+@pytest.mark.parametrize("error_deg", [0.8, pytest.param(-3.0, marks=pytest.mark.slow), 179.9])
 def test_noiseless_in_error_at_rounding(error_deg: float) -> None:
     run = run_of(noiseless(replace(CASE, heading_error_deg=error_deg, drift_deg_per_h=0.0)))
     found = estimate(taxi_flight(run))

@@ -26,6 +26,7 @@ from groundstation.pipeline.one_flight.flight import Job
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event
 from groundstation.reports.drawing import sketching
+from tests.blank_figures import leave_blank
 from tests.test_resume import SETTINGS, SHORT, assert_equal_runs, tell_and_sleep
 
 SAMPLES = SHORT.parent
@@ -50,14 +51,6 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
-def whole(logs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run on this machine."""
-    out = tmp_path_factory.mktemp("whole") / "out"
-    run_many([logs], out, Configuration(), jobs=1)
-    return out
-
-
 def sent(folder: Path, url: str) -> str:
     RemoteFolder(url).send(folder)
     return url
@@ -71,7 +64,12 @@ def fetched(url: str, target: Path) -> Path:
     return target
 
 
-def test_a_run_elsewhere_gives_what_a_run_here_gives(memory: str, logs: Path, whole: Path, tmp_path: Path) -> None:
+def test_a_run_elsewhere_gives_what_a_run_here_gives(
+    memory: str, logs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    leave_blank(monkeypatch)
+    whole = tmp_path / "whole"
+    run_many([logs], whole, Configuration(), jobs=1)
     source, out = sent(logs, f"{memory}logs"), f"{memory}out"
     first = run_many([source], out, Configuration(), jobs=1)
     assert [one.state for one in first] == ["failed", "done", "done"]
@@ -107,18 +105,19 @@ def test_what_is_finished_elsewhere_is_not_done_again(
     assert_equal_runs(copy, Path(finished_run(SHORT.stem, SETTINGS).folder).parent)
 
 
-def test_a_flight_elsewhere_loses_its_pdf_and_keeps_what_somebody_put_there(memory: str) -> None:
+def test_a_flight_elsewhere_loses_its_pdf_and_keeps_what_somebody_put_there(
+    memory: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    leave_blank(monkeypatch)
     out, source = f"{memory}out", f"{memory}logs"
     far = RemoteFolder(out)
     RemoteFolder(source).write(SHORT.name, SHORT.read_bytes())
     (done,) = run_many([source], out, Configuration(), jobs=1)
     far.write(f"{done.flight_id}/notes.txt", b"mine")
     assert json.loads(far.read(f"{done.flight_id}/manifest.json") or b"")["source"]["path"] == f"{source}/{SHORT.name}"
-    with sketching():
-        run_many([source], out, Configuration(), jobs=1, with_pdf=False)  # the reports alone
+    run_many([source], out, Configuration(), jobs=1, with_pdf=False)  # the reports alone
     assert not {"report.pdf", "summary.pdf"} & {name.rpartition("/")[2] for name in far.files()}
-    with sketching():
-        run_many([source], out, SETTINGS, jobs=1, with_pdf=False)  # the analysis
+    run_many([source], out, SETTINGS, jobs=1, with_pdf=False)  # the analysis
     assert far.read(f"{done.flight_id}/notes.txt") == b"mine"
 
 
@@ -264,9 +263,11 @@ def test_a_bucket_lets_one_of_several_runs_begin(bucket: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_cluster_loses_nothing_when_a_worker_is_killed(bucket: str, logs: Path, whole: Path, tmp_path: Path) -> None:
+def test_a_cluster_loses_nothing_when_a_worker_is_killed(bucket: str, logs: Path, tmp_path: Path) -> None:
     from distributed import LocalCluster
 
+    whole = tmp_path / "whole"
+    run_many([logs], whole, Configuration(), jobs=1)
     source, out = sent(logs, f"{bucket}/logs"), f"{bucket}/out"
     killed = threading.Event()
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0") as cluster:

@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, INDEXED, answer_values
 from groundstation.reports.index import IndexRow, columns_of, failed_row, index_row, write_index
 from groundstation.results.files import save
@@ -14,10 +16,12 @@ from groundstation.results.flight import FlightResults
 from tests.report_example import MANIFEST, example, heading_result
 from tests.saved import load, write_flight_report
 
+pytestmark = pytest.mark.usefixtures("unpainted")  # an index holds nothing of a page but a link to it
+
 
 def row_of(folder: Path, results: FlightResults) -> IndexRow:
     save(folder / results.flight_id, results, MANIFEST)
-    write_flight_report(folder / results.flight_id)
+    write_flight_report(folder / results.flight_id, with_pdf=False)
     saved = load(folder / results.flight_id)
     return index_row(saved, "flight", answer_values(saved.results))
 

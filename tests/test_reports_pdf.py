@@ -22,6 +22,7 @@ from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
 from tests import test_reports as html
+from tests.blank_figures import leave_blank
 from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import MANIFEST, example, heading_result
 from tests.saved import load, write_flight_report
@@ -69,6 +70,7 @@ class Paper:
     document: Document
     reader: PdfReader
     pages: tuple[str, ...]
+    places: list[tuple[float, float, str]]
     size_bytes: int
 
 
@@ -82,8 +84,8 @@ def flight(tmp_path_factory: pytest.TempPathFactory) -> Paper:
     made = flight_document(load(folder))
     write_pdf(made, folder / PDF)
     reader = PdfReader(folder / PDF)
-    pages = tuple(" ".join(page.extract_text().split()) for page in reader.pages)
-    return Paper(made, reader, pages, (folder / PDF).stat().st_size)
+    texts, found = texts_and_places(reader)
+    return Paper(made, reader, tuple(" ".join(text.split()) for text in texts), found, (folder / PDF).stat().st_size)
 
 
 def strings(doc: Document) -> Iterator[str]:
@@ -140,21 +142,19 @@ def test_title_and_outline_are_there_and_no_time(flight: Paper) -> None:
     assert flight.size_bytes < LARGEST_PDF_BYTES
 
 
-def places(reader: PdfReader) -> list[tuple[float, float, str]]:
-    """Left edge and size of every piece of text."""
+def texts_and_places(reader: PdfReader) -> tuple[list[str], list[tuple[float, float, str]]]:
+    """Text of each page; left edge and size of every piece of text, and the piece."""
     found: list[tuple[float, float, str]] = []
 
     def visit(text: str, page: list[float], line: list[float], _font: Any, size: float) -> None:
         if text.strip():
             found.append((page[4] + line[4], size * abs(page[0] * line[0]), text))
 
-    for page in reader.pages:
-        page.extract_text(visitor_text=visit)
-    return found
+    return [page.extract_text(visitor_text=visit) for page in reader.pages], found
 
 
 def test_no_text_is_small_or_outside_the_margins(flight: Paper) -> None:
-    found = places(flight.reader)
+    found = flight.places
     assert len(found) > 500
     assert not [item for item in found if item[1] < SMALLEST_POINTS]
     assert not [item for item in found if not MARGIN_POINTS <= item[0] <= A4_POINTS[0] - MARGIN_POINTS]
@@ -171,10 +171,10 @@ def test_a_long_table_repeats_its_head_on_every_page(tmp_path: Path) -> None:
 def test_a_wide_table_stays_on_its_page(tmp_path: Path, columns: int) -> None:
     write_pdf(document(grid(3, columns)), tmp_path / PDF)
     reader = PdfReader(tmp_path / PDF)
-    found = places(reader)
+    texts, found = texts_and_places(reader)
     assert max(left for left, _, _ in found) < A4_POINTS[0] - MARGIN_POINTS
     assert min(size for _, size, _ in found) >= SMALLEST_POINTS
-    assert packed(text_of(reader)).count("123456") == 3 * (columns - 1)
+    assert packed(" ".join(texts)).count("123456") == 3 * (columns - 1)
 
 
 def test_words_without_a_space_are_broken_and_copied_whole(tmp_path: Path) -> None:
@@ -188,6 +188,7 @@ def test_words_without_a_space_are_broken_and_copied_whole(tmp_path: Path) -> No
 
 def test_nothing_from_a_log_is_markup(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(html, "HOSTILE", html.HOSTILE + TYPST)
+    leave_blank(monkeypatch)  # texts inside figures are outlines
     reader = paper(tmp_path, html.hostile_results())
     text = packed(text_of(reader))
     assert text.count(packed(TYPST)) > 20  # as it was written, everywhere
@@ -201,7 +202,8 @@ def test_the_template_reads_and_imports_nothing() -> None:
     assert template.count("json(") == 1 and "json(bytes(sys.inputs.document))" in template
 
 
-def test_cyrillic_is_shown_and_unknown_scripts_do_no_harm(tmp_path: Path) -> None:
+def test_cyrillic_is_shown_and_unknown_scripts_do_no_harm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    leave_blank(monkeypatch)
     metadata = {"aircraft": "Як-40 борт 87937", "flight": "рейс 17 «Ёлка»", "note": "日本語 한국어 עברית"}
     reader = paper(tmp_path, replace(example(heading_result()), metadata=metadata))
     assert "Як-40 борт 87937 · flight рейс 17 «Ёлка»" in text_of(reader)
@@ -216,7 +218,10 @@ CHANGES = (
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_paper_is_made_whatever_is_missing(tmp_path: Path, change: Callable[[FlightResults], FlightResults]) -> None:
+def test_paper_is_made_whatever_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: Callable[[FlightResults], FlightResults]
+) -> None:
+    leave_blank(monkeypatch)  # tests/test_reports.py paints them
     text = text_of(paper(tmp_path, change(example(heading_result()))))
     assert "nan" not in text.lower().split() and "Heading correction: workings" in text
 
@@ -286,6 +291,7 @@ def test_a_run_without_pdf_leaves_none_and_report_makes_it_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log, out = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv", tmp_path / "out"
+    leave_blank(monkeypatch)
     (outcome,) = run_many([log], out, Configuration())
     made = Path(outcome.folder) / PDF
     first = made.read_bytes()

@@ -82,11 +82,10 @@ SAMPLES = ("taxi-good.csv", "taxi-damaged.csv", "taxi-notime.csv")
 RECORDED = ("g1000/log_220502_135932_EGPN.csv", "dataflash/erle_plane_4-12-2014_329.BIN", "inertial/gv_ff02.csv")
 
 
-@pytest.mark.usefixtures("unpainted")
 @pytest.mark.parametrize("log", [*SAMPLES, *RECORDED])
 def test_what_a_run_writes_obeys_the_schema_and_comes_back_equal(log: str, tmp_path: Path) -> None:
     path = Path(__file__).parents[1] / "sample_logs" / log if log in SAMPLES else real_log(log)
-    (outcome,) = run_many([path], tmp_path / "out", Configuration(), jobs=1, with_pdf=False)
+    (outcome,) = run_many([path], tmp_path / "out", Configuration(), jobs=1, only_results=True)
     text = (Path(outcome.folder) / "summary.json").read_text(encoding="utf-8")
     VALIDATOR.validate(json.loads(text))
     assert json_text(summary_of(load(Path(outcome.folder)).results)) == text

@@ -28,6 +28,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.reports.drawing import sketching
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 SHORT = SAMPLES / "taxi-short.csv"
@@ -145,7 +146,8 @@ def test_a_limit_of_the_ledger_redoes_everything(finished: Path) -> None:
 
 def test_the_pdf_alone_is_made_again(finished: Path, tmp_path: Path) -> None:
     out = copied(finished, tmp_path / "out")
-    _outcome, told = stages([SHORT], out, Configuration(), with_pdf=False)
+    with sketching():
+        _outcome, told = stages([SHORT], out, Configuration(), with_pdf=False)
     assert told == {"reporting"} and not (flight_in(out) / "report.pdf").exists()
     _outcome, told = stages([SHORT], out, Configuration())
     assert told == {"reporting"}
@@ -227,7 +229,7 @@ def test_an_interrupted_run_stops_at_once_and_keeps_its_index(tmp_path: Path) ->
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt) as caught:
-        run_many([SAMPLES], tmp_path / "out", Configuration(), jobs=2, with_pdf=False, listen=interrupt)
+        run_many([SAMPLES], tmp_path / "out", Configuration(), jobs=2, only_results=True, listen=interrupt)
     assert caught.value is not None  # the frames of the run are alive: its processes ended all the same
     assert ended_children()
     assert (tmp_path / "out" / "index.json").is_file()
@@ -304,7 +306,7 @@ def test_a_process_that_dies_takes_its_own_log_alone(tmp_path: Path) -> None:
             for child in multiprocessing.active_children():
                 os.kill(child.pid or 0, signal.SIGKILL)
 
-    first, killer, last = run_many([logs], tmp_path / "out", Configuration(), jobs=2, with_pdf=False, listen=kill)
+    first, killer, last = run_many([logs], tmp_path / "out", Configuration(), jobs=2, only_results=True, listen=kill)
     assert (first.state, last.state) == ("done", "done")
     assert killer.state == "failed" and killer.text == "killer.csv: its process died (killed, or out of memory)"
 
@@ -354,7 +356,7 @@ def test_a_time_limit_leaves_no_part_of_a_flight(tmp_path: Path) -> None:
             for child in multiprocessing.active_children():
                 os.kill(child.pid or 0, signal.SIGSTOP)
 
-    (late,) = run_many([SHORT], tmp_path, Configuration(), jobs=1, timeout_s=8.0, listen=stop, with_pdf=False)
+    (late,) = run_many([SHORT], tmp_path, Configuration(), jobs=1, timeout_s=8.0, listen=stop, only_results=True)
     assert late.state == "failed" and "not done within 8 s" in late.text
     assert [path.name for path in tmp_path.iterdir() if path.is_dir()] == []
     assert ended_children()

@@ -25,7 +25,7 @@ from tests.real_logs import real_log
 from tests.saved import load
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
-SEEDS = [*range(3), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 6))]
+SEEDS = [*range(2), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 6))]
 BYTE_IDENTICAL = ("summary.json", "report.html", "report.pdf", "tables")
 
 
@@ -67,26 +67,27 @@ def test_the_index_lists_the_flight(good: Outcome) -> None:
 @pytest.mark.usefixtures("unpainted")
 def test_the_mcap_gives_what_the_log_gave(good: Outcome, tmp_path: Path) -> None:
     mcap = Path(good.folder) / f"{good.flight_id}.mcap"
-    (again,) = run_many([mcap], tmp_path / "out", Configuration(), with_pdf=False)
+    (again,) = run_many([mcap], tmp_path / "out", Configuration(), only_results=True)
     assert again.flight_id == good.flight_id
     first, second = (load(Path(outcome.folder)).summary for outcome in (good, again))
     for key in ("results", "ledger", "clock", "completeness", "findings", "status"):
         assert second[key] == first[key], key
 
 
-def test_a_second_run_is_byte_identical(good: Outcome, tmp_path: Path) -> None:
+def test_a_second_run_is_byte_identical(finished_run: Callable[..., Outcome], tmp_path: Path) -> None:
+    first = finished_run("taxi-short")
     environment = {**os.environ, "PYTHONHASHSEED": "7"}
     command = [
         sys.executable,
         "-m",
         "groundstation",
         "run",
-        str(SAMPLES / "taxi-good.csv"),
+        str(SAMPLES / "taxi-short.csv"),
         "-o",
         str(tmp_path / "out"),
     ]
     subprocess.run(command, check=True, capture_output=True, env=environment)
-    assert contents(tmp_path / "out" / good.flight_id) == contents(Path(good.folder))
+    assert contents(tmp_path / "out" / first.flight_id) == contents(Path(first.folder))
 
 
 def test_the_report_is_made_again_from_the_saved_results_alone(good: Outcome, tmp_path: Path) -> None:
@@ -101,7 +102,7 @@ def test_the_report_is_made_again_from_the_saved_results_alone(good: Outcome, tm
 def test_excluding_an_interval_changes_the_answer_and_is_kept(good: Outcome, tmp_path: Path) -> None:
     segment = load(Path(good.folder)).summary["results"]["heading"]["segments"][0]
     excluded = Interval(str(segment["start_s"]), str(segment["end_s"]), "for the test")
-    job = Job(SAMPLES / "taxi-good.csv", tmp_path, Configuration(exclude=(excluded,)), with_pdf=False)
+    job = Job(SAMPLES / "taxi-good.csv", tmp_path, Configuration(exclude=(excluded,)), only_results=True)
     outcome = run_flight(job)
     heading = load(Path(outcome.folder)).summary["results"]["heading"]
     before = load(Path(good.folder)).summary["results"]["heading"]
@@ -111,7 +112,7 @@ def test_excluding_an_interval_changes_the_answer_and_is_kept(good: Outcome, tmp
 
 @pytest.mark.usefixtures("unpainted")
 def test_a_folder_with_all_samples_gives_each_its_truth(tmp_path: Path) -> None:
-    outcomes = run_many([SAMPLES], tmp_path / "out", Configuration(), jobs=1, with_pdf=False)
+    outcomes = run_many([SAMPLES], tmp_path / "out", Configuration(), jobs=1, only_results=True)
     by_name = {Path(outcome.source).stem: outcome for outcome in outcomes}
     verdict = {
         name: load(Path(outcome.folder)).summary["results"].get("heading", {}).get("verdict")
@@ -174,7 +175,7 @@ def test_a_damaged_log_ends_in_one_line_or_in_results(tmp_path: Path, seed: int)
     rng = np.random.default_rng(seed)
     log = tmp_path / "log.csv"
     log.write_bytes(mutated((SAMPLES / "taxi-short.csv").read_bytes(), rng))
-    outcome = run_flight(Job(log, tmp_path / "out", Configuration()))
+    outcome = run_flight(Job(log, tmp_path / "out", Configuration(), with_pdf=False))
     assert outcome.code in (0, 1, 3)
     assert "internal error" not in outcome.text and "\n" not in outcome.text
 
@@ -184,7 +185,7 @@ def test_a_damaged_mcap_ends_in_one_line_or_in_results(good: Outcome, tmp_path: 
     rng = np.random.default_rng(100 + seed)
     path = tmp_path / "flight.mcap"
     path.write_bytes(mutated((Path(good.folder) / f"{good.flight_id}.mcap").read_bytes(), rng))
-    outcome = run_flight(Job(path, tmp_path / "out", Configuration()))
+    outcome = run_flight(Job(path, tmp_path / "out", Configuration(), with_pdf=False))
     assert outcome.code in (1, 3) or outcome.state == "done"
     assert "internal error" not in outcome.text and "\n" not in outcome.text
 
@@ -203,7 +204,7 @@ def test_convert_writes_one_file_or_a_folder(tmp_path: Path) -> None:
     ["g1000/log_220416_161856_LFQA.csv", "g1000/log_220502_135932_EGPN.csv"],
 )
 def test_a_taxi_that_never_reaches_the_speed_gate_is_not_assessable(tmp_path: Path, name: str) -> None:
-    outcome = run_flight(Job(real_log(name), tmp_path, Configuration(), with_pdf=False))
+    outcome = run_flight(Job(real_log(name), tmp_path, Configuration(), only_results=True))
     entries = load(Path(outcome.folder)).summary["not_assessable"]
     reasons = {entry["analysis"]: entry["reason"] for entry in entries}
     assert "6" in reasons["heading"] and "m/s" in reasons["heading"]
@@ -213,7 +214,7 @@ def test_a_taxi_that_never_reaches_the_speed_gate_is_not_assessable(tmp_path: Pa
 @pytest.mark.real_log
 @pytest.mark.parametrize("name", ["g1000/log_210623_141501_TEST1.csv", "g1000/log_220417_125002_LFQA.csv"])
 def test_a_real_light_aircraft_is_not_accepted(tmp_path: Path, name: str) -> None:
-    outcome = run_flight(Job(real_log(name), tmp_path, Configuration(), with_pdf=False))
+    outcome = run_flight(Job(real_log(name), tmp_path, Configuration(), only_results=True))
     heading = load(Path(outcome.folder)).summary["results"]["heading"]
     assert heading["verdict"] in ("reject", "undecided")
     assert heading["precision_deg"] > 0.05
@@ -224,10 +225,10 @@ def test_copies_of_one_log_are_kept_once_however_many_run_at_a_time(tmp_path: Pa
     log = "time_s,baro.pressure_altitude_m\n" + "".join(f"{second},100.0\n" for second in range(30))
     for name in ("b", "a", "c"):
         (tmp_path / f"logs/{name}.csv").write_text(log, encoding="utf-8")
-    outcomes = run_many([tmp_path / "logs"], tmp_path / "out", Configuration(), jobs=2, with_pdf=False)
+    outcomes = run_many([tmp_path / "logs"], tmp_path / "out", Configuration(), jobs=2, only_results=True)
     assert [outcome.state for outcome in outcomes] == ["done", "skipped", "skipped"]
     (folder,) = flight_folders(tmp_path / "out")
-    assert {path.suffix for path in folder.iterdir()} >= {".mcap", ".rrd", ".html", ".json"}
+    assert {path.suffix for path in folder.iterdir()} >= {".mcap", ".json"}
     assert load(folder).summary["flight"]["source"]["name"] == "a.csv"
 
 
@@ -237,7 +238,7 @@ def test_a_log_and_its_mcap_are_one_flight(tmp_path: Path) -> None:
     log = tmp_path / "logs/x.csv"
     log.write_bytes((SAMPLES / "taxi-notime.csv").read_bytes())
     convert_many([log], tmp_path / "logs/x.mcap")
-    outcomes = run_many([tmp_path / "logs"], tmp_path / "out", Configuration(), jobs=1, with_pdf=False)
+    outcomes = run_many([tmp_path / "logs"], tmp_path / "out", Configuration(), jobs=1, only_results=True)
     assert [outcome.state for outcome in outcomes] == ["done", "skipped"]
     assert outcomes[0].flight_id == f"NOTIME_{outcomes[0].sha256[:8]}"
 
@@ -254,7 +255,7 @@ def test_damage_of_an_mcap_is_kept_with_it(good: Outcome, tmp_path: Path) -> Non
     data[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 1
     (tmp_path / "flipped.mcap").write_bytes(data)
     (first,) = convert_many([tmp_path / "flipped.mcap"], tmp_path / "again.mcap")
-    outcome = run_flight(Job(tmp_path / "again.mcap", tmp_path / "out", Configuration(), with_pdf=False))
+    outcome = run_flight(Job(tmp_path / "again.mcap", tmp_path / "out", Configuration(), only_results=True))
     assert (first.state, outcome.state) == ("data_lost", "data_lost")
     summary, before = load(Path(outcome.folder)).summary, load(Path(good.folder)).summary
     assert summary["status"] == "degraded" and summary["ledger"]["damages"]
@@ -267,13 +268,25 @@ def test_damage_of_an_mcap_is_kept_with_it(good: Outcome, tmp_path: Path) -> Non
 @pytest.mark.usefixtures("unpainted")
 def test_a_killed_run_keeps_what_was_finished_and_can_go_on(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "groundstation", "run", str(SAMPLES), "-o", str(out), "-j", "1", "--no-pdf"]
+    command = [
+        sys.executable,
+        "-m",
+        "groundstation",
+        "run",
+        str(SAMPLES),
+        "-o",
+        str(out),
+        "-j",
+        "1",
+        "--only",
+        "results",
+    ]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         while not list(out.glob("2*/manifest.json")):
             assert process.poll() is None, "the run ended before it could be killed"
             time.sleep(0.02)
         process.kill()
-    (outcome, *_) = run_many([SAMPLES / "taxi-short.csv"], out, Configuration(), with_pdf=False)
+    (outcome, *_) = run_many([SAMPLES / "taxi-short.csv"], out, Configuration(), only_results=True)
     assert outcome.state == "done"
     assert not list(out.glob(".partial*"))
     index = json.loads((out / "index.json").read_text(encoding="utf-8"))
@@ -322,6 +335,8 @@ def test_what_is_no_regular_file_is_refused(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("unpainted")
 def test_utc_intervals_of_a_flight_without_utc_are_a_finding(tmp_path: Path) -> None:
     interval = Interval("2026-05-04T06:00:00Z", "2026-05-04T06:01:00Z")
-    outcome = run_flight(Job(SAMPLES / "taxi-notime.csv", tmp_path, Configuration(exclude=(interval,)), with_pdf=False))
+    outcome = run_flight(
+        Job(SAMPLES / "taxi-notime.csv", tmp_path, Configuration(exclude=(interval,)), only_results=True)
+    )
     summary = load(Path(outcome.folder)).summary
     assert outcome.code == 0 and "UTC" in summary["not_assessable"][0]["reason"]

@@ -82,7 +82,7 @@ def test_trials_are_flown_in_processes_and_told_with_their_limits() -> None:
 
 
 def test_drawn_bearings_err_as_the_formulas_say_and_refute_category_two_laterally() -> None:
-    table = bearing_table(3000, 5)
+    table = bearing_table(1500, 5)
     near = (table["before_threshold_m"] <= 2000.0) & (table["bearing_sigma_deg"] == 1.0)
     for axis in ("lateral", "glide_path"):
         assert table[f"{axis}_drawn_m"][near] == pytest.approx(table[f"{axis}_formula_m"][near], rel=0.1)

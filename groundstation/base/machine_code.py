@@ -26,6 +26,7 @@ ENTRY, SUFFIX = "groundstation_entry", ".machine_code"
 LAYOUT = 2  # of what is kept
 OWN_ARGUMENTS = 3  # of an entry, before those of its loop: numba's answer and error, and where the result goes
 _RESULTS: dict[Any, type] = {int: ctypes.c_int64, bool: ctypes.c_int64, float: ctypes.c_double, None: ctypes.c_int64}
+_NO_BYTES = ctypes.c_char * 0
 _NUMBERS = count()  # every library has a name of its own
 _HARMLESS = frozenset(("memset", "memcpy", "memmove", "memcmp", "sqrt", "sin", "cos", "exp", "log", "pow", "atan2"))
 
@@ -297,12 +298,20 @@ class Linked:
         values: list[Any] = [ctypes.byref(nothing), ctypes.byref(error), ctypes.byref(result)]
         for one in _plain(arguments):
             if isinstance(one, np.ndarray):
-                values += (one.ctypes.data, *one.shape)
+                values += (_address(one), *one.shape)
             else:
                 values.append(one)
         if self._entry(*values):
             raise RuntimeError("a compiled loop has failed")
         return None if self._annotation is None else self._annotation(result.value)
+
+
+def _address(array: Any) -> int:
+    """Where an array's values begin; ``array.ctypes.data`` takes two to three times as long."""
+    if array.flags.writeable:
+        return ctypes.addressof(_NO_BYTES.from_buffer(array))
+    address: int = array.__array_interface__["data"][0]
+    return address
 
 
 def _plain(arguments: Sequence[Any]) -> list[Any]:

@@ -118,6 +118,14 @@ Only = Annotated[
     Literal["results"] | None,
     typer.Option("--only", help="results: no recording and no report, of a flight or of all; a later run makes them."),
 ]
+Store = Annotated[
+    str,
+    typer.Option(
+        "--store",
+        help="A Delta table that takes the rows of the flights, too; several runs may write into one.",
+        metavar="delta:PATH|URL",
+    ),
+]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
 Profile = Annotated[
     Path | None,

@@ -15,6 +15,7 @@ from groundstation.cli import fleets, flights, plans, rules, simulated, watching
 from groundstation.cli.application import (
     DATA_LOST,
     DONE,
+    FAILED,
     INTERRUPTED,
     AircraftFile,
     ConfigFile,
@@ -32,6 +33,7 @@ from groundstation.cli.application import (
     Quiet,
     ReferenceFiles,
     SiteFile,
+    Store,
     ThresholdsFile,
     Together,
     Verbose,
@@ -85,6 +87,9 @@ def info(
     description = describe.describe(log, profile, tuple(icd or ()))
     shown = printing.as_json(description.to_dict()) if json else printing.description(description, everything=verbose)
     typer.echo(shown)
+    if not description.has_records:
+        say(f"error: {log.name}: no record that could be read")
+        return FAILED
     return DATA_LOST if description.has_lost_data else DONE
 
 
@@ -218,6 +223,7 @@ def run(
     ] = None,
     no_pdf: NoPdf = False,
     only: Only = None,
+    store: Store = "",
     redo: Annotated[bool, typer.Option("--redo", help="Do again what an earlier run finished.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done; write nothing.")] = False,
     force: Force = False,
@@ -241,8 +247,9 @@ def run(
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd)
     is_one_log = together or (len(paths) == 1 and not Path(paths[0]).is_dir())
     configuration = judged_by(applying(settings, apply), reference or (), is_one_log=is_one_log)
-    if together and (dry_run or scheduler or stations is not None or timeout is not None):
-        raise UsageError("--together", "--dry-run, --scheduler, --stations or --timeout beside it", "it without them")
+    if together and (dry_run or scheduler or stations is not None or timeout is not None or store):
+        beside = "--dry-run, --scheduler, --stations, --timeout or --store"
+        raise UsageError("--together", f"{beside} beside it", "it without them")
     if dry_run:
         plan = partial(plan_many, with_pdf=not no_pdf, only_results=only == "results")
         planned = plan(paths, output, configuration, redo=redo, stations=stations)
@@ -251,7 +258,9 @@ def run(
     if timeout is not None and math.isnan(timeout):
         raise UsageError("--timeout nan", "no number", "seconds")
     timeout_s = math.inf if timeout is None else timeout
-    run_apart = partial(run_many, jobs=jobs, scheduler=scheduler, redo=redo, stations=stations, timeout_s=timeout_s)
+    run_apart = partial(
+        run_many, jobs=jobs, scheduler=scheduler, redo=redo, stations=stations, timeout_s=timeout_s, store=store
+    )
     run_logs = run_together if together else run_apart  # logs are joined anew at every run, in this process
     try:
         with listener("none" if quiet else progress) as listen:

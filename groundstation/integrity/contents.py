@@ -1,5 +1,6 @@
 """What the batches of a log hold, counted as they pass: fields, counters, motion, drop-outs, and rows in time."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -41,13 +42,18 @@ class _FieldTally:
         self.present += len(values)
         if values.dtype.kind != "f":
             return
-        least, most = values.min(initial=np.inf), values.max(initial=-np.inf)
-        is_sound = least >= self.low and most <= self.high
-        is_finite = np.isfinite(least) and np.isfinite(most)
-        if not is_sound or (self.is_known and not is_finite):  # else two passes tell that there is nothing odd
+        if self._may_be_odd(values):
             values, rows = self._without_odd(values, rows, record_index, device_ns)
         if self.constancy is not None:
             self.constancy.add(values, record_index, device_ns, rows)
+
+    def _may_be_odd(self, values: FloatArray) -> bool:
+        """Whether there may be NaN, or a value out of range: two passes tell it, one where nobody knows the range."""
+        most = np.maximum.reduce(values, initial=-np.inf)
+        if not self.is_known:
+            return math.isnan(most)
+        least = np.minimum.reduce(values, initial=np.inf)
+        return not (least >= self.low and most <= self.high and math.isfinite(least) and math.isfinite(most))
 
     def _without_odd(
         self, values: FloatArray, rows: Int64Array | None, record_index: Int64Array, device_ns: Int64Array

@@ -54,7 +54,7 @@ def report(case: Case, found: dict) -> None:
 def main() -> int:
     """Read the command line; FUZZ in the environment is the number of logs of each format."""
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz")
-    parser.add_argument("formats", nargs="*", default=FORMATS, choices=[*FORMATS, []], metavar="FORMAT")
+    parser.add_argument("formats", nargs="*", default=[], choices=[*FORMATS, []], metavar="FORMAT")
     parser.add_argument("--cases", type=int, default=int(os.environ["FUZZ"]) if os.environ.get("FUZZ") else None)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=None)

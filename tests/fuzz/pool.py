@@ -5,15 +5,17 @@ import resource
 import tempfile
 import time
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from tests.fuzz.trial import Case, Watch, run_case
 
+Run = Callable[[Case, Path, Watch], dict[str, Any]]
+
 LIMIT_S = 5.0  # of processor time: other programs may hold the processor
 WALL = 12.0  # so many times the limit have to pass before a child is taken for hung
-START_S = 240.0  # of a child: imports and compiled loops
+START_S = 900.0  # of a child: imports and compiled loops
 MEMORY_BYTES = 1 << 30  # that a case may take beyond what a child has after its first logs
 REPEATS = 2  # a case that hangs is run again
 
@@ -27,18 +29,18 @@ def _peak_mb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def _child(pipe: Any, warm_up: list[Case]) -> None:
+def _child(pipe: Any, warm_up: list[Case], run: Run) -> None:
     warnings.simplefilter("error", RuntimeWarning)  # what numpy warns of would be told to users
     watch = Watch()
     with tempfile.TemporaryDirectory() as name:
         tempfile.tempdir = name
         for case in warm_up:  # compiled loops are loaded before memory is limited
-            run_case(case, Path(name), watch)
+            run(case, Path(name), watch)
         _limit_memory()
         pipe.send(_peak_mb())
         while (case := pipe.recv()) is not None:
             before, began = _peak_mb(), time.process_time()
-            found = run_case(case, Path(name), watch)
+            found = run(case, Path(name), watch)
             found |= {"seconds": time.process_time() - began, "growth_mb": _peak_mb() - before}
             pipe.send(found)
 
@@ -46,10 +48,10 @@ def _child(pipe: Any, warm_up: list[Case]) -> None:
 class Child:
     """One child process."""
 
-    def __init__(self, warm_up: list[Case]) -> None:
+    def __init__(self, warm_up: list[Case], run: Run = run_case) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_child, args=(theirs, warm_up), daemon=True)
+        self._process = context.Process(target=_child, args=(theirs, warm_up, run), daemon=True)
         self._process.start()
         theirs.close()
         if not self._pipe.poll(START_S):

@@ -68,8 +68,10 @@ def groups_of(flights: FigureData) -> dict[str, NDArray[np.intp]]:
 
 def normals_of(aircraft: Sequence[str], moments: Sequence[Moments]) -> tuple[FittedNormal, ...]:
     """Normals fitted to the samples of the whole fleet and of each named aircraft."""
-    named = sorted({name for name in aircraft if name})
-    parts = {name: [one for own, one in zip(aircraft, moments, strict=True) if own == name] for name in named}
+    parts: dict[str, list[Moments]] = {name: [] for name in sorted({*aircraft}) if name}
+    for name, one in zip(aircraft, moments, strict=True):
+        if name:
+            parts[name].append(one)
     groups = {WHOLE_FLEET: list(moments)} | parts
     pooled = [(name, len(group), merged(group)) for name, group in groups.items()]
     return tuple(

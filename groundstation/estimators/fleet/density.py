@@ -1,7 +1,8 @@
 """Densities of many flights on one grid, from histograms on a lattice fine enough to be merged into any grid."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ LATTICE_DEG = 0.01
 BINS_PER_SIGMA = 5.0
 MOST_BINS = 400
 REACH_SIGMAS = 4.0
+AT_ONCE = 1000  # flights
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ def histogram_of(value_deg: FloatArray) -> SampleHistogram:
 
 
 def densities_of(
-    flight_id: Sequence[str], aircraft: Sequence[str], moments: Sequence[Moments], histograms: Sequence[SampleHistogram]
+    flight_id: Sequence[str], aircraft: Sequence[str], moments: Sequence[Moments], histograms: Iterable[SampleHistogram]
 ) -> Densities:
     """Put the samples of flights on one grid.
 
@@ -42,8 +44,10 @@ def densities_of(
 
     Parameters
     ----------
-    flight_id, aircraft, moments, histograms : sequences
+    flight_id, aircraft, moments : sequences
         One entry per flight with samples.
+    histograms : iterable
+        The same; they need not be there at once.
     """
     ids, names = np.array(flight_id, dtype=np.str_), np.array(aircraft, dtype=np.str_)
     samples = np.array([part.count for part in moments], dtype=np.int64)
@@ -51,14 +55,26 @@ def densities_of(
     density = np.zeros((len(ids), bins), dtype=np.float32)
     pooled = np.zeros(bins)
     width_deg = cells * LATTICE_DEG
-    for row, (histogram, total) in enumerate(zip(histograms, samples, strict=True)):
-        place = (histogram.cell.astype(np.int64) - first) // cells
-        inside = (place >= 0) & (place < bins)
-        counts = np.bincount(place[inside], histogram.count[inside], minlength=bins)
-        density[row] = counts / (total * width_deg)
-        pooled += counts
+    row, left = 0, iter(histograms)
+    while some := list(islice(left, AT_ONCE)):
+        counts = _counted(some, first, cells, bins)
+        total = samples[row : row + len(some), None] * width_deg
+        density[row : row + len(some)] = counts / total
+        pooled += counts.sum(axis=0)
+        row += len(some)
     edges = np.asarray((first + cells * np.arange(bins + 1)) * LATTICE_DEG, dtype=np.float64)
     return Densities(edges, ids, names, samples, density, pooled / (max(int(samples.sum()), 1) * width_deg))
+
+
+def _counted(histograms: Sequence[SampleHistogram], first: int, cells: int, bins: int) -> FloatArray:
+    """Samples of each histogram in the bins of the grid, shape (k, bins)."""
+    sizes = [len(one.cell) for one in histograms]
+    row = np.repeat(np.arange(len(sizes)), sizes)
+    place = (np.concatenate([one.cell for one in histograms]).astype(np.int64) - first) // cells
+    inside = (place >= 0) & (place < bins)
+    count = np.concatenate([one.count for one in histograms])[inside]
+    flat = np.bincount(row[inside] * bins + place[inside], count, minlength=len(sizes) * bins)
+    return np.asarray(flat.reshape(len(sizes), bins), dtype=np.float64)
 
 
 def _grid(moments: Sequence[Moments]) -> tuple[int, int, int]:

@@ -4,8 +4,10 @@ import math
 from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.results.fleet import FleetSkill
 from groundstation.results.forecast import METHODS
@@ -58,22 +60,50 @@ class SkillMerger:
 
     def add(self, row: SkillOfFlight) -> None:
         """Add a row of one flight."""
-        sums = self._sums.setdefault((row.method, row.horizon_min), _Sums())
-        sums.starts += row.starts
-        sums.squares_m2 += row.starts * row.rms_m**2
-        sums.rms_m.append(row.rms_m)
-        if row.is_within is not None:
-            sums.judged += 1
-            sums.within += row.is_within
-        if math.isfinite(row.coverage95):
-            sums.covered += row.starts * row.coverage95
-            sums.coverage_starts += row.starts
+        within = -1 if row.is_within is None else int(row.is_within)
+        columns = {name: np.array([value]) for name, value in vars(row).items() if name != "is_within"}
+        self.add_columns({**columns, "method": np.array([row.method], dtype=object), "is_within": np.array([within])})
+
+    def add_columns(self, rows: Mapping[str, NDArray[Any]]) -> None:
+        """Add rows of flights: the fields of :class:`SkillOfFlight` as columns, ``is_within`` -1 where it is None."""
+        for key, own in _groups(rows["method"], rows["horizon_min"]).items():
+            sums = self._sums.setdefault(key, _Sums())
+            starts, rms_m, coverage = (rows[name][own] for name in ("starts", "rms_m", "coverage95"))
+            judged, known = rows["is_within"][own] >= 0, np.isfinite(coverage)
+            sums.starts += int(starts.sum())
+            sums.squares_m2 = _added(sums.squares_m2, starts * rms_m**2)
+            sums.rms_m.extend(rms_m.tolist())
+            sums.judged += int(judged.sum())
+            sums.within += int((rows["is_within"][own] > 0).sum())
+            sums.covered = _added(sums.covered, (starts * coverage)[known])
+            sums.coverage_starts += int(starts[known].sum())
 
     def rows(self) -> tuple[FleetSkill, ...]:
         """What was added, by method in the order of ``METHODS``, then by horizon."""
         order = {name: place for place, name in enumerate(METHODS)}
         keys = sorted(self._sums, key=lambda key: (order.get(key[0], len(order)), *key))
         return tuple(_row(method, horizon_min, self._sums) for method, horizon_min in keys)
+
+
+def _groups(method: NDArray[Any], horizon_min: NDArray[np.float64]) -> dict[tuple[str, float], NDArray[np.intp]]:
+    """Rows of each method and horizon."""
+    if not len(method):
+        return {}
+    names, name = np.unique(method, return_inverse=True)
+    horizons, horizon = np.unique(horizon_min, return_inverse=True)
+    code = name * len(horizons) + horizon
+    order = np.argsort(code, kind="stable")
+    codes, starts = np.unique(code[order], return_index=True)
+    parts = np.split(order, starts[1:])
+    return {
+        (str(names[one // len(horizons)]), float(horizons[one % len(horizons)])): part
+        for one, part in zip(codes.tolist(), parts, strict=True)
+    }
+
+
+def _added(total: float, values: NDArray[np.float64]) -> float:
+    """A total with values added one after the other: the same however the flights are parted."""
+    return float(np.cumsum(np.concatenate([[total], values]))[-1])
 
 
 def _row(method: str, horizon_min: float, all_sums: Mapping[tuple[str, float], _Sums]) -> FleetSkill:

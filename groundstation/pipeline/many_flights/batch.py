@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path, PurePath
 
 from groundstation.base.errors import UnclaimedLogError, UsageError
+from groundstation.pipeline.many_flights.delta_sink import delta_place, put_flights
 from groundstation.pipeline.many_flights.fleet_store import Scan, refresh, scan
 from groundstation.pipeline.many_flights.found_sessions import (
     STATIONS_TOML,
@@ -56,6 +57,7 @@ def run_many(
     stations: Path | None = None,
     only_results: bool = False,
     timeout_s: float = math.inf,
+    store: str = "",
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
     """Run logs and folders of logs into ``out``, then the sessions among the flights; the index lists all of them.
@@ -77,6 +79,8 @@ def run_many(
         Neither recordings nor reports, of flights or of all; a later run without it makes them.
     timeout_s : float
         A log, or a session, that takes longer has failed, and the process that ran it is ended.
+    store : str
+        ``delta:`` and a path or URL: a Delta table that takes the rows of these flights, too.
 
     Returns
     -------
@@ -90,11 +94,13 @@ def run_many(
         is writing into it, or there is no such scheduler.
     """
     ground = None if stations is None else load_stations(stations)
+    if store:
+        delta_place(store)
     inputs = _inputs(paths, out, configuration)
     crew = _crew(scheduler, jobs or cores(), len(inputs), listen, timeout_s)
     make = partial(Job, configuration=configuration, fail_on=fail_on, with_pdf=with_pdf, only_results=only_results)
     listen(Event("begin", total=len(inputs)))
-    asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo, only_results=only_results)
+    asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo, only_results=only_results, store=store)
     if any(is_remote(str(place)) for place in (out, *paths)):
         remote = [
             RemoteJob(make(Path(), Path(), is_named=one.is_named), one.url, str(out), redo, one.size) for one in inputs
@@ -154,7 +160,7 @@ def _run_here(
     refuse_foreign(out, force)
     with alone_in(out):
         prepare(out)
-        known = KnownFlights(None if asked.redo else scan(out))
+        known = KnownFlights(None if asked.redo else out)
         placement = Placement(LocalOutput(out), [job.log for job in work])
 
         def left() -> Iterator[tuple[int, Job]]:
@@ -175,7 +181,8 @@ def _run_here(
         outcomes = (*placement.outcomes(), *sessions)
         found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
         problems = write_beside(out, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found)
-        return (*outcomes, *unwritten, *problems)
+        stored = put_flights(asked.store, found, outcomes) if asked.store else ()
+        return (*outcomes, *unwritten, *problems, *stored)
 
 
 def _swept(placement: Placement, out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, ...]]:
@@ -220,7 +227,8 @@ def _run_remote(
                 beside = write_beside(
                     copy, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found
                 )
-                problems = (*unwritten, *beside)
+                stored = put_flights(asked.store, found, outcomes) if asked.store else ()
+                problems = (*unwritten, *beside, *stored)
                 is_whole = True
             finally:
                 output.publish(FLEET_FILES, is_whole=is_whole)
@@ -326,7 +334,7 @@ def plan_many(
     inputs, out = _inputs(paths, out, configuration), Path(out)
     refuse_foreign(out, force=True)
     before = scan(out)
-    known = KnownFlights(None if redo else before)
+    known = KnownFlights(None if redo else out)
     make = partial(Job, out=out, configuration=configuration, with_pdf=with_pdf, only_results=only_results)
     work = [make(Path(one.url), is_named=one.is_named) for one in inputs]
     outcomes = []

@@ -1,11 +1,13 @@
 """A folder of flights as a fleet: its statistics, from what each flight adds, and fleet.parquet."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain, compress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError
 from groundstation.estimators.analyses import ANSWER_TYPES
@@ -15,6 +17,7 @@ from groundstation.estimators.fleet.density import densities_of
 from groundstation.estimators.fleet.deviation import deviations
 from groundstation.estimators.fleet.moments import Moments
 from groundstation.estimators.fleet.skill import SkillMerger
+from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
 from groundstation.pipeline.many_flights.fleet_rows import session_row
 from groundstation.pipeline.many_flights.fleet_share import (
     check_rows_of,
@@ -25,7 +28,7 @@ from groundstation.pipeline.many_flights.fleet_share import (
     skill_rows_of,
     to_arrow,
 )
-from groundstation.pipeline.many_flights.fleet_store import MOST_LISTED, Scan, scan
+from groundstation.pipeline.many_flights.fleet_store import MOST_LISTED, Scan, month_of, scan
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.figures import FigureData
 from groundstation.results.file_names import INDEX_JSON, SUMMARY
@@ -75,7 +78,8 @@ def gather(out: Path) -> FleetResults:
         When a file of the dataset of flights cannot be read.
     """
     found = scan(out)
-    return _results(found, *_shares(found))
+    shares, unread = _unread_shares(found)
+    return _results(found, flights_of(_flights(found, shares)), shares, unread)
 
 
 def write_fleet(out: Path, found: Scan) -> tuple[FleetResults, tuple[Outcome, ...]]:
@@ -95,7 +99,9 @@ def write_fleet(out: Path, found: Scan) -> tuple[FleetResults, tuple[Outcome, ..
     FleetResults, tuple of Outcome
         What :func:`gather` gives, and what could not be written.
     """
-    table, unread = _shares(found)
+    shares, unread = _unread_shares(found)
+    problems: tuple[Outcome, ...] = ()
+    table = _flights(found, shares)
     try:
         if len(found) > MOST_LISTED:
             (out / FLEET_PARQUET).unlink(missing_ok=True)
@@ -103,42 +109,56 @@ def write_fleet(out: Path, found: Scan) -> tuple[FleetResults, tuple[Outcome, ..
             write_bytes(out / FLEET_PARQUET, fleet_parquet(table))
     except OSError as error:
         problem = f"{out}: {FLEET_PARQUET} cannot be written ({error.strerror or error})"
-        return _results(found, table, unread), (Outcome(str(out), "failed", problem),)
-    return _results(found, table, unread), ()
+        problems = (Outcome(str(out), "failed", problem),)
+    flights = flights_of(table)
+    del table
+    return _results(found, flights, shares, unread), problems
 
 
-def _shares(found: Scan) -> tuple[Any, list[NotInFleet]]:
-    """The shares of all flights that can be read, and those that cannot."""
-    import pyarrow as pa
-
+def _unread_shares(found: Scan) -> tuple[Any, list[NotInFleet]]:
+    """Shares of the flights that the dataset has not, as far as they can be read, and those that cannot."""
     shares, unread = [], []
     for name in found.stale:
         try:
             shares.append(share_of(found.out / name))
         except GroundstationError as error:
             unread.append(NotInFleet("failed", str(found.out / name), str(error)))
-    columns = [name for name in to_arrow([]).column_names if name != "index"]
-    table = found.table(columns)
-    if shares:
-        table = pa.concat_tables([table, to_arrow(shares).select(table.column_names)]).sort_by("flight_id")
-    return table, unread
+    return to_arrow(shares), unread
 
 
-def _results(found: Scan, table: Any, unread: list[NotInFleet]) -> FleetResults:
+def _flights(found: Scan, shares: Any) -> Any:
+    """The columns of all flights, as Arrow."""
+    names = [column.name for column in FLIGHT_COLUMNS]
+    return _joined(found.table(names), shares.select(names))
+
+
+def _joined(table: Any, shares: Any) -> Any:
+    import pyarrow as pa
+
+    if not len(shares):
+        return table
+    return pa.concat_tables([table, shares.select(table.column_names)]).sort_by("flight_id")
+
+
+def _parts(found: Scan, shares: Any, columns: Sequence[str]) -> Iterator[Any]:
+    """Some columns of all flights in the order of their ids: a month at a time, where the months are in that order."""
+    months = list(map(month_of, found.fresh))
+    if len(shares) or not months or months != sorted(months):
+        yield _joined(found.table(columns), shares)
+    else:
+        yield from found.months_of(columns)
+
+
+def _results(found: Scan, flights: FigureData, shares: Any, unread: list[NotInFleet]) -> FleetResults:
     settings = ChangeSettings()
-    flights = flights_of(table)
-    sampled = np.flatnonzero(flights["samples"] > 0)
-    moments = [
-        Moments(
-            int(flights["samples"][row]), *(float(flights[f"sample_{name}"][row]) for name in ("mean_deg", "m2_deg2"))
-        )
-        for row in sampled
-    ]
-    aircraft = flights["aircraft"][sampled].tolist()
-    histograms = list(histograms_of(table, sampled))
+    is_sampled = flights["samples"] > 0
+    figures = (flights[name][is_sampled].tolist() for name in ("samples", "sample_mean_deg", "sample_m2_deg2"))
+    moments = [Moments(int(count), mean, m2) for count, mean, m2 in zip(*figures, strict=True)]
+    aircraft = flights["aircraft"][is_sampled].tolist()
+    cells = _parts(found, shares, ("sample_cell", "sample_count"))
+    histograms = compress(chain.from_iterable(map(histograms_of, cells)), is_sampled.tolist())
     trend, changes = answer.trends(flights, settings)
-    checks = _table("calibration_checks", CHECK_COLUMNS, _check_rows(table, flights))
-    merger, skill_rows = _skill(table, flights)
+    merger, skill_flights, checks = _details(found, flights, shares)
     sessions: list[SessionRow] = []
     for folder in found.sessions:
         try:
@@ -147,13 +167,13 @@ def _results(found: Scan, table: Any, unread: list[NotInFleet]) -> FleetResults:
             unread.append(NotInFleet("failed", str(folder), str(error)))
     return FleetResults(
         flights=flights,
-        densities=densities_of(flights["flight_id"][sampled].tolist(), aircraft, moments, histograms),
+        densities=densities_of(flights["flight_id"][is_sampled].tolist(), aircraft, moments, histograms),
         normals=answer.normals_of(aircraft, moments),
         by_aircraft=answer.by_aircraft(flights),
         trend=trend,
         change_points=changes,
         skill=merger.rows(),
-        skill_flights=_table("skill_flights", SKILL_COLUMNS, skill_rows),
+        skill_flights=skill_flights,
         calibration=answer.calibrations(checks),
         calibration_checks=checks,
         outliers=answer.outliers(flights),
@@ -164,34 +184,36 @@ def _results(found: Scan, table: Any, unread: list[NotInFleet]) -> FleetResults:
     )
 
 
-def _names(flights: FigureData) -> Iterator[tuple[str, str]]:
-    """Flight id and aircraft of each flight."""
-    return zip(flights["flight_id"].tolist(), flights["aircraft"].tolist(), strict=True)
+def _details(found: Scan, flights: FigureData, shares: Any) -> tuple[SkillMerger, FigureData, FigureData]:
+    """Skill merged over the flights, the rows of each flight's shipped method, all checks."""
+    merger, first = SkillMerger(), 0
+    skill: list[dict[str, NDArray[Any]]] = []
+    checks: list[dict[str, NDArray[Any]]] = []
+    for part in _parts(found, shares, ("shipped", "skill", "checks")):
+        rows, columns = skill_rows_of(part)
+        merger.add_columns(columns)
+        is_shipped = columns["is_shipped"]
+        told = {name: values[is_shipped] for name, values in columns.items() if name in SKILL_COLUMNS}
+        skill.append(told | {"row": first + rows[is_shipped]})
+        rows, columns = check_rows_of(part)
+        checks.append(columns | {"row": first + rows})
+        first += len(part)
+    return (
+        merger,
+        _table("skill_flights", SKILL_COLUMNS, flights, skill),
+        _table("calibration_checks", CHECK_COLUMNS, flights, checks),
+    )
 
 
-def _check_rows(table: Any, flights: FigureData) -> list[tuple[Any, ...]]:
-    return [
-        (check.quantity, *names, check.verdict, check.residual_deg, check.sigma_deg, check.z, check.is_inside)
-        for names, checks in zip(_names(flights), check_rows_of(table), strict=True)
-        for check in checks
-    ]
-
-
-def _skill(table: Any, flights: FigureData) -> tuple[SkillMerger, list[tuple[Any, ...]]]:
-    """Skill merged over the flights, and the rows of each flight's shipped method."""
-    merger, rows = SkillMerger(), []
-    for names, start, (shipped, skill) in zip(_names(flights), flights["start_utc"], skill_rows_of(table), strict=True):
-        for one in skill:
-            merger.add(one)
-            if one.method == shipped:
-                figures = (one.horizon_min, one.starts, one.rms_m, one.coverage95)
-                rows.append((*names, start, one.method, *figures))
-    return merger, rows
-
-
-def _table(name: str, types: Mapping[str, str], rows: list[tuple[Any, ...]]) -> FigureData:
-    columns = zip(*rows, strict=True) if rows else ([] for _ in types)
-    arrays = {key: np.array(values, dtype=types[key]) for key, values in zip(types, columns, strict=True)}
+def _table(
+    name: str, types: Mapping[str, str], flights: FigureData, parts: Sequence[Mapping[str, NDArray[Any]]]
+) -> FigureData:
+    """A table from parts that have some of its columns and, as ``row``, the flight that the others are of."""
+    rows = np.concatenate([np.zeros(0, np.intp), *(part["row"] for part in parts)])
+    arrays = {}
+    for key, kind in types.items():
+        own = [part[key] for part in parts if key in part]
+        arrays[key] = np.concatenate(own).astype(kind) if own else flights[key][rows]
     return FigureData(name, arrays, {})
 
 

@@ -27,12 +27,28 @@ from groundstation.results.files import load, utf8_text
 from groundstation.tables.session_tracks import aircraft_named
 
 TEXTS = ("text", "category")
-TEXTS_AT_ONCE = 1000
+SKILL_FIELDS = {
+    "method": "string",
+    "horizon_min": "double",
+    "starts": "int64",
+    "rms_m": "double",
+    "coverage95": "double",
+    "is_within": "bool",
+}  # of SkillOfFlight
+CHECK_FIELDS = {
+    "quantity": "string",
+    "z": "double",
+    "is_inside": "bool",
+    "residual_deg": "double",
+    "sigma_deg": "double",
+    "verdict": "string",
+}  # of Check
 MOST_WIDE_CHARACTERS = 10_000_000  # of a column of texts as wide as its longest; beyond it each is an object
 DETAILS = {
     "index": "JSON: the flight's row of index.json",
-    "forecast": "JSON: the shipped method, and the skill of each method and horizon",
-    "checks": "JSON: what independent thing each estimate was compared with",
+    "shipped": "the shipped method of the forecast",
+    "skill": "forecast skill of each method and horizon",
+    "checks": "what independent thing each estimate was compared with",
     "sample_cell": "cells of 0.01 deg that hold used heading samples",
     "sample_count": "how many samples each of them holds",
 }
@@ -104,10 +120,10 @@ def to_arrow(shares: Sequence[FlightShare]) -> Any:
     import pyarrow as pa
 
     arrays = {column.name: _arrow(column, [share.row[column.name] for share in shares]) for column in FLIGHT_COLUMNS}
-    forecasts = [[share.shipped, [_finite(one) for one in share.skill]] for share in shares]
     arrays["index"] = pa.array([_json(to_json_exactly(share.index)) for share in shares], pa.string())
-    arrays["forecast"] = pa.array(list(map(_json, forecasts)), pa.string())
-    arrays["checks"] = pa.array([_json([_finite(one) for one in share.checks]) for share in shares], pa.string())
+    arrays["shipped"] = pa.array([utf8_text(share.shipped) for share in shares], pa.string())
+    arrays["skill"] = pa.array([list(map(_finite, share.skill)) for share in shares], _rows_of(SKILL_FIELDS))
+    arrays["checks"] = pa.array([list(map(_finite, share.checks)) for share in shares], _rows_of(CHECK_FIELDS))
     for name, part in (("sample_cell", "cell"), ("sample_count", "count")):
         counts = [getattr(share.histogram, part) for share in shares]
         arrays[name] = pa.array(counts, pa.list_(pa.field("element", pa.int32())))  # as Parquet names it
@@ -126,31 +142,56 @@ def index_rows_of(table: Any) -> list[IndexRow]:
     return [from_json(IndexRow, json.loads(text)) for text in table.column("index").to_pylist()]
 
 
-def skill_rows_of(table: Any) -> Iterator[tuple[str, list[SkillOfFlight]]]:
-    """The shipped method and the skill of each flight in a table of shares."""
-    for text in _texts(table, "forecast"):
-        shipped, rows = json.loads(text)
-        yield shipped, [SkillOfFlight(**({"coverage95": math.nan} | row)) for row in rows]
+def skill_rows_of(table: Any) -> tuple[NDArray[np.intp], dict[str, NDArray[Any]]]:
+    """The skill of all flights in a table of shares: the row of the flight, and columns; ``is_within`` -1 is unknown.
+
+    ``is_shipped`` says whether the method is the shipped one of its flight.
+    """
+    rows, parts = _flat(table.column("skill"))
+    columns = {name: _values(array, -1 if name == "is_within" else math.nan) for name, array in parts.items()}
+    shipped = np.array(table.column("shipped").to_pylist(), dtype=object)
+    columns["is_shipped"] = (columns["method"] == shipped[rows]).astype(np.bool_)
+    return rows, columns
 
 
-def check_rows_of(table: Any) -> Iterator[list[Check]]:
-    """The checks of each flight in a table of shares."""
-    for text in _texts(table, "checks"):
-        yield [Check(**row) for row in json.loads(text)]
+def check_rows_of(table: Any) -> tuple[NDArray[np.intp], dict[str, NDArray[Any]]]:
+    """The checks of all flights in a table of shares: the row of the flight, and columns."""
+    rows, parts = _flat(table.column("checks"))
+    return rows, {name: _values(array, math.nan) for name, array in parts.items()}
 
 
-def histograms_of(table: Any, rows: NDArray[np.intp]) -> Iterator[SampleHistogram]:
-    """The histogram of the used samples of some flights in a table of shares."""
-    yield from map(
-        SampleHistogram, *(_lists(table.column(name).take(rows)) for name in ("sample_cell", "sample_count"))
-    )
+def _flat(column: Any) -> tuple[NDArray[np.intp], dict[str, Any]]:
+    """Lists of rows as columns, and the list that each is from."""
+    whole = column.combine_chunks()
+    parts = whole.flatten()
+    counts = np.diff(whole.offsets.to_numpy())
+    names = [field.name for field in parts.type]
+    return np.repeat(np.arange(len(whole)), counts), dict(zip(names, parts.flatten(), strict=True))
 
 
-def _texts(table: Any, name: str) -> Iterator[str]:
-    """The texts of a column, a few at a time."""
-    column = table.column(name)
-    for start in range(0, len(column), TEXTS_AT_ONCE):
-        yield from column.slice(start, TEXTS_AT_ONCE).to_pylist()
+def _values(array: Any, missing: float) -> NDArray[Any]:
+    """Values of Arrow; ``missing`` stands for a number or a flag that is not there."""
+    import pyarrow as pa
+
+    if pa.types.is_string(array.type):
+        return np.array(array.to_pylist(), dtype=object)
+    if pa.types.is_boolean(array.type):
+        return np.asarray(array.cast(pa.int8()).fill_null(int(np.nan_to_num(missing))).to_numpy(zero_copy_only=False))
+    if pa.types.is_floating(array.type):
+        array = array.fill_null(missing)
+    return np.asarray(array.to_numpy(zero_copy_only=False))
+
+
+def _rows_of(fields: Mapping[str, str]) -> Any:
+    import pyarrow as pa
+
+    struct = pa.struct([(name, pa.type_for_alias(kind)) for name, kind in fields.items()])
+    return pa.list_(pa.field("element", struct))  # as Parquet names it
+
+
+def histograms_of(table: Any) -> Iterator[SampleHistogram]:
+    """The histogram of the used samples of each flight in a table of shares."""
+    yield from map(SampleHistogram, *(_lists(table.column(name)) for name in ("sample_cell", "sample_count")))
 
 
 def fleet_parquet(table: Any) -> bytes:
@@ -173,13 +214,14 @@ def parquet_bytes(table: Any) -> bytes:
             again = table.column(place).cast(pa.string()).combine_chunks().dictionary_encode()
             table = table.set_column(place, pa.field(one.name, again.type), again)
     buffer = io.BytesIO()
-    pq.write_table(table.combine_chunks(), buffer, compression="zstd")
+    pq.write_table(table.combine_chunks(), buffer, compression="zstd", write_page_checksum=True)
     return buffer.getvalue()
 
 
 def _finite(row: Any) -> dict[str, Any]:
-    """The fields of a row that are numbers, texts or flags; JSON knows no NaN."""
-    return {name: value for name, value in asdict(row).items() if value == value}
+    """The fields of a row without those that are NaN, which are missing."""
+    found = {name: value for name, value in asdict(row).items() if value == value}
+    return {name: utf8_text(value) if isinstance(value, str) else value for name, value in found.items()}
 
 
 def _json(document: Any) -> str:

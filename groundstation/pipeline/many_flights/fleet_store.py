@@ -6,48 +6,47 @@ whole, the hidden one last, so that a run that is killed leaves a month that is 
 """
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from hashlib import blake2b
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
+
+import numpy as np
 
 from groundstation.base.errors import GroundstationError
-from groundstation.base.units import NS_PER_S
 from groundstation.base.version import __version__
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
 from groundstation.pipeline.many_flights.fleet_samples import SampleStore
-from groundstation.pipeline.many_flights.fleet_share import DETAILS, FlightShare, parquet_bytes, share_of, to_arrow
+from groundstation.pipeline.many_flights.fleet_share import DETAILS, parquet_bytes, share_of, to_arrow
+from groundstation.pipeline.many_flights.flight_keys import Key, Keys, key_of, key_path, read_keys, write_keys
 from groundstation.pipeline.many_flights.inputs import is_flight, is_session
 from groundstation.pipeline.many_flights.workers import Crew, in_turn
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Listener, silent
-from groundstation.results.file_names import ARRAYS, MANIFEST, SUMMARY
-from groundstation.results.files import utf8_text, write_bytes
+from groundstation.results.file_names import ARRAYS, SUMMARY
+from groundstation.results.files import write_bytes
 
-FLIGHTS, KEYS = "flights.parquet", ".flights"
+FLIGHTS = "flights.parquet"
 UNKNOWN = "unknown"
 _COLUMNS = [(column.name, column.kind, column.meaning) for column in FLIGHT_COLUMNS]
 VERSION = repr((__version__, _COLUMNS, DETAILS))  # with another one everything is read again
-STAMPED = ("", SUMMARY, MANIFEST, f"{ARRAYS}/heading_samples.parquet")  # "": the folder, whose time its names change
+STAMPED = ("", f"/{SUMMARY}", f"/{ARRAYS}/heading_samples.parquet")
+STAMPED_AT_LEAST = 4  # numbers: of the folder and the summary
 MOST_LISTED = 20_000  # flights: of more there is no index.json with a row of each, and no fleet.parquet
 MOST_READ_HERE = 300  # flights, by the process that leads a run
 _VERSION = int.from_bytes(blake2b(VERSION.encode(), digest_size=8).digest(), "big")
 
 
-class Key(NamedTuple):
-    """What is known of a flight folder without reading it; ``stamp`` is of its files when it was read."""
+class DamagedMonthError(GroundstationError):
+    """A month of the dataset cannot be read; ``month`` says which."""
 
-    flight_id: str
-    stamp: int
-    path: str
-    sha256: str
-    link_name: str
-    hears: str
-    start_ns: int | None
-    end_ns: int | None
-    samples: str
+    def __init__(self, out: Path, month: str, found: str) -> None:
+        place, hint = str(_path(out, month)), "a run, or `report OUT`, makes it again from the flight folders"
+        super().__init__(place, found, "a file of a run", hint)
+        self.month = month
 
 
 @dataclass(frozen=True)
@@ -57,8 +56,8 @@ class Scan:
     Parameters
     ----------
     out : Path
-    fresh : mapping
-        Those that have not changed since the dataset was written, by flight id, in that order.
+    fresh : Keys
+        Those that have not changed since the dataset was written.
     stale : tuple of str
         The others, in order.
     others : tuple of str
@@ -68,7 +67,7 @@ class Scan:
     """
 
     out: Path
-    fresh: Mapping[str, Key]
+    fresh: Keys
     stale: tuple[str, ...]
     others: tuple[str, ...]
     months: Mapping[str, int]
@@ -79,6 +78,10 @@ class Scan:
     def with_sessions(self, names: Iterable[str]) -> "Scan":
         """The same with session folders that were made since."""
         return replace(self, others=tuple(sorted({*self.others, *names})))
+
+    def with_only(self, flight_ids: Iterable[str]) -> "Scan":
+        """The same with some of the flights alone."""
+        return replace(self, fresh=self.fresh.only(flight_ids), stale=())
 
     @property
     def sessions(self) -> list[Path]:
@@ -91,24 +94,50 @@ class Scan:
         return tuple(sorted((*self.fresh, *self.stale)))
 
     def table(self, columns: Sequence[str] | None = None) -> Any:
-        """The shares of the fresh flights, or some columns of them, in the order of flight ids."""
+        """The shares of the fresh flights, or some columns of them, in the order of flight ids.
+
+        Raises
+        ------
+        DamagedMonthError
+            When a file of the dataset cannot be read.
+        """
         import pyarrow as pa
+
+        empty = to_arrow([]) if columns is None else to_arrow([]).select(_with_id(columns))
+        return _sorted(pa.concat_tables([empty, *self.months_of(columns)]))
+
+    def months_of(self, columns: Sequence[str] | None = None) -> Iterator[Any]:
+        """The same, a month at a time.
+
+        Raises
+        ------
+        DamagedMonthError
+            When a file of the dataset cannot be read.
+        """
         import pyarrow.parquet as pq
 
-        months = sorted({month_of(name) for name in self.fresh})
-        wanted = None if columns is None else list(dict.fromkeys(("flight_id", *columns)))
-        tables = [to_arrow([]) if wanted is None else to_arrow([]).select(wanted)]
-        place, hint = str(self.out / FLIGHTS), "remove it: `report OUT` makes it again"
-        try:
-            for month in months:
-                with pq.ParquetFile(_path(self.out, month)) as file:
-                    tables.append(file.read(wanted))
-            found = _chosen(pa.concat_tables(tables), self.fresh)
-        except (OSError, ValueError) as error:
-            raise GroundstationError(place, type(error).__name__, "files of a run", hint) from error
-        if len(found) != len(self.fresh):
-            raise GroundstationError(place, f"{len(found)} flights", f"{len(self.fresh)}", hint)
-        return found
+        by_month: dict[str, list[str]] = {}
+        for name in self.fresh:
+            by_month.setdefault(month_of(name), []).append(name)
+        for month, names in sorted(by_month.items()):
+            try:
+                with pq.ParquetFile(_path(self.out, month), page_checksum_verification=True) as file:
+                    found = _chosen(file.read(None if columns is None else _with_id(columns)), names)
+            except (OSError, ValueError, KeyError) as error:
+                raise DamagedMonthError(self.out, month, type(error).__name__) from error
+            if len(found) != len(names):
+                raise DamagedMonthError(self.out, month, f"{len(found)} flights instead of {len(names)}")
+            yield found
+
+
+def _with_id(columns: Sequence[str]) -> list[str]:
+    return list(dict.fromkeys(("flight_id", *columns)))
+
+
+def _sorted(table: Any) -> Any:
+    """Rows in the order of flight ids, which that of the months is but for flights without a time."""
+    names = table.column("flight_id").to_pylist()
+    return table if names == sorted(names) else table.take(np.argsort(np.array(names, dtype=object), kind="stable"))
 
 
 def month_of(flight_id: str) -> str:
@@ -125,39 +154,53 @@ def month_of(flight_id: str) -> str:
 
 def scan(out: Path) -> Scan:
     """Look at the flight folders of an OUT and at the dataset: of a known flight only times and sizes are asked for."""
-    by_month = {path.stem: _keys(out, path.stem) for path in sorted((out / FLIGHTS).glob("*.parquet"))}
-    keys = {key.flight_id: key for found in by_month.values() for key in found}
-    fresh: dict[str, Key] = {}
+    by_month = _keys_by_month(out)
+    keys = Keys.joined(list(by_month.values()))
+    stamps, root = keys.stamps(), str(out)
+    fresh: list[int] = []
     stale: list[str] = []
     others: list[str] = []
-    for name in sorted(_folder_names(out)):
-        key, stamp = keys.get(name), stamp_of(out, name)
-        if key is not None and key.stamp == stamp:
-            fresh[name] = key
+    for name in folder_names(out):
+        place, stamp = keys.place(name), stamp_of(root, name)
+        if place is not None and stamps[place] == stamp:
+            fresh.append(place)
         elif stamp is not None:
             (stale if is_flight(out / name) else others).append(name)
-    return Scan(out, fresh, tuple(stale), tuple(others), {month: len(found) for month, found in by_month.items()})
+    months = {month: len(found) for month, found in by_month.items()}
+    return Scan(out, keys.at(fresh), tuple(stale), tuple(others), months)
 
 
-def _folder_names(out: Path) -> list[str]:
+def remembered(out: Path) -> Keys:
+    """What is known of the flights of an OUT, also of those that have changed since or are gone."""
+    return Keys.joined(list(_keys_by_month(out).values()))
+
+
+def _keys_by_month(out: Path) -> dict[str, Keys]:
+    return {path.stem: read_keys(out, path.stem) for path in sorted((out / FLIGHTS).glob("*.parquet"))}
+
+
+def folder_names(out: Path) -> list[str]:
+    """Names of the folders of an OUT that are not hidden, in order."""
     try:
         with os.scandir(out) as entries:
-            return [entry.name for entry in entries if entry.name[0] != "." and entry.is_dir()]
+            return sorted(entry.name for entry in entries if entry.name[0] != "." and entry.is_dir())
     except FileNotFoundError:
         return []
 
 
-def stamp_of(out: Path, name: str) -> int | None:
-    """Times and sizes of what a share is made from, in one number; None where there is no summary."""
-    told: list[int] = []
-    for file in STAMPED:
-        try:
-            found = os.stat(f"{out}/{name}/{file}")  # noqa: PTH116 - a Path costs more than the question
+def stamp_of(out: Path | str, name: str) -> int | None:
+    """Times and sizes that change with a flight, in one number; None where there is no summary.
+
+    Asked for are the folder, whose time every file that is put there or replaced changes, the summary and the samples.
+    """
+    path, told = f"{out}/{name}", []  # a Path costs more than the question
+    try:
+        for file in STAMPED:
+            found = os.stat(f"{path}{file}")  # noqa: PTH116
             told += [found.st_mtime_ns, found.st_size if file else 0]
-        except OSError:
-            if file == SUMMARY:
-                return None
-            told += [0, -1]
+    except OSError:
+        if len(told) < STAMPED_AT_LEAST:
+            return None
     return hash((_VERSION, *told))  # of whole numbers: the same in every process
 
 
@@ -197,7 +240,8 @@ def refresh(out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, .
     """
     before, samples = scan(out), SampleStore(out)
     there = samples.files()
-    fresh = {name for name, key in before.fresh.items() if not key.samples or key.samples in there}
+    kept = [place for place, file in enumerate(before.fresh.column("samples")) if not file or file in there]
+    fresh = before.fresh.at(kept)
     jobs = list(_jobs(before, fresh))
     here: Crew = partial(in_turn, listen=silent)
     is_much = crew is not None and sum(len(job.read) for job in jobs) > MOST_READ_HERE
@@ -205,27 +249,42 @@ def refresh(out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, .
     problems = tuple(one for _, one in sorted(ended.items()) if one.state == "failed")
     if problems:
         return scan(out), problems
-    keys = {name: before.fresh[name] for name in fresh}
-    months = dict(before.months)
-    for job in jobs:
-        written = {key.flight_id: key for key in _keys(out, job.month)}
-        keys, months[job.month] = keys | written, len(written)
-    keys = {name: keys[name] for name in before.names if name in keys}
-    unread = tuple(name for name in before.names if name not in keys)
-    expected = {key.samples for key in keys.values()}
-    samples.remove(name for name in there - expected if Path(name).stem not in unread)
-    return Scan(out, keys, unread, before.others, months), ()
+    after = _after(before, fresh, [job.month for job in jobs])
+    expected = set(after.fresh.column("samples"))
+    samples.remove(name for name in there - expected if Path(name).stem not in after.stale)
+    return after, ()
 
 
-def _jobs(before: Scan, fresh: set[str]) -> Iterator[MonthJob]:
+def _after(before: Scan, fresh: Keys, written: Collection[str]) -> Scan:
+    """The scan once some months are written."""
+    if not written:
+        return replace(before, fresh=fresh)
+    new = {month: read_keys(before.out, month) for month in written}
+    unchanged = fresh.at([place for place, name in enumerate(fresh) if month_of(name) not in new])
+    keys = Keys.joined([unchanged, *new.values()]).only(before.names)
+    months = {**before.months, **{month: len(found) for month, found in new.items()}}
+    return replace(before, fresh=keys, stale=tuple(name for name in before.names if name not in keys), months=months)
+
+
+def _jobs(before: Scan, fresh: Keys) -> Iterator[MonthJob]:
     """The months that are to be written: with flights that changed, and with some that are gone."""
-    kept: dict[str, list[str]] = {}
+    counts = Counter(map(month_of, fresh))
     read: dict[str, list[str]] = {}
-    for name in before.names:
-        (kept if name in fresh else read).setdefault(month_of(name), []).append(name)
-    for month in sorted({*before.months, *read}):
-        if month in read or before.months.get(month) != len(kept.get(month, ())):
-            yield MonthJob(before.out, month, frozenset(kept.get(month, ())), tuple(read.get(month, ())))
+    for name in sorted({*before.stale, *(name for name in before.fresh if name not in fresh)}):
+        read.setdefault(month_of(name), []).append(name)
+    changed = {*read, *(month for month, count in before.months.items() if count != counts[month])}
+    kept: dict[str, list[str]] = {month: [] for month in changed}
+    for name in fresh if changed else ():
+        if (month := month_of(name)) in changed:
+            kept[month].append(name)
+    for month in sorted(changed):
+        yield MonthJob(before.out, month, frozenset(kept[month]), tuple(read.get(month, ())))
+
+
+def forget_month(out: Path, month: str) -> None:
+    """Remove a month of the dataset: its flights are read again."""
+    for path in (key_path(out, month), _path(out, month)):
+        path.unlink(missing_ok=True)
 
 
 def write_month(job: MonthJob, listen: Listener = silent) -> Outcome:
@@ -241,31 +300,31 @@ def write_month(job: MonthJob, listen: Listener = silent) -> Outcome:
 def _write(job: MonthJob) -> None:
     import pyarrow as pa
 
-    keys = [key for key in _keys(job.out, job.month) if key.flight_id in job.kept]
-    old = _chosen(_read(_path(job.out, job.month)), {key.flight_id: key for key in keys})
+    keys = read_keys(job.out, job.month).only(job.kept)
+    old = _chosen(_read(_path(job.out, job.month)), keys)
+    keys = keys.only(old.column("flight_id").to_pylist())
     samples, shares = SampleStore(job.out), []
-    for name in sorted({*job.read, *job.kept} - set(old.column("flight_id").to_pylist())):
+    new: list[Key] = []
+    for name in sorted({*job.read, *job.kept}.difference(keys)):
         stamp = stamp_of(job.out, name)
         try:
             share = share_of(job.out / name, samples)
         except GroundstationError:  # it is told of where the fleet is put together
             continue
         shares.append(share)
-        keys.append(key_of(share, stamp or 0))
-    put_month(job.out, job.month, pa.concat_tables([old, to_arrow(shares)]), keys)
+        new.append(key_of(share, stamp or 0))
+    put_month(job.out, job.month, pa.concat_tables([old, to_arrow(shares)]), Keys.joined([keys, Keys.of(new)]))
 
 
-def put_month(out: Path, month: str, table: Any, keys: Sequence[Key]) -> None:
+def put_month(out: Path, month: str, table: Any, keys: Keys) -> None:
     """Put a month of the dataset: the shares of the flights that have a key, in the order of their ids."""
-    by_id = {key.flight_id: key for key in keys}
-    paths = _path(out, month), _key_path(out, month)
-    if not by_id:
-        for path in paths:
-            path.unlink(missing_ok=True)
+    if not len(keys):
+        forget_month(out, month)
         return
-    for path, content in zip(paths, (_chosen(table, by_id), _key_table(by_id)), strict=True):
-        path.parent.mkdir(exist_ok=True)
-        write_bytes(path, parquet_bytes(content))
+    path = _path(out, month)
+    path.parent.mkdir(exist_ok=True)
+    write_bytes(path, parquet_bytes(_chosen(table, keys)))
+    write_keys(out, month, keys)
 
 
 def _path(out: Path, month: str) -> Path:
@@ -278,7 +337,7 @@ def _read(path: Path) -> Any:
 
     empty = to_arrow([])
     try:
-        with pq.ParquetFile(path) as file:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
             found = file.read()
     except (OSError, ValueError):
         return empty
@@ -287,49 +346,8 @@ def _read(path: Path) -> Any:
 
 def _chosen(table: Any, keys: Iterable[str]) -> Any:
     """The rows of some flights, in the order of their ids."""
-    import numpy as np
-
     wanted, names = sorted(keys), table.column("flight_id").to_pylist()
     if names == wanted:
         return table
     places = {name: place for place, name in enumerate(names)}
     return table.take(np.array([places[name] for name in wanted if name in places], dtype=np.int64))
-
-
-def _key_path(out: Path, month: str) -> Path:
-    return out / KEYS / f"{month}.parquet"
-
-
-def _keys(out: Path, month: str) -> list[Key]:
-    """What is known of the flights of a month; nothing where it cannot be read."""
-    import pyarrow.parquet as pq
-
-    try:
-        with pq.ParquetFile(_key_path(out, month)) as file:
-            table = file.read()
-        return list(map(Key, *(table.column(name).to_pylist() for name in Key._fields)))
-    except (OSError, ValueError, KeyError):
-        return []
-
-
-def key_of(share: FlightShare, stamp: int) -> Key:
-    """What a run must know of a flight whose folder had a stamp when its share was read."""
-    row, start_ns = share.row, share.row["start_utc"]
-    duration_s = row["duration_s"]
-    is_timed = start_ns is not None and duration_s == duration_s
-    end_ns = start_ns + round(duration_s * NS_PER_S) if is_timed else None
-    path, name, hears = map(utf8_text, (share.path, share.link_name, "\n".join(share.hears)))
-    sha256 = str(share.index.sha256)
-    return Key(row["flight_id"], stamp, path, sha256, name, hears, start_ns, end_ns, share.samples)
-
-
-def _key_table(by_id: Mapping[str, Key]) -> Any:
-    import pyarrow as pa
-
-    numbers = ("stamp", "start_ns", "end_ns")
-    columns = zip(*(by_id[name] for name in sorted(by_id)), strict=True)
-    arrays = {
-        name: pa.array(values, pa.int64() if name in numbers else pa.string())
-        for name, values in zip(Key._fields, columns, strict=True)
-    }
-    return pa.table(arrays)

@@ -30,7 +30,7 @@ class Asked:
     """How a run is to do its sessions; the fields are those of :class:`SessionJob`.
 
     ``stations`` is None where no file was named: then there may be one beside the logs. ``mcap_in`` gives the MCAP of a
-    flight folder.
+    flight folder. ``store`` is the table that takes the rows of the flights; empty without one.
     """
 
     out: Path
@@ -41,6 +41,7 @@ class Asked:
     redo: bool = False
     mcap_in: Callable[[Path], Path] = lambda folder: file_in(folder, ".mcap")
     only_results: bool = False
+    store: str = ""
 
 
 @dataclass(frozen=True)
@@ -53,9 +54,9 @@ class FoundSessions:
 
 def find_sessions(asked: Asked, found: Scan, flight_ids: AbstractSet[str]) -> FoundSessions:
     """Find the sessions in which one of these flights takes part, with whatever other flight of the folder."""
-    members = members_of(found)
-    if not any(one.hears and one.folder.name in flight_ids for one in members):
+    if not any(one.hears for one in members_of(found, flight_ids)):
         return FoundSessions()
+    members = members_of(found)
     groups, apart = sessions_among(members, lambda folder: _heard(asked.mcap_in, folder))
     jobs: list[SessionJob] = []
     told: list[Outcome] = []

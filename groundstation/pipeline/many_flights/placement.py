@@ -3,8 +3,9 @@
 import json
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from groundstation.base.errors import GroundstationError
 from groundstation.pipeline.many_flights.fleet_store import Scan
@@ -16,8 +17,7 @@ from groundstation.results.file_names import MANIFEST
 from groundstation.results.files import utf8_text
 
 
-@dataclass(frozen=True)
-class _Origin:
+class _Origin(NamedTuple):
     """Which log a flight folder came from: where it was, and the digest of its content."""
 
     path: str
@@ -109,9 +109,9 @@ class Placement:
         now = {outcome.sha256: outcome.flight_id for outcome in flights}
         versions = {(utf8_text(_place_of(one)), plain_id(one.flight_id, one.sha256)) for one in flights}
         old = []
+        known = dict(zip(found.fresh, map(_Origin, *map(found.fresh.column, ("path", "sha256"))), strict=True))
         for name in found.names:
-            known = found.fresh.get(name)
-            origin = _origin_of(found.out / name) if known is None else _Origin(known.path, known.sha256)
+            origin = known.get(name) or _origin_of(found.out / name)
             if origin is None or now.get(origin.sha256) == name:
                 continue
             if origin.sha256 in now or (utf8_text(origin.path), plain_id(name, origin.sha256)) in versions:

@@ -9,7 +9,15 @@ from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET, write_fleet
 from groundstation.pipeline.many_flights.fleet_columns import INDEXED, answer_values
 from groundstation.pipeline.many_flights.fleet_samples import SAMPLES
 from groundstation.pipeline.many_flights.fleet_share import index_rows_of
-from groundstation.pipeline.many_flights.fleet_store import FLIGHTS, MOST_LISTED, Scan, refresh, scan
+from groundstation.pipeline.many_flights.fleet_store import (
+    FLIGHTS,
+    MOST_LISTED,
+    DamagedMonthError,
+    Scan,
+    forget_month,
+    refresh,
+    scan,
+)
 from groundstation.pipeline.many_flights.inputs import (
     FLIGHT_FOLDER_MARK,
     OUT_FOLDER_MARK,
@@ -43,28 +51,50 @@ def write_beside(
     With ``only_results`` the page and the recording of all flights are removed: they would tell of an earlier run.
     """
     problems: list[Outcome] = []
+    again: set[str] = set()
     try:
         with told_in_a_line(str(out)):
-            if found is None:
-                found, unwritten = refresh(out)
-                problems += unwritten
-            problems += write_index_of(out, outcomes, kept_rows, found)
-            fleet, unwritten = write_fleet(out, found)
-            problems += unwritten
-            problem = None
-            if only_results:
-                for name in (FLEET_PAGE, FLEET_PDF, FLEET_RECORDING):
-                    (out / name).unlink(missing_ok=True)
-            else:
-                from groundstation.viewer.fleet import write_fleet_recording
-
-                problem = write_fleet_report(out, fleet, with_pdf=with_pdf).problem
-                write_fleet_recording(out / FLEET_RECORDING, fleet)
+            while True:
+                if found is None:
+                    found, unwritten = refresh(out)
+                    problems += unwritten
+                try:
+                    problems += _write_beside(out, outcomes, kept_rows, found, with_pdf, only_results)
+                    break
+                except DamagedMonthError as error:
+                    if error.month in again:  # making it again did not help
+                        raise
+                    again.add(error.month)
+                    forget_month(out, error.month)
+                    text = f"{error.where}: damaged ({error.found}), made again from the flight folders"
+                    problems.append(Outcome(str(out), "skipped", text))
+                    found = None
     except GroundstationError as error:  # the flights are done, and told of in any case
         problems.append(Outcome(str(out), "failed", str(error)))
-    else:
-        problems += [Outcome(str(out), "skipped", f"{out}: {problem}")] if problem else []
     return tuple(problems)
+
+
+def _write_beside(
+    out: Path,
+    outcomes: Sequence[Outcome],
+    kept_rows: Sequence[IndexRow],
+    found: Scan,
+    with_pdf: bool,
+    only_results: bool,
+) -> list[Outcome]:
+    """Write index, fleet, page and recording from the flights as they were found; returns what went wrong."""
+    problems = list(write_index_of(out, outcomes, kept_rows, found))
+    fleet, unwritten = write_fleet(out, found)
+    problems += unwritten
+    if only_results:
+        for name in (FLEET_PAGE, FLEET_PDF, FLEET_RECORDING):
+            (out / name).unlink(missing_ok=True)
+        return problems
+    from groundstation.viewer.fleet import write_fleet_recording
+
+    problem = write_fleet_report(out, fleet, with_pdf=with_pdf).problem
+    write_fleet_recording(out / FLEET_RECORDING, fleet)
+    return [*problems, Outcome(str(out), "skipped", f"{out}: {problem}")] if problem else problems
 
 
 def write_index_of(

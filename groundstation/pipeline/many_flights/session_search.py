@@ -5,7 +5,7 @@ do those that they belong with. Where UTC puts a flight beside nobody whom it he
 clock that is wrong, or none at all, does not hide a session.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -17,7 +17,8 @@ from groundstation.base.records import RecordBatch
 from groundstation.base.signals import kind_of, topics_of_kind
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.many_flights.fleet_store import Key, Scan
+from groundstation.pipeline.many_flights.fleet_store import Scan
+from groundstation.pipeline.many_flights.flight_keys import Key
 from groundstation.results.files import load_document
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.session_clock import transmission_ns
@@ -55,11 +56,13 @@ class Apart:
     reason: str
 
 
-def members_of(found: Scan) -> tuple[Member, ...]:
-    """The flights of a folder, in the order of their names, those that cannot be read left out."""
+def members_of(found: Scan, flight_ids: Set[str] | None = None) -> tuple[Member, ...]:
+    """The flights of a folder, or some of them, in the order of their names, those that cannot be read left out."""
     members = []
-    for name in found.names:
+    for name in found.names if flight_ids is None else sorted(flight_ids):
         known = found.fresh.get(name)
+        if known is None and name not in found.stale:
+            continue
         try:
             members.append(_member(found.out / name) if known is None else _known_member(found.out / name, known))
         except GroundstationError:  # the index tells of it

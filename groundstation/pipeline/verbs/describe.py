@@ -46,17 +46,23 @@ class BusWord:
 
 @dataclass(frozen=True)
 class Description:
-    """A log described: facts for people (name to text), topics, findings, and what is on its buses."""
+    """A log described: facts for people (name to text), topics, findings, and what is on its buses.
+
+    ``has_records``: at least one record of the log could be read.
+    """
 
     facts: dict[str, str]
     topics: tuple[TopicDescription, ...]
     findings: tuple[Finding, ...]
     has_lost_data: bool
     buses: tuple[BusWord, ...] = ()
+    has_records: bool = True
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
-        return asdict(self)
+        plain = asdict(self)
+        del plain["has_records"]  # the exit code tells it
+        return plain
 
 
 def describe(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()) -> Description:
@@ -94,7 +100,8 @@ def _recorded(log: Log) -> Description:
             fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
     facts = facts_of(log, dict(found.header.metadata), ledger)
     lost = any(damage.loses_data for damage in found.damages)
-    return Description(facts, _topics(ledger, fields), ledger_findings(found.ledger), lost, _buses(buses, log))
+    topics, findings = _topics(ledger, fields), ledger_findings(found.ledger)
+    return Description(facts, topics, findings, lost, _buses(buses, log), has_records=bool(topics))
 
 
 def _bus_contents(ledger: Ledger) -> "BusContents | None":
@@ -163,7 +170,8 @@ def _stored(log: Log) -> Description:
     facts = facts_of(log, dict(info.metadata), info.ledger)
     facts["log"] = f"{info.source_name}, read as {info.reader}"
     findings = (*info.findings, *(damage_finding(damage) for damage in damages))
-    return Description(facts, _topics(info.ledger, fields), findings, _has_lost(info, damages), _buses(buses, log))
+    lost, topics = _has_lost(info, damages), _topics(info.ledger, fields)
+    return Description(facts, topics, findings, lost, _buses(buses, log), has_records=bool(fields))
 
 
 def _has_lost(info: StoreInfo, damages: list[Damage]) -> bool:

@@ -1,0 +1,142 @@
+"""What is known of every flight folder without reading it, as columns: no object but of one asked for."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.units import NS_PER_S
+from groundstation.pipeline.many_flights.fleet_share import FlightShare, parquet_bytes
+from groundstation.results.files import utf8_text, write_bytes
+
+KEYS = ".flights"
+NUMBERS = ("stamp", "start_ns", "end_ns")
+
+
+class Key(NamedTuple):
+    """What is known of a flight folder without reading it; ``stamp`` is of its files when it was read."""
+
+    flight_id: str
+    stamp: int
+    path: str
+    sha256: str
+    link_name: str
+    hears: str
+    start_ns: int | None
+    end_ns: int | None
+    samples: str
+
+
+class Keys(Mapping[str, Key]):
+    """Keys of flights by flight id, in that order; kept as columns.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+        The fields of :class:`Key`.
+    """
+
+    def __init__(self, table: Any) -> None:
+        names = table.column("flight_id").to_pylist()
+        if any(one >= other for one, other in pairwise(names)):
+            last = {name: place for place, name in enumerate(names)}  # of a name that stands twice
+            table = table.take(np.array([last[name] for name in sorted(last)], dtype=np.int64))
+            names = sorted(last)
+        self.table, self.names = table, names
+
+    @classmethod
+    def of(cls, keys: Iterable[Key]) -> "Keys":
+        """Keys from keys, in whatever order."""
+        import pyarrow as pa
+
+        columns = list(zip(*keys, strict=True)) or [()] * len(Key._fields)
+        kinds = [pa.int64() if name in NUMBERS else pa.string() for name in Key._fields]
+        arrays = [pa.array(values, kind) for values, kind in zip(columns, kinds, strict=True)]
+        return cls(pa.table(dict(zip(Key._fields, arrays, strict=True))))
+
+    @classmethod
+    def joined(cls, parts: Sequence["Keys"]) -> "Keys":
+        """Several of them as one."""
+        import pyarrow as pa
+
+        return cls(pa.concat_tables([cls.of(()).table, *(part.table for part in parts)]).combine_chunks())
+
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {name: place for place, name in enumerate(self.names)}
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._places
+
+    def __getitem__(self, name: str) -> Key:
+        place = self._places[name]
+        return Key(*(self.table.column(field)[place].as_py() for field in Key._fields))
+
+    def place(self, name: str) -> int | None:
+        """Where a flight stands; None where it does not."""
+        return self._places.get(name)
+
+    def column(self, name: str) -> list[Any]:
+        """A field of all flights, in their order."""
+        found: list[Any] = self.table.column(name).to_pylist()
+        return found
+
+    def stamps(self) -> list[int]:
+        """The stamps, in the order of the flights."""
+        return self.column("stamp")
+
+    def at(self, places: Sequence[int] | NDArray[np.int64]) -> "Keys":
+        """Those at some places, which ascend."""
+        if len(places) == len(self):
+            return self
+        return Keys(self.table.take(np.asarray(places, dtype=np.int64)))
+
+    def only(self, names: Iterable[str]) -> "Keys":
+        """Those of some flights."""
+        return self.at(sorted(self._places[name] for name in names if name in self._places))
+
+
+def key_path(out: Path, month: str) -> Path:
+    """The file with the keys of a month."""
+    return out / KEYS / f"{month}.parquet"
+
+
+def read_keys(out: Path, month: str) -> Keys:
+    """What is known of the flights of a month; nothing where it cannot be read."""
+    import pyarrow.parquet as pq
+
+    empty = Keys.of(())
+    try:
+        with pq.ParquetFile(key_path(out, month)) as file:
+            table = file.read()
+        return Keys(table) if table.schema.equals(empty.table.schema) else empty
+    except (OSError, ValueError):
+        return empty
+
+
+def write_keys(out: Path, month: str, keys: Keys) -> None:
+    """Write what is known of the flights of a month."""
+    path = key_path(out, month)
+    path.parent.mkdir(exist_ok=True)
+    write_bytes(path, parquet_bytes(keys.table))
+
+
+def key_of(share: FlightShare, stamp: int) -> Key:
+    """What a run must know of a flight whose folder had a stamp when its share was read."""
+    row, start_ns = share.row, share.row["start_utc"]
+    duration_s = row["duration_s"]
+    is_timed = start_ns is not None and duration_s == duration_s
+    end_ns = start_ns + round(duration_s * NS_PER_S) if is_timed else None
+    path, name, hears = map(utf8_text, (share.path, share.link_name, "\n".join(share.hears)))
+    sha256 = str(share.index.sha256)
+    return Key(row["flight_id"], stamp, path, sha256, name, hears, start_ns, end_ns, share.samples)
