@@ -62,6 +62,8 @@ def test_transition_against_the_matrix_exponential(interpreted: None) -> None:
         _, phi, noise = vehicle.step(np.zeros(7), 0.0, step_s)
         assert phi == pytest.approx(exact[7:, 7:].T, rel=1e-12, abs=1e-14)
         assert noise == pytest.approx(exact[7:, 7:].T @ exact[:7, 7:], rel=1e-9, abs=1e-13)
+    shortest = aircraft_of(track, "local", CooperativeSettings(ins=belief)).step(np.zeros(7), 0.0, 5e-13)[1]
+    assert shortest == pytest.approx(np.eye(7), abs=1e-12)  # as the first step of all, too
     forth, back = vehicle.step(np.zeros(7), 0.0, 2.0)[1], vehicle.step(np.zeros(7), 2.0, 0.0)[1]
     assert forth @ back == pytest.approx(np.eye(7), abs=1e-13)
 

@@ -2,21 +2,23 @@
 
 import http.client
 import os
-import re
-import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 import rerun as rr
+from rerun.catalog import CatalogClient
+from rerun_bindings import CatalogClientInternal
 
-from groundstation.viewer import verification
+from groundstation.base.errors import GroundstationError
+from groundstation.pipeline.verbs.view import look_at
+from groundstation.viewer import launch, verification
 from groundstation.viewer.fleet_catalog import catalog_server
-from groundstation.viewer.launch import viewer_command, viewer_environment
+from groundstation.viewer.gate import may_enter
+from groundstation.viewer.own_page import page_files, page_server
 from groundstation.viewer.recorder import FLIGHT_TIME
 from groundstation.viewer.recording import save_stream
 from groundstation.viewer.verification import damaged
@@ -58,6 +60,21 @@ def test_a_recording_with_altered_bytes_is_told_and_the_rest_is_served(sound: Pa
         assert all(reason and "\n" not in reason and str(tmp_path) not in reason for _, reason in catalog.refused)
 
 
+def test_a_damaged_recording_is_not_opened(sound: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[Path] = []
+
+    def open_viewer(what: Path, **_: object) -> int:
+        opened.append(what)
+        return 0
+
+    monkeypatch.setattr(launch, "open_viewer", open_viewer)
+    look = partial(look_at, web=True, host="127.0.0.1", port=None, profile=None, say=print)
+    with pytest.raises(GroundstationError, match=r"altered\.rrd: damaged: "):
+        look(str(altered(sound, tmp_path / "altered.rrd")))
+    look(str(sound))
+    assert opened == [sound]
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="the stand-in for Rerun's executable is a script of the shell")
 @pytest.mark.parametrize("end", ["kill -ABRT $$", "exit 101", "sleep 60"])
 def test_a_recording_that_ends_or_hangs_its_reader_is_left_out(
@@ -88,30 +105,6 @@ def asked(address: str, method: str, path: str, **headers: str) -> tuple[int, st
         connection.close()
 
 
-@contextmanager
-def page_of(recording: Path) -> Iterator[tuple[str, str]]:
-    """Addresses of the page of `view --web` and of its data."""
-    command = viewer_command(recording, web=True, port=0, headless=True)
-    command[command.index("auto")] = "0"
-    with tempfile.TemporaryFile() as told:
-        process = subprocess.Popen(command, stdout=told, stderr=told, env=viewer_environment(os.environ) | {"CI": "1"})
-        try:
-            for _ in range(int(PATIENCE_S * 10)):
-                told.seek(0)
-                text = told.read().decode()
-                page = re.search(r"web-viewer at http://([\d.]+:\d+)", text)
-                data = re.search(r"gRPC connections on ([\d.]+:\d+)", text)
-                if page and data:
-                    break
-                with pytest.raises(subprocess.TimeoutExpired):
-                    process.wait(0.1)
-            assert page and data, text
-            yield page[1], data[1]
-        finally:
-            process.kill()
-            process.wait()
-
-
 def assert_only_own_pages_read(data: str) -> None:
     """Data are given to pages of this machine alone: the browser keeps an answer from an origin that is not named."""
     wish = {"Access_Control_Request_Method": "POST", "Access_Control_Request_Headers": "content-type,x-grpc-web"}
@@ -128,14 +121,75 @@ def assert_no_file_outside(address: str, file: Path) -> None:
         assert status in (400, 404) and content == b"", path
 
 
-def test_the_page_and_its_data_are_closed_to_other_origins(sound: Path) -> None:
-    with page_of(sound) as (page, data):
-        assert_only_own_pages_read(data)
-        for one in (page, data):
-            assert_no_file_outside(one, sound)
-        status, allowed, content = asked(page, "GET", "/", Host="pages.example", Origin=STRANGER)
-        assert (status, allowed) == (200, None)  # Rerun's page answers any name; there is nothing of the flight in it
-        assert b"Rerun" in content and sound.stem.encode() not in content
+PAGE = {"/": ("text/html", b"the viewer")}
+
+
+@pytest.fixture
+def page(sound: Path) -> Iterator[str]:
+    with page_server(sound, PAGE, host="127.0.0.1", port=0) as server:
+        yield server.url.removeprefix("http://")
+
+
+def test_the_page_leads_to_its_recording(page: str, sound: Path) -> None:
+    connection = http.client.HTTPConnection(page, timeout=PATIENCE_S)
+    connection.request("GET", "/")
+    response = connection.getresponse()
+    response.read()
+    assert (response.status, response.getheader("Location")) == (302, f"/?url=http://{page}/sound.rrd")
+    assert asked(page, "GET", f"/?url=http://{page}/sound.rrd") == (200, None, b"the viewer")
+    assert asked(page, "GET", "/sound.rrd") == (200, None, sound.read_bytes())
+
+
+def test_a_recording_of_any_name_is_found(sound: Path, tmp_path: Path) -> None:
+    odd = tmp_path / "a&b #1 50%.rrd"
+    odd.write_bytes(sound.read_bytes())
+    with page_server(odd, PAGE, host="127.0.0.1", port=0) as server:
+        address = server.url.removeprefix("http://")
+        connection = http.client.HTTPConnection(address, timeout=PATIENCE_S)
+        connection.request("GET", "/")
+        asked_for = parse_qs(urlsplit(connection.getresponse().headers["Location"]).query)["url"][0]
+        connection.close()
+        assert asked(address, "GET", urlsplit(asked_for).path) == (200, None, sound.read_bytes())
+
+
+def test_a_page_at_no_port_is_one_line(sound: Path) -> None:
+    with pytest.raises(GroundstationError, match="99999"), page_server(sound, PAGE, host="127.0.0.1", port=99999):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("wish", "status", "first", "end"),
+    [
+        ("bytes=10-19", 206, 10, 20),
+        ("bytes=10-", 206, 10, None),
+        ("bytes=0-99999999", 206, 0, None),
+        ("bytes=99999999-", 416, 0, 0),
+        ("bytes=20-10", 416, 0, 0),
+        ("words=1-2", 200, 0, None),
+    ],
+)
+def test_parts_of_a_recording(page: str, sound: Path, wish: str, status: int, first: int, end: int | None) -> None:
+    assert asked(page, "GET", "/sound.rrd", Range=wish) == (status, None, sound.read_bytes()[first:end])
+
+
+def test_the_page_and_its_recording_answer_their_own_names_alone(page: str, sound: Path) -> None:
+    assert_no_file_outside(page, sound)
+    for path in ("/", "/sound.rrd"):
+        for stranger in (
+            "pages.example",
+            "pages.example:80",
+            "127.0.0.1.pages.example",
+            "localhost:1@pages.example",
+            "",
+        ):
+            assert asked(page, "GET", path, Host=stranger, Origin=STRANGER) == (421, None, b"")
+    assert asked(page, "GET", "/sound.rrd", Host="localhost:1", Origin=STRANGER)[:2] == (200, None)
+
+
+@pytest.mark.slow
+def test_the_files_of_the_page_are_there() -> None:
+    files = page_files(launch.viewer_executable(), launch.viewer_environment(os.environ))
+    assert b"Rerun" in files["/"][1] and files["/re_viewer_bg.wasm"][1].startswith(b"\0asm")
 
 
 def test_the_catalog_is_closed_to_other_origins(sound: Path) -> None:
@@ -143,3 +197,23 @@ def test_the_catalog_is_closed_to_other_origins(sound: Path) -> None:
         address = catalog.url.removeprefix("rerun+http://")
         assert_only_own_pages_read(address)
         assert_no_file_outside(address, sound)
+        status, _, content = asked(address, "GET", "/", Host="pages.example", Origin=STRANGER)
+        assert (status, content) == (421, b"")
+        assert asked(address, "GET", "/", Host=f"localhost:{address.rpartition(':')[2]}")[0] != 421
+        gates = CatalogClient._from_internal(CatalogClientInternal(catalog.url, None, None))
+        assert gates.get_dataset("flights").segment_ids() == ["sound"]  # a program comes in
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        b"",
+        b"GET / HTTP/1.1\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n",
+        b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nhOST: pages.example\r\n\r\n",
+        b"GET / HTTP/1.1\r\nX: y\r\n\r\nHost: 127.0.0.1\r\n\r\n",
+        b"PRI / HTTP/1.1\r\nHost: pages.example\r\n\r\n",
+    ],
+)
+def test_who_does_not_name_this_machine_stays_outside(head: bytes) -> None:
+    assert not may_enter(head)

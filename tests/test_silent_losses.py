@@ -83,6 +83,13 @@ def test_a_definition_of_dataflash_made_into_another_is_told(
     assert len(reasons) == 1 and reasons[0].endswith(told)
 
 
+def test_a_type_that_a_script_names_in_small_letters_is_no_damage(tmp_path: Path) -> None:
+    path = tmp_path / "a.BIN"
+    path.write_bytes(flight_log(2).content.replace(b"MAG\0QBhhhB", b"wing" + b"QBhhhB"))
+    assert path.read_bytes().count(b"wing") == 1
+    assert not [one for one in damages(path) if one.what.startswith("records read by a definition")]
+
+
 def test_an_instance_that_no_autopilot_has_is_no_sensor_of_its_own(tmp_path: Path) -> None:
     content = bytearray(flight_log(2).content)
     at = content.find(b"\xa3\x95\x0a")

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import rerun as rr
 from rerun.catalog import CatalogClient, DatasetEntry
@@ -16,6 +17,7 @@ from rerun_bindings import CatalogClientInternal
 from groundstation.base.errors import GroundstationError
 from groundstation.viewer.catalog_table import save_flight_table
 from groundstation.viewer.fleet import FLEET, FLIGHTS_TEXT
+from groundstation.viewer.gate import Gate, hidden_address
 from groundstation.viewer.recording import open_stream
 from groundstation.viewer.verification import damaged
 
@@ -65,15 +67,9 @@ def catalog_server(
     GroundstationError
         When the port is taken or the address is not of this machine.
     """
-    try:
-        server = Server(host=host, port=port)
-    except ValueError as error:
-        reason = str(error).rpartition(": ")[2]
-        raise GroundstationError(f"{host}:{port}", reason, next_step="choose another --port or --host") from error
-    with server, tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
+    with _behind_a_gate(host, port) as (server, url), tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
         # the public constructor asks for datafusion (43 MB), which listing and registering do not use
         client = CatalogClient._from_internal(CatalogClientInternal(server.url(), None, None))
-        url = reachable(server.url())
         segments: dict[str, tuple[str, ...]] = {SESSIONS: ()}
         links: dict[str, str] = {}
         refused: list[tuple[Path, str]] = []
@@ -94,6 +90,21 @@ def catalog_server(
             if has_fleet:
                 _link(dataset, fleet, links, Path(folder) / "links.rrd")
         yield Catalog(url, table_url, segments[FLIGHTS], segments[SESSIONS], has_fleet, tuple(refused))
+
+
+@contextmanager
+def _behind_a_gate(host: str, port: int) -> Iterator[tuple[Server, str]]:
+    """Rerun's server on an address that nobody is told, and the address of the gate before it for others."""
+    try:
+        entry = Gate(host, port)
+    except (OSError, OverflowError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise GroundstationError(f"{host}:{port}", reason, next_step="choose another --port or --host") from error
+    with entry.listening(), Server(host=hidden_address(), port=0) as server:
+        inner = urlsplit(server.url().removeprefix("rerun+"))
+        entry.open(str(inner.hostname), int(inner.port or 0))
+        shown = f"[{host}]" if ":" in host else host
+        yield server, reachable(f"rerun+http://{shown}:{entry.port}")
 
 
 def reachable(url: str) -> str:

@@ -5,12 +5,14 @@ import os
 import socket
 import subprocess
 import sys
-from collections.abc import Mapping
+import threading
+import webbrowser
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError
+from groundstation.viewer.own_name import LOCAL
 
-LOCAL = "127.0.0.1"
 WEB_PORT = 9090
 
 
@@ -92,7 +94,13 @@ def _web_port(host: str) -> int:
 
 
 def open_viewer(
-    what: Path | str, *, web: bool = False, host: str = LOCAL, port: int | None = None, headless: bool = False
+    what: Path | str,
+    *,
+    web: bool = False,
+    host: str = LOCAL,
+    port: int | None = None,
+    headless: bool = False,
+    say: Callable[[str], None] = lambda _: None,
 ) -> int:
     """Open a recording, or what an address offers, and wait until the viewer is closed; Ctrl-C closes it.
 
@@ -109,6 +117,8 @@ def open_viewer(
         everything else any free one.
     headless : bool
         No window; with ``web``: no browser is opened.
+    say : callable
+        Takes the address of the page of a recording.
 
     Returns
     -------
@@ -118,7 +128,7 @@ def open_viewer(
     Raises
     ------
     GroundstationError
-        When there is no such file, or no viewer.
+        When there is no such file, no viewer, or the page cannot be served.
     """
     folder = None
     if isinstance(what, Path):
@@ -126,8 +136,27 @@ def open_viewer(
             raise GroundstationError(str(what), "no such file", next_step="run the log first")
         what = what.absolute()
         folder = what.parent  # where the links of fleet.rrd begin
+        if web:
+            return _open_page(what, host, port, headless=headless, say=say)
     command = viewer_command(what, web=web, host=host, port=port, headless=headless)
     try:
         return subprocess.run(command, check=False, env=viewer_environment(os.environ), cwd=folder).returncode
     except KeyboardInterrupt:
         return 0
+
+
+def _open_page(recording: Path, host: str, port: int | None, *, headless: bool, say: Callable[[str], None]) -> int:
+    """Serve the page with a recording until Ctrl-C."""
+    from groundstation.viewer.own_page import page_files, page_server
+
+    port = _web_port(host) if port is None else port
+    try:
+        files = page_files(viewer_executable(), viewer_environment(os.environ))
+        with page_server(recording, files, host=host, port=port) as server:
+            say(f"{server.url}\nCtrl-C ends")
+            if not headless:
+                webbrowser.open(server.url)
+            threading.Event().wait()
+    except KeyboardInterrupt:
+        pass
+    return 0

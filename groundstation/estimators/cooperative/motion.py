@@ -237,7 +237,7 @@ def step(
     if fleet.model[who] == GLOBAL:
         _over_epochs(fleet, who, from_s, to_s, phi, noise, room)
     else:
-        if abs(room[KEPT_STEP, 0, 0] - (to_s - from_s)) > SAME_STEP_S or to_s == from_s:
+        if abs(room[KEPT_STEP, 0, 0] - (to_s - from_s)) > SAME_STEP_S or abs(to_s - from_s) <= SAME_STEP_S:
             fill_dynamics(fleet, who, fleet.first[who], F)
             discretise(n, F, fleet.density[who], to_s - from_s, room[KEPT_PHI], room[KEPT_NOISE], room)
             room[KEPT_STEP, 0, 0] = to_s - from_s

@@ -15,7 +15,7 @@ from groundstation.readers.dataflash import rules
 from groundstation.readers.dataflash.definitions import FMT_DTYPE, Definition
 from groundstation.readers.dataflash.rules import MOST_SENSORS, Rule
 
-_NAME = re.compile(rb"[A-Z][A-Za-z0-9_]{0,3}")
+_NAME = re.compile(rb"[A-Za-z][A-Za-z0-9_]{0,3}")
 _LABELS = re.compile(rb"[A-Za-z][A-Za-z0-9_]*(,[A-Za-z][A-Za-z0-9_]*)*")
 _TEXTS = frozenset(("Name", "Message", "Label", "UnitIds", "MultIds"))
 _TIMES = ("TimeUS", "TimeMS")
