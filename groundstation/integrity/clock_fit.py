@@ -148,10 +148,11 @@ def _break(time_s: FloatArray, first: int, before: _Line, after: _Line, *, is_st
     if is_step:
         return ClockBreak(zero_ns + round(at_s * NS_PER_S), sigma_s, "step", step_s, step_sigma_s)
     change = after.slope - before.slope
-    meets_s = at_s - step_s / change
-    sigma_s = float(np.hypot(sigma_s, step_sigma_s / abs(change)))
-    if abs(meets_s - at_s) < SIGNIFICANT * sigma_s:  # else the rate changed by and by
-        at_s = meets_s
+    if change:  # lines of one slope meet nowhere
+        meets_s = at_s - step_s / change
+        sigma_s = float(np.hypot(sigma_s, step_sigma_s / abs(change)))
+        if abs(meets_s - at_s) < SIGNIFICANT * sigma_s:  # else the rate changed by and by
+            at_s = meets_s
     return ClockBreak(zero_ns + round(at_s * NS_PER_S), sigma_s, "rate", 0.0, step_sigma_s)
 
 
