@@ -117,6 +117,17 @@ def test_steps_and_changes_of_rate_together() -> None:
     assert found.breaks[1].drift_change_ppm == pytest.approx(300.0, abs=15.0)
 
 
+def test_pieces_with_one_rate_meet_nowhere_and_are_told_all_the_same() -> None:
+    """More steps than are told: the rest is cut where rates change, and the pieces beside a cut can have one rate."""
+    true_ns = np.arange(2000) * 50_000_000
+    reference_ns = true_ns.copy()
+    reference_ns[1000:] -= NS_PER_S
+    reference_ns = UTC_NS + reference_ns // NS_PER_S * NS_PER_S
+    found = fit_relation(true_ns, reference_ns, step_s=0.25, observable_ppm=100.0, bound_s=0.001)
+    assert all(np.isfinite([one.time_ns, one.time_sigma_s, one.step_s]).all() for one in found.breaks)
+    assert {one.kind for one in found.breaks} == {"step", "rate"}
+
+
 def test_late_messages_and_single_wild_readings_are_no_steps() -> None:
     true_s, rng = np.arange(0.0, 600.0, 0.5), np.random.default_rng(2)
     recorder_s = true_s + np.where(rng.random(len(true_s)) < 0.1, rng.exponential(0.5, len(true_s)), 0.0)

@@ -148,24 +148,56 @@ def _break(time_s: FloatArray, first: int, before: _Line, after: _Line, *, is_st
     if is_step:
         return ClockBreak(zero_ns + round(at_s * NS_PER_S), sigma_s, "step", step_s, step_sigma_s)
     change = after.slope - before.slope
-    meets_s = at_s - step_s / change
-    sigma_s = float(np.hypot(sigma_s, step_sigma_s / abs(change)))
-    if abs(meets_s - at_s) < SIGNIFICANT * sigma_s:  # else the rate changed by and by
-        at_s = meets_s
+    if change:  # lines of one slope meet nowhere
+        meets_s = at_s - step_s / change
+        sigma_s = float(np.hypot(sigma_s, step_sigma_s / abs(change)))
+        if abs(meets_s - at_s) < SIGNIFICANT * sigma_s:  # else the rate changed by and by
+            at_s = meets_s
     return ClockBreak(zero_ns + round(at_s * NS_PER_S), sigma_s, "rate", 0.0, step_sigma_s)
 
 
 def _scatter(residual_s: FloatArray) -> float:
-    return float(_MAD * np.median(np.abs(residual_s)))
+    return _MAD * _median(np.abs(residual_s))
 
 
-def _medians(values: FloatArray, blocks: int) -> FloatArray:
-    """Medians of blocks of equal numbers of samples; what does not go into them is left out between them."""
-    starts = np.linspace(0, len(values), blocks, endpoint=False).astype(np.int64)
-    length = len(values) // blocks
-    middle = length // 2
-    ordered = np.partition(values[starts[:, None] + np.arange(length)], (middle - 1, middle), axis=1)
-    return np.asarray(ordered[:, middle] if length % 2 else 0.5 * (ordered[:, middle - 1] + ordered[:, middle]))
+def _median(values: FloatArray) -> float:
+    """As numpy's of values that are there, without its checks."""
+    middle = len(values) // 2
+    if len(values) % 2:
+        return float(np.partition(values, middle)[middle])
+    ordered = np.partition(values, (middle - 1, middle))
+    return 0.5 * float(ordered[middle - 1] + ordered[middle])
+
+
+class _Blocks:
+    """Blocks of equal numbers of samples; what does not go into them is left out between them."""
+
+    def __init__(self, samples: int, blocks: int) -> None:
+        self._shape = blocks, samples // blocks
+        self._starts = (np.arange(blocks) * (samples / blocks)).astype(np.int64)
+        self._is_all = samples % blocks == 0
+        self._places = None if self._is_all else self._starts[:, None] + np.arange(self._shape[1])
+
+    def medians(self, values: FloatArray) -> FloatArray:
+        """Median of each block."""
+        middle, is_odd = divmod(self._shape[1], 2)
+        rows = values.reshape(self._shape) if self._places is None else values[self._places]
+        ordered = np.partition(rows, middle if is_odd else (middle - 1, middle), axis=1)
+        return np.asarray(ordered[:, middle] if is_odd else 0.5 * (ordered[:, middle - 1] + ordered[:, middle]))
+
+    def medians_in_order(self, values: FloatArray) -> FloatArray:
+        """The same of values that never fall: what stands in the middle."""
+        middle, is_odd = divmod(self._shape[1], 2)
+        at = self._starts + middle
+        return np.asarray(values[at] if is_odd else 0.5 * (values[at - 1] + values[at]))
+
+
+def _medians_of_five(values: FloatArray) -> FloatArray:
+    """Median of each value and the four behind it, shape (n - 4,), by comparing whole columns."""
+    a, b, c, d, e = (values[at : len(values) - 4 + at] for at in range(5))
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    low, high = np.maximum(low, np.minimum(c, d)), np.minimum(high, np.maximum(c, d))  # neither least nor most of four
+    return np.asarray(np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), e)))
 
 
 def _student(freedom: float) -> float:
@@ -195,11 +227,12 @@ def _line(time_s: FloatArray, offset_s: FloatArray, bound_s: float) -> _Line:
     """Line through the medians of blocks of equal numbers of samples."""
     blocks = min(BLOCKS, len(time_s) // LEAST_IN_BLOCK)
     rounding_s = max(bound_s, FLOOR_S)
-    at_s = _medians(time_s, max(blocks, 1))
+    of_blocks = _Blocks(len(time_s), max(blocks, 1))
+    at_s = of_blocks.medians_in_order(time_s)
     middle_s = float(at_s.mean())
     lever_s = at_s - middle_s
     if blocks < FEWEST_BLOCKS or np.ptp(lever_s) == 0.0:
-        level_s = float(np.median(offset_s))
+        level_s = _median(offset_s)
         sigma_s = float(np.hypot(_scatter(offset_s - level_s), rounding_s / 12**0.5))
         return _Line(middle_s, level_s, 0.0, sigma_s, float("inf"))
     lever_s -= lever_s.mean()  # of times that hardly differ the first mean is rounded
@@ -207,12 +240,12 @@ def _line(time_s: FloatArray, offset_s: FloatArray, bound_s: float) -> _Line:
     offset = slope = 0.0
     span_s = float(time_s[-1] - time_s[0])
     left_s = offset_s
-    residual = _medians(left_s, blocks)
+    residual = of_blocks.medians(left_s)
     for _turn in range(4):  # medians of what a line leaves, for a steep line moves them within a block
         more, steeper = float(residual.mean()), float(lever_s @ residual) / power
         offset, slope = offset + more, slope + steeper
         left_s = offset_s - offset - slope * (time_s - middle_s)
-        residual = _medians(left_s, blocks)
+        residual = of_blocks.medians(left_s)
         if abs(more) + abs(steeper) * span_s < SETTLED_S:
             break
     offset_sigma_s, slope_sigma = _standard_errors(residual, lever_s)
@@ -233,9 +266,10 @@ def _standard_errors(residual: FloatArray, lever: FloatArray) -> tuple[float, fl
     The more it is, the fewer the degrees of freedom: (n - 2) (1 - r) / (1 + r).
     """
     count, power, correlation = len(residual), float(lever @ lever), _correlation(residual)
-    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    places = np.arange(count)
+    correlated = (correlation**places)[np.abs(places[:, None] - places)]
     design = np.column_stack([np.full(count, count**-0.5), lever / power**0.5])
-    spread = design.T @ correlation**apart @ design
+    spread = design.T @ correlated @ design
     variance = float(residual @ residual) / (count - float(np.trace(spread)))
     factor = _student(max((count - 2) * (1.0 - correlation) / (1.0 + correlation), 2.0))
     level, slope = factor * np.sqrt(variance * np.diag(spread))
@@ -248,11 +282,12 @@ def _steps(time_s: FloatArray, offset_s: FloatArray, step_s: float, bound_s: flo
     if count < 2 * side:
         return []
     spans, changes = np.diff(time_s), np.diff(offset_s)
-    slope = float(np.median(changes[spans > 0] / spans[spans > 0])) if (spans > 0).any() else 0.0
+    goes_on = spans > 0
+    slope = _median(changes[goes_on] / spans[goes_on]) if goes_on.any() else 0.0
     level = offset_s - slope * time_s
     jitter_s = _scatter(np.diff(level)) / 2**0.5
     least_s = max(step_s, JITTER_TIMES * jitter_s, 1.5 * bound_s)
-    middles = np.median(np.lib.stride_tricks.sliding_window_view(level, side), axis=1)
+    middles = _medians_of_five(level)
     size = np.abs(middles[side:] - middles[:-side])  # of a step before sample side + place
     found: list[int] = []
     for place in np.flatnonzero(size > least_s).tolist():
@@ -260,7 +295,7 @@ def _steps(time_s: FloatArray, offset_s: FloatArray, step_s: float, bound_s: flo
         if found and at - found[-1] < 2 * side:  # of one step
             continue
         window = slice(at - side, min(at + 3 * side, count))
-        before, after = middles[place], np.median(level[window][-side:])
+        before, after = middles[place], _median(level[window][-side:])
         closer = np.abs(level[window] - after) - np.abs(level[window] - before)
         first = int(np.argmin(np.concatenate(([0.0], np.cumsum(-closer)))))  # samples before the step fit what was
         if 0 < first < len(closer) and abs(after - before) > least_s:
@@ -274,7 +309,8 @@ def _rate_changes(time_s: FloatArray, offset_s: FloatArray, first: int, stop: in
     if blocks < 2 * SIDE_BLOCKS:
         return set()
     time, offset = time_s[first:stop], offset_s[first:stop]
-    at_s, level = _medians(time, blocks), _medians(offset, blocks)
+    of_blocks = _Blocks(len(time), blocks)
+    at_s, level = of_blocks.medians_in_order(time), of_blocks.medians(offset)
     split = _best_split(at_s, level, max(bound_s, FLOOR_S))
     if not split:
         return set()
@@ -299,8 +335,8 @@ def _rate_changes(time_s: FloatArray, offset_s: FloatArray, first: int, stop: in
 def _best_split(at_s: FloatArray, level: FloatArray, rounding_s: float) -> int:
     """Block before which a second line begins that explains much; 0 where one line will do."""
     floor = len(at_s) * rounding_s**2 / 12.0
-    whole = _left_over(at_s, level)[-1]
     forward, backward = _left_over(at_s, level), _left_over(at_s[::-1], level[::-1])[::-1]
+    whole = forward[-1]
     places = np.arange(SIDE_BLOCKS, len(at_s) - SIDE_BLOCKS + 1)
     both = forward[places - 1] + backward[places]
     best = int(np.argmin(both))
@@ -320,7 +356,7 @@ def _residual(at_s: FloatArray, level: FloatArray) -> FloatArray:
 
 def _left_over(at_s: FloatArray, level: FloatArray) -> FloatArray:
     """Sum of squares that a line leaves of the first 1, 2, ... values, shape (n,)."""
-    time, value = at_s - at_s.mean(), level - np.median(level)
+    time, value = at_s - at_s.mean(), level - _median(level)
     count = np.arange(1, len(at_s) + 1)
     sums = [np.cumsum(one) for one in (time, value, time * time, time * value, value * value)]
     power = np.maximum(sums[2] - sums[0] ** 2 / count, 1e-300)

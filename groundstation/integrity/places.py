@@ -1,4 +1,4 @@
-"""Places and device times of a log's records: kept compactly, and beyond a size in a temporary file.
+"""Places and device times of a log's records: kept as they came, and beyond a size compactly in a temporary file.
 
 A survey needs them twice more: for the clock, in the order of the log, and for the ledger, topic by topic. Neither
 needs all at once.
@@ -18,7 +18,7 @@ from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatc
 from groundstation.integrity.counting import is_frozen
 from groundstation.integrity.ordering import joined_columns
 
-MEMORY_BYTES = 16 << 20  # more than that goes to a file
+MEMORY_BYTES = 16 << 20  # when there are more, all go to a file
 WINDOW_RECORDS = 500_000  # at least so many records of all topics are laid in order at a time
 
 
@@ -34,11 +34,18 @@ class Piece:
         """The times that are there, in the order of the places."""
         return self.time.values if self.time.present is None else self.time.values[self.time.present]
 
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes."""
+        present = self.time.present
+        return self.index.nbytes + self.time.values.nbytes + (0 if present is None else present.nbytes)
+
     def holds(self, batch: RecordBatch) -> bool:
         """Whether it is the places and times of this batch."""
         device = batch.device_time_ns
         return (
-            np.array_equal(self.index, batch.record_index)
+            len(self.index) == len(batch)
+            and np.array_equal(self.index, batch.record_index)
             and np.array_equal(self.time.values, device.values)
             and (self.time.present is device.present or np.array_equal(self.time.mask, device.mask))
         )
@@ -73,6 +80,11 @@ class Kept:
     is_timed: bool
     times: tuple[int, ...]
 
+    @property
+    def size(self) -> int:
+        """Bytes that it takes in a file."""
+        return self.count * ((4 if self.is_near else 8) + 8 + (0 if self.is_timed else 1))
+
 
 class Places:
     """Keeps pieces, once for batches with the same places and times, and gives them back.
@@ -84,14 +96,18 @@ class Places:
     """
 
     def __init__(self) -> None:
-        self._file: Any = tempfile.SpooledTemporaryFile(max_size=MEMORY_BYTES)  # noqa: SIM115 -- lives as long as this
+        self._held: dict[int, tuple[Kept, Piece]] = {}
+        self._held_bytes = 0
+        self._file: Any = None
         self._end = 0
         self._count = self.records = 0
         self._recent: deque[tuple[Piece, Kept]] = deque(maxlen=8)
 
     def close(self) -> None:
-        """Let the file go."""
-        self._file.close()
+        """Let pieces and file go."""
+        self._held.clear()
+        if self._file is not None:
+            self._file.close()
 
     @property
     def is_long(self) -> bool:
@@ -104,8 +120,11 @@ class Places:
             if piece.holds(batch):
                 return kept
         device = batch.device_time_ns
-        present = None if device.present is None else np.array(device.present)
-        piece = Piece(np.array(batch.record_index), Column(np.array(device.values, dtype=np.int64), present))
+        present = None if device.present is None else _lasting(device.present)
+        piece = Piece(
+            _lasting(np.asarray(batch.record_index, np.int64)),
+            Column(_lasting(np.asarray(device.values, np.int64)), present),
+        )
         self._recent.append((piece, self._keep(piece)))
         return self._recent[-1][1]
 
@@ -113,24 +132,39 @@ class Places:
         index, timed = piece.index, piece.timed
         first, last = int(index[0]), int(index[-1])
         is_near, is_timed = last - first < 1 << 32, len(timed) == len(index)
-        parts = [(index - first).astype(np.uint32) if is_near else index - first, piece.time.values]
-        parts += [] if is_timed else [piece.time.mask]
         times = (int(timed[0]), int(timed[-1]), len(timed), _repeats(timed)) if len(timed) else ()
         kept = Kept(self._count, self._end, len(index), first, last, is_near, is_timed, times)
+        self._end += kept.size
+        self._count += 1
+        self.records += len(index)
+        self._held[kept.number] = kept, piece
+        self._held_bytes += piece.nbytes
+        if self._file is not None or self._held_bytes > MEMORY_BYTES:
+            self._write()
+        return kept
+
+    def _write(self) -> None:
+        """Write what is in memory to the file, and let it go."""
         try:
-            self._file.seek(self._end)
-            for part in parts:
-                self._file.write(part.data)
-                self._end += part.nbytes
+            if self._file is None:
+                self._file = tempfile.TemporaryFile()  # noqa: SIM115 -- lives as long as this
+            for kept, piece in self._held.values():
+                self._file.seek(kept.at)
+                places = piece.index - kept.first
+                self._file.write((places.astype(np.uint32) if kept.is_near else places).data)
+                self._file.write(np.ascontiguousarray(piece.time.values).data)
+                if not kept.is_timed:
+                    self._file.write(np.ascontiguousarray(piece.time.mask).data)
         except OSError as error:
             folder, reason = tempfile.gettempdir(), error.strerror or type(error).__name__
             raise GroundstationError(folder, f"no temporary file ({reason})", "", "make room, or set TMPDIR") from error
-        self._count += 1
-        self.records += len(index)
-        return kept
+        self._held.clear()
+        self._held_bytes = 0
 
     def piece(self, kept: Kept) -> Piece:
         """A piece as it was."""
+        if kept.number in self._held:
+            return self._held[kept.number][1]
         self._file.seek(kept.at)
         index = self._array(np.uint32 if kept.is_near else np.int64, kept.count).astype(np.int64) + kept.first
         time = self._array(np.int64, kept.count)
@@ -165,6 +199,12 @@ class Places:
             index[rows], time[rows], timed[rows] = window_index, window_time.values, window_time.mask
             count = rows.stop
         return index[:count], Column(time[:count], timed[:count])
+
+
+def _lasting(array: Any) -> Any:
+    """The array, or a copy where it would hold much more memory than its own; arrays of records never change."""
+    owner = array if array.base is None else array.base
+    return array if isinstance(owner, np.ndarray) and owner.nbytes <= 2 * array.nbytes else np.array(array)
 
 
 def _repeats(times: Int64Array) -> int:

@@ -1,6 +1,7 @@
 """One pass over a log: its header, clock model and ledger.
 
-Kept are 12 bytes a record for each set of topics that are sampled together, beyond 16 MiB in a temporary file.
+Kept are places and times, 16 bytes a record, for each set of topics that are sampled together; when there are more than
+16 MiB of them, all go to a temporary file, 12 bytes a record.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
