@@ -1,7 +1,6 @@
 """The command ``groundstation``: its verbs. Heavy imports happen inside them."""
 
 import io
-import math
 import sys
 from functools import partial
 from pathlib import Path
@@ -33,6 +32,7 @@ from groundstation.cli.application import (
     ReferenceFiles,
     SiteFile,
     ThresholdsFile,
+    Timeout,
     Together,
     Verbose,
     answers_with_exit_code,
@@ -40,6 +40,7 @@ from groundstation.cli.application import (
     examples,
     say,
     tell_written,
+    time_limit_s,
 )
 
 __all__ = ["app", "fleets", "flights", "main", "plans", "rules", "simulated", "watching"]  # the modules hold more verbs
@@ -187,15 +188,7 @@ def run(
     scheduler: Annotated[
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
     ] = "",
-    timeout: Annotated[
-        float | None,
-        typer.Option(
-            "--timeout",
-            help="Longest time for one log; one that takes longer has failed. Left out: none.",
-            metavar="SECONDS",
-            min=1.0,
-        ),
-    ] = None,
+    timeout: Timeout = None,
     fail_on: FailOn = "none",
     apply: Annotated[
         str,
@@ -248,9 +241,7 @@ def run(
         planned = plan(paths, output, configuration, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)
         return DONE
-    if timeout is not None and math.isnan(timeout):
-        raise UsageError("--timeout nan", "no number", "seconds")
-    timeout_s = math.inf if timeout is None else timeout
+    timeout_s = time_limit_s(timeout)
     run_apart = partial(run_many, jobs=jobs, scheduler=scheduler, redo=redo, stations=stations, timeout_s=timeout_s)
     run_logs = run_together if together else run_apart  # logs are joined anew at every run, in this process
     try:
