@@ -243,3 +243,43 @@ def test_a_recorded_flight_answers_as_before(name: str, tmp_path: Path) -> None:
     convert_log(open_log(real_log("g1000/log_210623_141501_TEST1.csv")), whole)
     before, after = (answer(opened(path, tmp_path), name) for path in (whole, disguised(whole, tmp_path)))
     assert_equal_answers(before, after, MODEL_DEG)
+
+
+def test_of_the_head_of_a_log_known_keys_with_known_values_stay(tmp_path: Path) -> None:
+    told = {
+        "derived.ins.true_heading_deg": "magnetic heading of RA-1",
+        "derived.ins.RA-1": "RA-1",
+        "derived.RA-1": "RA-1",
+        "heading_is_track.ins.true_heading_deg": "the nose of RA-1",
+        "ins_class": "RA-1",
+        "ins_kind": "RA-1",
+        "always_on_ground": "RA-1",
+        "reference.parking_heading_deg": "RA-1",
+        "reference.parking_heading_sigma_deg": "0.02",
+        "clip.from_s": "RA-1",
+        "derived_from": "RA-1",
+    }
+    info = replace(StoreInfo("a.csv", "ab" * 32, "flat-csv"), metadata=told)
+    shown = Disguise(SEED, START_NS).info(info)
+    assert "RA-1" not in json.dumps({**shown.metadata, **shown.to_strings({})})
+    kept = dict(shown.metadata)
+    kept.pop("anonymous")
+    assert kept == {
+        "derived.ins.true_heading_deg": "magnetic",
+        "heading_is_track.ins.true_heading_deg": "heading_is_track",
+        "reference.parking_heading_sigma_deg": "0.02",
+    }
+    facts = {"ins_class": "navigation", "ins_kind": "unaided", "always_on_ground": "true"}
+    assert facts.items() <= Disguise(SEED).info(replace(info, metadata=facts)).metadata.items()
+
+
+def test_topics_left_out_do_not_move_flight_time_zero(tmp_path: Path) -> None:
+    made = make().flight
+    early = table("raw.boot", made["ins"].time_ns[:3] - 4_700_000_000, {"state": np.arange(3.0)})
+    zero_ns = int(early.time_ns[0])
+    whole = stored(Flight({"raw.boot": early, **made.tables}, {}, zero_ns, True, "a"), tmp_path / "a.mcap")
+    for name, wanted in (("plain", Wanted(topics=("ins",))), ("disguised", Wanted(None, None, ("ins",), True, SEED))):
+        part = tmp_path / f"{name}.mcap"
+        clip(whole, part, wanted, with_recording=False)
+        assert opened(part, tmp_path).time_s("ins")[0] == pytest.approx(4.7), name
+        assert float(read_info(part).metadata["clip.zero_s"]) == 0.0

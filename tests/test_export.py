@@ -287,6 +287,16 @@ def test_figures_are_written_with_units_and_utc(tmp_path: Path) -> None:
     assert {path.stem for path in (tmp_path / "all").iterdir()} == set(load(folder).figures)
 
 
+def test_the_tables_of_a_run_are_not_overwritten(tmp_path: Path) -> None:
+    folder = save_flight(tmp_path / "out", 0)
+    table = folder / "tables" / "heading_samples.csv"
+    before = table.read_bytes()
+    for target, names in ((table.parent, ()), (table, ("heading_samples",)), (folder / "arrays", ())):
+        with pytest.raises(UsageError, match="run's own"):
+            export_figures(folder, target, names, force=True)
+    assert table.read_bytes() == before
+
+
 def test_figures_need_a_flight_folder_and_a_name_that_is_there(tmp_path: Path) -> None:
     folder = save_flight(tmp_path / "out", 0)
     with pytest.raises(UsageError, match="heading_samples"):

@@ -72,6 +72,16 @@ def test_a_log_is_run_once_when_it_has_stopped_growing(tmp_path: Path, monkeypat
     assert Looks(tmp_path, monkeypatch).play(grow, grow, nothing, nothing, nothing) == [["a.csv"]]
 
 
+def test_a_batch_has_the_limits_that_the_watch_was_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.csv").write_text("1")
+    batches = list[Batch]()
+    monkeypatch.setattr(watching, "run_batch", lambda batch, _listen: batches.append(batch) or ())
+    options = {"only_results": True, "timeout_s": 7.0, "wait": lambda _seconds: None, "say": print}
+    list(watch(tmp_path, tmp_path / "out", Configuration(), every_s=1.0, once=True, **options))
+    (batch,) = batches
+    assert (batch.only_results, batch.timeout_s, batch.is_first, batch.force) == (True, 7.0, True, False)
+
+
 def test_a_log_that_is_replaced_is_run_again_and_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("a.csv", "b.csv"):
         (tmp_path / name).write_text("1")

@@ -1,5 +1,6 @@
 """What all verbs have in common: the application, its exit codes, options spelled alike, errors in one line."""
 
+import math
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
@@ -126,6 +127,15 @@ Store = Annotated[
         metavar="delta:PATH|URL",
     ),
 ]
+Timeout = Annotated[
+    float | None,
+    typer.Option(
+        "--timeout",
+        help="Longest time for one log; one that takes longer has failed. Left out: none.",
+        metavar="SECONDS",
+        min=1.0,
+    ),
+]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
 Profile = Annotated[
     Path | None,
@@ -171,6 +181,19 @@ ReferenceFiles = Annotated[
         readable=False,
     ),
 ]
+
+
+def time_limit_s(given: float | None) -> float:
+    """The seconds that ``--timeout`` gives one log; infinite where it is left out.
+
+    Raises
+    ------
+    UsageError
+        When it is no number.
+    """
+    if given is not None and math.isnan(given):
+        raise UsageError("--timeout nan", "no number", "seconds")
+    return math.inf if given is None else given
 
 
 def say(text: str) -> None:

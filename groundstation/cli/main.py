@@ -1,7 +1,6 @@
 """The command ``groundstation``: its verbs. Heavy imports happen inside them."""
 
 import io
-import math
 import sys
 from functools import partial
 from pathlib import Path
@@ -35,6 +34,7 @@ from groundstation.cli.application import (
     SiteFile,
     Store,
     ThresholdsFile,
+    Timeout,
     Together,
     Verbose,
     answers_with_exit_code,
@@ -42,6 +42,7 @@ from groundstation.cli.application import (
     examples,
     say,
     tell_written,
+    time_limit_s,
 )
 
 __all__ = ["app", "fleets", "flights", "main", "plans", "rules", "simulated", "watching"]  # the modules hold more verbs
@@ -192,15 +193,7 @@ def run(
     scheduler: Annotated[
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
     ] = "",
-    timeout: Annotated[
-        float | None,
-        typer.Option(
-            "--timeout",
-            help="Longest time for one log; one that takes longer has failed. Left out: none.",
-            metavar="SECONDS",
-            min=1.0,
-        ),
-    ] = None,
+    timeout: Timeout = None,
     fail_on: FailOn = "none",
     apply: Annotated[
         str,
@@ -255,9 +248,7 @@ def run(
         planned = plan(paths, output, configuration, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)
         return DONE
-    if timeout is not None and math.isnan(timeout):
-        raise UsageError("--timeout nan", "no number", "seconds")
-    timeout_s = math.inf if timeout is None else timeout
+    timeout_s = time_limit_s(timeout)
     run_apart = partial(
         run_many, jobs=jobs, scheduler=scheduler, redo=redo, stations=stations, timeout_s=timeout_s, store=store
     )

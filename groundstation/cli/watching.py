@@ -15,17 +15,20 @@ from groundstation.cli.application import (
     Jobs,
     Json,
     NoPdf,
+    Only,
     Profile,
     Progress,
     Quiet,
     ReferenceFiles,
     SiteFile,
     ThresholdsFile,
+    Timeout,
     Verbose,
     answers_with_exit_code,
     app,
     examples,
     say,
+    time_limit_s,
 )
 
 if TYPE_CHECKING:
@@ -62,8 +65,10 @@ def watch(
         typer.Option("--stations", help="Ground stations of the sessions (TOML).", metavar="FILE", readable=False),
     ] = None,
     jobs: Jobs = 0,
+    timeout: Timeout = None,
     fail_on: FailOn = "none",
     no_pdf: NoPdf = False,
+    only: Only = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -81,6 +86,7 @@ def watch(
     from groundstation.pipeline.many_flights.watching import watch as looked_at
     from groundstation.pipeline.one_flight.configuration import load_configuration
 
+    timeout_s = time_limit_s(timeout)
     settings = load_configuration(config, aircraft, site, profile=profile, thresholds=thresholds, icds=icd)
     configuration = judged_by(settings, reference or (), is_one_log=False)
     every_outcome: list[Outcome] = []
@@ -94,6 +100,8 @@ def watch(
             with_pdf=not no_pdf,
             stations=stations,
             force=force,
+            only_results=only == "results",
+            timeout_s=timeout_s,
             say=say,
             listen=listen,
         )

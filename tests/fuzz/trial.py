@@ -50,7 +50,7 @@ class Watch:
     def _note(self, event: str, path: Any, folder: Any = None) -> None:
         named = os.fsdecode(path)
         if isinstance(folder, int) and folder >= 0:  # relative to an open folder
-            named = os.path.join(os.readlink(f"/proc/self/fd/{folder}"), named)
+            named = str(Path(f"/proc/self/fd/{folder}").readlink() / named)
         name = os.path.realpath(named)
         if not (name + "/").startswith(self.folder + "/") and "/__pycache__" not in name and "numba" not in name:
             self.seen.append(f"{event} {name}")

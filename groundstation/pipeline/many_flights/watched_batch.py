@@ -1,5 +1,6 @@
 """One batch of a watch, in a process of its own: a watch of weeks keeps no thread and no memory of what it ran."""
 
+import math
 import multiprocessing
 import os
 import signal
@@ -40,6 +41,8 @@ class Batch:
     stations: Path | None
     force: bool
     is_first: bool
+    only_results: bool = False
+    timeout_s: float = math.inf
 
 
 def run_batch(batch: Batch, listen: Listener) -> tuple[Outcome, ...] | str:
@@ -127,6 +130,8 @@ def _outcomes(batch: Batch, listen: Listener) -> tuple[Outcome, ...]:
             batch.out,
             batch.configuration,
             jobs=batch.jobs,
+            only_results=batch.only_results,
+            timeout_s=batch.timeout_s,
             force=batch.force,
             fail_on=batch.fail_on,
             with_pdf=batch.with_pdf,

@@ -4,6 +4,7 @@ All that is known of finished logs stands in OUT, so the watch may be killed at 
 what is finished, and goes on. Folders are listed again and again, which works on network shares too.
 """
 
+import math
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -68,6 +69,8 @@ def watch(
     with_pdf: bool = True,
     stations: Path | None = None,
     force: bool = False,
+    only_results: bool = False,
+    timeout_s: float = math.inf,
     say: Callable[[str], None],
     listen: Listener = silent,
     wait: Callable[[float], None] = time.sleep,
@@ -83,6 +86,10 @@ def watch(
         Of this machine, or of a share that it sees as a folder.
     once : bool
         Look twice, run what is ready, and end; what kept it from that is then an outcome that failed.
+    only_results : bool
+        No recording and no report, as for ``run``.
+    timeout_s : float
+        Longest time for one log, in seconds; one that takes longer has failed, and is run again when it changes.
     say : callable
         Is given what is not about a log: that the folder cannot be reached, that another run writes into ``out``.
     wait : callable
@@ -98,7 +105,7 @@ def watch(
     if folder.resolve() == out.resolve():
         raise UsageError(str(out), "the folder that is watched", "another one for the results")
     refuse_foreign(out, force)
-    batch = Batch((), out, configuration, fail_on, with_pdf, jobs, stations, force, is_first=True)
+    batch = Batch((), out, configuration, fail_on, with_pdf, jobs, stations, force, True, only_results, timeout_s)
     watched, trouble = Watched(), _Trouble((lambda _: None) if once else say)
     watched.ready(_look(folder, out, configuration, trouble))
     while True:

@@ -7,11 +7,13 @@ date: the true heading that follows from it is the same.
 
 import hashlib
 import hmac
+import math
 import secrets
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,12 +23,13 @@ from groundstation.base.clock import Clock
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.ledger import DamagedSpan, Ledger
 from groundstation.base.records import HEADING_IS_TRACK, BoolArray, Column, Damage, Int64Array, RecordBatch
-from groundstation.base.signals import is_canonical, kind_of
+from groundstation.base.signals import TOPICS, is_canonical, kind_of
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.estimators.inertial.noise import class_names
 from groundstation.tables.declination import declination_along
 from groundstation.tables.headings import positions_for
-from groundstation.tables.phases import ALWAYS_ON_GROUND
+from groundstation.tables.phases import ALWAYS_ON_GROUND, YES
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:
@@ -38,19 +41,38 @@ NAMED = frozenset(("link", "adf"))  # topics whose second part is the name of an
 MAGNETIC_HEADING = "magnetic_heading_deg"
 COLUMNS_LEFT_OUT = frozenset(("frequency_mhz", "course_magnetic_deg"))  # of a localizer: it is found by them
 WORDS = frozenset(("mode", "constellation", "fix"))  # text of a few fixed words
-KEPT_FACTS = frozenset(
-    (
-        *("ins_kind", "ins_class", ALWAYS_ON_GROUND, "clip.zero_s", "clip.from_s", "clip.to_s"),
-        *("reference.parking_heading_deg", "reference.parking_heading_sigma_deg"),
-    )
-)
-KEPT_KINDS = ("derived.", f"{HEADING_IS_TRACK}.")
+INS_KINDS = ("gnss_aided", "unaided")
+ORIGINS = ("magnetic", "land")  # what analyses look for in the text that tells what a field was derived from
 ANONYMOUS, ZERO_EVENT = "anonymous", "flight time zero"
 LEAST_SHIFT_DEG, WEEKS, FORWARD_BEFORE_YEAR = 10.0, (26, 300), 2018  # models of the field serve 2010 to 2029
 ON_EARTH_M = 6.0e6  # nearer to the origin, a position is one of a local frame
 WEEK_NS, YEAR_NS = 7 * 86_400 * NS_PER_S, 31_556_952 * NS_PER_S
 DATE_NS = 25 * YEAR_NS  # times so near to the start are dates, others count from elsewhere
 XYZ = "xyz"
+
+
+def _number(text: str) -> str:
+    """A number as it was written; empty where it is none."""
+    try:
+        return text.strip() if math.isfinite(float(text)) else ""
+    except ValueError:
+        return ""
+
+
+def _word_of(*words: str) -> Callable[[str], str]:
+    """Makes of a text the known word that it is; empty where it is another."""
+    return lambda text: text.strip().lower() if text.strip().lower() in words else ""
+
+
+_FACTS: Mapping[str, Callable[[str], str]] = MappingProxyType(
+    {
+        "ins_kind": _word_of(*INS_KINDS),
+        "ins_class": lambda text: _word_of(*class_names())(text),
+        ALWAYS_ON_GROUND: _word_of(*YES),
+        **dict.fromkeys(("clip.zero_s", "clip.from_s", "clip.to_s"), _number),
+        **dict.fromkeys(("reference.parking_heading_deg", "reference.parking_heading_sigma_deg"), _number),
+    }
+)
 
 
 @dataclass(frozen=True)
@@ -199,9 +221,10 @@ class Disguise:
 
     def info(self, info: "StoreInfo") -> "StoreInfo":
         """Facts of the flight without names, places, dates and free text."""
-        facts = {
-            name: value for name, value in info.metadata.items() if name in KEPT_FACTS or name.startswith(KEPT_KINDS)
-        }
+        facts = {}
+        for name, value in info.metadata.items():
+            fact = self._fact(name, value)
+            facts.update({} if fact is None else dict([fact]))
         if info.metadata.get("aircraft"):
             facts["aircraft"] = self.alias(info.metadata["aircraft"].strip())
         start_ns = None if info.start_ns is None else info.start_ns + self.shift_ns
@@ -220,6 +243,21 @@ class Disguise:
             remarks=(),
             damages=bare,
         )
+
+    def _fact(self, name: str, value: str) -> tuple[str, str] | None:
+        """A fact of the head of the log as it may be told: a known key with a number or a known word; else None."""
+        if name in _FACTS:
+            known = _FACTS[name](value)
+            return (name, known) if known else None
+        code, _, path = name.partition(".")
+        topic, _, column = path.rpartition(".")
+        shown = self.topic(topic)
+        if code not in ("derived", HEADING_IS_TRACK) or shown is None:
+            return None
+        if column not in {one.name for one in TOPICS[kind_of(topic)]}:
+            return None
+        origin = next((word for word in ORIGINS if word in value.lower()), "another signal")
+        return f"{code}.{shown}.{column}", origin if code == "derived" else code
 
     def _ledger(self, ledger: Ledger, start_utc_ns: int | None) -> Ledger:
         """What only the log could tell of its damage, without texts and places."""

@@ -24,7 +24,7 @@ from groundstation.pipeline.one_flight.intervals import flight_seconds
 from groundstation.pipeline.one_flight.log import Log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
-from groundstation.pipeline.verbs.anonymous import ANONYMOUS, disguise_of
+from groundstation.pipeline.verbs.anonymous import ANONYMOUS, Disguise, disguise_of
 from groundstation.pipeline.verbs.describe import facts_of
 from groundstation.results.flight import Source
 
@@ -155,10 +155,7 @@ def _cut(log: Log, mcap: Path, target: Path, wanted: Wanted, limits: Thresholds)
     census, damages = census_of(info, limits), list[Damage]()
     first_ns: int | None = None
     with StoreWriter(target, info) as writer:
-        zero = None if disguise is None or wanted.start or wanted.topics else disguise.zero(zero_ns)
-        if zero is not None:
-            writer.write(zero)
-            census.add(zero)
+        zero: RecordBatch | None = None
         for item in read(mcap, part):
             if isinstance(item, RecordBatch):
                 assert item.time_ns is not None
@@ -166,6 +163,11 @@ def _cut(log: Log, mcap: Path, target: Path, wanted: Wanted, limits: Thresholds)
                 shown = item if disguise is None else disguise.batch(item)
                 if shown is None:
                     continue
+                if first_ns is None:
+                    zero = _zero_event(wanted, disguise, zero_ns, time_ns)
+                    for event in () if zero is None else (zero,):
+                        writer.write(event)
+                        census.add(event)
                 first_ns = time_ns if first_ns is None else min(first_ns, time_ns)
                 writer.write(shown)
                 census.add(shown)
@@ -185,6 +187,17 @@ def _cut(log: Log, mcap: Path, target: Path, wanted: Wanted, limits: Thresholds)
         cut = replace(cut, source_name=target.name if disguise is None else f"{ANONYMOUS}.mcap", source_sha256="")
         info = writer.info = recounted(cut, damages, census)
     return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages))
+
+
+def _zero_event(wanted: Wanted, disguise: Disguise | None, zero_ns: int, first_ns: int) -> RecordBatch | None:
+    """An event at flight time zero, where topics left out may be what began there; None where none is needed.
+
+    Analyses count from flight time zero: without it their grid would begin elsewhere.
+    """
+    is_whole = disguise is not None and not wanted.topics
+    if wanted.start or not (is_whole or (wanted.topics and first_ns > zero_ns)):
+        return None
+    return (disguise or Disguise(0)).zero(zero_ns)
 
 
 def _zero_ns(mcap: Path, info: "StoreInfo") -> int:

@@ -9,9 +9,11 @@ import numpy as np
 from groundstation.base.errors import UsageError, told_in_a_line
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.verbs.export import require_place, require_suffix, saved_flight
 from groundstation.results.figures import FigureData, numbers
+from groundstation.results.file_names import ARRAYS, TABLES
 from groundstation.results.files import csv_text, write_text
 from groundstation.results.flight import UTC_OF
 
@@ -45,6 +47,7 @@ def export_figures(folder: Path, target: Path, names: Sequence[str] = (), *, for
     elif target.is_file():
         raise UsageError(str(target), "a file", f"a folder for {len(wanted)} figures")
     for file in files.values():
+        _refuse_saved(file.parent)
         require_place(folder, file, force)
     with told_in_a_line(str(target)):
         for name, file in files.items():
@@ -52,6 +55,13 @@ def export_figures(folder: Path, target: Path, names: Sequence[str] = (), *, for
             write_text(file, csv_text(_with_utc(saved.figures[name], saved.results.start_utc_ns)))
     rows = ", ".join(f"{name} ({len(saved.figures[name])})" for name in wanted)
     return Outcome(str(folder), "done", f"-> {target}: {rows}", folder=str(target))
+
+
+def _refuse_saved(place: Path) -> None:
+    """Refuse the tables of a run: summary.json and later runs count on them as they were written."""
+    place = place.resolve()
+    if place.name in (TABLES, ARRAYS) and (place.parent / FLIGHT_FOLDER_MARK).is_file():
+        raise UsageError(str(place), "a folder of the run's own", "another one: -f does not overwrite results")
 
 
 def _with_utc(figure: FigureData, start_utc_ns: int | None) -> FigureData:
