@@ -11,7 +11,7 @@ from groundstation.pipeline.one_flight.outcome import Outcome
 
 KIND = "delta:"
 DIGEST = "row_sha256"
-TRIES = 5  # of a commit that another writer comes before
+TRIES = 20  # of a commit that another writer comes before: each time one of them has written
 MEANING = "of the row: a row that is there with the same one is not written again"
 
 
@@ -84,9 +84,9 @@ def _merge(place: str, rows: Any) -> None:
     from deltalake import DeltaTable
     from deltalake.exceptions import CommitFailedError
 
-    DeltaTable.create(place, rows.schema, mode="ignore", name="flights", description="one row per flight")
     for left in reversed(range(TRIES)):
-        try:
+        try:  # the making of the table is a commit, too
+            DeltaTable.create(place, rows.schema, mode="ignore", name="flights", description="one row per flight")
             (
                 DeltaTable(place)
                 .merge(rows, "kept.flight_id = new.flight_id", "new", "kept", merge_schema=True)
