@@ -21,7 +21,7 @@ from groundstation.base.errors import UsageError
 from groundstation.cli.main import app
 from groundstation.pipeline.many_flights import workers
 from groundstation.pipeline.many_flights.batch import _crew, plan_many, run_many
-from groundstation.pipeline.many_flights.fleet_store import KEYS
+from groundstation.pipeline.many_flights.flight_keys import KEYS
 from groundstation.pipeline.many_flights.out_folder import LOCK
 from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, _teller, in_turn, side_by_side
 from groundstation.pipeline.one_flight.configuration import Configuration

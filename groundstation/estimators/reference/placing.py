@@ -20,6 +20,8 @@ from groundstation.results.reference import Observed, Placed
 
 UNKNOWNS = 5  # arm forward and right, offset, constant north and east
 FAR_SIGMAS = 5.0
+ROUNDING_M = 1e-6  # errors of a constant are the rounding of positions: none of it is far
+RANK = 1e-9  # of the largest singular value: below it two unknowns are one
 COARSE_STEP_S, GROSS_S = 0.25, 1.0
 BETTER = 0.5  # what a gross offset must leave of the difference of speeds
 LEAST_COMPARED = 20
@@ -57,20 +59,26 @@ def fit_place(errors: Errors) -> PlaceFit | None:
     if known.sum() <= 2 * UNKNOWNS:
         return None
     measured, rows = errors.position_m[known, :2], _design(errors, known)
-    for _ in range(2):
-        solved, _unused, rank, _also = np.linalg.lstsq(rows.reshape(-1, UNKNOWNS), measured.reshape(-1), rcond=1e-9)
-        if rank < UNKNOWNS:
+    solved = _solved(rows, measured)
+    if solved is None:
+        return None
+    away = np.abs(measured - rows @ solved)
+    near = (away <= FAR_SIGMAS * 1.4826 * np.median(away, axis=0) + ROUNDING_M).all(axis=1)
+    if not near.all() and near.sum() > 2 * UNKNOWNS:
+        measured, rows = measured[near], rows[near]
+        solved = _solved(rows, measured)
+        if solved is None:
             return None
-        left = measured - rows @ solved
-        far = FAR_SIGMAS * 1.4826 * np.median(np.abs(left), axis=0) + 1e-9
-        near = (np.abs(left) <= far).all(axis=1)
-        if near.all() or near.sum() <= 2 * UNKNOWNS:
-            break
-        measured, rows, left = measured[near], rows[near], left[near]
-    flat = rows.reshape(-1, UNKNOWNS)
-    weights = (flat @ np.linalg.inv(flat.T @ flat)).reshape(rows.shape)
+    left = measured - rows @ solved
+    weights = np.linalg.pinv(rows.reshape(-1, UNKNOWNS), rcond=RANK).T.reshape(rows.shape)
     products = np.einsum("nci,nc->ni", weights, left)[:, :3]
     return PlaceFit(np.asarray(solved[:3]), *_uncertainty(products))
+
+
+def _solved(rows: FloatArray, measured: FloatArray) -> FloatArray | None:
+    """The unknowns by least squares; None where the rows do not tell them apart."""
+    solved, _unused, rank, _also = np.linalg.lstsq(rows.reshape(-1, UNKNOWNS), measured.reshape(-1), rcond=RANK)
+    return None if rank < UNKNOWNS else np.asarray(solved)
 
 
 def _uncertainty(products: FloatArray) -> tuple[FloatArray, FloatArray]:
