@@ -332,7 +332,7 @@ def test_the_time_column_may_feed_a_field_too(tmp_path: Path) -> None:
 
 def test_an_absent_profile_is_a_settings_error(tmp_path: Path) -> None:
     log, _settings = files(tmp_path, "", "t,v\n0,1\n")
-    with pytest.raises(SettingsError, match="no readable profile"):
+    with pytest.raises(SettingsError, match="no readable file"):
         registry.identify(log, tmp_path / "none.toml")
 
 

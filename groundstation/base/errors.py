@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
+MOST_FOUND = 1000  # characters of what a file held that an error quotes
+
 
 class GroundstationError(Exception):
     """Report a failure in one line a user can act on.
@@ -26,7 +28,8 @@ class GroundstationError(Exception):
 
     def __init__(self, where: str, found: str, expected: str = "", next_step: str = "") -> None:
         self.where, self.found, self.expected, self.next_step = where, found, expected, next_step
-        text = f"{where}: found {found}" if expected else f"{where}: {found}"
+        shown = found if len(found) <= MOST_FOUND else f"{found[:MOST_FOUND]} ... ({len(found)} characters)"
+        text = f"{where}: found {shown}" if expected else f"{where}: {shown}"
         if expected:
             text += f", expected {expected}"
         if next_step:

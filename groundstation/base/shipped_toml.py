@@ -1,12 +1,12 @@
 """TOML files that come with the package and are chosen by name; a user's own are chosen by path."""
 
-import tomllib
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from groundstation.base.errors import SettingsError
+from groundstation.base.toml_text import toml_table, toml_text
 
 SUFFIX = ".toml"
 
@@ -54,17 +54,11 @@ class ShippedToml:
         if wanted.endswith(SUFFIX):
             path = Path(name_or_path)
             where, name = path.name, path.stem
-            try:
-                text = path.read_text(encoding="utf-8")
-            except (OSError, UnicodeDecodeError) as error:
-                raise SettingsError(where, f"a file for {self.what} that cannot be read ({error})") from error
+            text = toml_text(path, where, f"a TOML file for {self.what}")
         elif wanted.lower() in self.names():
             name = wanted.lower()
             where = f"{name}{SUFFIX}"
             text = (resources.files(self.package) / self.folder / where).read_text(encoding="utf-8")
         else:
             raise SettingsError(self.what, repr(wanted), f"a file *{SUFFIX} or one of {', '.join(self.names())}")
-        try:
-            return TomlFile(name, where, tomllib.loads(text), text)
-        except tomllib.TOMLDecodeError as error:
-            raise SettingsError(where, f"text that is not TOML ({error})") from error
+        return TomlFile(name, where, toml_table(text, where, f"a TOML file for {self.what}"), text)

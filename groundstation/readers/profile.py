@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.signals import RAW_PREFIX, Field, field_of, is_canonical
+from groundstation.base.toml_text import toml_table, toml_text
 from groundstation.base.units import CONVERSIONS
 from groundstation.readers.layout import METHODS, Key
 
@@ -108,16 +109,8 @@ def read_table(path: Path) -> dict[str, Any]:
     SettingsError
         When it cannot be read or is no TOML.
     """
-    import tomllib
-
-    try:
-        text = path.read_bytes().decode("utf-8")
-        return tomllib.loads(text)
-    except OSError as error:
-        reason = (error.strerror or type(error).__name__).lower()
-        raise SettingsError(str(path), f"no readable profile ({reason})", "", "check the path") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise SettingsError(str(path), f"no valid TOML ({error})", "a profile as docs/profiles.md describes") from error
+    text = toml_text(path, str(path), "a profile", "check the path")
+    return toml_table(text, str(path), "a profile as docs/profiles.md describes")
 
 
 class Checker:

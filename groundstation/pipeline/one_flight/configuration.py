@@ -3,7 +3,6 @@
 The analyses are imported when their settings are asked for, or when the user gives any: a log is converted without.
 """
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import settings_from
+from groundstation.base.toml_text import toml_table, toml_text
 from groundstation.integrity.limits import Thresholds, thresholds_from
 
 if TYPE_CHECKING:
@@ -205,12 +205,8 @@ def read_toml(path: Path) -> dict[str, Any]:
     SettingsError
         When the file cannot be read or is not TOML.
     """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise SettingsError(str(path), error.strerror or "cannot be opened", "a readable TOML file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise SettingsError(str(path), f"not TOML ({error})", "a TOML file", "see docs/configuration.md") from error
+    what = ("a TOML file", "see docs/configuration.md")
+    return toml_table(toml_text(path, str(path), *what), str(path), *what)
 
 
 def load_configuration(

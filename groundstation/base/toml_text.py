@@ -1,0 +1,50 @@
+"""TOML of a user's file: bounded in size and depth, every refusal in one line."""
+
+from pathlib import Path
+from typing import Any
+
+from groundstation.base.errors import SettingsError
+
+MAX_BYTES = 16 << 20  # a pipe or a device that never ends is refused there
+
+
+def toml_text(path: Path, where: str, expected: str = "a TOML file", next_step: str = "") -> str:
+    """The text of a file, decoded (UTF-8, with or without its mark).
+
+    ``where`` names the file in errors; ``expected`` and ``next_step`` are what they say of it.
+
+    Raises
+    ------
+    SettingsError
+        When it cannot be opened, is longer than 16 MiB or no UTF-8.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        reason = (getattr(error, "strerror", None) or "no such name").lower()
+        raise SettingsError(where, f"no readable file ({reason})", expected, next_step) from error
+    if len(content) > MAX_BYTES:
+        raise SettingsError(where, f"more than {MAX_BYTES >> 20} MiB", expected, next_step)
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise SettingsError(where, f"not TOML ({error})", expected, next_step) from error
+
+
+def toml_table(text: str, where: str, expected: str = "a TOML file", next_step: str = "") -> dict[str, Any]:
+    """The table that a TOML text holds.
+
+    Raises
+    ------
+    SettingsError
+        When it is not TOML, or nested too deeply.
+    """
+    import tomllib  # 10 ms that most commands do not need
+
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError(where, f"not TOML ({error})", expected, next_step) from error
+    except RecursionError as error:
+        raise SettingsError(where, "not TOML (brackets in brackets, too many)", expected, next_step) from error
