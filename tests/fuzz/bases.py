@@ -16,6 +16,7 @@ from tests.bag_writer import small_flight as small_flight_of_a_robot
 from tests.bag_writer import write_ros1, write_ros2
 from tests.dataflash_writer import MAGIC as DATAFLASH_MAGIC
 from tests.dataflash_writer import flight_log
+from tests.flightdata_writer import write_flightdata
 from tests.real_logs import REAL_LOGS
 from tests.receiver_writer import nmea_log, novatel_log, novatel_text_log, ubx_log
 from tests.telemetry_writer import telemetry
@@ -207,6 +208,28 @@ def starts_with(magic: bytes) -> Callable[[bytes], Iterator[int]]:
     return starts
 
 
+def hdf5() -> bytes:
+    """A recording of an airliner of 20 s."""
+    rows = np.arange(20.0)
+    parameters = {
+        "Latitude": {"data": 60.0 + 0.001 * rows, "offset": 0.75, "units": "deg"},
+        "Longitude": {"data": 10.0 + 0.002 * rows, "offset": 0.5, "units": "deg"},
+        "Heading True": {"data": (350.0 + rows) % 360.0, "offset": 0.25},
+        "Groundspeed": {"data": 100.0 + rows, "offset": 0.75, "units": "kts"},
+        "Acceleration Normal": {"data": np.ones(160), "frequency": 8.0},
+        "Flap": {"data": np.full(20, 15.0), "mask": rows % 2 == 0, "lfl": False},
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        return write_flightdata(Path(folder) / "log.hdf5", parameters).read_bytes()
+
+
+def hdf5_starts(data: bytes) -> Iterator[int]:
+    """Where the parts of an HDF5 file begin that lead to others: its head, trees, symbol tables, names."""
+    for magic in (b"\x89HDF", b"TREE", b"SNOD", b"HEAP"):
+        for at in starts_with(magic)(data):
+            yield from range(at + 4, min(at + 40, len(data)), 8)
+
+
 _STARTS: dict[str, Callable[[bytes], Iterator[int]]] = {
     "flat-csv": line_starts,
     "csv-profile": line_starts,
@@ -227,6 +250,7 @@ _STARTS: dict[str, Callable[[bytes], Iterator[int]]] = {
     "pos": line_starts,
     "sbet": lambda data: iter(range(0, len(data), 136)),
     "tlog": lambda data: iter(range(0, len(data), 48)),
+    "hdf5": hdf5_starts,
 }
 FORMATS = tuple(_STARTS)
 _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
@@ -249,6 +273,7 @@ _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
     "pos": (pos,),
     "sbet": (lambda: sbet(count=300).tobytes(),),
     "tlog": (lambda: bytes(telemetry().data),),
+    "hdf5": (hdf5,),
 }
 _RECORDED = {
     "csv-profile": ("g1000/log_220502_135932_EGPN.csv", "fixedwing/umn_thor_flight75.csv"),

@@ -82,6 +82,7 @@ def suffix_of(format_name: str) -> str:
         "flatbuffer": ".mcap",
         "ros1": ".bag",
         "sqlite3": ".db3",
+        "hdf5": ".hdf5",
         "gzip": ".gz",
         "zstd": ".zst",
     }.get(format_name, ".csv")
