@@ -2,10 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Int64Array, RecordBatch
+from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Int64Array, RecordBatch, frozen
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,12 +25,14 @@ def occupied(part: Part) -> Part | None:
     columns = part.columns.values()
     if not part.columns or any(column.present is None for column in columns):
         return part if part.columns else None
-    rows: BoolArray = np.logical_or.reduce([column.mask for column in columns])
+    masks = {id(column.present): column.mask for column in columns}
+    rows: BoolArray = np.logical_or.reduce(list(masks.values())) if len(masks) > 1 else next(iter(masks.values()))
     if rows.all():
         return part
     if not rows.any():
         return None
-    kept = {name: column.take(rows) for name, column in part.columns.items()}
+    taken = {identity: frozen(mask[rows]) for identity, mask in masks.items()}
+    kept = {name: Column(column.values[rows], taken[id(column.present)]) for name, column in part.columns.items()}
     validity_ns = None if part.validity_ns is None else part.validity_ns[rows]
     return Part(part.index[rows], part.time.take(rows), kept, validity_ns)
 
@@ -40,27 +44,43 @@ def merged(topic: str, parts: Sequence[Part]) -> RecordBatch:
         return RecordBatch(topic, one.index, one.time, one.columns, validity_time_ns=one.validity_ns)
     index = np.concatenate([part.index for part in parts])
     order = np.argsort(index, kind="stable")
-    time = Column(
-        np.concatenate([part.time.values for part in parts])[order],
-        np.concatenate([part.time.mask for part in parts])[order],
-    )
-    columns = {}
+    places = np.empty_like(order)
+    places[order] = np.arange(len(order))
+    places_of = np.split(places, np.cumsum([len(part.index) for part in parts])[:-1])
+    columns: dict[str, Column] = {}
+    masks: dict[tuple[tuple[int, int], ...], BoolArray | None] = {}  # of parts with the same masks there is one
     for name in dict.fromkeys(name for part in parts for name in part.columns):
-        having = [part.columns.get(name) for part in parts]
-        dtype = np.result_type(*(column.values.dtype for column in having if column is not None))
-        values, present = np.zeros(len(index), dtype=dtype), np.zeros(len(index), dtype=bool)
-        start = 0
-        for part, column in zip(parts, having, strict=True):
-            rows = slice(start, start + len(part.index))
-            start += len(part.index)
-            if column is not None:
-                values[rows], present[rows] = column.values, column.mask
-        columns[name] = Column(values[order], present[order])
+        known = {number: part.columns[name] for number, part in enumerate(parts) if name in part.columns}
+        pieces = [(places_of[number], column) for number, column in known.items()]
+        key = tuple((number, id(column.present)) for number, column in known.items())
+        if key not in masks:
+            masks[key] = _present(pieces, len(index))
+        columns[name] = Column(_values(pieces, len(index)), masks[key])
+    times = list(zip(places_of, [part.time for part in parts], strict=True))
+    time = Column(_values(times, len(index)), _present(times, len(index)))
     validity_ns = None
     if any(part.validity_ns is not None for part in parts):
         each = [part.time.values if part.validity_ns is None else part.validity_ns for part in parts]
         validity_ns = np.concatenate(each)[order]
     return RecordBatch(topic, index[order], time, columns, validity_time_ns=validity_ns)
+
+
+def _values(pieces: Sequence[tuple[Int64Array, Column]], rows: int) -> NDArray[Any]:
+    """Values of several pieces that stand at given places."""
+    kind = np.result_type(*(piece.values.dtype for _at, piece in pieces))
+    first = pieces[0][1].values[:1]  # one text throughout is one run to write
+    values = np.full(rows, np.nan if kind.kind == "f" else first[0] if len(first) else 0, dtype=kind)
+    for at, piece in pieces:
+        values[at] = piece.values
+    return values
+
+
+def _present(pieces: Sequence[tuple[Int64Array, Column]], rows: int) -> BoolArray | None:
+    """Where there is a value; None when everywhere."""
+    present = np.zeros(rows, dtype=bool)
+    for at, piece in pieces:
+        present[at] = True if piece.present is None else piece.present
+    return None if present.all() else frozen(present)
 
 
 def bounded(batch: RecordBatch) -> Iterator[RecordBatch]:

@@ -1,31 +1,23 @@
 """Canonical topics from the records of a block: ins, gnss, magnetometer, baro, air, electric, discrete."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.atmosphere import REFUSED, pressure_altitude_m
-from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Damage, Int64Array, RecordBatch, frozen
+from groundstation.base.records import BoolArray, Column, Damage, RecordBatch, frozen
 from groundstation.readers.dataflash import rules
 from groundstation.readers.dataflash.choices import Choices
 from groundstation.readers.dataflash.events import event_names
 from groundstation.readers.dataflash.overview import Overview, Unit
 from groundstation.readers.dataflash.rules import Rule
 from groundstation.readers.dataflash.values import Rows, as_double
+from groundstation.readers.layout import velocity_from_track
+from groundstation.readers.parts import Part, bounded, merged, occupied
 
 FIX_2D, FIX_3D = 2, 3
 RANGE_GOOD, FACING_DOWN = 4, 25
-
-
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """What one record type gives to a canonical topic."""
-
-    rows: Rows
-    columns: dict[str, Column]
 
 
 class Mapper:
@@ -40,7 +32,7 @@ class Mapper:
 
     def __init__(self, found: Overview, choices: Choices) -> None:
         self._found, self._choices = found, choices
-        self._parts: dict[str, list[_Part]] = {}
+        self._parts: dict[str, list[Part]] = {}
         self.fields: dict[str, dict[str, None]] = {}  # what was yielded, for the remarks
         self._refused: dict[str, int] = {}
         self._takers = self._all_takers()
@@ -48,17 +40,15 @@ class Mapper:
     def take(self, rows: Rows) -> None:
         """Take in the rows of one sensor; types that map to nothing are passed over."""
         for topic, columns_of in self._takers.get((rows.definition.name, rows.instance), ()):
-            columns = columns_of(topic, rows)
-            if columns:
-                self._parts.setdefault(topic, []).append(_with_samples(rows, columns))
+            part = occupied(Part(rows.record_index, rows.time_ns, columns_of(topic, rows)))
+            if part is not None and len(part.index):
+                self._parts.setdefault(topic, []).append(part)
 
     def batches(self) -> Iterator[RecordBatch]:
         """Yield what was taken in since the last call."""
         parts, self._parts = self._parts, {}
         for topic, of_topic in sorted(parts.items()):
-            batch = _merged(topic, [part for part in of_topic if len(part.rows)])
-            for start in range(0, len(batch), MAX_BATCH_ROWS):
-                piece = batch.take(slice(start, start + MAX_BATCH_ROWS)) if len(batch) > MAX_BATCH_ROWS else batch
+            for piece in bounded(merged(topic, of_topic)):
                 self.fields.setdefault(topic, {}).update(dict.fromkeys(piece.columns))
                 yield piece
 
@@ -130,7 +120,7 @@ class Mapper:
         values = self._values(topic, rows, rules.POSITION)
         if not {"latitude_deg", "longitude_deg"} <= values.keys():
             return {}
-        known = (values["latitude_deg"] != 0.0) | (values["longitude_deg"] != 0.0)  # both zero: not known yet
+        known = frozen((values["latitude_deg"] != 0.0) | (values["longitude_deg"] != 0.0))  # both zero: not known yet
         return self._with_mode(rows, {name: Column(column, known) for name, column in values.items()})
 
     def _backup(self, topic: str, rows: Rows) -> dict[str, Column]:
@@ -145,7 +135,7 @@ class Mapper:
             values = self._values(topic, rows, wanted)
             used = None
             if core is not None:
-                used = self._choices.primary_core.at(rows.record_index, before=0) == core
+                used = frozen(self._choices.primary_core.at(rows.record_index, before=0) == core)
             columns = {name: Column(column, used) for name, column in values.items()}
             if is_solution and columns:
                 columns["mode"] = self._mode(rows, used)
@@ -155,7 +145,7 @@ class Mapper:
 
     def _gnss(self, topic: str, rows: Rows) -> dict[str, Column]:
         status = rows.values("Status") if rows.definition.has_numbers("Status") else np.full(len(rows), FIX_3D)
-        has_2d, has_3d = status >= FIX_2D, status >= FIX_3D
+        has_2d, has_3d = frozen(status >= FIX_2D), frozen(status >= FIX_3D)
         columns = {}
         for name, values in self._values(topic, rows, rules.POSITION).items():
             columns[name] = Column(values, has_3d if name == "altitude_msl_m" else has_2d)
@@ -163,9 +153,8 @@ class Mapper:
         if "track_deg" in motion:
             motion["track_deg"] = wrap_360(motion["track_deg"])
         if {"track_deg", "ground_speed_mps"} <= motion.keys():
-            track_rad = np.deg2rad(motion["track_deg"])
-            motion["velocity_north_mps"] = motion["ground_speed_mps"] * np.cos(track_rad)
-            motion["velocity_east_mps"] = motion["ground_speed_mps"] * np.sin(track_rad)
+            velocity = velocity_from_track(motion["track_deg"], motion["ground_speed_mps"])
+            motion["velocity_north_mps"], motion["velocity_east_mps"] = velocity
         columns |= {name: Column(values, has_3d) for name, values in motion.items()}
         columns |= {
             name: Column(values, has_2d) for name, values in self._values(topic, rows, rules.GNSS_QUALITY).items()
@@ -183,7 +172,7 @@ class Mapper:
         return {"velocity_sigma_mps": Column(sigmas[at], known)}
 
     def _magnetometer(self, topic: str, rows: Rows) -> dict[str, Column]:
-        healthy = rows.values("Health") != 0 if rows.definition.has_numbers("Health") else None
+        healthy = frozen(rows.values("Health") != 0) if rows.definition.has_numbers("Health") else None
         return {name: Column(values, healthy) for name, values in self._values(topic, rows, rules.FIELD).items()}
 
     def _baro(self, topic: str, rows: Rows) -> dict[str, Column]:
@@ -197,7 +186,7 @@ class Mapper:
     def _height(self, topic: str, rows: Rows) -> dict[str, Column]:
         if not rows.definition.has_numbers("Dist", "Stat", "Orient"):
             return {}
-        is_height = (rows.values("Orient") == FACING_DOWN) & (rows.values("Stat") == RANGE_GOOD)
+        is_height = frozen((rows.values("Orient") == FACING_DOWN) & (rows.values("Stat") == RANGE_GOOD))
         return {name: Column(values, is_height) for name, values in self._values(topic, rows, rules.HEIGHT).items()}
 
     def _landed(self, topic: str, rows: Rows) -> dict[str, Column]:
@@ -210,57 +199,3 @@ class Mapper:
     def _event(self, topic: str, rows: Rows) -> dict[str, Column]:
         names = event_names(rows, self._choices.vehicle)
         return {} if names is None else {"name": Column(names)}
-
-
-def _with_samples(rows: Rows, columns: dict[str, Column]) -> _Part:
-    """The rows in which anything is present."""
-    if any(column.present is None for column in columns.values()):
-        return _Part(rows, columns)
-    occupied = np.logical_or.reduce([column.mask for column in columns.values()])
-    if occupied.all():
-        return _Part(rows, columns)
-    return _Part(rows.take(occupied), {name: column.take(occupied) for name, column in columns.items()})
-
-
-def _merged(topic: str, parts: list[_Part]) -> RecordBatch:
-    """One batch of several parts, in the order of the file; a field is absent in the rows of the parts without it."""
-    if not parts:
-        return RecordBatch(topic, np.zeros(0, dtype=np.int64), Column(np.zeros(0, dtype=np.int64)), {})
-    index = np.concatenate([part.rows.record_index for part in parts])
-    order = np.argsort(index, kind="stable")
-    places = np.empty_like(order)
-    places[order] = np.arange(len(order))
-    places_of = np.split(places, np.cumsum([len(part.rows) for part in parts])[:-1])
-    columns: dict[str, Column] = {}
-    masks: dict[tuple[int, ...], BoolArray | None] = {}  # fields of the same parts are present in the same rows
-    for name in dict.fromkeys(name for part in parts for name in part.columns):
-        known = {number: part.columns[name] for number, part in enumerate(parts) if name in part.columns}
-        pieces = [(places_of[number], column) for number, column in known.items()]
-        if any(column.present is not None for column in known.values()):
-            mask = _present(pieces, len(index))
-        elif (key := tuple(known)) in masks:
-            mask = masks[key]
-        else:
-            mask = masks[key] = _present(pieces, len(index))
-        columns[name] = Column(_values(pieces, len(index)), mask)
-    times = [(at, part.rows.time_ns) for at, part in zip(places_of, parts, strict=True)]
-    time = Column(_values(times, len(index)), _present(times, len(index)))
-    return RecordBatch(topic, index[order], time, columns)
-
-
-def _values(pieces: list[tuple[Int64Array, Column]], rows: int) -> Any:
-    """Values of several pieces that stand at given places."""
-    kind = np.result_type(*(piece.values.dtype for _at, piece in pieces))
-    filler = np.nan if kind.kind == "f" else pieces[0][1].values[0]  # one text throughout is one run to write
-    values = np.full(rows, filler, dtype=kind)
-    for at, piece in pieces:
-        values[at] = piece.values
-    return values
-
-
-def _present(pieces: list[tuple[Int64Array, Column]], rows: int) -> BoolArray | None:
-    """Where there is a value; None when everywhere."""
-    present = np.zeros(rows, dtype=bool)
-    for at, piece in pieces:
-        present[at] = True if piece.present is None else piece.present
-    return None if present.all() else frozen(present)
