@@ -211,6 +211,34 @@ def test_corrupt_pieces_cost_their_parameter_alone(tmp_path: Path) -> None:
     assert log.values("guidance", "vertical_deviation_dots")
 
 
+@pytest.mark.parametrize(("level", "samples"), [(4, ROWS - 1), (4, ROWS + 1)])
+def test_a_piece_of_another_length_is_not_filled_with_memory(tmp_path: Path, level: int, samples: int) -> None:
+    path = tmp_path / "log.hdf5"
+    write_flightdata(path, {"Pitch": ramp(0.0, 1.0), "Roll": ramp(5.0, 1.0)})
+    with h5py.File(path, "r+") as file:
+        file["series/Pitch/data"].id.write_direct_chunk((0,), zlib.compress(np.arange(float(samples)).tobytes(), level))
+    log = Read(path)
+    assert log.damage("corrupt").count == ROWS and "Pitch" in log.damage("corrupt").place
+    assert log.values("ins", "roll_deg") == pytest.approx(5.0 + np.arange(ROWS))
+
+
+def test_a_heap_that_never_ends_is_read_and_told(tmp_path: Path) -> None:
+    path = plain(tmp_path / "log.hdf5")
+    before = [batch.columns for batch in Read(path).batches]
+    data = bytearray(path.read_bytes())
+    heap = data.index(b"GCOL")
+    place, free, number = heap + 16, 0, 1
+    while number:  # the last object is the free space
+        number = int.from_bytes(data[place : place + 2], "little")
+        free, length = place, int.from_bytes(data[place + 8 : place + 16], "little")
+        place += 16 + -(-length // 8) * 8
+    data[free + 8 : free + 16] = bytes(8)
+    path.write_bytes(data)
+    log = Read(path)
+    assert log.damage("corrupt").place == f"byte {free + 8}" and "without an end" in log.damage("corrupt").what
+    assert str([batch.columns for batch in log.batches]) == str(before)
+
+
 @pytest.mark.parametrize("content", [b"\x89HDF\r\n\x1a\n series", b"\x89HDF\r\n\x1a\n\0\0\0 series" + bytes(500)])
 def test_what_is_no_recording_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "log.hdf5"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.base.errors import MOST_FOUND, GroundstationError, SettingsError
+from groundstation.base.errors import MOST_SHOWN, GroundstationError, SettingsError
 from groundstation.base.toml_text import MAX_BYTES, toml_table, toml_text
 from tests.fuzz.documents import KINDS, LOADERS, TextCase, bases, run_text, text_of
 from tests.fuzz.trial import Watch
@@ -57,4 +57,4 @@ def test_what_is_no_toml_is_told_in_a_line(tmp_path: Path) -> None:
 
 def test_an_error_quotes_no_more_than_a_line_holds() -> None:
     told = str(GroundstationError("a.toml", "y" * 5000, "a number"))
-    assert told == f"a.toml: found {'y' * MOST_FOUND} ... (5000 characters), expected a number"
+    assert told == f"a.toml: found {'y' * MOST_SHOWN} ... (5000 characters), expected a number"

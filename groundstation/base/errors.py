@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
-MOST_FOUND = 1000  # characters of what a file held that an error quotes
+MOST_SHOWN = 2000  # characters of each part of an error: a file may have put much into it
 
 
 class GroundstationError(Exception):
@@ -28,8 +28,8 @@ class GroundstationError(Exception):
 
     def __init__(self, where: str, found: str, expected: str = "", next_step: str = "") -> None:
         self.where, self.found, self.expected, self.next_step = where, found, expected, next_step
-        shown = found if len(found) <= MOST_FOUND else f"{found[:MOST_FOUND]} ... ({len(found)} characters)"
-        text = f"{where}: found {shown}" if expected else f"{where}: {shown}"
+        where, found, expected, next_step = (_shown(one) for one in (where, found, expected, next_step))
+        text = f"{where}: found {found}" if expected else f"{where}: {found}"
         if expected:
             text += f", expected {expected}"
         if next_step:
@@ -39,6 +39,10 @@ class GroundstationError(Exception):
     def _render_traceback_(self) -> list[str]:
         """The error as a notebook shows it: its line, without the calls that led there."""
         return [f"{type(self).__name__}: {self}"]
+
+
+def _shown(part: str) -> str:
+    return part if len(part) <= MOST_SHOWN else f"{part[:MOST_SHOWN]} ... ({len(part)} characters)"
 
 
 class UnreadableLogError(GroundstationError):

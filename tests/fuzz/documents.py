@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.base.errors import GroundstationError
+from groundstation.base.errors import MOST_SHOWN, GroundstationError
 from tests.fuzz.bases import g1000
 from tests.fuzz.mutation import Mutant, random_edits
 from tests.fuzz.pool import LIMIT_S, WALL, Child
@@ -28,7 +28,7 @@ from tests.fuzz.trial import Watch
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "groundstation"
-MOST_BYTES = 4000  # of a refusal: what it quotes is cut
+MOST_CHARACTERS = 4 * MOST_SHOWN + 200  # of a refusal: what it quotes is cut
 NUMBERS = ("0", "-1", "1e308", "-1e308", "nan", "inf", "-inf", "1e999", "9" * 400, "0x7fffffffffffffff", "077", "+5")
 OTHERS = ("true", '""', '"x"', '"' + "y" * 5000 + '"', "1979-05-27T07:32:00Z", "2026-13-01", '"\\u0000"', "'''")
 FORMS = ("[]", "{}", "[[]]", "[1, 2, 3]", "[nan, inf]", '["a", "b"]', "{a = 1}", "[" * 3000, "{" * 3000, "- " * 3000)
@@ -262,7 +262,7 @@ def run_text(case: Any, folder: Path, watch: Watch) -> dict[str, Any]:
     except GroundstationError as error:
         told = str(error)
         came_to, fault = "refused", ""
-        if "\n" in told or len(told) > MOST_BYTES or not told.isprintable():
+        if "\n" in told or len(told) > MOST_CHARACTERS or not told.isprintable():
             came_to, fault = "crash", f"a refusal of {len(told)} characters: {told[:300]!r}"
     except BaseException:  # every other exception is what is looked for
         came_to, fault = "crash", traceback.format_exc()

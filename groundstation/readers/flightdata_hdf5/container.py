@@ -6,9 +6,9 @@ file cannot hold and attributes of any type are refused, each with its reason.
 
 import io
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
 import h5py
@@ -18,6 +18,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
+from groundstation.readers.flightdata_hdf5.soundness import check_pieces, endless_heaps
 from groundstation.readers.source import Source
 
 HIGHEST_RATE_HZ = 128.0
@@ -55,6 +56,7 @@ class Parameter:
     is_derived: bool
     data: Any
     mask: Any
+    _checked: tuple[set[int], set[int]] = field(default_factory=lambda: (set(), set()))  # pieces of data, of mask
 
     def times_ns(self, first: int, last: int) -> Int64Array:
         """Device times of samples [first, last), nanoseconds since the start of the recording."""
@@ -73,6 +75,8 @@ class Parameter:
 
         Raises one of :data:`FAILURES` where the file is damaged.
         """
+        check_pieces(self.data, first, last, self._checked[0])
+        check_pieces(self.mask, first, last, self._checked[1])
         values = np.asarray(self.data[first:last], dtype=np.float64)
         is_valid = np.asarray(self.mask[first:last]) == 0
         if values.shape != (last - first,) or is_valid.shape != values.shape:
@@ -92,13 +96,14 @@ class Refused:
 class Container:
     """What a recording holds: start (UTC seconds since 1970, None where it is not told), parameters, refused ones.
 
-    ``missing_bytes``: how much was cut off.
+    ``missing_bytes``: how much was cut off; ``mended``: where heaps of text without an end were given one.
     """
 
     start_utc_s: float | None
     parameters: tuple[Parameter, ...]
     refused: tuple[Refused, ...]
     missing_bytes: int = 0
+    mended: tuple[int, ...] = ()
 
 
 @contextmanager
@@ -111,14 +116,15 @@ def opened(source: Source) -> Iterator[Container]:
         When it is no HDF5 file, or one without parameters.
     """
     with source.open() as stream:
-        whole = _announced_size(source.head)
+        mended, whole = endless_heaps(stream), max(_announced_size(source.head), source.size)
+        is_sound = not mended and whole == source.size
         try:
-            file = h5py.File(_Padded(stream, whole) if whole > source.size else stream, "r")
+            file = h5py.File(stream if is_sound else _Mended(stream, whole, mended), "r")
         except FAILURES as error:
             raise _unreadable(source, error) from error
         with closing(file):
             try:
-                container = _contents(file, source.size, max(whole - source.size, 0))
+                container = _contents(file, source.size, whole - source.size, tuple(mended))
             except FAILURES as error:
                 raise _unreadable(source, error) from error
             if not container.parameters:
@@ -132,11 +138,14 @@ def _unreadable(source: Source, error: BaseException) -> UnreadableLogError:
     return UnreadableLogError(source.name, f"HDF5 that cannot be opened ({text})", "", "check how it was copied")
 
 
-class _Padded(io.RawIOBase):
-    """A cut file with zeros in place of what is missing: the library refuses a file that is shorter than it says."""
+class _Mended(io.RawIOBase):
+    """A file with zeros in place of what was cut off, and other bytes at some places.
 
-    def __init__(self, stream: BinaryIO, size: int) -> None:
-        self._stream, self._size, self._at = stream, size, 0
+    The library refuses a file that is shorter than it says, and reads heaps without an end for ever.
+    """
+
+    def __init__(self, stream: BinaryIO, size: int, mended: Mapping[int, bytes]) -> None:
+        self._stream, self._size, self._mended, self._at = stream, size, mended, 0
 
     def readable(self) -> bool:
         return True
@@ -156,6 +165,10 @@ class _Padded(io.RawIOBase):
         self._stream.seek(self._at)
         found = self._stream.read(len(buffer))
         buffer[:] = found + bytes(len(buffer) - len(found))
+        for place, content in self._mended.items():
+            for at, byte in enumerate(content, place - self._at):
+                if 0 <= at < len(buffer):
+                    buffer[at] = byte
         self._at += len(buffer)
         return len(buffer)
 
@@ -169,7 +182,7 @@ def _announced_size(head: bytes) -> int:
     return announced if announced <= LARGEST_BYTES else 0
 
 
-def _contents(file: Any, size: int, missing: int) -> Container:
+def _contents(file: Any, size: int, missing: int, mended: tuple[int, ...]) -> Container:
     start = _number(file.attrs, "start_timestamp")
     parameters: list[Parameter] = []
     refused: list[Refused] = []
@@ -183,7 +196,7 @@ def _contents(file: Any, size: int, missing: int) -> Container:
         except FAILURES as error:
             refused.append(Refused(_text(name), " ".join(str(error).split())[:MOST_TEXT]))
     known_start = start if math.isfinite(start) and 0 < start < 2**32 else None
-    return Container(known_start, tuple(parameters), tuple(refused), missing)
+    return Container(known_start, tuple(parameters), tuple(refused), missing, mended)
 
 
 def _parameter(series: Any, name: str, size: int, missing: int) -> Parameter:

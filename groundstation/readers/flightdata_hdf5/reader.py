@@ -64,6 +64,8 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
         yield from steps.remarks()
         if container.missing_bytes:
             yield Damage("truncated", f"byte {source.size}", container.missing_bytes, "bytes cut off")
+        for place in container.mended:
+            yield Damage("corrupt", f"byte {place}", 1, "heap of text without an end")
         for refused in container.refused:
             yield Damage("dropped_channel", f"parameter {refused.name}", 1, f"parameter with {refused.reason}")
         yield from losses.damages()
