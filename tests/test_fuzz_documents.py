@@ -6,6 +6,7 @@ import pytest
 
 from groundstation.base.errors import MOST_SHOWN, GroundstationError, SettingsError
 from groundstation.base.toml_text import MAX_BYTES, toml_table, toml_text
+from groundstation.pipeline.one_flight.intervals import flight_seconds
 from tests.fuzz.documents import KINDS, LOADERS, TextCase, bases, run_text, text_of
 from tests.fuzz.trial import Watch
 
@@ -58,3 +59,20 @@ def test_what_is_no_toml_is_told_in_a_line(tmp_path: Path) -> None:
 def test_an_error_quotes_no_more_than_a_line_holds() -> None:
     told = str(GroundstationError("a.toml", "y" * 5000, "a number"))
     assert told == f"a.toml: found {'y' * MOST_SHOWN} ... (5000 characters), expected a number"
+
+
+def test_an_error_does_not_drive_the_terminal() -> None:
+    assert str(GroundstationError("\x1b[2Ja.csv", "a\0b", "no\nbreak")) == "?[2Ja.csv: found a?b, expected no break"
+
+
+@pytest.mark.parametrize("text", ["+" + "9" * 400 + ":00", "9" * 400])
+def test_a_time_of_too_many_digits_is_no_time(text: str) -> None:
+    with pytest.raises(SettingsError, match="flight seconds"):
+        flight_seconds(text, 0, True)
+
+
+def test_a_number_of_too_many_digits_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "p.toml"
+    path.write_text(bases("profile")[0].replace('unit = "ft" }', f'unit = "ft", offset = {"9" * 400} }}', 1))
+    with pytest.raises(SettingsError, match="offset: found a number of 400 digits"):
+        LOADERS["profile"](path)

@@ -42,7 +42,9 @@ class GroundstationError(Exception):
 
 
 def _shown(part: str) -> str:
-    return part if len(part) <= MOST_SHOWN else f"{part[:MOST_SHOWN]} ... ({len(part)} characters)"
+    """As much of a part as a person reads, in characters that a terminal shows."""
+    text = " ".join(part.split()) if len(part) <= MOST_SHOWN else f"{part[:MOST_SHOWN]} ... ({len(part)} characters)"
+    return "".join(one if one.isprintable() else "?" for one in text)
 
 
 class UnreadableLogError(GroundstationError):

@@ -146,7 +146,10 @@ class Checker:
     def number(self, value: Any, key: str) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < float("inf"):
             self.fail(key, repr(value), "a finite number")
-        return float(value)
+        try:
+            return float(value)
+        except OverflowError:
+            self.fail(key, f"a number of {len(str(value))} digits", "a number")
 
     def canonical(self, value: Any, key: str) -> tuple[str, Field]:
         topic, _, name = self.text(value, key).rpartition(".")

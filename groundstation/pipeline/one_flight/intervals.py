@@ -30,12 +30,13 @@ def flight_seconds(text: str, start_ns: int, has_utc: bool) -> float:
     """
     match = _CLOCK.match(text.strip())
     if match:
-        hours, minutes, seconds = match.groups()
-        return int(hours or 0) * 3600.0 + int(minutes) * 60.0 + float(seconds)
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = math.nan
+        hours, minutes, last = match.groups()
+        seconds = float(hours or 0) * 3600.0 + float(minutes) * 60.0 + float(last)
+    else:
+        try:
+            seconds = float(text)
+        except ValueError:
+            seconds = math.nan
     if math.isfinite(seconds):
         return seconds
     if not has_utc:
