@@ -14,7 +14,8 @@ from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.records import Column, RecordBatch
 from groundstation.base.units import NS_PER_S
 from groundstation.tables.assemble import flight_from_batches
-from groundstation.tables.phases import PHASES, Phases, flight_phases, ground_mask
+from groundstation.tables.motion import LONGEST_GRID, window_sum
+from groundstation.tables.phases import PHASES, STEP_NS, Phases, flight_phases, ground_mask
 from groundstation.tables.table import Flight, Table
 
 Floats = NDArray[np.float64]
@@ -480,3 +481,19 @@ def test_real_light_aircraft_that_only_taxied(name: str) -> None:
     assert set(phases.phase) == {"unknown", "standstill", "taxi"}
     fixed_s = flight.duration_s - flight.time_s("gnss")[0]
     assert phases.seconds_in("standstill") + phases.seconds_in("taxi") > 0.9 * fixed_s
+
+
+@pytest.mark.parametrize("half", [0, 1, 3, 9, 40])
+@pytest.mark.parametrize("shape", [(0,), (1,), (9,), (2, 31)])
+def test_a_sum_over_a_window_is_cut_at_the_ends(half: int, shape: tuple[int, ...]) -> None:
+    values = np.random.default_rng(3).integers(-9, 9, shape).astype(float)
+    rows = range(shape[-1])
+    told = [values[..., max(row - half, 0) : row + half + 1].sum(axis=-1) for row in rows]
+    assert np.array_equal(np.moveaxis(window_sum(values, half), -1, 0), np.reshape(told, (shape[-1], *shape[:-1])))
+
+
+def test_a_span_of_many_days_has_no_phases_and_says_so() -> None:
+    batch = RecordBatch("gnss", np.array([0, LONGEST_GRID * STEP_NS]), None, {"ground_speed_mps": Column(np.zeros(2))})
+    flight = flight_from_batches([batch])
+    phases = flight_phases(flight)
+    assert phases.intervals == () and "a span of many days" in phases.method
