@@ -493,7 +493,9 @@ def test_a_sum_over_a_window_is_cut_at_the_ends(half: int, shape: tuple[int, ...
 
 
 def test_a_span_of_many_days_has_no_phases_and_says_so() -> None:
-    batch = RecordBatch("gnss", np.array([0, LONGEST_GRID * STEP_NS]), None, {"ground_speed_mps": Column(np.zeros(2))})
+    time_ns = np.array([0, LONGEST_GRID * STEP_NS])
+    columns = {"ground_speed_mps": Column(np.zeros(2))}
+    batch = RecordBatch("gnss", np.arange(2), Column(time_ns), columns, time_ns)
     flight = flight_from_batches([batch], metadata={}, has_utc=False, source_name="days.csv")
     phases = flight_phases(flight)
     assert phases.intervals == () and "a span of many days" in phases.method
