@@ -1,11 +1,13 @@
 """Users' settings files: every mistake is told in one line that names file and key."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from groundstation.base.errors import SettingsError
 from groundstation.estimators.heading.settings import HeadingSettings
+from groundstation.integrity.limits import shipped
 from groundstation.pipeline.one_flight.configuration import Configuration, Interval, load_configuration
 
 
@@ -73,7 +75,7 @@ def test_thresholds_are_a_section_and_a_file(tmp_path: Path) -> None:
     assert load_configuration(config).thresholds.gaps.min_s == 0.5
     own = written(tmp_path, "t.toml", "version = 1\n[gaps]\nperiods = 4\n")
     found = load_configuration(config, thresholds=own)
-    assert found.thresholds.gaps == type(found.thresholds.gaps)(4.0, 0.2)
+    assert found.thresholds.gaps == replace(shipped().gaps, periods=4.0)
     assert found.to_dict() == {"thresholds": {"version": 1, "gaps": {"periods": 4}}}
     with pytest.raises(SettingsError, match=r"c.toml, key thresholds.version"):
         load_configuration(written(tmp_path, "c.toml", "[thresholds]\ngaps.min_s = 0.5\n"))

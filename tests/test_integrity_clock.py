@@ -243,3 +243,20 @@ def found_for(times_s: list[float]) -> Survey:
 def test_each_oddity_is_one_line(times_s: list[float], code: str, severity: str) -> None:
     found = [finding for finding in ledger_findings(found_for(times_s).ledger) if finding.code == code]
     assert found and found[0].severity == severity and "\n" not in found[0].text
+
+
+@pytest.mark.parametrize(("end", "told"), [(100, 0), (90, 0), (89, 11), (40, 60)])
+def test_a_topic_that_breaks_off_is_told_with_what_is_missing(end: int, told: int) -> None:
+    """Ten seconds, and a twentieth of the log, are allowed; 60 records are missing of one that stops at 40 of 100 s."""
+    rows = np.arange(101)
+    batches = [surveyed_topic("ins", rows), surveyed_topic("gnss", rows[: end + 1]), surveyed_topic("raw.x", rows[:20])]
+    ledger = survey([LogHeader("t"), *batches]).ledger
+    found = [finding for finding in ledger_findings(ledger) if finding.code == "data.breaks_off"]
+    assert [(one.topic, one.count) for one in found if one.severity == "warn"] == ([("gnss", told)] if told else [])
+    assert [(one.topic, one.count) for one in found if one.severity == "info"] == [("raw.x", 81)]
+
+
+def surveyed_topic(topic: str, rows: "NDArray[np.int64]") -> RecordBatch:
+    values: NDArray[np.float64] = rows.astype(np.float64)
+    device_time_ns = Column(rows * NS_PER_S)
+    return RecordBatch(topic, rows, device_time_ns, {"x": Column(values)})

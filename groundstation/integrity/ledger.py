@@ -20,6 +20,7 @@ from groundstation.base.ledger import (
     TopicGaps,
 )
 from groundstation.base.records import Damage, Int64Array, Remark
+from groundstation.base.signals import is_canonical
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.limits import Thresholds, shipped
@@ -189,6 +190,13 @@ class LedgerCounts:
     def start_ns(self) -> int:
         """Corrected time of the first record of any topic: flight time zero."""
         return min((ledger.first_ns for ledger in self.topics), default=0)
+
+    @property
+    def end_ns(self) -> int:
+        """Corrected time of the last record of topics with a nominal rate, of canonical ones where there are any."""
+        rated = [ledger for ledger in self.topics if ledger.nominal_rate_hz is not None]
+        canonical = [ledger for ledger in rated if is_canonical(ledger.topic)]
+        return max((ledger.last_ns for ledger in canonical or rated), default=self.start_ns)
 
     @property
     def spans(self) -> tuple[Span, ...]:

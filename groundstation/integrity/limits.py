@@ -25,10 +25,15 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class GapLimits:
-    """A gap is a step longer than ``periods`` nominal periods and than ``min_s`` seconds."""
+    """A gap is a step longer than ``periods`` nominal periods and than ``min_s`` seconds.
+
+    A topic breaks off when it ends ``end_s`` seconds and ``end_share`` of the log before the others.
+    """
 
     periods: float = required_number(1.0)
     min_s: float = required_number(0.0)
+    end_s: float = required_number(0.0)
+    end_share: float = required_number(0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -155,7 +160,7 @@ def thresholds_from(table: Mapping[str, Any], where: str = "thresholds", key: st
     Examples
     --------
     >>> thresholds_from({"version": 1, "gaps": {"periods": 5.0}}).gaps
-    GapLimits(periods=5.0, min_s=0.2)
+    GapLimits(periods=5.0, min_s=0.2, end_s=10.0, end_share=0.05)
     """
     if not table:
         return shipped()

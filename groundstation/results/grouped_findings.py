@@ -11,6 +11,7 @@ NAMED = 5  # topics named in a line
 KINDS = {
     "values.nan": "fields of raw topics hold NaN as the device wrote it",
     "time.duplicates": "raw topics repeat times: records at the time of the one before",
+    "data.breaks_off": "raw topics end before the log does",
     "data.gaps": "raw topics have gaps; where, is drawn under data quality",
 }
 
