@@ -2,11 +2,15 @@
 
 import io
 import sys
+from collections.abc import Sequence
+from copy import copy
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.main import get_command_name
+from typer.models import CommandInfo
 
 from groundstation.base.errors import UsageError
 from groundstation.base.version import __version__
@@ -422,4 +426,18 @@ def main(arguments: Any = None) -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a code page that lacks a sign loses no answer
-    app(arguments)
+    _application_for(sys.argv[1:] if arguments is None else arguments)(arguments)
+
+
+def _application_for(words: Sequence[str]) -> typer.Typer:
+    """The application with the verb alone that is asked for: Typer makes the parameters of all before it calls one."""
+    asked = [verb for verb in app.registered_commands if [*words[:1]] == [_name_of(verb)]]
+    if not asked:
+        return app
+    alone = copy(app)
+    alone.registered_commands, alone.registered_groups = asked, []
+    return alone
+
+
+def _name_of(verb: CommandInfo) -> str:
+    return verb.name or get_command_name(verb.callback.__name__ if verb.callback else "")

@@ -1,5 +1,6 @@
 """Runs cases in a child process with a limit of time for each and of memory for all; a child that hangs is replaced."""
 
+import gc
 import multiprocessing
 import resource
 import tempfile
@@ -36,6 +37,8 @@ def _child(pipe: Any, warm_up: list[Case], run: Run) -> None:
         tempfile.tempdir = name
         for case in warm_up:  # compiled loops are loaded before memory is limited
             run(case, Path(name), watch)
+        gc.collect()
+        gc.freeze()  # modules are not looked through again after each log
         _limit_memory()
         pipe.send(_peak_mb())
         while (case := pipe.recv()) is not None:
