@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -73,12 +74,20 @@ def heading_errors(
     iron: Iron, horizontal_nt: float, down_nt: float, bank_deg: float = 0.0, pitch_deg: float = 0.0
 ) -> FloatArray:
     """Error of the uncorrected magnetic heading in the middle of each bin of it, shape (360,), at a bank."""
-    level = np.full(len(HEADINGS_DEG), bank_deg), np.full(len(HEADINGS_DEG), pitch_deg)
-    field = field_in_body(horizontal_nt, down_nt, HEADINGS_DEG, *level)
+    field, level = _circle_in_body(horizontal_nt, down_nt, bank_deg, pitch_deg)
     shown = levelled_heading_deg(field @ iron.soft.T + iron.hard_nt, *level)
     error = wrap_180(shown - HEADINGS_DEG)
     order = np.argsort(shown)
     return np.asarray(np.interp(CENTRES_DEG, shown[order], error[order], period=360.0))
+
+
+@lru_cache(maxsize=8)
+def _circle_in_body(
+    horizontal_nt: float, down_nt: float, bank_deg: float, pitch_deg: float
+) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
+    """The field along the body at each of ``HEADINGS_DEG``, and roll and pitch there: the same for every iron."""
+    level = np.full(len(HEADINGS_DEG), bank_deg), np.full(len(HEADINGS_DEG), pitch_deg)
+    return field_in_body(horizontal_nt, down_nt, HEADINGS_DEG, *level), level
 
 
 def bank_bias(iron: Iron, horizontal_nt: float, down_nt: float, bank_deg: float, pitch_deg: float = 0.0) -> FloatArray:
@@ -87,13 +96,27 @@ def bank_bias(iron: Iron, horizontal_nt: float, down_nt: float, bank_deg: float,
     return wrap_180(0.5 * (at[0] + at[1]) - at[2])
 
 
+def curve_coefficients(error_deg: FloatArray) -> FloatArray:
+    """A to E, shape (5,), of errors in the middle of each bin of the heading, shape (360,); their covariance is not
+    asked for, see :func:`harmonics.fit`.
+    """
+    columns, inverse = _normal_equations()
+    return np.asarray(inverse @ (columns.T @ error_deg), dtype=np.float64)
+
+
+@cache
+def _normal_equations() -> tuple[FloatArray, FloatArray]:
+    columns = harmonics.design(CENTRES_DEG)
+    return columns, np.asarray(np.linalg.pinv(columns.T @ columns), dtype=np.float64)
+
+
 def level_coefficients(
     iron: Iron, covariance: FloatArray, horizontal_nt: float, down_nt: float, pitch_deg: float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
     """A to E of level flight that an iron makes, shape (5,), and their covariance, shape (5, 5)."""
 
     def coefficients(other: Iron) -> FloatArray:
-        return harmonics.fit(CENTRES_DEG, heading_errors(other, horizontal_nt, down_nt, 0.0, pitch_deg))[0]
+        return curve_coefficients(heading_errors(other, horizontal_nt, down_nt, 0.0, pitch_deg))
 
     slopes = derivatives(iron, coefficients, horizontal_nt)
     return coefficients(iron), slopes @ covariance @ slopes.T
