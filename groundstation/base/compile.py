@@ -17,6 +17,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from groundstation.base.drafts import drafts
 from groundstation.base.machine_code import (
     INTEGER,
     SUFFIX,
@@ -91,14 +92,15 @@ class Loop:
 
     @cached_property
     def _part(self) -> Any:
-        """The function as numba has it inside others, with whose code it is kept."""
-        return self._dispatcher(is_cached=False) if self._is_kept else self._called
+        """The function as numba has it inside others, with whose code it is kept; from Python a call crashes."""
+        return self._dispatcher(is_cached=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
-    def _dispatcher(self, is_cached: bool) -> Any:
+    def _dispatcher(self, is_cached: bool, **options: bool) -> Any:
         import numba
 
         with _LOCK:
-            return _njit(numba)(cache=is_cached, nogil=True, error_model="numpy", **self._options)(self.py_func)
+            options = self._options | options
+            return _njit(numba)(cache=is_cached, nogil=True, error_model="numpy", **options)(self.py_func)
 
     @property
     def _numba_type_(self) -> Any:
@@ -155,9 +157,11 @@ class Loop:
             else:
                 types += [numba.types.CPointer(numba.from_dtype(np.dtype(form[0]))), *[numba.int64] * form[1]]
         options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
-        entry = _njit(numba)(tuple(types), nogil=True, error_model="numpy", **options)(names["entry"])
-        ((signature, compiled),) = entry.overloads.items()
-        return object_file(entry.inspect_llvm(signature), compiled.fndesc.llvm_func_name, forms)
+        with drafts():
+            entry = _njit(numba)(tuple(types), nogil=True, error_model="numpy", **options)(names["entry"])
+        (compiled,) = entry.overloads.values()
+        name = compiled.fndesc.llvm_func_name
+        return object_file(compiled.library.optimised(name), name, forms)
 
 
 def compiled(function: Function) -> Function:

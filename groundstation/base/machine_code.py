@@ -197,8 +197,8 @@ def _linker() -> Any:
     return binding.create_lljit_compiler()
 
 
-def object_file(ir: str, entry: str, forms: Sequence[Form]) -> bytes | None:
-    """What is kept of a module in LLVM's assembly; None where its entry may call what only numba's process has.
+def object_file(module: Any, entry: str, forms: Sequence[Form]) -> bytes | None:
+    """What is kept of a module of LLVM; None where its entry may call what only numba's process has.
 
     It is a byte for each number and array that the entry takes, 1 for an array that it may write to, and an object
     file.
@@ -207,7 +207,7 @@ def object_file(ir: str, entry: str, forms: Sequence[Form]) -> bytes | None:
 
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
-    module = binding.parse_assembly(ir.replace(entry, ENTRY))
+    module.get_function(entry).name = ENTRY
     if _calls_out(module):
         return None
     machine = binding.Target.from_default_triple().create_target_machine(
@@ -229,18 +229,8 @@ def _written(module: Any, forms: Sequence[Form]) -> bytes:
 
 
 def _calls_out(module: Any) -> bool:
-    """Whether the entry, or what it calls, calls a function that is no part of the module, of LLVM or of C."""
-    functions = {one.name: one for one in module.functions}
-    waiting, seen = [ENTRY], {ENTRY}
-    while waiting:
-        for block in functions[waiting.pop()].blocks:
-            for instruction in block.instructions:
-                for operand in instruction.operands:
-                    name = operand.name
-                    if name in functions and name not in seen:
-                        seen.add(name)
-                        waiting.append(name)
-    outside = {name for name in seen if functions[name].is_declaration and not name.startswith("llvm.")}
+    """Whether a module, which is what its entry needs alone, needs a function that is not of LLVM or of C."""
+    outside = {one.name for one in module.functions if one.is_declaration and not one.name.startswith("llvm.")}
     return bool(outside - _HARMLESS)
 
 
