@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from itertools import count
 from pathlib import Path
 from types import FunctionType
@@ -165,7 +165,7 @@ class KeptCode:
     def __init__(self, folder: Path, function: Callable[..., Any], forms: Sequence[Form]) -> None:
         short = hashlib.sha256(repr(forms).encode()).hexdigest()[:8]
         self._path = folder / f"{function.__module__}.{function.__qualname__}-{short}{SUFFIX}"
-        self._digest = digest_of(function, forms)
+        self._of = function, forms
 
     def read(self) -> bytes | None:
         """The object file; None where there is none, or one of other code or of another processor."""
@@ -183,6 +183,10 @@ class KeptCode:
             partial = self._path.with_name(f"{self._path.name}.{os.getpid()}")
             partial.write_bytes(self._head(code) + code)
             partial.replace(self._path)
+
+    @cached_property
+    def _digest(self) -> bytes:
+        return digest_of(*self._of)
 
     def _head(self, code: bytes) -> bytes:
         return self._digest + hashlib.sha256(code).digest()
