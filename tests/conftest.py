@@ -12,6 +12,7 @@ import pytest
 from filelock import FileLock
 from rerun.experimental import ViewerClient
 
+from groundstation.base import compile as compiling
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
@@ -19,6 +20,9 @@ from groundstation.reports.drawing import sketching
 from tests.viewer_shots import NoViewerError, viewer
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
+compiling.PLAIN_S = (
+    0.0  # loops are tested as they are compiled; test_plain_scanners tells that plain Python does the same
+)
 
 
 @pytest.fixture(scope="module")

@@ -95,10 +95,10 @@ def test_package_imports_nothing_at_module_level() -> None:
     assert not [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
 
 
-def test_numba_is_imported_by_its_one_wrapper_alone() -> None:
+def test_numba_is_imported_by_its_wrapper_alone() -> None:
     for path in modules():
         names = {name.partition(".")[0] for name, _ in imports_of(path)}
-        assert "numba" not in names or path == PACKAGE / "base" / "compile.py", path
+        assert "numba" not in names or path in (PACKAGE / "base" / "compile.py", PACKAGE / "base" / "drafts.py"), path
 
 
 def test_no_file_imports_itself_through_others() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from groundstation.base import compile as compiling
-from groundstation.base.compile import Loop, compiled, in_place
+from groundstation.base.compile import SMALL_BYTES, Loop, compiled, in_place, scanner
 from groundstation.base.machine_code import KeptCode, digest_of, forms_of
 
 WEIGHT = 3
@@ -48,6 +48,17 @@ def sign(value: int) -> float:
     return 1.0 if value > 0 else -1.0
 
 
+@scanner
+def count_of(data: np.ndarray, wanted: int, weights: np.ndarray) -> int:
+    """Weighted number of bytes of a value; ``weights`` are used up."""
+    found = 0
+    for byte in data:
+        if byte == wanted:
+            found += _weighted(weights[0])
+    weights[0] = 0
+    return found
+
+
 class Limits(NamedTuple):
     """What :func:`inside` is handed."""
 
@@ -80,8 +91,9 @@ def mean(values: np.ndarray) -> float:
 def kept_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of compiled code of its own, and loops that have found nothing yet."""
     monkeypatch.setattr(compiling, "_cache_folder", lambda: tmp_path)
-    for loop in (total, is_above, inside, sign):
+    for loop in (total, is_above, inside, sign, count_of):
         monkeypatch.setattr(loop, "_linked", {})
+        monkeypatch.setattr(loop, "_is_missing", {})
     return tmp_path
 
 
@@ -118,6 +130,30 @@ def test_a_user_without_a_home_keeps_no_compiled_code(monkeypatch: pytest.Monkey
     monkeypatch.setattr(compiling, "_cache_folder", lambda: None)
     monkeypatch.setattr(is_above, "_linked", {})
     assert is_above(np.array([1.0, 2.0]), 1.5)
+
+
+def test_a_few_bytes_are_gone_through_in_plain_python_until_there_is_code(
+    kept_here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def count(size: int) -> int:
+        weights = np.array([2])
+        answer = count_of(np.ones(size, np.uint8), 1, weights)
+        assert weights[0] == 0
+        assert type(answer) is int
+        return answer // (2 * WEIGHT)
+
+    ran: list[int] = []
+    plain = Loop._run_plain
+    monkeypatch.setattr(Loop, "_run_plain", lambda loop, given: (ran.append(len(given[0])), plain(loop, given))[1])
+    monkeypatch.setattr(compiling, "PLAIN_S", 10.0)
+    assert count(SMALL_BYTES) == SMALL_BYTES and ran == [SMALL_BYTES] and not list(kept_here.iterdir())
+    monkeypatch.setattr(count_of, "_plain_s", 10.0)  # enough of that
+    assert count(5) == 5 and len(list(kept_here.iterdir())) == 1
+    monkeypatch.setattr(count_of, "_plain_s", 0.0)
+    assert count(6) == 6 and count(SMALL_BYTES + 1) == SMALL_BYTES + 1
+    monkeypatch.setattr(count_of, "_linked", {})  # as in another process
+    monkeypatch.setattr(count_of, "_is_missing", {})
+    assert count(7) == 7 and ran == [SMALL_BYTES]
 
 
 def test_arrays_with_gaps_are_left_to_numba(kept_here: Path) -> None:

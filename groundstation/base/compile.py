@@ -3,7 +3,8 @@
 A loop is compiled at its first call, and numba imported then. What was compiled goes beside the code when that folder
 can be written, else into the user's cache folder, else it is compiled again in each process; ``numba.njit(cache=True)``
 alone raises at import in a read-only install without a home. Loops over numbers and arrays are kept as machine code of
-their own (``base.machine_code``), and found again without numba.
+their own (``base.machine_code``), and found again without numba. Where nothing is kept, plain Python goes through the
+bytes of a small log: it has done so before a compiler has started.
 Keep compiled functions scalar: small matrix products inside njit take 7-10 s to compile.
 """
 
@@ -13,10 +14,13 @@ from collections.abc import Callable
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from threading import RLock
+from time import perf_counter
+from types import FunctionType
 from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from groundstation.base.drafts import drafts
 from groundstation.base.machine_code import (
     INTEGER,
     SUFFIX,
@@ -33,6 +37,8 @@ from groundstation.base.machine_code import (
 )
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+SMALL_BYTES = 65_536  # of a log: plain Python takes up to a second for so many, and a compiler several
+PLAIN_S = 1.0  # of a process for one loop: after that it is compiled, however few bytes come
 _LOCK = RLock()  # numba and its linker are told one thing at a time
 
 
@@ -78,8 +84,9 @@ def _njit(numba: Any) -> Callable[..., Any]:
 class Loop:
     """A function that is compiled when it is first called, by Python or by another one that is compiled."""
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, bool]) -> None:
-        self.py_func, self._options = function, options
+    def __init__(self, function: Callable[..., Any], options: dict[str, bool], small_bytes: int = 0) -> None:
+        self.py_func, self._options, self._small_bytes = function, options, small_bytes
+        self._plain_s, self._is_missing = 0.0, dict[tuple[Form, ...], bool]()
         self._is_kept = options.get("_nrt", True) is False and can_answer(function)
         self._linked: dict[tuple[Form, ...], Linked | None] = {}
         update_wrapper(self, function)
@@ -91,14 +98,15 @@ class Loop:
 
     @cached_property
     def _part(self) -> Any:
-        """The function as numba has it inside others, with whose code it is kept."""
-        return self._dispatcher(is_cached=False) if self._is_kept else self._called
+        """The function as numba has it inside others, with whose code it is kept; from Python a call crashes."""
+        return self._dispatcher(is_cached=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
-    def _dispatcher(self, is_cached: bool) -> Any:
+    def _dispatcher(self, is_cached: bool, **options: bool) -> Any:
         import numba
 
         with _LOCK:
-            return _njit(numba)(cache=is_cached, nogil=True, error_model="numpy", **self._options)(self.py_func)
+            options = self._options | options
+            return _njit(numba)(cache=is_cached, nogil=True, error_model="numpy", **options)(self.py_func)
 
     @property
     def _numba_type_(self) -> Any:
@@ -111,6 +119,8 @@ class Loop:
         if forms is None:
             return self._called(*arguments)
         if forms not in self._linked:
+            if self._small_bytes and self._is_soon_done(forms, arguments):
+                return self._run_plain(arguments)
             with _LOCK:
                 if forms not in self._linked:
                     self._linked[forms] = self._found(forms)
@@ -118,6 +128,28 @@ class Loop:
         if linked is None or linked.would_write(arguments):  # to an array that is read-only: numba refuses it by name
             return self._called(*arguments)
         return linked(*arguments)
+
+    def _is_soon_done(self, forms: tuple[Form, ...], arguments: tuple[Any, ...]) -> bool:
+        """Whether there is nothing kept, and so little to do that it need not be compiled."""
+        if len(arguments[0]) > self._small_bytes or self._plain_s >= PLAIN_S:
+            return False
+        if forms not in self._is_missing:
+            folder = _cache_folder()
+            self._is_missing[forms] = folder is None or KeptCode(folder, self.py_func, forms).read() is None
+        return self._is_missing[forms]
+
+    @cached_property
+    def _plain(self) -> Any:
+        return _in_plain_python(self.py_func, {})
+
+    def _run_plain(self, arguments: tuple[Any, ...]) -> Any:
+        """The same by Python, and the time that it took."""
+        begin = perf_counter()
+        with np.errstate(all="ignore"):  # as compiled code does
+            answer = self._plain(*arguments)
+        self._plain_s += perf_counter() - begin
+        annotation = self.py_func.__annotations__["return"]
+        return None if annotation is None else annotation(answer)
 
     def __reduce__(self) -> str:
         """A loop is pickled as functions are, by its name in its module."""
@@ -155,9 +187,22 @@ class Loop:
             else:
                 types += [numba.types.CPointer(numba.from_dtype(np.dtype(form[0]))), *[numba.int64] * form[1]]
         options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
-        entry = _njit(numba)(tuple(types), nogil=True, error_model="numpy", **options)(names["entry"])
-        ((signature, compiled),) = entry.overloads.items()
-        return object_file(entry.inspect_llvm(signature), compiled.fndesc.llvm_func_name, forms)
+        with drafts():
+            entry = _njit(numba)(tuple(types), nogil=True, error_model="numpy", **options)(names["entry"])
+        (compiled,) = entry.overloads.values()
+        name = compiled.fndesc.llvm_func_name
+        return object_file(compiled.library.optimised(name), name, forms)
+
+
+def _in_plain_python(function: Any, made: dict[Any, Any]) -> Any:
+    """A function with plain ones in the place of the loops that it calls."""
+    if function not in made:
+        names = dict(function.__globals__)
+        made[function] = FunctionType(function.__code__, names, function.__name__, function.__defaults__)
+        for name in function.__code__.co_names:
+            if isinstance(names.get(name), Loop):
+                names[name] = _in_plain_python(names[name].py_func, made)
+    return made[function]
 
 
 def compiled(function: Function) -> Function:
@@ -169,6 +214,13 @@ def in_place(function: Function) -> Function:
     """The same for a loop that makes no array: without the counting of references to those that it is handed, which
     took up to 40 % of the time of loops that hand on tuples of them."""
     return _compile(function, _nrt=False)
+
+
+def scanner(function: Function) -> Function:
+    """Like ``in_place``, for a loop over the bytes of a log, its first argument: up to SMALL_BYTES of them are gone
+    through in plain Python where no machine code is kept. No number in it may go beyond 64 bits: numpy's and Python's
+    differ there from compiled ones."""
+    return _compile(function, SMALL_BYTES, _nrt=False)
 
 
 def part(function: Function) -> Function:
@@ -183,5 +235,5 @@ def inlined(function: Function) -> Function:
     return _compile(function, _nrt=False, forceinline=True)
 
 
-def _compile(function: Function, **options: bool) -> Function:
-    return cast(Function, Loop(function, options))
+def _compile(function: Function, small_bytes: int = 0, **options: bool) -> Function:
+    return cast(Function, Loop(function, options, small_bytes))

@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from itertools import count
 from pathlib import Path
 from types import FunctionType
@@ -165,7 +165,7 @@ class KeptCode:
     def __init__(self, folder: Path, function: Callable[..., Any], forms: Sequence[Form]) -> None:
         short = hashlib.sha256(repr(forms).encode()).hexdigest()[:8]
         self._path = folder / f"{function.__module__}.{function.__qualname__}-{short}{SUFFIX}"
-        self._digest = digest_of(function, forms)
+        self._of = function, forms
 
     def read(self) -> bytes | None:
         """The object file; None where there is none, or one of other code or of another processor."""
@@ -184,6 +184,10 @@ class KeptCode:
             partial.write_bytes(self._head(code) + code)
             partial.replace(self._path)
 
+    @cached_property
+    def _digest(self) -> bytes:
+        return digest_of(*self._of)
+
     def _head(self, code: bytes) -> bytes:
         return self._digest + hashlib.sha256(code).digest()
 
@@ -197,8 +201,8 @@ def _linker() -> Any:
     return binding.create_lljit_compiler()
 
 
-def object_file(ir: str, entry: str, forms: Sequence[Form]) -> bytes | None:
-    """What is kept of a module in LLVM's assembly; None where its entry may call what only numba's process has.
+def object_file(module: Any, entry: str, forms: Sequence[Form]) -> bytes | None:
+    """What is kept of a module of LLVM; None where its entry may call what only numba's process has.
 
     It is a byte for each number and array that the entry takes, 1 for an array that it may write to, and an object
     file.
@@ -207,7 +211,7 @@ def object_file(ir: str, entry: str, forms: Sequence[Form]) -> bytes | None:
 
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
-    module = binding.parse_assembly(ir.replace(entry, ENTRY))
+    module.get_function(entry).name = ENTRY
     if _calls_out(module):
         return None
     machine = binding.Target.from_default_triple().create_target_machine(
@@ -229,18 +233,8 @@ def _written(module: Any, forms: Sequence[Form]) -> bytes:
 
 
 def _calls_out(module: Any) -> bool:
-    """Whether the entry, or what it calls, calls a function that is no part of the module, of LLVM or of C."""
-    functions = {one.name: one for one in module.functions}
-    waiting, seen = [ENTRY], {ENTRY}
-    while waiting:
-        for block in functions[waiting.pop()].blocks:
-            for instruction in block.instructions:
-                for operand in instruction.operands:
-                    name = operand.name
-                    if name in functions and name not in seen:
-                        seen.add(name)
-                        waiting.append(name)
-    outside = {name for name in seen if functions[name].is_declaration and not name.startswith("llvm.")}
+    """Whether a module, which is what its entry needs alone, needs a function that is not of LLVM or of C."""
+    outside = {one.name for one in module.functions if one.is_declaration and not one.name.startswith("llvm.")}
     return bool(outside - _HARMLESS)
 
 

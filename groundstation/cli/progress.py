@@ -27,7 +27,9 @@ def _tell_of_compiling() -> None:
     from groundstation.base.compile import keeps_nothing
 
     if keeps_nothing():
-        sys.stderr.write("no compiled code is kept here yet: what a log needs of it is compiled first, some seconds\n")
+        sys.stderr.write(
+            "no compiled code is kept here yet: what a log above 64 kB needs is compiled first, some seconds\n"
+        )
 
 
 def _as_json(event: Event) -> None:

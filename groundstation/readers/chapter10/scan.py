@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.base.compile import in_place
+from groundstation.base.compile import in_place, scanner
 
 HEADER_BYTES, SECONDARY_BYTES, SYNC = 24, 12, 0xEB25
 MOST_BYTES, MOST_COMPUTER_BYTES = 524_288, 134_217_728  # of a packet, by the standard
@@ -104,7 +104,7 @@ def _checksum_is_right(data: Any, halves: Any, words: Any, at: int, start: int, 
     return total & 0xFFFFFFFF == _u32(data, end - 4)
 
 
-@in_place
+@scanner
 def scan(
     data: Any, halves: Any, words: Any, syncs: Any, size: int, is_last: bool, packets: Any, spans: Any, state: Any
 ) -> None:
@@ -183,7 +183,7 @@ def _stamp(data: Any, at: int, packet: Any) -> int:
     return int(packet[RTC])
 
 
-@in_place
+@scanner
 def messages_1553(data: Any, packets: Any, places: Any, times: Any, heads: Any, words: Any, lost: Any) -> int:
     """Messages of MIL-STD-1553 packets; how many there are.
 
@@ -243,7 +243,7 @@ def see_429(data: Any, packets: Any, seen: Any) -> None:
             seen[int(data[at + 3]) << 8 | int(data[at + 4])] = True
 
 
-@in_place
+@scanner
 def words_429(data: Any, packets: Any, places: Any, times: Any, heads: Any, words: Any, lost: Any) -> int:
     """Words of ARINC-429 packets; how many there are.
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.compile import in_place
+from groundstation.base.compile import in_place, scanner
 
 LOOKAHEAD = 1_024  # bytes that must follow the record that is judged: itself and two more, at most 255 each
 NEAR_US = 10_000_000  # a record whose time is within 10 s of the last good one is believed
@@ -143,7 +143,7 @@ def _is_cut(data: Any, at: int, length: int, lengths: Any, time_kind: Any, last_
     return True
 
 
-@in_place
+@scanner
 def scan(
     data: Any,
     magic: Any,

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.compile import in_place
+from groundstation.base.compile import in_place, scanner
 
 HEADER = 3
 MAX_MESSAGE = HEADER + 0xFFFF
@@ -207,7 +207,7 @@ def _is_cut(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
     return at + 3 + size > end and least[message_id] <= size - 2 <= most[message_id]
 
 
-@in_place
+@scanner
 def leads_on(data: Any, at: int, end: int, least: Any, most: Any) -> bool:
     """Whether a strong message begins at a place, or behind at most three weak ones; the end of the data is as good."""
     for _ in range(4):
@@ -292,7 +292,7 @@ def _next_inside(data: Any, last: int, at: int, end: int, least: Any, most: Any)
     return at
 
 
-@in_place
+@scanner
 def scan(
     data: Any, ahead: int, least: Any, most: Any, topic: Any, out_at: Any, out_topic: Any, spans: Any, state: Any
 ) -> int:
