@@ -22,18 +22,19 @@ import pyarrow as pa
 
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.fleet import write_fleet
+from groundstation.pipeline.many_flights.fleet_samples import SAMPLES
 from groundstation.pipeline.many_flights.fleet_share import share_of, to_arrow
 from groundstation.pipeline.many_flights.fleet_store import (
     Scan,
-    month_of,
     put_month,
     refresh,
     remembered,
     scan,
     stamp_of,
 )
-from groundstation.pipeline.many_flights.flight_keys import Key, Keys
+from groundstation.pipeline.many_flights.flight_keys import Key, Keys, month_of
 from groundstation.pipeline.many_flights.known_flights import KnownFlights
+from groundstation.pipeline.many_flights.out_folder import clear_unfinished, prepare, refuse_foreign
 from groundstation.pipeline.many_flights.output import LocalOutput
 from groundstation.pipeline.many_flights.placement import Placement
 from groundstation.pipeline.many_flights.publishing import write_index_of
@@ -61,10 +62,25 @@ def make_flight(out: Path, identity: str, template: Path) -> None:
         os.link(template / name, out / identity / name)
 
 
+def samples_of(identity: str, number: int) -> str:
+    """File of the heading samples of a flight, in the dataset of samples."""
+    return f"aircraft=A{number % AIRCRAFT:02d}/month={month_of(identity)}/{identity}.parquet"
+
+
+def make_samples(out: Path, files: list[str], sample: Path) -> None:
+    """Put the samples of flights, linked to as few files as the file system allows."""
+    for number, name in enumerate(files):
+        kept = out.parent / f"sample{number % TEMPLATES}.parquet"
+        if not kept.exists():
+            shutil.copy(sample, kept)
+        (out / SAMPLES / name).parent.mkdir(parents=True, exist_ok=True)
+        os.link(kept, out / SAMPLES / name)
+
+
 def make_fleet(out: Path, templates: list[Path], flights: int, with_folders: bool) -> None:
     """Make a folder of flights, and what workers put into the dataset of them, as if they had read them."""
     shares = to_arrow([share_of(template) for template in templates])
-    rng = np.random.default_rng(7)
+    rng, sample = np.random.default_rng(7), next((out.parent / SAMPLES).rglob("*.parquet"))
     months: dict[str, list[int]] = {}
     for number in range(flights):
         months.setdefault(month_of(identity_of(number, flights)), []).append(number)
@@ -72,6 +88,9 @@ def make_fleet(out: Path, templates: list[Path], flights: int, with_folders: boo
         names = [identity_of(number, flights) for number in numbers]
         for number, name in zip(numbers if with_folders else (), names, strict=False):
             make_flight(out, name, templates[number % TEMPLATES])
+        files = [samples_of(name, number) if with_folders else "" for number, name in zip(numbers, names, strict=True)]
+        if with_folders:
+            make_samples(out, files, sample)
         table = shares.take(np.array(numbers) % TEMPLATES)
         number = np.array(numbers)
         starts = [int(datetime.strptime(one[:16], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC).timestamp()) for one in names]
@@ -90,8 +109,8 @@ def make_fleet(out: Path, templates: list[Path], flights: int, with_folders: boo
             array = array.dictionary_encode() if pa.types.is_dictionary(kind) else array.cast(kind)
             table = table.set_column(place, key, array)
         keys = [
-            Key(name, stamp_of(out, name) or 0, f"/logs/{one}.ulg", f"{one:064x}", "", "", start * NS_PER_S, None, "")
-            for one, name, start in zip(numbers, names, starts, strict=True)
+            Key(name, stamp_of(out, name) or 0, f"/logs/{one}.ulg", f"{one:064x}", "", "", start * NS_PER_S, None, file)
+            for one, name, start, file in zip(numbers, names, starts, files, strict=True)
         ]
         put_month(out, month, table, Keys.of(keys))
 
@@ -108,7 +127,10 @@ def timed(what: str, work: Callable[[], Any]) -> Any:
 
 def one_more(out: Path, identity: str) -> None:
     """What a run does beside the flight itself when it adds one."""
+    refuse_foreign(out, force=False)
+    prepare(out)
     KnownFlights(out)
+    clear_unfinished(out)
     found, problems = refresh(out)
     Placement(LocalOutput(out), []).sweep(found)
     members_of(found, {identity})
@@ -145,6 +167,7 @@ def main() -> None:
 def one_flight(out: Path, templates: list[Path], flights: int) -> None:
     """What a run does when a flight is gone, and when one comes."""
     last = identity_of(flights - 1, flights)
+    write_index_of(out, ())
     shutil.rmtree(out / last)
     timed("one flight gone", lambda: one_more(out, last))
     (out / last).mkdir()

@@ -2,15 +2,18 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from groundstation.pipeline.many_flights.fleet_store import scan
+from groundstation.pipeline.many_flights.fleet_store import refresh, scan
 from groundstation.pipeline.many_flights.output import LocalOutput
 from groundstation.pipeline.many_flights.placement import Placement
 from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX, remove
 from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.results.files import load_manifest, save_manifest
+from tests.fleet_example import save_flight
 
 ONE, OTHER = "1" * 64, "2" * 64
 FLIGHT = "20260504T060000Z_A12"
@@ -128,3 +131,28 @@ def test_a_flight_that_cannot_be_put_into_place_has_failed_and_stops_no_other(tm
     first, second = run(tmp_path, finished(tmp_path, "a", ONE), finished(tmp_path, "b", OTHER, "other"))
     assert first.state == "failed" and first.text.startswith(f"{FLIGHT}: cannot be put into place (")
     assert second.state == "done" and names(tmp_path) == [FLIGHT, "other"]
+
+
+def test_a_flight_is_removed_for_what_its_manifest_says_not_for_what_is_remembered(tmp_path: Path) -> None:
+    old = [save_flight(tmp_path, number) for number in range(2)]
+    found, _unwritten = refresh(tmp_path)
+    remembered = found.fresh[old[0].name].sha256
+    for folder, sha256 in zip(old, (OTHER, remembered), strict=True):
+        manifest = json.loads((folder / "manifest.json").read_text())
+        manifest["source"]["sha256"] = sha256
+        (folder / "manifest.json").write_text(json.dumps(manifest))  # in place: the time of the folder stays
+    placement = Placement(LocalOutput(tmp_path), ["a"])
+    placement.put(0, finished(tmp_path, "a", remembered))
+    assert list(scan(tmp_path).fresh) == [folder.name for folder in old]
+    assert placement.sweep(scan(tmp_path))
+    assert names(tmp_path) == sorted([".flights", FLIGHT, old[0].name, "flights.parquet", "samples.parquet"])
+
+
+def test_a_manifest_that_is_replaced_alone_is_noticed(tmp_path: Path) -> None:
+    folders = [save_flight(tmp_path, number) for number in range(2)]
+    refresh(tmp_path)
+    manifest = load_manifest(folders[1])
+    save_manifest(folders[1], replace(manifest, source=replace(manifest.source, path="/moved/b.csv")))
+    assert scan(tmp_path).stale == (folders[1].name,)
+    found, _ = refresh(tmp_path)
+    assert found.fresh[folders[1].name].path == "/moved/b.csv"

@@ -1,6 +1,7 @@
 """Sessions that ``run`` finds among the flights of a folder."""
 
 import json
+import random
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -11,6 +12,7 @@ import pytest
 
 from groundstation.cli.main import main
 from groundstation.estimators.analyses import ANSWER_TYPES
+from groundstation.pipeline.many_flights import session_search
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
 from groundstation.pipeline.many_flights.remote import RemoteFolder
@@ -85,6 +87,55 @@ def test_logs_that_follow_each_other_go_with_those_of_their_time() -> None:
 def test_two_recorders_of_one_aircraft_both_stay() -> None:
     a, again, b = flight("a", "A", "B", (0, 10)), flight("a_", "A", "B", (0, 9)), flight("b", "B", "A", (0, 10))
     assert searched(a, again, b)[0] == [["a", "a_", "b"]]
+
+
+def pairs_of_all(flights: Sequence[Member], span_of: Callable[[Member], Span | None]) -> list[tuple[Member, Member]]:
+    """Every two flights that overlap and of which one heard the other's name: each is held beside each."""
+    found = {}
+    for one in flights:
+        for other in sorted(flights, key=lambda one: one.aircraft):
+            spans = span_of(one), span_of(other)
+            if other.aircraft in one.hears - {one.aircraft} and None not in spans and _overlap_s(*spans) > 0:
+                found.setdefault(frozenset((one.folder, other.folder)), (one, other))
+    return list(found.values())
+
+
+def _overlap_s(*spans: Span | None) -> int:
+    return min(span[1] for span in spans if span) - max(span[0] for span in spans if span)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_flights_in_the_order_of_their_times_are_found_as_by_asking_every_pair(seed: int) -> None:
+    rng = random.Random(seed)
+
+    def span() -> Span | None:
+        begin = rng.randrange(60)
+        return None if rng.random() < 0.1 else (begin, begin + rng.choice((0, 3, 3, 20)))
+
+    flights = [
+        flight(f"{number}", rng.choice("ABCD"), " ".join(rng.sample("ABCDN", rng.randrange(4))), span())
+        for number in range(40)
+    ]
+    by_utc = session_search.overlapping(flights, lambda one: one.span_ns)
+    assert by_utc == pairs_of_all(flights, lambda one: one.span_ns) and by_utc
+    joined = {(one.folder, other.aircraft) for pair in by_utc[::3] for one, other in (pair, pair[::-1])}
+    heard = {one.folder: span() for one in flights}
+    expected = [
+        (one, other)
+        for one, other in pairs_of_all(flights, lambda one: heard[one.folder])
+        if (one.folder, other.aircraft) not in joined and (other.folder, one.aircraft) not in joined
+    ]
+    assert session_search.overlapping(flights, lambda one: heard[one.folder], joined) == expected
+
+
+def test_of_flights_that_follow_each_other_only_neighbours_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    flights = [flight(f"{name}{day}", name, "A B", (20 * day, 20 * day + 10)) for day in range(500) for name in "AB"]
+    compared: list[int] = []
+    overlap_ns = session_search.overlap_ns
+    monkeypatch.setattr(session_search, "overlap_ns", lambda *spans: compared.append(1) or overlap_ns(*spans))
+    groups, apart = sessions_among(flights, lambda folder: None)
+    assert len(groups) == 500 and not apart
+    assert len(compared) < 20 * len(flights)  # of 250 000 pairs
 
 
 # ------------------------------------------------------------------------------------------------ through ``run``

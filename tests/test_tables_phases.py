@@ -1,5 +1,6 @@
 """Ground proof and phases: no sample in the air may pass for ground, whatever flies and however it is logged."""
 
+import gc
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,9 +14,10 @@ from groundstation.base.angles import wrap_360
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.records import Column, RecordBatch
 from groundstation.base.units import NS_PER_S
+from groundstation.tables import phases as module
 from groundstation.tables.assemble import flight_from_batches
-from groundstation.tables.motion import LONGEST_GRID, window_sum
-from groundstation.tables.phases import PHASES, STEP_NS, Phases, flight_phases, ground_mask
+from groundstation.tables.motion import LONGEST_GRID, Motion, motion_of, window_sum
+from groundstation.tables.phases import ALWAYS_ON_GROUND, PHASES, STEP_NS, Phases, flight_phases, ground_mask
 from groundstation.tables.table import Flight, Table
 
 Floats = NDArray[np.float64]
@@ -180,6 +182,32 @@ def test_turning_the_world_or_shifting_time_changes_nothing() -> None:
     mask, _ = prove(flight_of(truth), truth)
     assert np.mean(mask == prove(flight_of(turned), turned)[0]) > 0.99  # the noise falls otherwise on the axes
     assert np.array_equal(mask, prove(flight_of(truth, start_ns=0), truth)[0])
+
+
+def test_the_motion_of_a_flight_is_found_once_and_forgotten_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    truth = light_aircraft()
+    asked: list[Flight] = []
+
+    def motion(flight: Flight) -> Motion:
+        asked.append(flight)
+        return motion_of(flight)
+
+    monkeypatch.setattr(module, "motion_of", motion)
+    flights = [flight_of(truth), replace(flight_of(truth), metadata={ALWAYS_ON_GROUND: "yes"})]
+    times = flights[0].start_ns + np.arange(0, 600, dtype=np.int64) * NS_PER_S
+    alone = ground_mask(flight_of(truth), times)
+    del asked[:]
+    found = flight_phases(flights[0])
+    again = [ground_mask(flights[0], times) for _ in range(3)]
+    assert len(asked) == 1 and all(np.array_equal(one.mask, alone.mask) for one in again)
+    assert not np.all(alone.mask) and np.all(ground_mask(flights[1], times).mask), "each has its own"
+    assert found == flight_phases(flights[0])
+    theirs = {id(one) for one in flights}
+    assert theirs <= {flight for flight, _ in module._KEPT}
+    asked.clear()
+    del flights
+    gc.collect()
+    assert theirs.isdisjoint(flight for flight, _ in module._KEPT)
 
 
 def test_drifting_satellite_altitude_does_not_stop_the_taxi() -> None:

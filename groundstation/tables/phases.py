@@ -1,5 +1,8 @@
 """Where a flight was on the ground, proven, and the phases it went through."""
 
+import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -122,7 +125,8 @@ def ground_mask(flight: Flight, time_ns: Int64Array, *, settings: GroundSettings
     -------
     GroundProof
     """
-    return _Evidence(flight, settings or GroundSettings()).proof(np.asarray(time_ns, dtype=np.int64))
+    with _evidence_of(flight, settings) as evidence:
+        return evidence.proof(np.asarray(time_ns, dtype=np.int64))
 
 
 def flight_phases(flight: Flight, *, settings: GroundSettings | None = None) -> Phases:
@@ -133,26 +137,50 @@ def flight_phases(flight: Flight, *, settings: GroundSettings | None = None) -> 
     stretch before lift-off that is faster than a quarter of the speed there, a landing roll the like after touch-down:
     these two may hold samples that are not proven ground. All else is unknown.
     """
-    evidence = _Evidence(flight, settings or GroundSettings())
-    size = grid_size(flight)
-    if size <= 1:
-        return Phases((), evidence.method)
-    label = _labels(evidence)
-    edges = np.flatnonzero(np.diff(label)) + 1
-    bounds = [0.0, *(float(edge) / RATE_HZ for edge in edges), flight.duration_s]
-    return Phases(
-        tuple(Interval(start, end, PHASES[label[round(start * RATE_HZ)]]) for start, end in pairwise(bounds)),
-        evidence.method,
-    )
+    with _evidence_of(flight, settings) as evidence:
+        size = grid_size(flight)
+        if size <= 1:
+            return Phases((), evidence.method)
+        label = _labels(evidence)
+        edges = np.flatnonzero(np.diff(label)) + 1
+        bounds = [0.0, *(float(edge) / RATE_HZ for edge in edges), flight.duration_s]
+        return Phases(
+            tuple(Interval(start, end, PHASES[label[round(start * RATE_HZ)]]) for start, end in pairwise(bounds)),
+            evidence.method,
+        )
+
+
+@contextmanager
+def _evidence_of(flight: Flight, settings: GroundSettings | None) -> Iterator["_Evidence"]:
+    """The evidence in a flight: kept as long as the flight is, as analyses ask for the ground one after the other.
+
+    The motion, which is large, is not.
+    """
+    key = id(flight), settings or GroundSettings()
+    kept = _KEPT.get(key)
+    if kept is None:
+        kept = _KEPT[key] = _Evidence(flight, key[1])
+        weakref.finalize(flight, _KEPT.pop, key, None)
+    try:
+        yield kept
+    finally:
+        kept.__dict__.pop("motion", None)
 
 
 class _Evidence:
     """What speaks for ground and for flight: the flag if it can be believed, else the detector, computed once."""
 
     def __init__(self, flight: Flight, settings: GroundSettings) -> None:
-        self.flight, self.settings = flight, settings
+        self._flight, self.settings = weakref.ref(flight), settings
         self.contact = contact_of(flight)
         self.is_always_on_ground = flight.metadata.get(ALWAYS_ON_GROUND, "").strip().lower() in YES
+
+    @property
+    def flight(self) -> Flight:
+        """The flight; whoever asks for evidence holds it."""
+        flight = self._flight()
+        assert flight is not None
+        return flight
 
     @cached_property
     def grid_ns(self) -> Int64Array:
@@ -202,7 +230,7 @@ class _Evidence:
         lower, upper = np.clip(cell, 0, size - 1), np.clip(cell + (rest > 0), 0, size - 1)
         return GroundProof(inside & self.ground[lower] & self.ground[upper], self.method)
 
-    @property
+    @cached_property
     def ground(self) -> BoolArray:
         """Proven contact on the grid."""
         if self.is_always_on_ground:
@@ -223,6 +251,9 @@ class _Evidence:
         if self.contact is not None and not self.against_flag:
             return _up_to_the_ground(held(self.contact, self.grid_ns)[1], self.ground)
         return _between_lift_off_and_touch_down(self.motion, self.ground, self.detection)
+
+
+_KEPT: dict[tuple[int, GroundSettings], _Evidence] = {}  # by the identity of a flight that is there
 
 
 def _labels(evidence: _Evidence) -> NDArray[np.int64]:

@@ -28,7 +28,7 @@ from groundstation.pipeline.many_flights.fleet_share import (
     skill_rows_of,
     to_arrow,
 )
-from groundstation.pipeline.many_flights.fleet_store import MOST_LISTED, Scan, month_of, scan
+from groundstation.pipeline.many_flights.fleet_store import MOST_LISTED, Scan, scan
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.figures import FigureData
 from groundstation.results.file_names import INDEX_JSON, SUMMARY
@@ -142,8 +142,8 @@ def _joined(table: Any, shares: Any) -> Any:
 
 def _parts(found: Scan, shares: Any, columns: Sequence[str]) -> Iterator[Any]:
     """Some columns of all flights in the order of their ids: a month at a time, where the months are in that order."""
-    months = list(map(month_of, found.fresh))
-    if len(shares) or not months or months != sorted(months):
+    places = np.concatenate([np.zeros(0, np.intp), *found.fresh.by_month().values()])
+    if len(shares) or not len(places) or np.any(np.diff(places) < 0):
         yield _joined(found.table(columns), shares)
     else:
         yield from found.months_of(columns)

@@ -1,8 +1,9 @@
 """What is known of every flight folder without reading it, as columns: no object but of one asked for."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import operator
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
-from itertools import pairwise
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +14,8 @@ from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.fleet_share import FlightShare, parquet_bytes
 from groundstation.results.files import utf8_text, write_bytes
 
-KEYS = ".flights"
+KEYS, UNKNOWN = ".flights", "unknown"
+DAY_CHARACTERS = 9  # of a flight id: date and the letter behind it, from which the month follows
 NUMBERS = ("stamp", "start_ns", "end_ns")
 
 
@@ -41,12 +43,27 @@ class Keys(Mapping[str, Key]):
     """
 
     def __init__(self, table: Any) -> None:
-        names = table.column("flight_id").to_pylist()
-        if any(one >= other for one, other in pairwise(names)):
+        self._table = table
+
+    @cached_property
+    def _ordered(self) -> tuple[Any, list[str]]:
+        """The table in the order of the flights, each once, and their names; files are written so."""
+        table, names = self._table, self._table.column("flight_id").to_pylist()
+        if not all(map(operator.lt, names, islice(names, 1, None))):
             last = {name: place for place, name in enumerate(names)}  # of a name that stands twice
             table = table.take(np.array([last[name] for name in sorted(last)], dtype=np.int64))
             names = sorted(last)
-        self.table, self.names = table, names
+        return table, names
+
+    @property
+    def table(self) -> Any:
+        """The fields of :class:`Key`, a row for each flight."""
+        return self._ordered[0]
+
+    @property
+    def names(self) -> list[str]:
+        """The flight ids."""
+        return self._ordered[1]
 
     @classmethod
     def of(cls, keys: Iterable[Key]) -> "Keys":
@@ -63,7 +80,7 @@ class Keys(Mapping[str, Key]):
         """Several of them as one."""
         import pyarrow as pa
 
-        return cls(pa.concat_tables([cls.of(()).table, *(part.table for part in parts)]).combine_chunks())
+        return cls(pa.concat_tables([cls.of(()).table, *(part._table for part in parts)]).combine_chunks())
 
     @cached_property
     def _places(self) -> dict[str, int]:
@@ -95,15 +112,52 @@ class Keys(Mapping[str, Key]):
         """The stamps, in the order of the flights."""
         return self.column("stamp")
 
-    def at(self, places: Sequence[int] | NDArray[np.int64]) -> "Keys":
-        """Those at some places, which ascend."""
-        if len(places) == len(self):
-            return self
-        return Keys(self.table.take(np.asarray(places, dtype=np.int64)))
-
-    def only(self, names: Iterable[str]) -> "Keys":
+    def only(self, names: Collection[str]) -> "Keys":
         """Those of some flights."""
-        return self.at(sorted(self._places[name] for name in names if name in self._places))
+        import pyarrow as pa
+        import pyarrow.compute as pc
+
+        is_named = pc.is_in(self.table.column("flight_id"), value_set=pa.array(names, pa.string()))
+        found = self.table.filter(is_named)
+        return self if len(found) == len(self) else Keys(found)
+
+    def without(self, values: Collection[str], field: str) -> "Keys":
+        """Those without some values of a field."""
+        if not values:
+            return self
+        return self.only([name for name, one in zip(self, self.column(field), strict=True) if one not in values])
+
+    def at(self, places: NDArray[np.intp]) -> "Keys":
+        """Those at some places."""
+        return Keys(self.table.take(places))
+
+    def by_month(self) -> dict[str, NDArray[np.intp]]:
+        """Places of the flights of each month, months and places in order."""
+        import pyarrow.compute as pc
+
+        days = pc.utf8_slice_codeunits(self.table.column("flight_id"), 0, DAY_CHARACTERS).combine_chunks()
+        encoded = days.dictionary_encode()
+        month_of_day = list(map(month_of, encoded.dictionary.to_pylist()))
+        months = sorted(set(month_of_day))
+        numbers = np.array([months.index(one) for one in month_of_day], dtype=np.intp)
+        number = numbers[encoded.indices.to_numpy()]
+        return {month: np.flatnonzero(number == place) for place, month in enumerate(months)}
+
+    def names_at(self, places: NDArray[np.intp]) -> list[str]:
+        """Flight ids at some places."""
+        return [self.names[place] for place in places.tolist()]
+
+
+def month_of(flight_id: str) -> str:
+    """The month by whose name a flight's file goes.
+
+    Examples
+    --------
+    >>> month_of("20260504T060000Z_A12_7"), month_of("NOTIME_0123abcd")
+    ('2026-05', 'unknown')
+    """
+    digits, letter = flight_id[:8], flight_id[8:DAY_CHARACTERS]
+    return f"{digits[:4]}-{digits[4:6]}" if letter == "T" and digits.isascii() and digits.isdecimal() else UNKNOWN
 
 
 def key_path(out: Path, month: str) -> Path:
@@ -118,7 +172,7 @@ def read_keys(out: Path, month: str) -> Keys:
     empty = Keys.of(())
     try:
         with pq.ParquetFile(key_path(out, month)) as file:
-            table = file.read()
+            table = file.read(use_threads=False)  # small files: threads take longer
         return Keys(table) if table.schema.equals(empty.table.schema) else empty
     except (OSError, ValueError):
         return empty

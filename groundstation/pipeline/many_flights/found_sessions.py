@@ -12,7 +12,14 @@ from groundstation.pipeline.many_flights.fleet_store import Scan
 from groundstation.pipeline.many_flights.inputs import file_in
 from groundstation.pipeline.many_flights.remote import is_remote
 from groundstation.pipeline.many_flights.session import SessionJob, load_stations, run_one, sessions_of
-from groundstation.pipeline.many_flights.session_search import Member, Span, heard_span_ns, members_of, sessions_among
+from groundstation.pipeline.many_flights.session_search import (
+    Member,
+    Span,
+    heard_span_ns,
+    members_of,
+    ranging_with,
+    sessions_among,
+)
 from groundstation.pipeline.many_flights.workers import Crew
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import remove
@@ -56,8 +63,8 @@ def find_sessions(asked: Asked, found: Scan, flight_ids: AbstractSet[str]) -> Fo
     """Find the sessions in which one of these flights takes part, with whatever other flight of the folder."""
     if not any(one.hears for one in members_of(found, flight_ids)):
         return FoundSessions()
-    members = members_of(found)
-    groups, apart = sessions_among(members, lambda folder: _heard(asked.mcap_in, folder))
+    members = ranging_with(found, flight_ids)
+    groups, apart = sessions_among(members, lambda folder: _heard(asked.mcap_in, folder), flight_ids)
     jobs: list[SessionJob] = []
     told: list[Outcome] = []
     for group in groups:
@@ -69,11 +76,7 @@ def find_sessions(asked: Asked, found: Scan, flight_ids: AbstractSet[str]) -> Fo
         except Exception as error:
             reason, trace = reason_of(f"session of {names}", error)
             told.append(Outcome(names, "failed", reason, trace=trace, is_session=True))
-    told += [
-        Outcome(one.folder.name, "skipped", f"{one.folder.name}: {one.reason}", is_session=True)
-        for one in apart
-        if one.folder.name in flight_ids
-    ]
+    told += [Outcome(one.folder.name, "skipped", f"{one.folder.name}: {one.reason}", is_session=True) for one in apart]
     return FoundSessions(tuple(jobs), tuple(told))
 
 

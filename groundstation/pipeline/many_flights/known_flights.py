@@ -1,9 +1,12 @@
 """Flights that an OUT has already, by the log they came from; a folder is read when its log is asked for."""
 
+from collections import Counter
+from contextlib import suppress
+from functools import cached_property
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError
-from groundstation.pipeline.many_flights.fleet_store import folder_names, remembered
+from groundstation.pipeline.many_flights.fleet_store import names_in, remembered
 from groundstation.pipeline.one_flight.resume import Finished, finished
 from groundstation.results.files import load_manifest
 
@@ -21,25 +24,36 @@ class KnownFlights:
 
     def __init__(self, out: Path | None = None) -> None:
         self._out = out
-        self._folders: dict[str, list[str]] = {}
-        if out is None:
-            return
-        keys = remembered(out)
-        digests = keys.column("sha256")
-        for name in folder_names(out):
-            place = keys.place(name)
-            try:
-                sha256 = digests[place] if place is not None else load_manifest(out / name).source.sha256
-            except GroundstationError:  # it is not whole
-                continue
-            self._folders.setdefault(sha256, []).append(name)
+        self._names: list[str] = []
+        self._digests: list[str] = []
+        if out is not None:
+            keys = remembered(out)
+            self._names, self._digests = list(keys), keys.column("sha256")
+            for name in set(names_in(out)).difference(keys.names):
+                with suppress(GroundstationError):  # it is not whole
+                    self._digests.append(load_manifest(out / name).source.sha256)
+                    self._names.append(name)
+        self._one_of = dict(zip(self._digests, self._names, strict=True))
 
     def __len__(self) -> int:
-        return len(self._folders)
+        return len(self._one_of)
 
     def of(self, sha256: str) -> Finished | None:
         """The flight that a log gave, by the digest of the log; None when there is none that is whole."""
-        if self._out is None:
+        if self._out is None or sha256 not in self._one_of:
             return None
-        found = (finished(self._out / name) for name in reversed(self._folders.get(sha256, [])))
+        several = self._several.get(sha256) or [self._one_of[sha256]]
+        found = (finished(self._out / name) for name in several)
         return next((one for one in found if one is not None and one.sha256 == sha256), None)
+
+    @cached_property
+    def _several(self) -> dict[str, list[str]]:
+        """Folders by the digest of their log where it gave more than one, the last name first."""
+        if len(self._one_of) == len(self._names):
+            return {}
+        counts = Counter(self._digests)
+        found: dict[str, list[str]] = {}
+        for name, sha256 in sorted(zip(self._names, self._digests, strict=True), reverse=True):
+            if counts[sha256] > 1:
+                found.setdefault(sha256, []).append(name)
+        return found

@@ -1,5 +1,6 @@
 """The folder that results go into: whether it is ours, who else writes into it, what a killed run left in it."""
 
+import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,7 +18,7 @@ def refuse_foreign(out: Path, force: bool) -> None:
     """Refuse to write results into what another made, or into a flight folder."""
     if out.exists() and not out.is_dir():
         raise UsageError(str(out), "a file", "a folder for the results")
-    if out.is_dir() and any(one.name != LOCK for one in out.iterdir()) and not is_ours(out) and not force:
+    if out.is_dir() and not is_ours(out) and not force and any(one.name != LOCK for one in out.iterdir()):
         raise UsageError(str(out), "a folder that groundstation did not make", "a new or own folder", "-f uses it")
     if (out / FLIGHT_FOLDER_MARK).exists():
         raise UsageError(str(out), "a flight folder", "a folder that holds flight folders", "name another -o")
@@ -49,5 +50,6 @@ def prepare(out: Path) -> None:
 
 def clear_unfinished(out: Path) -> None:
     """Clear away what nobody writes any more: this run is alone in here, and none of its jobs is running."""
-    for left_over in out.glob(f"{PARTIAL_PREFIX}*"):
-        shutil.rmtree(left_over, ignore_errors=True)
+    for name in os.listdir(out):  # noqa: PTH208 (a pattern is three times as slow, which 100 000 folders tell)
+        if name.startswith(PARTIAL_PREFIX):
+            shutil.rmtree(out / name, ignore_errors=True)

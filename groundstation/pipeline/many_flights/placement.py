@@ -1,7 +1,7 @@
 """Where finished flights are put, one after the other, so that a run that is killed keeps what it had finished."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from groundstation.base.errors import GroundstationError
 from groundstation.pipeline.many_flights.fleet_store import Scan
+from groundstation.pipeline.many_flights.flight_keys import Keys
 from groundstation.pipeline.many_flights.output import Output
 from groundstation.pipeline.many_flights.remote import is_remote
 from groundstation.pipeline.one_flight.identity import plain_id
@@ -109,9 +110,8 @@ class Placement:
         now = {outcome.sha256: outcome.flight_id for outcome in flights}
         versions = {(utf8_text(_place_of(one)), plain_id(one.flight_id, one.sha256)) for one in flights}
         old = []
-        known = dict(zip(found.fresh, map(_Origin, *map(found.fresh.column, ("path", "sha256"))), strict=True))
-        for name in found.names:
-            origin = known.get(name) or _origin_of(found.out / name)
+        for name in sorted({*_came_from(found.fresh, now, {path for path, _ in versions}), *found.stale}):
+            origin = _origin_of(found.out / name)  # nothing is removed for what is remembered alone
             if origin is None or now.get(origin.sha256) == name:
                 continue
             if origin.sha256 in now or (utf8_text(origin.path), plain_id(name, origin.sha256)) in versions:
@@ -131,6 +131,13 @@ class Placement:
         if origin is None or origin.sha256 == outcome.sha256:
             return False
         return origin.path != _place_of(outcome)
+
+
+def _came_from(flights: Keys, digests: Collection[str], paths: Collection[str]) -> Iterator[str]:
+    """Flights that came from logs of some digests or at some places, as far as is remembered."""
+    for name, path, sha256 in zip(flights, *map(flights.column, ("path", "sha256")), strict=True):
+        if sha256 in digests or path in paths:
+            yield name
 
 
 def _place_of(outcome: Outcome) -> str:

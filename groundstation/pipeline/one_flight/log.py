@@ -55,6 +55,8 @@ class Log:
     @cached_property
     def loaded_icds(self) -> "tuple[Icd, ...]":
         """The ICDs, read and checked."""
+        if not self.icds:  # what reads them is not loaded for nothing
+            return ()
         from groundstation.readers.icd import named_icd
 
         return tuple(named_icd(one) for one in self.icds)
