@@ -117,7 +117,7 @@ def write_index(out: Path, rows: Iterable[IndexRow], answers: Sequence[str] = ()
     """
     columns = columns_of(answers)
     told = [to_json_exactly(row) for row in sorted(rows, key=_place)]
-    plain = [{name: (row["answers"] | row).get(name) for name in columns} for row in told]
+    plain = [{name: row.get(name) for name in columns} for row in (row["answers"] | row for row in told)]
     note = {"elsewhere": elsewhere} if elsewhere else {}
     write_text(out / INDEX_JSON, json_text({"schema_version": SCHEMA_VERSION, **note, "rows": plain}))
     lines = [*([f"# {elsewhere}"] if elsewhere else []), ",".join(columns)]
