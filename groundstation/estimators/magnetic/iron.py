@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
-from groundstation.estimators.magnetic import harmonics
+from groundstation.base.records import frozen
 from groundstation.estimators.magnetic.attitude import field_in_body, levelled_heading_deg
-from groundstation.estimators.magnetic.compass_table import CENTRES_DEG
+from groundstation.estimators.magnetic.compass_table import CENTRES_DEG, fit_to_circle
 from groundstation.results.magnetic import Matrix, PoissonParameters, Vector
 
 HEADINGS_DEG: FloatArray = np.arange(0.0, 360.0, 0.5)
@@ -73,12 +74,19 @@ def heading_errors(
     iron: Iron, horizontal_nt: float, down_nt: float, bank_deg: float = 0.0, pitch_deg: float = 0.0
 ) -> FloatArray:
     """Error of the uncorrected magnetic heading in the middle of each bin of it, shape (360,), at a bank."""
-    level = np.full(len(HEADINGS_DEG), bank_deg), np.full(len(HEADINGS_DEG), pitch_deg)
-    field = field_in_body(horizontal_nt, down_nt, HEADINGS_DEG, *level)
+    field = _fields_nt(horizontal_nt, down_nt, bank_deg, pitch_deg)
+    level = np.full(1, bank_deg), np.full(1, pitch_deg)
     shown = levelled_heading_deg(field @ iron.soft.T + iron.hard_nt, *level)
     error = wrap_180(shown - HEADINGS_DEG)
     order = np.argsort(shown)
     return np.asarray(np.interp(CENTRES_DEG, shown[order], error[order], period=360.0))
+
+
+@lru_cache(maxsize=16)
+def _fields_nt(horizontal_nt: float, down_nt: float, bank_deg: float, pitch_deg: float) -> FloatArray:
+    """The earth's field in the body on every heading, shape (720, 3): the same for the hundreds of irons of a fit."""
+    level = np.full(len(HEADINGS_DEG), bank_deg), np.full(len(HEADINGS_DEG), pitch_deg)
+    return frozen(field_in_body(horizontal_nt, down_nt, HEADINGS_DEG, *level))
 
 
 def bank_bias(iron: Iron, horizontal_nt: float, down_nt: float, bank_deg: float, pitch_deg: float = 0.0) -> FloatArray:
@@ -93,7 +101,7 @@ def level_coefficients(
     """A to E of level flight that an iron makes, shape (5,), and their covariance, shape (5, 5)."""
 
     def coefficients(other: Iron) -> FloatArray:
-        return harmonics.fit(CENTRES_DEG, heading_errors(other, horizontal_nt, down_nt, 0.0, pitch_deg))[0]
+        return fit_to_circle(heading_errors(other, horizontal_nt, down_nt, 0.0, pitch_deg))
 
     slopes = derivatives(iron, coefficients, horizontal_nt)
     return coefficients(iron), slopes @ covariance @ slopes.T
