@@ -59,9 +59,10 @@ from groundstation.tables.declination import declination_along
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer.recording import write_recording
 from tests import magnetic_example
+from tests.blank_figures import leave_blank
 from tests.recording_contents import Contents
 from tests.saved import load
-from tests.test_magnetic_run import analysed, figure_eight, simulated
+from tests.test_magnetic_run import analysed, figure_eight, simulated, system_3_alone
 from tests.test_reports import HOSTILE
 
 FAMILY = MagneticFamilySettings(
@@ -79,6 +80,14 @@ OWNER = {"method": "compass_table", "verdict": "accept", "flight_id": "F1", "air
 
 
 # ---------------------------------------------------------------------------------------------- flights
+
+
+@pytest.fixture(scope="module", autouse=True)
+def short_runs() -> Iterator[None]:
+    """Runs of system 3 alone whose reports have no figures, a fifth of the work: no test here looks at more."""
+    with system_3_alone() as patch:
+        leave_blank(patch)
+        yield
 
 
 @pytest.fixture(scope="module")

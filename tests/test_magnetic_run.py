@@ -1,5 +1,7 @@
 """System 3 in a whole run: verdict and coefficients beside the truth, reasons where there is no answer, files."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
@@ -13,11 +15,13 @@ from groundstation.base.clock import Clock
 from groundstation.base.errors import SettingsError
 from groundstation.base.ledger import Ledger
 from groundstation.chapters.front import front
+from groundstation.estimators.analyses import FLIGHT_ANALYSES
 from groundstation.estimators.inertial.analysis import INERTIAL
 from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.analysis import MAGNETIC
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.pipeline.many_flights.fleet_columns import answer_values
+from groundstation.pipeline.one_flight import analyse as pipeline
 from groundstation.pipeline.one_flight.analyse import Given, analyse, known_of, run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.pipeline.one_flight.convert import convert_log
@@ -42,10 +46,20 @@ def simulated(name: str) -> Simulated:
     return simulate(load_scenario(name))
 
 
+@contextmanager
+def system_3_alone() -> Iterator[pytest.MonkeyPatch]:
+    """Within, runs have system 3 and what it builds on: the other analyses take longer, and no test of it asks them."""
+    with pytest.MonkeyPatch.context() as patch:
+        asked = tuple(one for one in FLIGHT_ANALYSES if one.name in ("latency", "heading", "magnetic"))
+        patch.setattr(pipeline, "FLIGHT_ANALYSES", asked)
+        yield patch
+
+
 def analysed(flight: Flight, configuration: Configuration | None = None) -> FlightResults:
     source = Source("flight.csv", "ab" * 32, 1, "flat-csv")
     given = Given("NOTIME_abababab", source, Ledger(), Clock(), (), has_lost_data=False)
-    return analyse(flight, given, configuration or Configuration())
+    with system_3_alone():
+        return analyse(flight, given, configuration or Configuration())
 
 
 @cache

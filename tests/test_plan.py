@@ -166,11 +166,14 @@ def test_the_scenarios_that_are_shipped_are_listed_and_read() -> None:
 
 
 def quick(scenario: object) -> object:
-    """The scenario with few iterations and trials: the study's tests make plans in full."""
+    """The scenario with few iterations, trials and measurements: the study's tests make plans in full."""
     if isinstance(scenario, RangeApproach):
-        return replace(scenario, trials=min(scenario.trials, 3))
+        noise = replace(scenario.noise, interval_s=max(scenario.noise.interval_s, 0.1))
+        return replace(scenario, trials=min(scenario.trials, 3), noise=noise)
     if not isinstance(scenario, SessionPlan):
         return scenario
+    if not any(point.is_placed for point in scenario.points):
+        scenario = replace(scenario, duration_s=min(scenario.steps, 10) * scenario.step_s)
     control = replace(scenario.control, starts=0, iterations=5)
     return replace(scenario, control=control, placement=replace(scenario.placement, starts=0, iterations=5, map_side=5))
 

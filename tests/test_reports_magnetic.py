@@ -9,8 +9,10 @@ import pytest
 from groundstation.chapters.magnetic import magnetic
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Figure, Grid, Note, Section
+from groundstation.reports import drawing
 from groundstation.reports.drawing import Drawing, sketching
 from groundstation.reports.figures import with_drawings
+from groundstation.reports.live import Svg
 from groundstation.reports.sections import flight_sections
 from groundstation.results.answer import by_analysis
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
@@ -20,6 +22,7 @@ from groundstation.results.flight import FlightResults, NotAssessable
 from groundstation.results.heading import Gate
 from groundstation.results.magnetic import ADVISORY, MagneticResult
 from groundstation.results.manifest import Manifest
+from tests.blank_figures import blank
 from tests.report_example import example
 from tests.saved import load
 from tests.test_magnetic_run import figure_eight
@@ -62,7 +65,17 @@ def whole(section: Section) -> Section:
     return replace(section, parts=(*section.parts, *section.appendix))
 
 
-def test_the_chapter_stands_whole(folder: Path) -> None:
+def paint_magnetic_figures_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the figures of the report's other chapters blank."""
+    paint = drawing.draw
+
+    def chosen(key: str, *rest: Any, **options: Any) -> Svg:
+        return (paint if key.startswith("magnetic") else blank)(key, *rest, **options)
+
+    monkeypatch.setattr(drawing, "draw", chosen)
+
+
+def test_the_chapter_stands_whole(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     section = chapter(load(folder).results)
     assert set(TABLES) <= {part.title for part in whole(section).parts if isinstance(part, Grid)}
     first = section.parts[0]
@@ -73,6 +86,7 @@ def test_the_chapter_stands_whole(folder: Path) -> None:
         drawn = with_drawings(whole(section), load(folder).results)
     titles = [part.title for part in drawn.parts if isinstance(part, Drawing)]
     assert {*FIGURES, "Modulus of the field"} <= set(titles)
+    paint_magnetic_figures_alone(monkeypatch)
     page = Page(report(folder, figure_eight()))
     assert "nan" not in page.text.lower().split()
     assert "None" not in page.text

@@ -32,7 +32,9 @@ DERIVED = ("location_fix.", "pose.", "log")  # what topics of channels made of o
 INFO = StoreInfo(source_name="a.csv", metadata={"aircraft": "T-1"}, has_utc=True)
 FLIPS = 60
 EVERY = [9, pytest.param(1, marks=pytest.mark.slow)]  # ninth place of a sweep; the slow tests take all
-MUTATIONS = 100
+FEW = [4, pytest.param(1, marks=pytest.mark.slow)]  # fourth place, of shorter sweeps
+MANY = 100
+MUTATIONS = [MANY // 4, pytest.param(MANY, marks=pytest.mark.slow)]
 EXTREMES = (0, 1, 2**31, 2**40, 2**63, 2**64 - 1)
 PEAK_BYTES = 16 << 20  # a file of 100 kB needs no more; a trusted length would
 
@@ -154,9 +156,12 @@ def test_flipped_bit_loses_no_more_than_its_chunk_and_the_loss_is_stated(
         assert damage.what.startswith("messages, 2026-05-04T06:")
 
 
-def test_flipped_bit_in_compressed_data_is_always_found(sample: Sample, tmp_path: Path) -> None:
+@pytest.mark.parametrize("shares", [(0.6,), pytest.param((0.3, 0.9), marks=pytest.mark.slow)])
+def test_flipped_bit_in_compressed_data_is_always_found(
+    sample: Sample, tmp_path: Path, shares: tuple[float, ...]
+) -> None:
     for chunk in sample.chunks:
-        for share in (0.3, 0.6, 0.9):
+        for share in shares:
             place = chunk.start + 60 + int(share * (chunk.end - chunk.start - 60))
             _, damages = recovered(tmp_path / "a.mcap", flipped(sample.data, place), sample)
             (damage,) = damages
@@ -229,9 +234,10 @@ def test_definitions_lost_with_the_summary_never_give_wrong_columns(sample: Samp
             assert any(damage.loses_data and damage.kind != "truncated" for damage in damages), place
 
 
-def test_overwritten_block_loses_only_the_chunks_it_touches(sample: Sample, tmp_path: Path) -> None:
+@pytest.mark.parametrize("every", FEW)
+def test_overwritten_block_loses_only_the_chunks_it_touches(sample: Sample, tmp_path: Path, every: int) -> None:
     size = 3_000
-    for start in range(sample.chunks[0].start, sample.data_end - size, 2_111):
+    for start in range(sample.chunks[0].start, sample.data_end - size, 2_111 * every):
         data = sample.data[:start] + bytes(size) + sample.data[start + size :]
         found, damages = recovered(tmp_path / "a.mcap", data, sample)
         for topic, rows in found.items():
@@ -256,9 +262,10 @@ def test_removed_and_inserted_bytes_lose_only_the_chunks_they_touch(sample: Samp
             assert sum(map(len, lost.values())) <= sum(len(chunk.rows) for chunk in hit)
 
 
-def test_repeated_chunk_is_read_once(sample: Sample, tmp_path: Path) -> None:
+@pytest.mark.parametrize("every", FEW)
+def test_repeated_chunk_is_read_once(sample: Sample, tmp_path: Path, every: int) -> None:
     whole = sample.data[: sample.data_end]
-    for chunk in sample.chunks:
+    for chunk in sample.chunks[::every]:
         copy = whole[chunk.start : chunk.end]
         found, damages = recovered(tmp_path / "a.mcap", whole[: chunk.end] + copy + whole[chunk.end :], sample)
         assert not missing(found)
@@ -304,10 +311,11 @@ def mutated(data: bytes, rng: np.random.Generator) -> bytes:
     return bytes(out[: int(rng.integers(len(out) // 2, len(out) + 1))]) if rng.random() < 0.3 else bytes(out)
 
 
-def test_random_mutations_never_fail_and_never_give_wrong_rows(sample: Sample, tmp_path: Path) -> None:
+@pytest.mark.parametrize("mutations", MUTATIONS)
+def test_random_mutations_never_fail_and_never_give_wrong_rows(sample: Sample, tmp_path: Path, mutations: int) -> None:
     rng = np.random.default_rng(2026)
     path = tmp_path / "a.mcap"
-    for _ in range(MUTATIONS):
+    for _ in range(mutations):
         data = mutated(sample.data, rng)
         try:
             found, damages = recovered(path, data, sample)
@@ -318,9 +326,10 @@ def test_random_mutations_never_fail_and_never_give_wrong_rows(sample: Sample, t
         assert not missing(found) or any(damage.loses_data for damage in damages)
 
 
-def test_random_mutations_of_a_foreign_file_never_fail_and_tell_what_they_cost(sample: Sample) -> None:
+@pytest.mark.parametrize("mutations", MUTATIONS)
+def test_random_mutations_of_a_foreign_file_never_fail_and_tell_what_they_cost(sample: Sample, mutations: int) -> None:
     rng = np.random.default_rng(9)
-    for _ in range(MUTATIONS):
+    for _ in range(mutations):
         data = mutated(sample.data, rng)
         found = list(ForeignMcap(BytesIO(data), len(data)))
         messages = [item for item in found if isinstance(item, ForeignMessages)]
@@ -427,7 +436,7 @@ def test_hostile_messages_and_schemas_with_right_checksums_never_fail(
     path = tmp_path / "a.mcap"
     payload = b"\x11" + bytes(8) + b"\x19" + bytes(8) + b"\xa2\x01\x03nav" + b"\xa8\x01\x01"
     raw, definition = messages_of(*[payload] * 12, payload[:9]), ins_definition()
-    for number in range(MUTATIONS):
+    for number in range(MANY):
         spoilt, kind = bytearray(raw), bytearray(definition)
         target = spoilt if number % 3 else kind
         for place in rng.integers(20, len(target), int(rng.integers(1, 6))):

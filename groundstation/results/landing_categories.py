@@ -13,12 +13,14 @@ range system of its own. Tolerance of the mean course line of an ILS at the thre
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.normal import NORMAL_95
+from groundstation.base.records import frozen
 
 LINEAR_95 = NORMAL_95  # 95 % of one Gaussian error lie within so many sigma
 RADIAL_95 = 2.447747  # the same of the radius of two with equal sigmas: sqrt(-2 ln 0.05)
@@ -88,6 +90,7 @@ def axis_category_met(error_95_m: float, axis: str) -> Category | None:
     return met[-1] if met else None
 
 
+@cache
 def _radial_factors() -> tuple[FloatArray, FloatArray]:
     """95 % radius over the larger sigma, by the ratio of the smaller one to it."""
     ratio = np.linspace(0.0, 1.0, _RATIOS)
@@ -98,7 +101,7 @@ def _radial_factors() -> tuple[FloatArray, FloatArray]:
         middle = 0.5 * (low + high)
         outside = np.exp(-0.5 * middle[:, None] ** 2 / length2).mean(axis=1)
         low, high = np.where(outside > 0.05, middle, low), np.where(outside > 0.05, high, middle)
-    return ratio, 0.5 * (low + high)
+    return frozen(ratio), frozen(0.5 * (low + high))
 
 
 def radius_95_m(covariance_m2: ArrayLike) -> FloatArray:

@@ -11,6 +11,7 @@ from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.manoeuvre import BINS
 
 CENTRES_DEG: FloatArray = np.arange(BINS, dtype=np.float64) + 0.5
+fit_to_circle = harmonics.fit_to(CENTRES_DEG)
 
 
 @dataclass(frozen=True)

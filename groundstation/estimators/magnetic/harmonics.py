@@ -1,6 +1,7 @@
 """The five classical coefficients, with errors that allow for residuals correlated from sample to sample."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -35,12 +36,23 @@ def fit(
     """
     columns = design(heading_deg)
     weighted = columns if weight is None else columns * weight[:, None]
-    bread = np.linalg.pinv(columns.T @ weighted)
+    bread = _bread(columns, weighted)
     values = bread @ (weighted.T @ error_deg)
     residual = error_deg - columns @ values
     correlation = autocorrelation(residual, COEFFICIENTS)
     middle = long_run(weighted * residual[:, None], correlation) * inflation(len(residual), COEFFICIENTS, correlation)
     return values, bread @ middle @ bread
+
+
+def fit_to(heading_deg: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """What gives the coefficients of :func:`fit` alone, shape (5,), for many errors on the same headings."""
+    columns = design(heading_deg)
+    bread = _bread(columns, columns)
+    return lambda error_deg: bread @ (columns.T @ error_deg)
+
+
+def _bread(columns: FloatArray, weighted: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.pinv(columns.T @ weighted), dtype=np.float64)
 
 
 def autocorrelation(residual: FloatArray, parameters: int) -> float:

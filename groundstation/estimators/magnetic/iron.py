@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
-from groundstation.estimators.magnetic import harmonics
+from groundstation.base.records import frozen
 from groundstation.estimators.magnetic.attitude import field_in_body, levelled_heading_deg
-from groundstation.estimators.magnetic.compass_table import CENTRES_DEG
+from groundstation.estimators.magnetic.compass_table import CENTRES_DEG, fit_to_circle
 from groundstation.results.magnetic import Matrix, PoissonParameters, Vector
 
 HEADINGS_DEG: FloatArray = np.arange(0.0, 360.0, 0.5)
@@ -74,20 +74,19 @@ def heading_errors(
     iron: Iron, horizontal_nt: float, down_nt: float, bank_deg: float = 0.0, pitch_deg: float = 0.0
 ) -> FloatArray:
     """Error of the uncorrected magnetic heading in the middle of each bin of it, shape (360,), at a bank."""
-    field, level = _circle_in_body(horizontal_nt, down_nt, bank_deg, pitch_deg)
+    field = _fields_nt(horizontal_nt, down_nt, bank_deg, pitch_deg)
+    level = np.full(1, bank_deg), np.full(1, pitch_deg)
     shown = levelled_heading_deg(field @ iron.soft.T + iron.hard_nt, *level)
     error = wrap_180(shown - HEADINGS_DEG)
     order = np.argsort(shown)
     return np.asarray(np.interp(CENTRES_DEG, shown[order], error[order], period=360.0))
 
 
-@lru_cache(maxsize=8)
-def _circle_in_body(
-    horizontal_nt: float, down_nt: float, bank_deg: float, pitch_deg: float
-) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
-    """The field along the body at each of ``HEADINGS_DEG``, and roll and pitch there: the same for every iron."""
+@lru_cache(maxsize=16)
+def _fields_nt(horizontal_nt: float, down_nt: float, bank_deg: float, pitch_deg: float) -> FloatArray:
+    """The earth's field in the body on every heading, shape (720, 3): the same for the hundreds of irons of a fit."""
     level = np.full(len(HEADINGS_DEG), bank_deg), np.full(len(HEADINGS_DEG), pitch_deg)
-    return field_in_body(horizontal_nt, down_nt, HEADINGS_DEG, *level), level
+    return frozen(field_in_body(horizontal_nt, down_nt, HEADINGS_DEG, *level))
 
 
 def bank_bias(iron: Iron, horizontal_nt: float, down_nt: float, bank_deg: float, pitch_deg: float = 0.0) -> FloatArray:
@@ -96,27 +95,13 @@ def bank_bias(iron: Iron, horizontal_nt: float, down_nt: float, bank_deg: float,
     return wrap_180(0.5 * (at[0] + at[1]) - at[2])
 
 
-def curve_coefficients(error_deg: FloatArray) -> FloatArray:
-    """A to E, shape (5,), of errors in the middle of each bin of the heading, shape (360,); their covariance is not
-    asked for, see :func:`harmonics.fit`.
-    """
-    columns, inverse = _normal_equations()
-    return np.asarray(inverse @ (columns.T @ error_deg), dtype=np.float64)
-
-
-@cache
-def _normal_equations() -> tuple[FloatArray, FloatArray]:
-    columns = harmonics.design(CENTRES_DEG)
-    return columns, np.asarray(np.linalg.pinv(columns.T @ columns), dtype=np.float64)
-
-
 def level_coefficients(
     iron: Iron, covariance: FloatArray, horizontal_nt: float, down_nt: float, pitch_deg: float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
     """A to E of level flight that an iron makes, shape (5,), and their covariance, shape (5, 5)."""
 
     def coefficients(other: Iron) -> FloatArray:
-        return curve_coefficients(heading_errors(other, horizontal_nt, down_nt, 0.0, pitch_deg))
+        return fit_to_circle(heading_errors(other, horizontal_nt, down_nt, 0.0, pitch_deg))
 
     slopes = derivatives(iron, coefficients, horizontal_nt)
     return coefficients(iron), slopes @ covariance @ slopes.T

@@ -7,7 +7,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.estimators.magnetic import harmonics
-from groundstation.estimators.magnetic.compass_table import CompassTable
+from groundstation.estimators.magnetic.compass_table import CompassTable, fit_to_circle
 from groundstation.estimators.magnetic.held_out import (
     LONGEST_STEP_S,
     Left,
@@ -17,7 +17,7 @@ from groundstation.estimators.magnetic.held_out import (
     left_by_table,
     seen_wander,
 )
-from groundstation.estimators.magnetic.iron import Iron, bank_bias, curve_coefficients, derivatives, level_coefficients
+from groundstation.estimators.magnetic.iron import Iron, bank_bias, derivatives, level_coefficients
 from groundstation.estimators.magnetic.modulus import PARAMETERS, fit_modulus
 from groundstation.estimators.magnetic.poisson import EarthField, IronFit, fit_iron
 from groundstation.estimators.magnetic.readings import Readings
@@ -131,7 +131,7 @@ def bias_coefficients(fits: Fits, azimuth_sigma_deg: float) -> tuple[FloatArray,
 
     def coefficients(iron: Iron) -> FloatArray:
         bias = bank_bias(iron, *_strengths(fit.earth), fits.bank_deg, fits.pitch_deg)
-        return curve_coefficients(bias)
+        return fit_to_circle(bias)
 
     slopes = derivatives(fit.iron, coefficients, max(abs(fit.earth.horizontal_nt), 1.0))
     return coefficients(fit.iron), slopes @ fit.covariance_with(azimuth_sigma_deg) @ slopes.T
