@@ -239,7 +239,7 @@ def test_an_answer_that_leans_on_a_damaged_span_says_so(finished_run: Callable[.
     cells = rows[head + 1 + at].split(",")
     rows[head + 1 + at] = ",".join(cells[:-2])  # a row too short, within the segment
     broken.write_text("\n".join(rows) + "\n", encoding="utf-8")
-    (outcome,) = run_many([broken], tmp_path / "out", Configuration({"thresholds": limits}), with_pdf=False)
+    (outcome,) = run_many([broken], tmp_path / "out", Configuration({"thresholds": limits}), only_results=True)
     summary = load(Path(outcome.folder)).summary
     (finding,) = (one for one in summary["findings"] if one["code"] == "heading.damaged_span")
     assert finding["severity"] == "warn" and "dropped rows" in finding["text"]
@@ -248,6 +248,6 @@ def test_an_answer_that_leans_on_a_damaged_span_says_so(finished_run: Callable[.
     first[head + 1 + at] = ",".join(cells)
     first[head + 2] = "0"  # the same loss at the parking stand, which no answer rests on
     broken.write_text("\n".join(first) + "\n", encoding="utf-8")
-    (outcome,) = run_many([broken], tmp_path / "out2", Configuration(), with_pdf=False)
+    (outcome,) = run_many([broken], tmp_path / "out2", Configuration(), only_results=True)
     codes = {one["code"] for one in load(Path(outcome.folder)).summary["findings"]}
     assert "data.dropped_rows" in codes and "heading.damaged_span" not in codes

@@ -128,7 +128,8 @@ def test_a_flipped_id_costs_its_own_record_alone(tmp_path: Path) -> None:
         assert intact <= set(places.tolist()), other
 
 
-def test_an_intact_record_between_damaged_headers_is_kept(tmp_path: Path) -> None:
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
+def test_an_intact_record_between_damaged_headers_is_kept(tmp_path: Path, every: int) -> None:
     """Any one bit in the header before it and any one in that behind it, be it with a time or without."""
     log = DataFlash()
     log.define(1, "ATT", "QccC", "TimeUS,Roll,Pitch,Yaw")
@@ -139,7 +140,7 @@ def test_an_intact_record_between_damaged_headers_is_kept(tmp_path: Path) -> Non
     starts, path = log.starts(), tmp_path / "between.BIN"
     for middle in (8, 9):
         for before in range(24):
-            for behind in range(24):
+            for behind in range(before % every, 24, every):
                 data = bytearray(log.content)
                 for record, bit in ((middle - 1, before), (middle + 1, behind)):
                     data[starts[record] + bit // 8] ^= 1 << bit % 8
@@ -230,13 +231,14 @@ def test_noise_is_read_without_a_failure(tmp_path: Path, seed: int) -> None:
     items_of(path)
 
 
-def test_very_many_definitions_take_linear_time(tmp_path: Path) -> None:
+@pytest.mark.parametrize("definitions", [5_000, pytest.param(20_000, marks=pytest.mark.slow)])
+def test_very_many_definitions_take_linear_time(tmp_path: Path, definitions: int) -> None:
     log = flight_log()
     odd = DataFlash()
     odd.define(99, "ONE", "B", "X")
     odd.define(99, "TWO", "H", "X")
     path = tmp_path / "definitions.BIN"
-    path.write_bytes(log.content + b"".join(odd.records) * 20_000)
+    path.write_bytes(log.content + b"".join(odd.records) * definitions)
     items = items_of(path)
     damages = [item for item in items if isinstance(item, Damage)]
     assert len(damages) < 50

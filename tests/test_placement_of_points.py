@@ -119,7 +119,7 @@ def test_no_place_of_the_map_beats_the_optimum() -> None:
 def test_a_pair_stays_a_pair_and_keeps_out_on_both_sides() -> None:
     pond = KeepOut("pond", ((-2100.0, 100.0), (500.0, 100.0), (500.0, 900.0), (-2100.0, 900.0)))
     points = PlannedPoint("left", 0.0, -600.0, is_placed=True), PlannedPoint("right", 0.0, 0.0, mirrors="left"), THIRD
-    answer, findings = plan_placement(approach(points, keep_out=(pond,)))
+    answer, findings = plan_placement(approach(points, keep_out=(pond,), iterations=10))
     assert "placement.given_kept_out" in {finding.code for finding in findings}
     for design in answer.designs:
         left, right, third = answer.places_of(design.design)
