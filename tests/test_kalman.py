@@ -180,9 +180,7 @@ def test_sparse_equals_dense() -> None:
 def test_blocks_equal_a_block_diagonal_matrix() -> None:
     model, count = case(), 3
     blocks = Transition.blocks(model.F, model.Q, count)
-    full = Transition.dense(
-        *(np.stack([block_diag(*[part] * count) for part in whole]) for whole in (model.F, model.Q))
-    )
+    full = sparse_of(*(np.stack([block_diag(*[part] * count) for part in whole]) for whole in (model.F, model.Q)))
     rng = np.random.default_rng(3)
     root = rng.normal(size=(15, 15))
     nothing = Measurements.of([], np.zeros(0), np.zeros((0, 1)), np.zeros((0, 1)), 1.0)
