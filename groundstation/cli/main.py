@@ -1,7 +1,6 @@
 """The command ``groundstation``: its verbs. Heavy imports happen inside them."""
 
 import io
-import os
 import sys
 from collections.abc import Sequence
 from copy import copy
@@ -53,8 +52,6 @@ from groundstation.cli.application import (
 __all__ = ["app", "fleets", "flights", "main", "plans", "rules", "simulated", "watching"]  # the modules hold more verbs
 
 
-# Threads that wait for small matrices cost processor time, and round otherwise on another number of cores.
-ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # OMP_NUM_THREADS would be Arrow's threads, too
 PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have an ``examine``; a test compares them
 
 
@@ -426,8 +423,6 @@ def cooperative(
 
 def main(arguments: Any = None) -> None:
     """Run the command line; the exit code is raised as SystemExit."""
-    for library in ONE_THREAD:
-        os.environ.setdefault(library, "1")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a code page that lacks a sign loses no answer
