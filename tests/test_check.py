@@ -251,3 +251,19 @@ def test_an_answer_that_leans_on_a_damaged_span_says_so(finished_run: Callable[.
     (outcome,) = run_many([broken], tmp_path / "out2", Configuration(), only_results=True)
     codes = {one["code"] for one in load(Path(outcome.folder)).summary["findings"]}
     assert "data.dropped_rows" in codes and "heading.damaged_span" not in codes
+
+
+def test_a_receiver_that_falls_silent_is_a_loss_for_every_verb_unless_limits_allow_it(tmp_path: Path) -> None:
+    """Positions for 40 of 100 s at 1 Hz: 60 records fewer than their rate leads one to expect."""
+    log, allowed, mcap = tmp_path / "a.csv", tmp_path / "allowed.toml", tmp_path / "a.mcap"
+    rows = [f"{t},{t % 9},{'50.0,30.0' if t <= 40 else ','}" for t in range(101)]
+    log.write_text("\n".join(["time_s,ins.roll_deg,gnss.latitude_deg,gnss.longitude_deg", *rows]) + "\n")
+    allowed.write_text("version = 1\n[gaps]\nend_s = 60.0\n")
+    code, entry = checked(log)
+    found = [one for one in entry["findings"] if one["code"] == "data.breaks_off"]
+    assert [(one["topic"], one["count"]) for one in found] == [("gnss", 60)]
+    assert entry["ledger"]["topics"]["gnss"]["losses"] == {"breaks_off": 60}
+    codes = [code, groundstation("info", log)[0], groundstation("convert", log, "-o", mcap)[0]]
+    codes += [groundstation("run", log, "-o", tmp_path / "out", "--only", "results")[0], checked(mcap)[0]]
+    assert codes == [3, 3, 3, 3, 3]
+    assert [checked(one, "--thresholds", allowed)[0] for one in (log, mcap)] == [0, 0]

@@ -254,6 +254,7 @@ def test_a_topic_that_breaks_off_is_told_with_what_is_missing(end: int, told: in
     found = [finding for finding in ledger_findings(ledger) if finding.code == "data.breaks_off"]
     assert [(one.topic, one.count) for one in found if one.severity == "warn"] == ([("gnss", told)] if told else [])
     assert [(one.topic, one.count) for one in found if one.severity == "info"] == [("raw.x", 81)]
+    assert ledger.loses_data is bool(told)  # exit code 3
 
 
 def surveyed_topic(topic: str, rows: "NDArray[np.int64]") -> RecordBatch:

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from groundstation.base.findings import Finding, Severity
+from groundstation.base.records import Damage
 from groundstation.base.signals import is_canonical
-from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.clock_findings import clock_findings, counted
 from groundstation.integrity.ledger import FieldCounts, LedgerCounts, TopicCounts
@@ -12,7 +12,7 @@ from groundstation.integrity.limits import DuplicateLimits
 from groundstation.integrity.sequence import Sequence
 
 TOPIC_CODES = (
-    *("time.duplicates", "data.gaps", "data.breaks_off", "data.sequence", "data.sequence_reset"),
+    *("time.duplicates", "data.gaps", "data.sequence", "data.sequence_reset"),
     *("values.out_of_range", "values.nan", "values.stuck"),
 )
 _REMARKS_THAT_WARN = (
@@ -24,12 +24,13 @@ _REMARKS_THAT_WARN = (
 def ledger_findings(ledger: LedgerCounts) -> tuple[Finding, ...]:
     """Findings of a ledger: clock first, then losses, topics and the reader's remarks.
 
-    Codes: those of :func:`clock_findings`, ``time.duplicates``, ``data.none``, ``data.gaps``, ``data.breaks_off``,
-    ``data.<kind of damage>`` (``data.truncated``, ``data.dropped_rows``, ``data.unreadable_cells`` ...),
+    Codes: those of :func:`clock_findings`, ``time.duplicates``, ``data.none``, ``data.gaps``,
+    ``data.<kind of damage>`` (``data.truncated``, ``data.dropped_rows``, ``data.breaks_off`` ...),
     ``data.sequence``, ``data.sequence_reset``, ``values.out_of_range``, ``values.nan``, ``values.stuck``,
     ``reader.<remark>`` (``reader.derived``, ``reader.assumed_utc`` ...).
     """
-    return (*clock_findings(ledger), *_damages(ledger), *topic_findings(ledger), *_remarks(ledger))
+    damages = (damage_finding(damage) for damage in ledger.damages)
+    return (*clock_findings(ledger), *damages, *topic_findings(ledger), *_remarks(ledger))
 
 
 def topic_findings(ledger: LedgerCounts) -> tuple[Finding, ...]:
@@ -37,11 +38,11 @@ def topic_findings(ledger: LedgerCounts) -> tuple[Finding, ...]:
     return tuple(finding for topic in ledger.topics for finding in _topic(topic, ledger))
 
 
-def _damages(ledger: LedgerCounts) -> Iterator[Finding]:
-    for damage in ledger.damages:
-        severity: Severity = "warn" if damage.loses_data else "info"
-        text = f"{damage.what}: {damage.count} ({damage.place})"
-        yield Finding(severity, f"data.{damage.kind}", text, damage.topic, damage.place, damage.count)
+def damage_finding(damage: Damage) -> Finding:
+    """A finding that tells of damage to the log."""
+    severity: Severity = "warn" if damage.loses_data else "info"
+    text = f"{damage.what}: {damage.count} ({damage.place})"
+    return Finding(severity, f"data.{damage.kind}", text, damage.topic, damage.place, damage.count)
 
 
 def _duplicates(topic: TopicCounts, clock: ClockModel, limits: DuplicateLimits) -> Finding:
@@ -67,25 +68,10 @@ def _topic(topic: TopicCounts, ledger: LedgerCounts) -> Iterator[Finding]:
         )
         severity: Severity = "warn" if is_canonical(topic.topic) else "info"  # nothing is estimated from raw topics
         yield Finding(severity, "data.gaps", text, topic.topic, place, len(topic.gaps))
-    yield from _end(topic, ledger)
     for sequence in topic.sequences:
         yield from _sequence(topic.topic, sequence, ledger.clock)
     for field in topic.fields:
         yield from _field(topic.topic, field, ledger.clock)
-
-
-def _end(topic: TopicCounts, ledger: LedgerCounts) -> Iterator[Finding]:
-    """A topic with a rate that is not there any more while others go on: a pause that has no end."""
-    if topic.nominal_rate_hz is None:
-        return
-    limits, end_ns = ledger.thresholds.gaps, ledger.end_ns
-    missing_s = (end_ns - topic.last_ns) / NS_PER_S
-    if missing_s <= limits.end_s or missing_s <= limits.end_share * (end_ns - ledger.start_ns) / NS_PER_S:
-        return
-    place = ledger.clock.text(topic.last_ns)
-    rows = round(missing_s * topic.nominal_rate_hz)
-    text = f"{topic.topic}: ends {missing_s:.1f} s before the log does, after {place}: {rows} records fewer by its rate"
-    yield Finding("warn" if is_canonical(topic.topic) else "info", "data.breaks_off", text, topic.topic, place, rows)
 
 
 def _field(topic: str, field: FieldCounts, clock: ClockModel) -> Iterator[Finding]:

@@ -14,6 +14,7 @@ import numpy as np
 from groundstation.base.gaps import Gaps
 from groundstation.base.records import BoolArray, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.units import NS_PER_S
+from groundstation.integrity.breaks_off import broken_off
 from groundstation.integrity.clock import ClockModel, estimate_clock
 from groundstation.integrity.clock_references import ClockReferences
 from groundstation.integrity.contents import Contents
@@ -129,7 +130,7 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
     clock = replace(clock, lateness_ns={ledger.topic: lateness for ledger, lateness in results})
     dropouts, timeline = (contents.dropouts(clock), contents.timeline(clock)) if clock.has_times else ((), None)
     ledger = LedgerCounts(topics, clock, tuple(damages), tuple(remarks), limits, dropouts, timeline)
-    return Survey(header, clock, ledger)
+    return Survey(header, clock, replace(ledger, damages=(*damages, *broken_off(ledger))))
 
 
 def _ledgers(

@@ -13,8 +13,10 @@ from groundstation.base.records import HEADING_IS_TRACK, Damage, Item, RecordBat
 from groundstation.base.signals import kind_of
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.version import __version__
+from groundstation.integrity.breaks_off import BREAKS_OFF, broken_off
 from groundstation.integrity.ledger import damage_entry
 from groundstation.integrity.ledger_findings import TOPIC_CODES, topic_findings
+from groundstation.integrity.ledger_findings import damage_finding as log_damage_finding
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.integrity.survey import Census
 from groundstation.pipeline.one_flight.configuration import NO_REFERENCES, References
@@ -200,7 +202,8 @@ def recounted(info: StoreInfo, damages: list[Damage], census: Census) -> StoreIn
     What only the log could tell (its clock, the order of its records, what its reader lost) stays as it was found.
     """
     counts, before = census.ledger(damages), info.ledger
-    anew = counts.document()
+    ends = broken_off(counts)
+    anew = replace(counts, damages=(*ends, *damages)).document()
     kept = [span for span in before.spans if span.cause not in COUNTED_CAUSES]
     # Of a file that is whole, what was skipped and cut is what the log had of it.
     told = anew if damages else before
@@ -211,22 +214,28 @@ def recounted(info: StoreInfo, damages: list[Damage], census: Census) -> StoreIn
         skipped_spans=told.skipped_spans,
         truncated=told.truncated,
         spans=tuple(sorted((*kept, *anew.spans), key=lambda span: span.start_s)),
-        damages=(*before.damages, *map(damage_entry, damages)),
+        damages=(
+            *(one for one in before.damages if one.kind != BREAKS_OFF),
+            *map(damage_entry, (*ends, *damages)),
+        ),
         remarks=before.remarks,
     )
     findings = (
-        *(finding for finding in info.findings if finding.code not in TOPIC_CODES),
+        *(finding for finding in info.findings if finding.code not in (*TOPIC_CODES, f"data.{BREAKS_OFF}")),
+        *map(log_damage_finding, ends),
         *topic_findings(counts),
         *map(damage_finding, damages),
     )
-    return replace(info, ledger=ledger, findings=findings, damages=(*info.damages, *map(asdict, damages)))
+    listed = (*(one for one in info.damages if one.get("kind") != BREAKS_OFF), *map(asdict, (*ends, *damages)))
+    return replace(info, ledger=ledger, findings=findings, damages=listed)
 
 
 def _with_what_the_log_told(topic: TopicEntry, before: TopicEntry | None) -> TopicEntry:
     """A topic counted anew, with what was out of order and unreadable in the log it came from."""
     if before is None:
         return topic
-    losses = dict(sorted({**before.losses, **topic.losses}.items()))
+    told = {kind: count for kind, count in before.losses.items() if kind != BREAKS_OFF}
+    losses = dict(sorted({**told, **topic.losses}.items()))
     return replace(topic, backward_steps=before.backward_steps, stray_rows=before.stray_rows, losses=losses)
 
 

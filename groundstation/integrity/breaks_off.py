@@ -1,0 +1,31 @@
+"""Topics that end before the others do: records that their rate leads one to expect, and that no log holds."""
+
+from groundstation.base.records import Damage
+from groundstation.base.signals import is_canonical
+from groundstation.base.units import NS_PER_S
+from groundstation.integrity.ledger import LedgerCounts
+
+BREAKS_OFF = "breaks_off"
+
+
+def broken_off(ledger: LedgerCounts) -> tuple[Damage, ...]:
+    """Topics with a rate that are not there any more while others go on: a pause that has no end.
+
+    Returns
+    -------
+    tuple of Damage
+        One a topic, with the records missing by its rate. Only canonical topics lose data: nothing is estimated from
+        raw ones.
+    """
+    limits, end_ns = ledger.thresholds.gaps, ledger.end_ns
+    allowed_s = max(limits.end_s, limits.end_share * (end_ns - ledger.start_ns) / NS_PER_S)
+    found = []
+    for topic in ledger.topics:
+        missing_s = (end_ns - topic.last_ns) / NS_PER_S
+        if topic.nominal_rate_hz is None or missing_s <= allowed_s:
+            continue
+        rows = round(missing_s * topic.nominal_rate_hz)
+        what = f"{topic.topic} ends {missing_s:.1f} s before the log does, records missing by its rate"
+        place = f"after {ledger.clock.text(topic.last_ns)}"
+        found.append(Damage(BREAKS_OFF, place, rows, what, topic.topic, is_canonical(topic.topic)))
+    return tuple(found)
