@@ -126,7 +126,7 @@ def _topics(topics: Mapping[str, TopicEntry]) -> str:
         "repeated": lambda topic: topic.duplicates,
         "steps back": lambda topic: topic.backward_steps,
         "stray": lambda topic: topic.stray_rows,
-        "unreadable": lambda topic: sum(topic.losses.values()),
+        "lost": lambda topic: sum(topic.losses.values()),
         "missing": lambda topic: topic.missing,
         "NaN": lambda topic: sum(field.nan for field in topic.fields.values()),
         "out of range": lambda topic: topic.out_of_range,
