@@ -9,8 +9,9 @@ from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.front import front
 from groundstation.chapters.parts import Document
 from groundstation.chapters.plan import is_plan
-from groundstation.reports.drawing import Drawing
+from groundstation.reports.drawing import Drawing, sketching
 from groundstation.reports.page import TEMPLATES, live_figures, render
+from groundstation.reports.painting import with_painted_figures
 from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.reports.sections import flight_sections
 from groundstation.reports.steer_card import write_exports
@@ -32,7 +33,9 @@ class Written:
     problem: str = ""
 
 
-def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], *, with_pdf: bool = True) -> Written:
+def write_flight_report(
+    folder: Path, answer_types: Mapping[str, type[Answer]], *, with_pdf: bool = True, painters: int = 1
+) -> Written:
     """Write report.html and report.pdf into a flight folder; with a magnetic deviation its table and steer card too.
 
     Parameters
@@ -45,6 +48,8 @@ def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], 
     with_pdf : bool
         Without it there is neither report.pdf nor steer_card.pdf afterwards: those of an earlier run would tell of
         other results.
+    painters : int
+        Processes that paint the figures, this one among them.
 
     Raises
     ------
@@ -53,7 +58,7 @@ def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], 
     """
     saved = load(folder, answer_types)
     exports, problem = write_exports(saved, with_pdf=with_pdf)  # first: the report links to those that are there
-    document = flight_document(saved)
+    document = flight_document(saved, painters)
     written = write_pages(folder / REPORT, flight_report_html(document), document, with_pdf=with_pdf)
     return Written((*written.paths, *exports), "; ".join(filter(None, (written.problem, problem))))
 
@@ -72,8 +77,15 @@ def write_pages(page: Path, html: str, document: Document, *, with_pdf: bool) ->
     return Written((page, pdf))
 
 
-def flight_document(saved: SavedFlight) -> Document:
-    """Put the report of one saved flight, a session of several or a plan, together."""
+def flight_document(saved: SavedFlight, painters: int = 1) -> Document:
+    """Put the report of one saved flight, a session of several or a plan, together; so many processes paint figures."""
+    with sketching() as sketches:
+        document = sketched_document(saved)
+    return with_painted_figures(document, sketches, painters)
+
+
+def sketched_document(saved: SavedFlight) -> Document:
+    """The report of a flight as it is told; within :func:`sketching` no figure is painted."""
     kind = PLAN if is_plan(saved.results) else SESSION if is_session(saved.results) else "Flight report"
     return Document(kind, saved.results.flight_id, front(saved.results), flight_sections(saved))
 

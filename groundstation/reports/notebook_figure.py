@@ -6,7 +6,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from groundstation.reports.drawing import Drawing, Sketch, report_style, sketching
-from groundstation.reports.flight_report import flight_document
+from groundstation.reports.flight_report import sketched_document
 from groundstation.reports.frames import MM_PER_INCH
 from groundstation.results.files import SavedFlight
 
@@ -26,7 +26,7 @@ class NotebookFigure(Figure):
 def sketches_of(saved: SavedFlight) -> dict[str, tuple[Drawing, Sketch]]:
     """Every figure of a flight's report by its key, in the order of the report, none painted yet."""
     with sketching() as sketches:
-        document = flight_document(saved)
+        document = sketched_document(saved)
     drawings = [part for section in document.sections for part in section.parts if isinstance(part, Drawing)]
     return {drawing.svg: (drawing, sketches[drawing.svg]) for drawing in drawings}
 

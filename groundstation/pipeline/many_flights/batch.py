@@ -28,8 +28,9 @@ from groundstation.pipeline.many_flights.publishing import FLEET_FILES, write_be
 from groundstation.pipeline.many_flights.remote import FarLog, far_logs, is_remote
 from groundstation.pipeline.many_flights.remote_runs import RemoteJob, digest_remote, run_remote
 from groundstation.pipeline.many_flights.session import load_stations, planned_session
-from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJob, Crew, cores, in_turn, side_by_side
+from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJob, Crew, in_turn, side_by_side
 from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.cores import cores, painters_of
 from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
@@ -98,7 +99,15 @@ def run_many(
         delta_place(store)
     inputs = _inputs(paths, out, configuration)
     crew = _crew(scheduler, jobs or cores(), len(inputs), listen, timeout_s)
-    make = partial(Job, configuration=configuration, fail_on=fail_on, with_pdf=with_pdf, only_results=only_results)
+    painters = 1 if scheduler else painters_of(jobs or cores(), len(inputs))
+    make = partial(
+        Job,
+        configuration=configuration,
+        fail_on=fail_on,
+        with_pdf=with_pdf,
+        only_results=only_results,
+        painters=painters,
+    )
     listen(Event("begin", total=len(inputs)))
     asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo, only_results=only_results, store=store)
     if any(is_remote(str(place)) for place in (out, *paths)):
@@ -148,7 +157,16 @@ def run_together(
             reason, trace = reason_of(named, error)
             listen(Event("end", named, reason))
             return (Outcome(named, "failed", reason, trace=trace),)
-        job = Job(mcap, Path(out), configuration, fail_on, with_pdf=with_pdf, url=named, only_results=only_results)
+        job = Job(
+            mcap,
+            Path(out),
+            configuration,
+            fail_on,
+            with_pdf=with_pdf,
+            url=named,
+            only_results=only_results,
+            painters=cores(),
+        )
         asked = Asked(Path(out), configuration, None, fail_on, with_pdf, redo=True, only_results=only_results)
         return _run_here([job], asked, partial(in_turn, listen=listen), force, listen)
 

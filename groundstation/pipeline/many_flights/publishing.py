@@ -26,6 +26,7 @@ from groundstation.pipeline.many_flights.inputs import (
     plan_folders,
     session_folders,
 )
+from groundstation.pipeline.one_flight.cores import cores
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
 from groundstation.reports.fleet_report import write_fleet_report
@@ -154,7 +155,7 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
     for folder in [out] if is_flight else [*flight_folders(out), *session_folders(out), *plan_folders(out)]:
         try:
             with told_in_a_line(str(folder)):
-                written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf)
+                written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf, painters=cores())
         except GroundstationError as error:
             if is_flight:
                 raise

@@ -70,6 +70,8 @@ class SessionJob:
         What is known of it before its logs are read.
     only_results : bool
         Whether there is neither a recording nor a report.
+    painters : int
+        How many processes paint the figures of its report.
     """
 
     logs: tuple[Log, ...]
@@ -82,6 +84,7 @@ class SessionJob:
     is_found: bool = False
     notes: tuple[Finding, ...] = ()
     only_results: bool = False
+    painters: int = 1
 
     @property
     def log(self) -> str:
@@ -198,7 +201,7 @@ def _finished(job: SessionJob, watch: Stopwatch) -> Outcome | None:
     folder, resume, problem = kept.folder, kept.resume, ""
     if not kept.is_finished:
         with watch.stage("reporting"):
-            problem = write_flight_report(folder, ANSWER_TYPES, with_pdf=job.with_pdf).problem
+            problem = write_flight_report(folder, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters).problem
         save_manifest(folder, replace(kept.manifest, resume=replace(resume, keys=job.keys())))
     state = state_of(worst(load_document(folder).findings), resume.has_lost_data, job.fail_on)
     found = _outcome(job, state, "; ".join(filter(None, (resume.text, problem))), folder, watch)
@@ -244,7 +247,7 @@ def _show(partial: Path, assembled: AssembledSession, results: FlightResults, jo
     with watch.stage("recording"):
         write_session_recording(partial / f"{results.flight_id}.rrd", assembled, results)
     with watch.stage("reporting"):
-        return write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf).problem
+        return write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters).problem
 
 
 def _flights(partial: Path, job: SessionJob) -> tuple[list[Flight], tuple[LogOfSession, ...], list[Finding]]:

@@ -59,7 +59,7 @@ class Job:
 
     ``add_suffix``: two flights of one id get ``_<sha8>`` of their logs; ``step`` is what has to be done, with what the
     flight that is ``finished`` has for the rest; ``url`` is where the log is, if ``path`` is but a copy of it. With
-    ``only_results`` there is neither a recording nor a report.
+    ``only_results`` there is neither a recording nor a report. ``painters`` is how many processes paint its figures.
     """
 
     path: Path
@@ -73,6 +73,7 @@ class Job:
     finished: Finished | None = None
     url: str = ""
     only_results: bool = False
+    painters: int = 1
 
     @property
     def log(self) -> str:
@@ -188,7 +189,7 @@ def _show(partial: Path, flight: Flight, results: FlightResults, job: Job, watch
     with watch.stage("recording"):
         write_recording(partial / f"{results.flight_id}.rrd", flight, results)
     with watch.stage("reporting"):
-        return write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf).problem
+        return write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters).problem
 
 
 def _export(folder: Path) -> str:
@@ -205,7 +206,8 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
         problem = _export(finished.folder)
     elif job.step == "reports":
         with watch.stage("reporting"):
-            problem = write_flight_report(finished.folder, ANSWER_TYPES, with_pdf=job.with_pdf).problem
+            written = write_flight_report(finished.folder, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters)
+            problem = written.problem
             remember_reports(finished, with_pdf=job.with_pdf)
     return Outcome(
         job.log,

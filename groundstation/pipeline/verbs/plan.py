@@ -13,6 +13,7 @@ from groundstation.estimators.analyses import ANSWER_TYPES, PLANS
 from groundstation.estimators.plan import Plan, Planned
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, PLAN_MARK
 from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
+from groundstation.pipeline.one_flight.cores import cores
 from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX, Stopwatch, place, state_of
 from groundstation.pipeline.one_flight.identity import safe_part
 from groundstation.pipeline.one_flight.manifest import manifest_of
@@ -117,7 +118,7 @@ def _run_into(
     with watch.stage("recording"):
         write_plan_recording(partial / f"{results.flight_id}.rrd", results)
     with watch.stage("reporting"):
-        problem = write_flight_report(partial, ANSWER_TYPES, with_pdf=with_pdf).problem
+        problem = write_flight_report(partial, ANSWER_TYPES, with_pdf=with_pdf, painters=cores()).problem
     place(partial, target)
     warned = (f"warning: {finding.text}" for finding in results.findings if finding.severity != "info")
     told = "; ".join(filter(None, (plan.sentence(results.answers), *warned, problem)))

@@ -1,0 +1,150 @@
+"""The figures of a report painted by several processes, each taking the next one when it is free.
+
+Processes are forked: they share the arrays and whatever is loaded, where new ones would spend more on imports than most
+reports take. A forked process must not touch threads of the one it came from, and painting needs none: matplotlib and
+numpy alone. Whatever a process does not deliver is painted here, so that a process that ends, hangs or is killed costs
+time and nothing else.
+"""
+
+import os
+import pickle
+import signal
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
+from typing import IO
+
+from groundstation.chapters.parts import Document, Part
+from groundstation.reports.drawing import Drawing, Sketch, draw
+from groundstation.reports.live import Svg
+
+CAN_FORK = sys.platform == "linux"
+FEWEST = 4  # figures that are worth another process
+LATE, LATE_S = 3.0, 10.0  # another process may end so many times the time of this one later, and at least so long
+LOOK_EVERY_S = 0.005
+NUMBER_BYTES = 2
+
+
+def with_painted_figures(document: Document, sketches: Mapping[str, Sketch], processes: int = 1) -> Document:
+    """The document with its sketches painted; ``processes`` paint side by side, equal bytes whatever their number."""
+    pictures = painted(sketches, processes)
+    sections = (
+        replace(section, parts=tuple(_painted(part, pictures) for part in section.parts))
+        for section in document.sections
+    )
+    return replace(document, sections=tuple(sections))
+
+
+def _painted(part: Part, pictures: Mapping[str, Svg]) -> Part:
+    return replace(part, svg=pictures[part.svg]) if isinstance(part, Drawing) else part
+
+
+def painted(sketches: Mapping[str, Sketch], processes: int = 1) -> dict[str, Svg]:
+    """Paint sketches: pictures by key.
+
+    Parameters
+    ----------
+    sketches : mapping of key to Sketch
+    processes : int
+        How many paint side by side, this one among them. One where the system cannot fork, or figures are few.
+    """
+    keys = list(sketches)
+    others = min(processes, len(keys) // 2) - 1 if CAN_FORK and len(keys) >= FEWEST else 0
+    if others < 1:
+        return {key: _paint(key, sketches[key]) for key in keys}
+    import matplotlib.backends.backend_svg
+    import matplotlib.figure  # noqa: F401 - loaded once for all
+
+    started = time.monotonic()
+    pictures: dict[str, Svg] = {}
+    with _queue(len(keys)) as queue, ExitStack() as painters:
+        at_work = [painters.enter_context(_painter(keys, sketches, queue)) for _ in range(others)]
+        for number in _taken(queue):
+            pictures[keys[number]] = _paint(keys[number], sketches[keys[number]])
+        now = time.monotonic()
+        for painter in at_work:
+            pictures |= painter.delivered(now + max(LATE_S, LATE * (now - started)))
+    return {key: pictures[key] if key in pictures else _paint(key, sketches[key]) for key in keys}
+
+
+@contextmanager
+def _queue(count: int) -> Iterator[int]:
+    """A pipe that holds the numbers from zero on and ends behind them: each is read by one process alone."""
+    reading, writing = os.pipe()
+    try:
+        os.write(writing, b"".join(number.to_bytes(NUMBER_BYTES) for number in range(count)))
+        os.close(writing)
+        yield reading
+    finally:
+        os.close(reading)
+
+
+def _taken(queue: int) -> Iterator[int]:
+    while number := os.read(queue, NUMBER_BYTES):
+        yield int.from_bytes(number)
+
+
+class _Painter:
+    """Another process that paints; what it has painted stands in a file."""
+
+    def __init__(self, pid: int, results: IO[bytes]) -> None:
+        self.pid, self.results, self.has_ended = pid, results, False
+
+    def delivered(self, deadline: float) -> dict[str, Svg]:
+        """The pictures of the process by key, once it has ended; at the deadline it is ended."""
+        while not self.has_ended and time.monotonic() < deadline:
+            self.has_ended = os.waitpid(self.pid, os.WNOHANG)[0] != 0
+            if not self.has_ended:
+                time.sleep(LOOK_EVERY_S)
+        self.end()
+        pictures: dict[str, Svg] = {}
+        self.results.seek(0)
+        with suppress(EOFError, pickle.UnpicklingError):  # the last one of a process that was ended may be cut
+            while True:
+                key, picture = pickle.load(self.results)
+                pictures[key] = picture
+        return pictures
+
+    def end(self) -> None:
+        """End the process if it has not ended."""
+        if not self.has_ended:
+            os.kill(self.pid, signal.SIGKILL)
+            os.waitpid(self.pid, 0)
+            self.has_ended = True
+
+
+@contextmanager
+def _painter(keys: Sequence[str], sketches: Mapping[str, Sketch], queue: int) -> Iterator[_Painter]:
+    """A process that takes numbers from the queue and paints what they stand for; none is left behind."""
+    parent = os.getpid()
+    with tempfile.TemporaryFile() as results:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # of threads, whose locks painting does not take
+            pid = os.fork()
+        if pid == 0:
+            _paint_on(keys, sketches, queue, results, parent)
+        painter = _Painter(pid, results)
+        try:
+            yield painter
+        finally:
+            painter.end()
+
+
+def _paint_on(keys: Sequence[str], sketches: Mapping[str, Sketch], queue: int, results: IO[bytes], parent: int) -> None:
+    """The life of another process. What it cannot paint is painted, and fails, where it can be told."""
+    try:
+        for number in _taken(queue):
+            pickle.dump((keys[number], _paint(keys[number], sketches[keys[number]])), results)
+            results.flush()
+            if os.getppid() != parent:
+                break
+    finally:
+        os._exit(0)  # nothing of the process it came from is closed or written here
+
+
+def _paint(key: str, sketch: Sketch) -> Svg:
+    return draw(key, sketch.height_mm, sketch.paint, sketch.width_mm)

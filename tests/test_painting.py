@@ -1,0 +1,89 @@
+"""Figures painted by several processes: equal bytes, and whatever becomes of the others every figure is there."""
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from groundstation.reports import painting
+from groundstation.reports.drawing import Sketch, draw
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux alone")
+
+
+def sketches(paint: Callable[[Any, int], None]) -> dict[str, Sketch]:
+    def of(number: int) -> Callable[[Any], None]:
+        return lambda figure: paint(figure, number)
+
+    return {f"figure-{number}": Sketch(20.0, of(number), 40.0) for number in range(6)}
+
+
+def curve(figure: Any, number: int) -> None:
+    figure.subplots().plot([0.0, 1.0, 2.0], [number, 1.0, 0.5])
+
+
+def by_another(then: Callable[[], object]) -> Callable[[Any, int], None]:
+    """Curves; another process than this one does something else before its first."""
+    this = os.getpid()
+
+    def paint(figure: Any, number: int) -> None:
+        if os.getpid() != this:
+            then()
+        time.sleep(0.02)  # the other one takes some
+        curve(figure, number)
+
+    return paint
+
+
+def no_child_is_left() -> bool:
+    try:
+        os.waitpid(-1, os.WNOHANG)
+    except ChildProcessError:
+        return True
+    return False
+
+
+@pytest.mark.parametrize("processes", [2, 3])
+def test_the_number_of_processes_changes_no_byte(processes: int) -> None:
+    asked = sketches(curve)
+    alone = {key: draw(key, sketch.height_mm, sketch.paint, sketch.width_mm) for key, sketch in asked.items()}
+    found = painting.painted(asked, processes)
+    assert list(found) == list(alone) and found == alone
+    assert [repr(found[key].panels) for key in alone] == [repr(alone[key].panels) for key in alone]
+    assert no_child_is_left()
+
+
+@pytest.mark.parametrize(
+    "then",
+    [
+        lambda: os.kill(os.getpid(), signal.SIGKILL),
+        lambda: time.sleep(60.0),
+        lambda: 1 / 0,
+        lambda: os._exit(3),
+    ],
+    ids=["killed", "hangs", "fails", "ends"],
+)
+def test_what_another_process_does_not_deliver_is_painted_here(
+    then: Callable[[], object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(painting, "LATE_S", 0.2)
+    monkeypatch.setattr(painting, "LATE", 0.1)
+    found = painting.painted(sketches(by_another(then)), 2)
+    assert found == painting.painted(sketches(curve))
+    assert no_child_is_left()
+
+
+def test_what_cannot_be_painted_fails_as_it_does_alone() -> None:
+    def paint(figure: Any, number: int) -> None:
+        if number == 4:
+            raise ValueError("no such curve")
+        curve(figure, number)
+
+    for processes in (1, 2):
+        with pytest.raises(ValueError, match="no such curve"):
+            painting.painted(sketches(paint), processes)
+    assert no_child_is_left()
