@@ -8,13 +8,14 @@ from groundstation.chapters.wording import number
 from groundstation.reports.fleet import CHAPTERS, flights, front
 from groundstation.reports.flight_report import Written, write_pages
 from groundstation.reports.page import TEMPLATES, digest_of, render
+from groundstation.reports.painting import with_painted_figures
 from groundstation.results.fleet import FleetResults
 
 PAGE = "summary.html"
 MOST_ROWS_ON_PAPER = 60
 
 
-def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True) -> Written:
+def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True, painters: int = 1) -> Written:
     """Write summary.html and summary.pdf into a folder of flights.
 
     Parameters
@@ -25,6 +26,8 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True)
         Equal results give equal bytes, whatever the time, the host or the order of the logs.
     with_pdf : bool
         Without it there is no summary.pdf afterwards.
+    painters : int
+        Processes that paint the figures, this one among them.
 
     Notes
     -----
@@ -37,7 +40,7 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True)
     OSError
         When a file cannot be written.
     """
-    document = fleet_document(fleet)
+    document = with_painted_figures(lambda: fleet_document(fleet), painters)
     return write_pages(out / PAGE, fleet_report_html(document, fleet), on_paper(document), with_pdf=with_pdf)
 
 

@@ -9,7 +9,7 @@ from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.front import front
 from groundstation.chapters.parts import Document
 from groundstation.chapters.plan import is_plan
-from groundstation.reports.drawing import Drawing, sketching
+from groundstation.reports.drawing import Drawing
 from groundstation.reports.page import TEMPLATES, live_figures, render
 from groundstation.reports.painting import with_painted_figures
 from groundstation.reports.pdf import PdfError, write_pdf
@@ -79,9 +79,7 @@ def write_pages(page: Path, html: str, document: Document, *, with_pdf: bool) ->
 
 def flight_document(saved: SavedFlight, painters: int = 1) -> Document:
     """Put the report of one saved flight, a session of several or a plan, together; so many processes paint figures."""
-    with sketching() as sketches:
-        document = sketched_document(saved)
-    return with_painted_figures(document, sketches, painters)
+    return with_painted_figures(lambda: sketched_document(saved), painters)
 
 
 def sketched_document(saved: SavedFlight) -> Document:

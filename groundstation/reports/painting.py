@@ -13,13 +13,13 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from typing import IO
 
 from groundstation.chapters.parts import Document, Part
-from groundstation.reports.drawing import Drawing, Sketch, draw
+from groundstation.reports.drawing import Drawing, Sketch, draw, sketching
 from groundstation.reports.live import Svg
 
 CAN_FORK = sys.platform == "linux"
@@ -29,8 +29,13 @@ LOOK_EVERY_S = 0.005
 NUMBER_BYTES = 2
 
 
-def with_painted_figures(document: Document, sketches: Mapping[str, Sketch], processes: int = 1) -> Document:
-    """The document with its sketches painted; ``processes`` paint side by side, equal bytes whatever their number."""
+def with_painted_figures(tell: Callable[[], Document], processes: int = 1) -> Document:
+    """A document with the figures that it draws while it is told, which then are painted.
+
+    ``processes`` paint side by side; equal bytes whatever their number.
+    """
+    with sketching() as sketches:
+        document = tell()
     pictures = painted(sketches, processes)
     sections = (
         replace(section, parts=tuple(_painted(part, pictures) for part in section.parts))

@@ -109,7 +109,17 @@ def run_many(
         painters=painters,
     )
     listen(Event("begin", total=len(inputs)))
-    asked = Asked(Path(out), configuration, ground, fail_on, with_pdf, redo, only_results=only_results, store=store)
+    asked = Asked(
+        Path(out),
+        configuration,
+        ground,
+        fail_on,
+        with_pdf,
+        redo,
+        only_results=only_results,
+        store=store,
+        painters=jobs or cores(),
+    )
     if any(is_remote(str(place)) for place in (out, *paths)):
         remote = [
             RemoteJob(make(Path(), Path(), is_named=one.is_named), one.url, str(out), redo, one.size) for one in inputs
@@ -198,9 +208,21 @@ def _run_here(
         sessions = _run_sessions(placement, asked, found, crew, listen)
         outcomes = (*placement.outcomes(), *sessions)
         found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
-        problems = write_beside(out, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found)
+        problems = _write_beside(out, outcomes, asked, found)
         stored = put_flights(asked.store, found, outcomes) if asked.store else ()
         return (*outcomes, *unwritten, *problems, *stored)
+
+
+def _write_beside(out: Path, outcomes: Sequence[Outcome], asked: Asked, found: Scan) -> tuple[Outcome, ...]:
+    """Write everything that stands beside the flights of a run; returns what went wrong."""
+    return write_beside(
+        out,
+        outcomes,
+        with_pdf=asked.with_pdf,
+        only_results=asked.only_results,
+        found=found,
+        painters=asked.painters,
+    )
 
 
 def _swept(placement: Placement, out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, ...]]:
@@ -242,9 +264,7 @@ def _run_remote(
                 sessions = _run_remote_sessions(placement, output, asked, found, listen)
                 outcomes = (*placement.outcomes(), *sessions)
                 found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
-                beside = write_beside(
-                    copy, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found
-                )
+                beside = _write_beside(copy, outcomes, asked, found)
                 stored = put_flights(asked.store, found, outcomes) if asked.store else ()
                 problems = (*unwritten, *beside, *stored)
                 is_whole = True

@@ -45,11 +45,13 @@ def write_beside(
     with_pdf: bool = True,
     only_results: bool = False,
     found: Scan | None = None,
+    painters: int = 1,
 ) -> tuple[Outcome, ...]:
     """Write everything that stands beside the flight folders; returns what could not be written or read.
 
     ``found`` is what :func:`groundstation.pipeline.many_flights.fleet_store.refresh` gave, where it was called already.
     With ``only_results`` the page and the recording of all flights are removed: they would tell of an earlier run.
+    ``painters`` is how many processes paint the figures of the page.
     """
     problems: list[Outcome] = []
     again: set[str] = set()
@@ -60,7 +62,7 @@ def write_beside(
                     found, unwritten = refresh(out)
                     problems += unwritten
                 try:
-                    problems += _write_beside(out, outcomes, kept_rows, found, with_pdf, only_results)
+                    problems += _write_beside(out, outcomes, kept_rows, found, with_pdf, only_results, painters)
                     break
                 except DamagedMonthError as error:
                     if error.month in again:  # making it again did not help
@@ -82,6 +84,7 @@ def _write_beside(
     found: Scan,
     with_pdf: bool,
     only_results: bool,
+    painters: int,
 ) -> list[Outcome]:
     """Write index, fleet, page and recording from the flights as they were found; returns what went wrong."""
     problems = list(write_index_of(out, outcomes, kept_rows, found))
@@ -93,7 +96,7 @@ def _write_beside(
         return problems
     from groundstation.viewer.fleet import write_fleet_recording
 
-    problem = write_fleet_report(out, fleet, with_pdf=with_pdf).problem
+    problem = write_fleet_report(out, fleet, with_pdf=with_pdf, painters=painters).problem
     write_fleet_recording(out / FLEET_RECORDING, fleet)
     return [*problems, Outcome(str(out), "skipped", f"{out}: {problem}")] if problem else problems
 
@@ -167,9 +170,8 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
     if is_flight:
         return paths, tuple(problems)
     told = {one.source for one in problems}
-    unread = [
-        one for one in write_beside(out, (), rows_without_flight(out), with_pdf=with_pdf) if one.source not in told
-    ]
+    beside = write_beside(out, (), rows_without_flight(out), with_pdf=with_pdf, painters=cores())
+    unread = [one for one in beside if one.source not in told]
     return [*paths, *(out / name for name in FLEET_FILES if (out / name).exists())], (*problems, *unread)
 
 
