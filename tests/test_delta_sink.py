@@ -14,6 +14,9 @@ from groundstation.pipeline.many_flights.fleet_share import fleet_parquet
 from groundstation.pipeline.many_flights.fleet_store import Scan, refresh
 from groundstation.pipeline.one_flight.outcome import Outcome
 from tests.fleet_example import save_flight
+from tests.test_remote import bucket
+
+__all__ = ["bucket"]
 
 deltalake = pytest.importorskip("deltalake")
 
@@ -62,6 +65,25 @@ def test_several_writers_lose_nothing(tmp_path: Path) -> None:
         told = list(pool.map(lambda found: put_flights(f"delta:{place}", found, outcomes(found)), founds))
     assert told == [(), (), ()]
     assert kept(place)["flight_id"].to_pylist() == sorted({name for found in founds for name in found.names})
+
+
+@pytest.mark.slow
+def test_several_writers_lose_nothing_in_a_bucket(bucket: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("AWS_ALLOW_HTTP", "true")  # the server on this machine has no certificate
+    place, founds = f"{bucket}/table", []
+    for writer in range(3):
+        save_flight(tmp_path / f"out{writer}", writer)
+        save_flight(tmp_path / f"out{writer}", 9)
+        founds.append(refresh(tmp_path / f"out{writer}")[0])
+    with ThreadPoolExecutor(3) as pool:
+        told = list(pool.map(lambda found: put_flights(f"delta:{place}", found, outcomes(found)), founds))
+    assert told == [(), (), ()]
+    table = deltalake.DeltaTable(place)
+    flights = pa.table(table.to_pyarrow_table())["flight_id"].to_pylist()
+    assert sorted(flights) == sorted({name for found in founds for name in found.names})
+    files = set(table.file_uris())
+    assert put_flights(f"delta:{place}", founds[0], outcomes(founds[0])) == ()
+    assert set(deltalake.DeltaTable(place).file_uris()) == files
 
 
 def test_what_is_wrong_is_told_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
