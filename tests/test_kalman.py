@@ -24,7 +24,7 @@ ROUNDING = 1e-9  # of sigmas: double precision over some hundred products
 BATCH_ROUNDING = 1e-7  # of sigmas: the normal equations of 40 epochs
 TAIL = 0.0005  # either side of a chi-square band
 SEED_MODEL, SEED_TRUTH = 11, range(100, 140)
-SIZE = 5
+SIZE = 6  # as the channels of the INS have: full matrices of so many states are compiled once
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def sparse_of(F: FloatArray, Q: FloatArray) -> Transition:
 def case(seed: int = SEED_MODEL, n: int = 40) -> Case:
     rng = np.random.default_rng(seed)
     A = np.zeros((SIZE, SIZE))
-    A[0, 1], A[1, 2], A[2, 1], A[3, 3] = 1.0, -1.0, 0.4, -0.2
+    A[0, 1], A[1, 2], A[2, 1], A[3, 3], A[5, 5] = 1.0, -1.0, 0.4, -0.2, -0.1
     F = np.stack([expm(A * seconds) for seconds in (1.0, 2.5)])
     F[:, 4] = np.eye(SIZE)[4]  # a constant
     F[np.abs(F) < 1e-12] = 0.0
@@ -75,11 +75,11 @@ def case(seed: int = SEED_MODEL, n: int = 40) -> Case:
     single = rng.random(len(epoch)) < 0.4
     H[single] = np.eye(SIZE)[rng.integers(0, SIZE, single.sum())] * 2.0
     H[~H.any(axis=1), 0] = 1.0
-    return Case(F, Q, step, epoch, H, rng.uniform(0.05, 2.0, len(epoch)), np.diag([4.0, 1.0, 0.5, 2.0, 3.0]))
+    return Case(F, Q, step, epoch, H, rng.uniform(0.05, 2.0, len(epoch)), np.diag([4.0, 1.0, 0.5, 2.0, 3.0, 1.5]))
 
 
 def draw(model: Case, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """True states (n, 5) and measurements (m,)."""
+    """True states (n, 6) and measurements (m,)."""
     x = np.linalg.cholesky(model.P0) @ rng.standard_normal(SIZE)
     truth = np.empty((len(model.step), SIZE))
     for k, step in enumerate(model.step):
@@ -182,9 +182,9 @@ def test_blocks_equal_a_block_diagonal_matrix() -> None:
     blocks = Transition.blocks(model.F, model.Q, count)
     full = sparse_of(*(np.stack([block_diag(*[part] * count) for part in whole]) for whole in (model.F, model.Q)))
     rng = np.random.default_rng(3)
-    root = rng.normal(size=(15, 15))
+    root = rng.normal(size=(3 * SIZE, 3 * SIZE))
     nothing = Measurements.of([], np.zeros(0), np.zeros((0, 1)), np.zeros((0, 1)), 1.0)
-    start = Start(rng.normal(size=15), root @ root.T)
+    start = Start(rng.normal(size=3 * SIZE), root @ root.T)
     runs = [run_filter(which, [0, 1, 1], nothing, start) for which in (blocks, full)]
     assert runs[0].x == pytest.approx(runs[1].x, rel=1e-12, abs=1e-12)
     assert np.allclose(runs[0].P, runs[1].P, rtol=1e-12, atol=1e-12)
