@@ -19,6 +19,7 @@ import pytest
 from pypdf import PdfReader
 
 from groundstation.base.timescales import utc_ns_to_stamp
+from groundstation.chapters.fleet import flights
 from groundstation.estimators.fleet import answer
 from groundstation.estimators.fleet.changes import ChangeSettings
 from groundstation.estimators.fleet.density import densities_of, histogram_of
@@ -27,7 +28,7 @@ from groundstation.estimators.fleet.moments import moments_of
 from groundstation.estimators.fleet.skill import SkillMerger, SkillOfFlight
 from groundstation.pipeline.many_flights.fleet import gather
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
-from groundstation.reports.fleet import densities, flights
+from groundstation.reports.fleet import densities
 from groundstation.reports.fleet_report import MOST_ROWS_ON_PAPER, PAGE, write_fleet_report
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import FleetResults, NotInFleet

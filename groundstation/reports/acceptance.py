@@ -1,7 +1,6 @@
 """The acceptance report: a page and a PDF ready to sign, from an acceptance alone."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +8,11 @@ import numpy as np
 
 from groundstation.chapters import acceptance as chapters
 from groundstation.chapters.acceptance_front import front, stated
-from groundstation.chapters.parts import Document, Figure, Part, Section
+from groundstation.chapters.parts import Document
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
+from groundstation.reports.figures import drawn_by
 from groundstation.reports.flight_report import ACCEPTANCE, Written, flight_report_html, write_pages
 from groundstation.results.acceptance import ENSEMBLE, Acceptance, Limit
 from groundstation.results.figures import numbers
@@ -36,13 +36,8 @@ def write_acceptance_report(page: Path, found: Acceptance, *, with_pdf: bool = T
 
 def acceptance_document(found: Acceptance) -> Document:
     """Put the report of an acceptance together, its figures drawn."""
-    sections = tuple(_drawn(section, found) for section in chapters.sections(found))
+    sections = tuple(drawn_by(DRAWN, section, found) for section in chapters.sections(found))
     return Document(ACCEPTANCE, f"{ACCEPTANCE} {found.name}", front(found), sections)
-
-
-def _drawn(section: Section, found: Acceptance) -> Section:
-    parts = (DRAWN[part.name](found) if isinstance(part, Figure) else part for part in section.parts)
-    return replace(section, parts=tuple(parts))
 
 
 def _single(found: Acceptance, *quantities: str) -> list[Limit]:
@@ -52,7 +47,7 @@ def _single(found: Acceptance, *quantities: str) -> list[Limit]:
     ]
 
 
-def _growth(found: Acceptance) -> Part:
+def _growth(found: Acceptance) -> Drawing:
     growth, curves = found.growth, found.curves
     hours, flight = numbers(growth, "hours"), numbers(curves, "flight")
     shown = d.thin(len(found.included), MOST_CURVES)
@@ -95,7 +90,7 @@ def _growth(found: Acceptance) -> Part:
     return Drawing("Radial error against time", caption, alt, d.draw("acceptance-growth", 94, paint))
 
 
-def _rates(found: Acceptance) -> Part:
+def _rates(found: Acceptance) -> Drawing:
     flights = sorted(found.included, key=lambda flight: flight.values[RATE])
     rate = np.array([flight.values[RATE] for flight in flights])
     share = np.arange(1, len(rate) + 1) / len(rate)
@@ -131,4 +126,4 @@ def _rates(found: Acceptance) -> Part:
     return Drawing("Distribution of the rate", caption, alt, d.draw("acceptance-rates", 72, paint))
 
 
-DRAWN: dict[str, Callable[[Acceptance], Part]] = {"acceptance.growth": _growth, "acceptance.rates": _rates}
+DRAWN: dict[str, Callable[[Acceptance], Drawing]] = {"acceptance.growth": _growth, "acceptance.rates": _rates}

@@ -3,9 +3,11 @@
 from dataclasses import replace
 from pathlib import Path
 
-from groundstation.chapters.parts import Document, Grid, Part
-from groundstation.chapters.wording import number
-from groundstation.reports.fleet import CHAPTERS, flights, front
+from groundstation.chapters.fleet import CHAPTERS, flights, front
+from groundstation.chapters.fleet.common import shortened
+from groundstation.chapters.parts import Document
+from groundstation.reports.figures import drawn_by
+from groundstation.reports.fleet import DRAWERS
 from groundstation.reports.flight_report import Written, write_pages
 from groundstation.reports.page import TEMPLATES, digest_of, render
 from groundstation.reports.painting import with_painted_figures
@@ -46,22 +48,15 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True,
 
 def fleet_document(fleet: FleetResults) -> Document:
     """Put the report of a fleet together, its tables at full length."""
-    sections = tuple(section for section in (build(fleet) for build in CHAPTERS) if section is not None)
+    told = (build(fleet) for build in CHAPTERS)
+    sections = tuple(drawn_by(DRAWERS, section, fleet) for section in told if section is not None)
     top = front.build(fleet)
     return Document("Fleet report", top.title, top, sections)
 
 
 def on_paper(document: Document) -> Document:
     """The same with long tables cut."""
-    sections = [replace(one, parts=tuple(map(_shortened, one.parts))) for one in document.sections]
-    return replace(document, sections=sections)
-
-
-def _shortened(part: Part) -> Part:
-    if not isinstance(part, Grid) or len(part.rows) <= MOST_ROWS_ON_PAPER:
-        return part
-    more = f"The first {MOST_ROWS_ON_PAPER}; {number(len(part.rows) - MOST_ROWS_ON_PAPER, 0)} more in {PAGE}."
-    return replace(part, rows=part.rows[:MOST_ROWS_ON_PAPER], caption=f"{part.caption} {more}".strip())
+    return replace(document, sections=[shortened(one, MOST_ROWS_ON_PAPER, PAGE) for one in document.sections])
 
 
 def fleet_report_html(document: Document, fleet: FleetResults) -> str:

@@ -1,6 +1,6 @@
 """The figures of a report, drawn where a chapter says one stands."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from groundstation.chapters.generic import SERIES as GENERIC_SERIES
@@ -88,12 +88,16 @@ DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, s
 
 def with_drawings(section: Section, results: FlightResults) -> Section:
     """The section with its figures drawn; one whose arrays are missing is left out."""
+    return drawn_by(DRAWERS, section, results)
+
+
+def drawn_by(drawers: Mapping[str, Callable[..., Drawn]], section: Section, results: object) -> Section:
+    """The section with its figures drawn from results by those who know their names."""
     parts: list[Part] = []
     for part in section.parts:
         if not isinstance(part, Figure):
             parts.append(part)
             continue
-        drawer = DRAWERS[part.name]
-        drawn = drawer(results, part.of) if part.of else drawer(results)  # type: ignore[call-arg]
+        drawn = drawers[part.name](results, *([part.of] if part.of else []))
         parts += () if drawn is None else [drawn] if isinstance(drawn, Drawing) else drawn
     return replace(section, parts=tuple(parts))

@@ -1,32 +1,20 @@
-"""Chapters of the fleet report: ``build(fleet)`` gives a Section, or None when there is nothing to say."""
+"""The figures of the fleet report, drawn where a chapter says one stands."""
 
 from collections.abc import Callable
 
-from groundstation.chapters.parts import Section
-from groundstation.reports.fleet import (
-    aircraft,
-    calibration,
-    densities,
-    deviation,
-    flights,
-    rest,
-    sessions,
-    skill,
-    trend,
-)
+from groundstation.reports.drawing import Drawing
+from groundstation.reports.fleet import aircraft, calibration, densities, deviation, skill, trend
 from groundstation.results.fleet import FleetResults
 
-CHAPTERS: tuple[Callable[[FleetResults], Section | None], ...] = (
-    flights.build,
-    sessions.build,
-    densities.build,
-    aircraft.heading,
-    trend.build,
-    aircraft.ins,
-    skill.build,
-    calibration.build,
-    deviation.build,
-    rest.outliers,
-    rest.not_in_fleet,
-    rest.method,
-)
+# By the name that a chapter gives; a figure that is one of several alike gets which.
+DRAWERS: dict[str, Callable[[FleetResults], Drawing] | Callable[[FleetResults, str], Drawing | None]] = {
+    "fleet.forest": aircraft.forest,
+    "fleet.rates": aircraft.rates,
+    "fleet.trend": trend.charts,
+    "fleet.growth": skill.growth,
+    "fleet.skill": skill.flights,
+    "fleet.calibration": calibration.checks,
+    "fleet.densities": densities.overlay,
+    "fleet.densities_by_aircraft": densities.by_aircraft,
+    "fleet.deviation": deviation.curves,
+}

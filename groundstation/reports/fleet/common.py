@@ -1,92 +1,18 @@
-"""What the chapters of the fleet report share: words for quantities and aircraft, their colours, axes of dates."""
+"""What the figures of the fleet report share: colours of aircraft, lines of names, axes of dates."""
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.chapters.verdict import VERDICTS
-from groundstation.chapters.wording import ABSENT, clean, is_number, named_quantity, number
+from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
 from groundstation.results.fleet import FleetResults
 
-NOT_NAMED = "not named"
 MOST_ROWS = 40  # aircraft in a figure with a line for each: more and the page is full
 ONE_COLOUR = d.INS
-BEYOND_REASON = 1e6
 ROW_MM = 4.8
-QUANTITIES: Mapping[str, tuple[str, str, int]] = {  # title, unit, decimals
-    "error_deg": ("heading error", "°", 3),
-    "standard_error_deg": ("standard error of the heading error", "°", 3),
-    "estimate_sd_deg": ("spread of the differences", "°", 3),
-    "onboard_difference_deg": ("heading error found on board − ours", "°", 3),
-    "reference_residual_arcmin": ("parking heading − reference", "′", 1),
-    "radial_error_rate_50_nmiph": ("INS error rate", "nmi/h", 2),
-    "forecast_60min_rms_m": ("forecast error after 60 min", "m", 0),
-}
-
-
-def title_of(quantity: str) -> str:
-    """A quantity in words."""
-    return QUANTITIES[quantity][0] if quantity in QUANTITIES else named_quantity(quantity)[0]
-
-
-def figure_of(quantity: str, value: float | None) -> str:
-    """A value of a quantity with its unit; angles carry their sign."""
-    _, unit, places = QUANTITIES.get(quantity, (*named_quantity(quantity), 3))
-    return bounded(value, places, unit, signed=unit in "°′")
-
-
-def bounded(value: float | None, places: int, unit: str = "", *, signed: bool = False) -> str:
-    """A number as it is written, or that it is beyond all reason: digits without end would burst a column.
-
-    Examples
-    --------
-    >>> bounded(0.456, 2, "m"), bounded(-1e15, 2, "°"), bounded(None, 2)
-    ('0.46\u202fm', '< −1\u202f000\u202f000°', '—')
-    """
-    if not is_number(value) or abs(value) <= BEYOND_REASON:
-        return number(value, places, unit, signed=signed)
-    return f"{'<' if value < 0 else '>'} {number(math.copysign(BEYOND_REASON, value), 0, unit)}"
-
-
-def span_of(bounds: tuple[float, float] | None, places: int, unit: str) -> str:
-    """An interval, each end written as :func:`bounded` does."""
-    return ABSENT if bounds is None else " … ".join(bounded(end, places, unit, signed=True) for end in bounds)
-
-
-def aircraft_name(name: str, most: int = 40) -> str:
-    """The name of an aircraft, shortened where it is very long, or that the log has none."""
-    name = clean(name) or NOT_NAMED
-    return name if len(name) <= most else name[: most - 1] + "…"
-
-
-def verdict_words(verdict: str) -> str:
-    """A verdict as a word for counts."""
-    return VERDICTS[verdict].text.lower() if verdict in VERDICTS else "not assessable"
-
-
-def day(time: np.datetime64) -> str:
-    """The day of a time: 2026-05-04; an em dash where it is missing."""
-    return ABSENT if np.isnat(time) else str(time.astype("datetime64[D]"))
-
-
-def minute(time: np.datetime64) -> str:
-    """A time to the minute: 2026-05-04 06:00; an em dash where it is missing."""
-    return ABSENT if np.isnat(time) else str(time.astype("datetime64[m]")).replace("T", " ")
-
-
-def plural(count: int, one: str, many: str = "") -> str:
-    """A count with its noun.
-
-    Examples
-    --------
-    >>> plural(1, "flight"), plural(3, "log"), plural(2, "is", "are")
-    ('1 flight', '3 logs', '2 are')
-    """
-    return f"{number(count, 0)} {one if count == 1 else many or one + 's'}"
 
 
 def colours_of(fleet: FleetResults) -> dict[str, str]:

@@ -1,16 +1,17 @@
-"""Chapter: density of the heading error of every flight, overlaid with the fitted normal (figure 3 of the paper)."""
+"""Figures: density of the heading error of every flight, overlaid with the fitted normal (figure 3 of the paper)."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.chapters.parts import Grid, Head, Note, Part, Section
+from groundstation.chapters.fleet.common import aircraft_name, plural
+from groundstation.chapters.fleet.densities import angle
 from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.fleet.common import aircraft_name, colours_of, left_out, plural, rows_shown
+from groundstation.reports.fleet.common import colours_of, left_out, rows_shown
 from groundstation.results.fleet import Densities, FittedNormal, FleetResults
 
 MOST_LINES = 150  # flights drawn as lines; more become bands of quantiles
@@ -19,25 +20,10 @@ MOST_PANELS = 12
 PANEL_COLUMNS = 3
 BANDS = ((0.05, 0.95, 0.25), (0.25, 0.75, 0.5))  # of the flights, and how dark
 LEFT_OUT = 0.001  # share of all samples that each end of the axis may leave out
-LEAD = (
-    "INS heading − GNSS track of the used samples, flight by flight, on one scale with the normal fitted to all: "
-    "figure 3 of the paper over this fleet."
-)
 
 
-def build(fleet: FleetResults) -> Section:
-    """Build the chapter."""
-    if not len(fleet.densities):
-        note = Note("No flight has samples of the heading error.", "unknown")
-        return Section("densities", "Density of the heading error", LEAD, (note,))
-    parts: list[Part] = [_overlay(fleet)]
-    if len([name for name in np.unique(fleet.densities.aircraft) if name]) > 1:
-        parts.append(_by_aircraft(fleet))
-    parts.append(_normals(fleet))
-    return Section("densities", "Density of the heading error", LEAD, parts)
-
-
-def _overlay(fleet: FleetResults) -> Drawing:
+def overlay(fleet: FleetResults) -> Drawing:
+    """Draw the density of every flight over each other."""
     densities, normal = fleet.densities, fleet.normal()
     everyone = np.arange(len(densities))
     low, high = _span(densities)
@@ -62,7 +48,7 @@ def _overlay(fleet: FleetResults) -> Drawing:
         axes.set_ylabel("probability density, 1/°")
         layout.legend_above(axes, 5)
 
-    fitted = "" if normal is None else f" with mean {_angle(normal.mean_deg)} and σ {number(normal.sigma_deg, 3, '°')}"
+    fitted = "" if normal is None else f" with mean {angle(normal.mean_deg)} and σ {number(normal.sigma_deg, 3, '°')}"
     caption = (
         f"{_how_drawn(len(densities), colours)} Dashed: all {number(int(densities.samples.sum()), 0)} samples; "
         f"black: the normal fitted to them{fitted}. Where the "
@@ -150,7 +136,8 @@ def _paint_normal(axes: Any, normal: FittedNormal | None, low: float, high: floa
     axes.plot(x, height, color=d.INK, linewidth=1.6, label=text, zorder=6)
 
 
-def _by_aircraft(fleet: FleetResults) -> Drawing:
+def by_aircraft(fleet: FleetResults) -> Drawing:
+    """Draw the densities of each aircraft on axes of their own."""
     densities = fleet.densities
     names, flights = np.unique(densities.aircraft, return_counts=True)
     counts = {name: count for name, count in zip(names.tolist(), flights.tolist(), strict=True) if name}
@@ -182,24 +169,3 @@ def _by_aircraft(fleet: FleetResults) -> Drawing:
     )
     alt = "A panel for each aircraft with the densities of its flights and the normal fitted to them."
     return Drawing("Density by aircraft", caption, alt, d.draw("fleet-panels", height, paint))
-
-
-def _normals(fleet: FleetResults) -> Grid:
-    heads = (
-        *(Head("Aircraft"), Head("Flights", True), Head("Samples", True)),
-        *(Head("Mean, °", True), Head("σ, °", True)),
-    )
-    rows = [
-        (
-            aircraft_name(one.aircraft) if place else "Whole fleet",
-            *(number(one.flights, 0), number(one.samples, 0)),
-            *(_angle(one.mean_deg, ""), number(one.sigma_deg, 3)),
-        )
-        for place, one in enumerate(fleet.normals)
-    ]
-    caption = "Merged from number, mean and sum of squares of each flight: what all samples in one array would give."
-    return Grid("Fitted normals", heads, rows, caption)
-
-
-def _angle(value: float, unit: str = "°") -> str:
-    return number(value, 3, unit, signed=True)

@@ -4,12 +4,12 @@ from collections import Counter
 
 import numpy as np
 
+from groundstation.chapters.fleet import skill
+from groundstation.chapters.fleet.aircraft import median_rate
+from groundstation.chapters.fleet.common import aircraft_name, bounded, day, figure_of, plural, title_of, verdict_words
 from groundstation.chapters.parts import Cell, Front, Mark
 from groundstation.chapters.verdict import VERDICTS
 from groundstation.chapters.wording import ABSENT, number, percent
-from groundstation.reports.fleet import skill
-from groundstation.reports.fleet.aircraft import median_rate
-from groundstation.reports.fleet.common import aircraft_name, bounded, day, figure_of, plural, title_of, verdict_words
 from groundstation.results.fleet import FleetResults
 
 MOST_NAMES = 6

@@ -3,9 +3,9 @@
 import numpy as np
 
 from groundstation.chapters.cooperative import state_of, title_of
+from groundstation.chapters.fleet.common import aircraft_name, minute
 from groundstation.chapters.parts import Cell, Grid, Head, Note, Section
 from groundstation.chapters.wording import ABSENT, clock, number
-from groundstation.reports.fleet.common import aircraft_name, minute
 from groundstation.results.fleet import FleetResults, SessionRow
 
 LEAD = "Flights of several aircraft that ranged to one another over a data link, analysed together."

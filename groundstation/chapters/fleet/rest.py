@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
+from groundstation.chapters.fleet.common import aircraft_name, figure_of, title_of
 from groundstation.chapters.parts import Facts, Grid, Head, Mark, Note, Section
 from groundstation.chapters.wording import ABSENT, number, percent, significant, words
-from groundstation.reports.fleet.common import aircraft_name, figure_of, title_of
 from groundstation.results.fleet import FleetResults
 
 KINDS = {"failed": Mark("bad", "failed"), "skipped": Mark("plain", "skipped")}

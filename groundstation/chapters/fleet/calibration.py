@@ -1,0 +1,45 @@
+"""Chapter: whether stated sigmas are honest, by independent checks over all flights."""
+
+from groundstation.chapters.parts import Figure, Grid, Head, Mark, Note, Section
+from groundstation.chapters.wording import number, percent, typeset
+from groundstation.results.fleet import FleetCalibration, FleetResults
+
+LEAD = "Are the stated intervals honest? Of something known independently, 95 % should lie inside."
+
+
+def build(fleet: FleetResults) -> Section:
+    """Build the chapter."""
+    title = "Calibration"
+    if not fleet.calibration:
+        text = "No flight has anything independent to check its answers by."
+        return Section("calibration", title, LEAD, (Note(text, "unknown"),))
+    return Section("calibration", title, LEAD, (Figure("fleet.calibration"), _table(fleet)))
+
+
+def judged(row: FleetCalibration) -> Mark:
+    """Whether the stated share lies in the interval of the share found."""
+    low, high = row.confidence95
+    if high < row.stated:
+        return Mark("warn", "too sure")
+    return Mark("plain", "too careful") if low > row.stated else Mark("good", "consistent")
+
+
+def _table(fleet: FleetResults) -> Grid:
+    heads = (
+        *(Head("Check"), Head("Checks", True), Head("Inside", True), Head("Share", True)),
+        *(Head("95 % interval", True), Head("Mean of z", True), Head("σ of z", True), Head("Sigmas are")),
+    )
+    rows = [
+        (
+            *(typeset(row.title), number(row.checks, 0), number(row.inside, 0), percent(row.share_inside, 1)),
+            " … ".join(percent(bound, 1) for bound in row.confidence95),
+            *(number(row.z_mean, 2, signed=True), number(row.z_sigma, 2), judged(row)),
+        )
+        for row in fleet.calibration
+    ]
+    caption = (
+        "z: residual over its stated sigma, honest are 0 and 1. For the heading, flights with the verdict reject are "
+        "left out. What was found on board rests on the samples we use too: more than 95 % inside is what to expect of "
+        "it. Positions by a reference: of every flight as many samples as are independent."
+    )
+    return Grid("Checks", heads, rows, caption)

@@ -1,0 +1,47 @@
+"""Chapter: density of the heading error of every flight, overlaid with the fitted normal (figure 3 of the paper)."""
+
+import numpy as np
+
+from groundstation.chapters.fleet.common import aircraft_name
+from groundstation.chapters.parts import Figure, Grid, Head, Note, Part, Section
+from groundstation.chapters.wording import number
+from groundstation.results.fleet import FleetResults
+
+LEAD = (
+    "INS heading − GNSS track of the used samples, flight by flight, on one scale with the normal fitted to all: "
+    "figure 3 of the paper over this fleet."
+)
+
+
+def build(fleet: FleetResults) -> Section:
+    """Build the chapter."""
+    if not len(fleet.densities):
+        note = Note("No flight has samples of the heading error.", "unknown")
+        return Section("densities", "Density of the heading error", LEAD, (note,))
+    parts: list[Part] = [Figure("fleet.densities")]
+    if len([name for name in np.unique(fleet.densities.aircraft) if name]) > 1:
+        parts.append(Figure("fleet.densities_by_aircraft"))
+    parts.append(_normals(fleet))
+    return Section("densities", "Density of the heading error", LEAD, parts)
+
+
+def _normals(fleet: FleetResults) -> Grid:
+    heads = (
+        *(Head("Aircraft"), Head("Flights", True), Head("Samples", True)),
+        *(Head("Mean, °", True), Head("σ, °", True)),
+    )
+    rows = [
+        (
+            aircraft_name(one.aircraft) if place else "Whole fleet",
+            *(number(one.flights, 0), number(one.samples, 0)),
+            *(angle(one.mean_deg, ""), number(one.sigma_deg, 3)),
+        )
+        for place, one in enumerate(fleet.normals)
+    ]
+    caption = "Merged from number, mean and sum of squares of each flight: what all samples in one array would give."
+    return Grid("Fitted normals", heads, rows, caption)
+
+
+def angle(value: float, unit: str = "°") -> str:
+    """An angle as this chapter writes it."""
+    return number(value, 3, unit, signed=True)

@@ -1,0 +1,58 @@
+"""Chapter: the magnetic deviation that flights found, those of one aircraft beside each other."""
+
+from groundstation.chapters.fleet.common import aircraft_name, bounded
+from groundstation.chapters.magnetic import TONES
+from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Part, Section
+from groundstation.chapters.wording import ABSENT, number
+from groundstation.results.fleet import DeviationRow, FleetResults
+from groundstation.results.magnetic import ADVISORY, LETTERS, METHOD_TITLES
+
+TITLE = "Magnetic deviation by aircraft"
+LEAD = "What each flight found with its figure-eight: does the deviation of an aircraft stay the same?"
+METHODS = {str(name): title for name, title in METHOD_TITLES.items()}
+CHANGED = 3.0  # times what the sigmas lead to expect
+
+
+def build(fleet: FleetResults) -> Section | None:
+    """Build the chapter; None where no flight found a deviation."""
+    if not fleet.deviations:
+        return None
+    parts: list[Part] = [Figure("fleet.deviation")] if usable(fleet) else []
+    return Section("deviation", TITLE, LEAD, (*parts, _table(fleet.deviations)))
+
+
+def usable(fleet: FleetResults) -> list[DeviationRow]:
+    """The deviations of the flights that are not rejected."""
+    return [row for row in fleet.deviations if row.verdict != "reject"]
+
+
+def _table(rows: tuple[DeviationRow, ...]) -> Grid:
+    heads = (
+        *(Head("Aircraft"), Head("Flight"), Head("Verdict"), Head("Method")),
+        *(Head(f"{letter}, °", True) for letter in LETTERS),
+        *(Head("After, °", True), Head("Others", True), Head("Differs, °", True), Head("Expected, °", True)),
+    )
+    caption = (
+        "Error = A + B sin c + C cos c + D sin 2c + E cos 2c, c the uncorrected magnetic heading. After: RMS in level "
+        "flight no fit has seen, after correction. Differs: RMS over the circle of the difference from the mean of the "
+        "aircraft's other flights; expected: what the standard deviations lead to where nothing changed; marked where "
+        f"it is more than {CHANGED:g} times that. {ADVISORY}"
+    )
+    return Grid("Deviation of every flight", heads, [_cells(row) for row in rows], caption)
+
+
+def _cells(row: DeviationRow) -> tuple[Cell, ...]:
+    difference, expected = row.difference_rms_deg, row.expected_rms_deg
+    is_changed = difference is not None and expected is not None and difference > CHANGED * expected
+    text = bounded(difference, 2)
+    return (
+        aircraft_name(row.aircraft),
+        row.flight_id,
+        Mark(TONES.get(row.verdict, "unknown"), row.verdict),
+        METHODS.get(row.method, row.method),
+        *(bounded(row.coefficients_deg[letter], 2, signed=True) for letter in LETTERS),
+        bounded(row.after_rms_deg, 2),
+        number(row.others, 0) if row.others else ABSENT,
+        Mark("warn", text) if is_changed else text,
+        bounded(expected, 2),
+    )
