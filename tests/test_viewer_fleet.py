@@ -10,6 +10,10 @@ import pyarrow as pa
 import pytest
 from rerun.experimental import ViewerClient
 
+from groundstation.chapters.fleet import aircraft, flights, rest, sessions, trend
+from groundstation.chapters.fleet import skill as forecast
+from groundstation.chapters.markdown import escaped
+from groundstation.chapters.parts import Grid
 from groundstation.pipeline.many_flights.fleet import gather
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import Densities, FleetResults, NotInFleet
@@ -167,10 +171,27 @@ def test_names_from_logs_are_neither_paths_nor_markup(contents: Contents) -> Non
     for document in ("/by_aircraft", "/flights", "/failed"):
         text = contents.text(document)
         assert "![" not in text and "<" not in text.replace("\\<", "")
-        for line in text.splitlines():
-            if line.startswith("|"):
-                cells = len(re.findall(r"(?<!\\)\|", line))
-                assert cells == len(re.findall(r"(?<!\\)\|", next(one for one in text.splitlines() if one[:1] == "|")))
+        for block in text.split("\n\n"):
+            if block.startswith("|"):
+                assert len({len(re.findall(r"(?<!\\)\|", line)) for line in block.splitlines()}) == 1
+
+
+def test_the_panels_tell_what_the_page_tells(contents: Contents, fleet: FleetResults) -> None:
+    skill_told, sessions_told = forecast.build(fleet), sessions.build(fleet)
+    assert skill_told is not None and sessions_told is None
+    for document, section in (
+        ("/by_aircraft", aircraft.heading(fleet)),
+        ("/by_aircraft", trend.build(fleet)),
+        ("/forecast/skill", skill_told),
+        ("/failed", rest.not_in_fleet(fleet)),
+    ):
+        text = contents.text(document)
+        grids = [part for part in section.parts if isinstance(part, Grid)]
+        assert grids and f"# {section.title}" in text
+        cells = (cell for grid in grids for row in grid.rows for cell in row)
+        assert [cell for cell in cells if escaped(cell if isinstance(cell, str) else cell.text) not in text] == []
+    names = [line.cells[0] for line in flights.lines(fleet)]
+    assert all(isinstance(name, str) and escaped(name) in contents.text("/flights") for name in names)
 
 
 def test_links_name_the_recordings_and_nothing_else(fleet: FleetResults, tmp_path: Path) -> None:
@@ -183,7 +204,7 @@ def test_links_name_the_recordings_and_nothing_else(fleet: FleetResults, tmp_pat
 
 def test_logs_without_a_flight_are_told(contents: Contents) -> None:
     text = contents.text("/failed")
-    assert "no reader" in text and "nothing" in text and "2 logs" in text
+    assert "no reader" in text and "nothing" in text and text.startswith("# Not in the fleet")
 
 
 @pytest.mark.parametrize("first", [0, 30])
@@ -198,7 +219,7 @@ def test_flights_without_a_time_have_a_number_alone(fleet: FleetResults, tmp_pat
             assert (((places <= first) | behind) == ("utc" in batch.schema.names)).all()
     places, _ = found.scalars(f"/aircraft/{STEADY}/heading_error/flights")
     assert len(places) == FLIGHTS // 3, "all of them have a place on flight_number"
-    assert f"# {FLIGHTS - first} without absolute time" in found.text("/flights")
+    assert f"{FLIGHTS - first} flights have no absolute time" in found.text("/flights")
 
 
 def test_one_flight_and_none(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """Sections as Markdown, in which nothing from a log can act as markup: text panels of the recording, study pages."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from groundstation.chapters.parts import Cell, Facts, Figure, Front, Grid, Mark, Note, Part, Section
 from groundstation.chapters.wording import clean
@@ -9,6 +9,7 @@ from groundstation.chapters.wording import clean
 # What can be markup anywhere or make an address a link; and what only a line can begin with: a title, a list, a rule.
 _ANYWHERE = re.compile(r"([\\`*_\[\]<>|~&]|:(?=//)|(?<=www)\.)", re.IGNORECASE)
 _AT_START = re.compile(r"^(\s*\d*)(#(?=#*(?:\s|$))|[-+.)](?=\s|$)|-(?=-)|=)")
+NO_LINKS: Mapping[str, str] = {}
 WIDEST_CELL = 60  # characters: a panel does not wrap cells, so longer remarks stand below the table
 
 
@@ -39,7 +40,9 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join([lines[0], "|" + "---|" * len(heads), *lines[1:]])
 
 
-def markdown(section: Section, *, level: int = 1, widest: int = WIDEST_CELL) -> str:
+def markdown(
+    section: Section, *, level: int = 1, widest: int = WIDEST_CELL, links: Mapping[str, str] = NO_LINKS
+) -> str:
     """A section as a Markdown document, headed by its headline or its title.
 
     The parts set small are left out, and figures, but for what stands in their place.
@@ -51,10 +54,12 @@ def markdown(section: Section, *, level: int = 1, widest: int = WIDEST_CELL) -> 
         Of its heading: 1 is ``#``.
     widest : int
         Characters of a cell; a longer remark stands below its table.
+    links : mapping of str to str
+        Where the names of rows lead to: a table's first cell with such a text is a link. Addresses stand as they are.
     """
     parts = [f"{'#' * level} {escaped(section.headline or section.title)}"]
     for part in (*section.above, *section.parts):
-        parts += _part(part, level + 1, widest)
+        parts += _part(part, level + 1, widest, links)
     return "\n\n".join(parts)
 
 
@@ -81,16 +86,16 @@ def front_markdown(front: Front) -> str:
     return "\n\n".join(parts)
 
 
-def _part(part: Part | None, level: int, widest: int = WIDEST_CELL) -> list[str]:
+def _part(part: Part | None, level: int, widest: int = WIDEST_CELL, links: Mapping[str, str] = NO_LINKS) -> list[str]:
     if isinstance(part, Figure):
-        return _part(part.instead, level, widest)
+        return _part(part.instead, level, widest, links)
     if isinstance(part, Note) and part.files:  # they lie beside a report
         return []
     if isinstance(part, Note):
         return [f"**{mark}** {escaped(part.text)}" if (mark := Mark(part.tone, "").symbol) else escaped(part.text)]
     if isinstance(part, Facts):
         return [] if part.compact else _facts(part, level, widest)
-    return _grid(part, level, widest) if isinstance(part, Grid) else []
+    return _grid(part, level, widest, links) if isinstance(part, Grid) else []
 
 
 def _facts(facts: Facts, level: int, widest: int = WIDEST_CELL) -> list[str]:
@@ -102,10 +107,13 @@ def _facts(facts: Facts, level: int, widest: int = WIDEST_CELL) -> list[str]:
     return [*_title(facts.title, level), cells, *long, *_caption(facts.caption)]
 
 
-def _grid(grid: Grid, level: int, widest: int) -> list[str]:
+def _grid(grid: Grid, level: int, widest: int, links: Mapping[str, str]) -> list[str]:
     """A table; where a column has long remarks they stand below it, each under the name of its row."""
     rows = [[_cell(cell) for cell in row] for row in grid.rows]
     named = min((place for row in grid.rows for place, cell in enumerate(row) if isinstance(cell, str)), default=0)
+    for row, told in zip(rows, grid.rows, strict=True):
+        if named < len(told) and (link := links.get(_text(told[named]))):
+            row[named] = f"[{row[named]}]({link})"
     long = {place for row in grid.rows for place, cell in enumerate(row) if len(_text(cell)) > widest}
     shown = [place for place in _in_sight(grid, named in long, named) if place == named or place not in long]
     heads = [escaped(grid.heads[place].title) for place in shown]

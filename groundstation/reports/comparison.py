@@ -5,18 +5,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from groundstation.base.findings import Finding
 from groundstation.base.geodesy import north_east_m
 from groundstation.base.normal import NORMAL_95
-from groundstation.chapters.findings import MARKS
-from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Part, Section
-from groundstation.chapters.wording import ABSENT, any_value, number, significant
+from groundstation.chapters.comparison import answers, findings, opening, settings
+from groundstation.chapters.parts import Section
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.reports.page import TEMPLATES, render
-from groundstation.results.comparison import Comparison, Delta, Value
+from groundstation.results.comparison import Comparison
 from groundstation.results.figures import FigureData, numbers
 from groundstation.results.files import SavedFlight
 from groundstation.results.forecast import ForecastResult
@@ -24,10 +22,6 @@ from groundstation.results.forecast import ForecastResult
 A, B = d.INS, d.GNSS
 MOST = 3000  # points of a line
 NEAR_M = 200_000.0  # flights that begin no further apart share one map
-SHARED = (
-    "Both come from {}: their noise is shared, and what differs follows from {} alone. A difference within the stated "
-    "sigmas is no proof that they do not matter."
-)
 LINES = (  # figure, column, column of the half width and what it is multiplied by, axis, title
     ("overview", "altitude_m", None, "altitude, m", "Altitude"),
     ("overview", "ground_speed_mps", None, "ground speed, m/s", "Ground speed"),
@@ -43,97 +37,14 @@ LINES = (  # figure, column, column of the half width and what it is multiplied 
 
 def comparison_html(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> str:
     """Render the page of a comparison as a complete HTML document."""
-    sections = (_answers(comparison), _figures(comparison, a, b), _settings(comparison), _findings(comparison))
+    sections = (answers(comparison), _figures(comparison, a, b), settings(comparison), findings(comparison))
     return render(
         "compare.html.j2",
         title=f"{comparison.a.flight_id} and {comparison.b.flight_id}",
-        opening=_opening(comparison),
+        opening=opening(comparison),
         sections=[section for section in sections if section is not None],
         style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
     )
-
-
-def _opening(comparison: Comparison) -> list[Part]:
-    sides = comparison.a, comparison.b
-    rows = [
-        ("Aircraft, flight", *(f"{side.aircraft} {side.flight}".strip() or ABSENT for side in sides)),
-        ("Source", *(side.source_name for side in sides)),
-        ("SHA-256", *(side.source_sha256[:16] for side in sides)),
-        ("Start, UTC", *(side.start_utc or "unknown" for side in sides)),
-    ]
-    alignment = comparison.alignment
-    when = "" if alignment.event == "utc" else f", A at {alignment.a_s:.1f} s, B at {alignment.b_s:.1f} s"
-    told = f"Clocks aligned on {alignment.event}{when}: clock of B {number(alignment.offset_s, 3, 's', signed=True)}."
-    heads = (Head(""), Head(f"A: {comparison.a.flight_id}"), Head(f"B: {comparison.b.flight_id}"))
-    opening: list[Part] = [Grid("", heads, rows), Note(f"{told} Times in the figures are flight times of A.")]
-    return (
-        [*opening, Note(SHARED.format(comparison.origin, comparison.cause), "warn")]
-        if comparison.is_same_log
-        else opening
-    )
-
-
-def _answers(comparison: Comparison) -> Section:
-    heads = (
-        Head("Answer"),
-        Head("A", True),
-        Head("B", True),
-        Head("B − A", True),
-        Head("σ", True),
-        Head("Beyond 1.96 σ"),
-    )
-    rows = [_row(delta) for delta in comparison.shown]
-    differing = sum(delta.is_different for delta in comparison.deltas)
-    caption = (
-        f"The main answers, and any other that differs beyond its sigma; {differing} of {len(comparison.deltas)} "
-        "common answers differ at all: compare.csv. σ of the difference from the sigmas that both state, taken as "
-        "independent; empty where one states none."
-    )
-    lead = "Answers that both flights have; names as in summary.json."
-    return Section("answers", "Answers", lead, (Grid("", heads, rows, caption),))
-
-
-def _row(delta: Delta) -> tuple[Cell, ...]:
-    change = "" if delta.delta is None else significant(delta.delta, 6)
-    sigma = "" if delta.sigma is None else significant(delta.sigma, 3)
-    marks: dict[bool | None, Cell] = {None: "", True: Mark("warn", "beyond"), False: "within"}
-    return (delta.name, _value(delta.a), _value(delta.b), change, sigma, marks[delta.is_significant])
-
-
-def _value(value: Value) -> str:
-    return ABSENT if value is None else any_value(value)
-
-
-def _settings(comparison: Comparison) -> Section | None:
-    if not comparison.settings:
-        return None
-    rows = [(pair.name, _value(pair.a), _value(pair.b)) for pair in comparison.settings]
-    lead = "What was set, what each analysis used, and versions, where they are not the same."
-    grid = Grid("", (Head("Setting"), Head("A", True), Head("B", True)), rows)
-    return Section("settings", "Settings that differ", lead, (grid,))
-
-
-def _findings(comparison: Comparison) -> Section | None:
-    sides = (
-        ("A", comparison.findings_a, comparison.not_assessable_a),
-        ("B", comparison.findings_b, comparison.not_assessable_b),
-    )
-    grids = [
-        Grid(f"{letter} alone", (Head("Severity"), Head("Finding"), Head("Code")), rows)
-        for letter, findings, reasons in sides
-        if (
-            rows := [
-                *_finding_rows(findings),
-                *((Mark("unknown", "not assessed"), f"{one.analysis}: {one.reason}", "") for one in reasons),
-            ]
-        )
-    ]
-    lead = "What was noticed in only one of the two, by severity, code and topic."
-    return Section("findings", "Findings of one alone", lead, grids) if grids else None
-
-
-def _finding_rows(findings: Sequence[Finding]) -> list[tuple[Cell, ...]]:
-    return [(MARKS[finding.severity], finding.text, finding.code) for finding in findings]
 
 
 # ---------------------------------------------------------------------------------------------------- figures

@@ -4,8 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from groundstation.chapters.fleet import CHAPTERS, flights, front
-from groundstation.chapters.fleet.common import shortened
 from groundstation.chapters.parts import Document
+from groundstation.chapters.shortened import shortened
 from groundstation.reports.figures import drawn_by
 from groundstation.reports.fleet import DRAWERS
 from groundstation.reports.flight_report import Written, write_pages

@@ -68,8 +68,8 @@ def send_fleet(stream: rr.RecordingStream, fleet: FleetResults) -> rrb.Blueprint
     if own:
         tabs.append(rrb.Tabs(contents=own, name="Aircraft"))
     forecast = [*skill_over_flights(recorder, fleet), *skill_by_horizon(recorder, fleet)]
-    if fleet.skill:
-        recorder.document("forecast/skill", forecast_text(fleet))
+    if skill := forecast_text(fleet):
+        recorder.document("forecast/skill", skill)
         views = [*forecast, document("Skill of the forecast", "forecast/skill")]
         tabs.append(rrb.Grid(contents=views, grid_columns=2, name="Forecast"))
     tabs.append(rrb.Vertical(contents=[document("Flights and their recordings", FLIGHTS_TEXT)], name="Flights"))

@@ -2,11 +2,9 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
-from groundstation.chapters.parts import Grid, Part, Section
 from groundstation.chapters.verdict import VERDICTS
 from groundstation.chapters.wording import ABSENT, clean, is_number, named_quantity, number
 
@@ -71,18 +69,6 @@ def day(time: np.datetime64) -> str:
 def minute(time: np.datetime64) -> str:
     """A time to the minute: 2026-05-04 06:00; an em dash where it is missing."""
     return ABSENT if np.isnat(time) else str(time.astype("datetime64[m]")).replace("T", " ")
-
-
-def shortened(section: Section, most: int, where: str) -> Section:
-    """The section with its long tables cut, which say how many rows more there are and where."""
-    return replace(section, parts=tuple(_cut(part, most, where) for part in section.parts))
-
-
-def _cut(part: Part, most: int, where: str) -> Part:
-    if not isinstance(part, Grid) or len(part.rows) <= most:
-        return part
-    more = f"The first {most}; {number(len(part.rows) - most, 0)} more in {where}."
-    return replace(part, rows=part.rows[:most], caption=f"{part.caption} {more}".strip())
 
 
 def plural(count: int, one: str, many: str = "") -> str:

@@ -42,7 +42,22 @@ class FlightLine:
 def lines(fleet: FleetResults) -> list[FlightLine]:
     """Flights in the order of the fleet: every one, or of more than :data:`MOST_LINES` those of note, then the last."""
     noted = remarks_of(fleet)
-    rows = _shown(fleet, noted)
+    return _lines(fleet, _shown(fleet, noted), noted)
+
+
+def by_number(fleet: FleetResults, rows: NDArray[np.intp], numbers: NDArray[np.int64]) -> Section:
+    """The chapter as a recording has it: some flights with the numbers by which they stand on its timeline."""
+    shown = _lines(fleet, rows, remarks_of(fleet))
+    cells = [
+        (line.cells[0], str(place), *line.cells[1:], _joined(line.remarks))
+        for line, place in zip(shown, numbers.tolist(), strict=True)
+    ]
+    some = f" The last {number(len(cells), 0)}; all of them are in flights.parquet." if len(cells) < len(fleet) else ""
+    grid = Grid("", (HEADS[0], Head("No.", True), *HEADS[1:]), cells, f"{CAPTION}{some}")
+    return Section(KEY, plural(len(fleet), "flight"), LEAD, (grid,) if cells else ())
+
+
+def _lines(fleet: FleetResults, rows: NDArray[np.intp], noted: Mapping[str, Sequence[Mark]]) -> list[FlightLine]:
     columns = {name: values[rows].tolist() for name, values in fleet.flights.columns.items() if name != "start_utc"}
     columns["start"] = [minute(time) for time in fleet.flights["start_utc"][rows]]
     told = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
