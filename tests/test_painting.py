@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
+from groundstation.chapters.parts import Document, Front, Section
 from groundstation.reports import painting
-from groundstation.reports.drawing import Sketch, draw
+from groundstation.reports.drawing import Drawing, Sketch, draw, sketching
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux alone")
 
@@ -87,3 +88,13 @@ def test_what_cannot_be_painted_fails_as_it_does_alone() -> None:
         with pytest.raises(ValueError, match="no such curve"):
             painting.painted(sketches(paint), processes)
     assert no_child_is_left()
+
+
+def test_within_sketching_nothing_is_painted() -> None:
+    def tell() -> Document:
+        part = Drawing("", "", "", draw("only", 20.0, lambda _figure: pytest.fail("painted"), 40.0))
+        return Document("", "", Front("", ()), (Section("", "", "", (part,)),))
+
+    with sketching() as gathered:
+        assert painting.with_painted_figures(tell, 2) == tell()
+    assert list(gathered) == ["only"]

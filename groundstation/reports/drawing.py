@@ -139,6 +139,11 @@ def sketching() -> Iterator[dict[str, Sketch]]:
         _sketches.reset(token)
 
 
+def is_sketching() -> bool:
+    """Whether somebody gathers sketches, and no figure is to be painted."""
+    return _sketches.get() is not None
+
+
 @contextmanager
 def report_style() -> Iterator[None]:
     """Set matplotlib's look to the report's for a while; a user's matplotlibrc does not reach it."""

@@ -19,7 +19,7 @@ from dataclasses import replace
 from typing import IO
 
 from groundstation.chapters.parts import Document, Part
-from groundstation.reports.drawing import Drawing, Sketch, draw, sketching
+from groundstation.reports.drawing import Drawing, Sketch, draw, is_sketching, sketching
 from groundstation.reports.live import Svg
 
 CAN_FORK = sys.platform == "linux"
@@ -32,8 +32,11 @@ NUMBER_BYTES = 2
 def with_painted_figures(tell: Callable[[], Document], processes: int = 1) -> Document:
     """A document with the figures that it draws while it is told, which then are painted.
 
-    ``processes`` paint side by side; equal bytes whatever their number.
+    ``processes`` paint side by side; equal bytes whatever their number. Who gathers sketches gets a document with
+    these.
     """
+    if is_sketching():
+        return tell()
     with sketching() as sketches:
         document = tell()
     pictures = painted(sketches, processes)
@@ -45,7 +48,7 @@ def with_painted_figures(tell: Callable[[], Document], processes: int = 1) -> Do
 
 
 def _painted(part: Part, pictures: Mapping[str, Svg]) -> Part:
-    return replace(part, svg=pictures[part.svg]) if isinstance(part, Drawing) else part
+    return replace(part, svg=pictures.get(part.svg, part.svg)) if isinstance(part, Drawing) else part
 
 
 def painted(sketches: Mapping[str, Sketch], processes: int = 1) -> dict[str, Svg]:
