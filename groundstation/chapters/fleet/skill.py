@@ -22,8 +22,8 @@ def build(fleet: FleetResults) -> Section | None:
         return None
     shipped = shipped_method(fleet)
     parts: list[Part] = []
-    rated = np.isin(fleet.flights["flight_id"], fleet.skill_flights["flight_id"])
-    if aided := int(np.sum(rated & (fleet.flights["ins_kind"] != "unaided"))):
+    aided_ids = fleet.flights["flight_id"][fleet.flights["ins_kind"] != "unaided"]
+    if aided := len(set(aided_ids.tolist()).intersection(fleet.skill_flights["flight_id"].tolist())):
         told = plural(aided, "flight has", "flights have")
         text = (
             f"{told} an INS that is aided by GNSS, or may be: their starts are in here, and look better than they are."
