@@ -78,6 +78,22 @@ def test_what_another_process_does_not_deliver_is_painted_here(
     assert no_child_is_left()
 
 
+def test_where_no_process_can_be_had_this_one_paints(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse() -> int:
+        raise BlockingIOError("Resource temporarily unavailable")
+
+    monkeypatch.setattr(os, "fork", refuse)
+    assert painting.painted(sketches(curve), 3) == painting.painted(sketches(curve))
+
+
+def test_processes_that_the_system_buries_are_no_trouble() -> None:
+    before = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    try:
+        assert painting.painted(sketches(curve), 2) == painting.painted(sketches(curve))
+    finally:
+        signal.signal(signal.SIGCHLD, before)
+
+
 def test_what_cannot_be_painted_fails_as_it_does_alone() -> None:
     def paint(figure: Any, number: int) -> None:
         if number == 4:

@@ -69,8 +69,11 @@ def painted(sketches: Mapping[str, Sketch], processes: int = 1) -> dict[str, Svg
 
     started = time.monotonic()
     pictures: dict[str, Svg] = {}
+    at_work: list[_Painter] = []
     with _queue(len(keys)) as queue, ExitStack() as painters:
-        at_work = [painters.enter_context(_painter(keys, sketches, queue)) for _ in range(others)]
+        with suppress(OSError):  # no further process is allowed, or there is nowhere to write: those at work go on
+            for _ in range(others):
+                at_work.append(painters.enter_context(_painter(keys, sketches, queue)))
         for number in _taken(queue):
             pictures[keys[number]] = _paint(keys[number], sketches[keys[number]])
         now = time.monotonic()
@@ -104,10 +107,8 @@ class _Painter:
 
     def delivered(self, deadline: float) -> dict[str, Svg]:
         """The pictures of the process by key, once it has ended; at the deadline it is ended."""
-        while not self.has_ended and time.monotonic() < deadline:
-            self.has_ended = os.waitpid(self.pid, os.WNOHANG)[0] != 0
-            if not self.has_ended:
-                time.sleep(LOOK_EVERY_S)
+        while not self._look(os.WNOHANG) and time.monotonic() < deadline:
+            time.sleep(LOOK_EVERY_S)
         self.end()
         pictures: dict[str, Svg] = {}
         self.results.seek(0)
@@ -119,10 +120,17 @@ class _Painter:
 
     def end(self) -> None:
         """End the process if it has not ended."""
-        if not self.has_ended:
+        if not self._look(os.WNOHANG):
             os.kill(self.pid, signal.SIGKILL)
-            os.waitpid(self.pid, 0)
+            self._look(0)
+
+    def _look(self, options: int) -> bool:
+        """Whether the process has ended; waits for it unless told not to."""
+        try:
+            self.has_ended = self.has_ended or os.waitpid(self.pid, options)[0] != 0
+        except ChildProcessError:  # the system was told to bury them
             self.has_ended = True
+        return self.has_ended
 
 
 @contextmanager
