@@ -20,6 +20,7 @@ import numpy as np
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import RecordBatch
+from tests.fuzz import recovery_streams as streams
 from tests.fuzz.bases import Base, bases, chapter10_starts, line_starts, mcap_starts, ulog_starts
 from tests.fuzz.mutation import Mutant
 from tests.fuzz.trial import Case, edits_of, suffix_of
@@ -320,6 +321,10 @@ def by_pandas_g1000(path: Path, found: Found) -> None:
     _by_pandas(path, found, _g1000_s)
 
 
+def _ours(count: Callable[[Iterator[RecordBatch], Found], None]) -> Callable[[Path, Found], None]:
+    return lambda path, found: count(_items(path), found)
+
+
 READERS: dict[str, dict[str, Callable[[Path, Found], None]]] = {
     "flat-csv": {"groundstation": our_csv, "pandas (bad lines skipped)": by_pandas_csv},
     "csv-profile": {"groundstation": our_g1000, "pandas (bad lines skipped)": by_pandas_g1000},
@@ -327,11 +332,26 @@ READERS: dict[str, dict[str, Callable[[Path, Found], None]]] = {
     "dataflash": {"groundstation": our_dataflash, "pymavlink": by_pymavlink},
     "chapter10": {"groundstation": our_chapter10, "pychapter10": by_pychapter10, "AcraNetwork": by_acranetwork},
     "mcap": {"groundstation": our_mcap, "mcap make_reader": by_mcap_seeking, "mcap StreamReader": by_mcap_stream},
+    "ubx": {"groundstation": _ours(streams.by_column("iTOW")), "pyubx2": streams.by_pyubx2},
+    "nmea": {"groundstation": _ours(streams.by_column("time", scale=1e3)), "pynmeagps": streams.by_pynmeagps},
+    "tlog": {"groundstation": _ours(streams.by_column("time_boot_ms", "time_usec"))},
+    "robot-mcap": {"groundstation": _ours(streams.by_time)},
+    "ros1": {"groundstation": _ours(streams.by_time)},
+}
+STREAMS = {
+    "ubx": streams.of_ubx,
+    "nmea": streams.of_nmea,
+    "tlog": streams.of_tlog,
+    "robot-mcap": streams.of_robot_mcap,
+    "ros1": streams.of_ros1,
 }
 
 
 def expected_of(base: Base) -> Expected | None:
     """Records of a base; None where it is not measured."""
+    if base.format in STREAMS:
+        rows = STREAMS[base.format](base.data)
+        return _expected(rows, [[]]) if rows else None
     if base.format == "ulog":
         return of_ulog(base.data)
     if base.format == "dataflash":
