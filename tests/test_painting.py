@@ -4,9 +4,10 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
+import psutil
 import pytest
 
 from groundstation.chapters.parts import Document, Front, Section
@@ -40,12 +41,11 @@ def by_another(then: Callable[[], object]) -> Callable[[Any, int], None]:
     return paint
 
 
-def no_child_is_left() -> bool:
-    try:
-        os.waitpid(-1, os.WNOHANG)
-    except ChildProcessError:
-        return True
-    return False
+@pytest.fixture(autouse=True)
+def _no_process_is_left() -> Iterator[None]:
+    before = {child.pid for child in psutil.Process().children()}
+    yield
+    assert {child.pid for child in psutil.Process().children()} <= before
 
 
 @pytest.mark.parametrize("processes", [2, 3])
@@ -55,7 +55,6 @@ def test_the_number_of_processes_changes_no_byte(processes: int) -> None:
     found = painting.painted(asked, processes)
     assert list(found) == list(alone) and found == alone
     assert [repr(found[key].panels) for key in alone] == [repr(alone[key].panels) for key in alone]
-    assert no_child_is_left()
 
 
 @pytest.mark.parametrize(
@@ -75,7 +74,6 @@ def test_what_another_process_does_not_deliver_is_painted_here(
     monkeypatch.setattr(painting, "LATE", 0.1)
     found = painting.painted(sketches(by_another(then)), 2)
     assert found == painting.painted(sketches(curve))
-    assert no_child_is_left()
 
 
 def test_where_no_process_can_be_had_this_one_paints(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -103,7 +101,6 @@ def test_what_cannot_be_painted_fails_as_it_does_alone() -> None:
     for processes in (1, 2):
         with pytest.raises(ValueError, match="no such curve"):
             painting.painted(sketches(paint), processes)
-    assert no_child_is_left()
 
 
 def test_within_sketching_nothing_is_painted() -> None:
