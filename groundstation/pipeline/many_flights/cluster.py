@@ -129,7 +129,8 @@ def _connected(scheduler: str) -> Iterator["Client"]:
         from distributed import Client
     except ImportError as error:
         raise UsageError(scheduler, "no package distributed", "", "pip install 'groundstation[cluster]'") from error
-    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what is wrong is told in one line here
+    for name in ("distributed", "distributed.client"):  # the second has a level of its own
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what is wrong is told in one line here
     try:
         client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
