@@ -361,6 +361,16 @@ def test_a_damaged_record_costs_little_of_the_rest(tmp_path: Path, form: str) ->
     assert damages and whole > rows > 0.9 * whole
 
 
+@pytest.mark.parametrize(("first", "count"), [(3511, 23), (906, 2003), (2, 714), (0, 4000)])
+def test_bytes_missing_in_the_header_of_a_bag_cost_no_message(tmp_path: Path, first: int, count: int) -> None:
+    """The header claims 4 KiB, and the first chunk begins within them; without its first bytes it is a bag still."""
+    path = written(tmp_path, "ros1")
+    data, (whole, _) = path.read_bytes(), rows_of(path)
+    path.write_bytes(data[:first] + data[first + count :])
+    rows, damages = rows_of(path)
+    assert rows == whole and [one.what for one in damages] == ["bytes that belong to no record, skipped"]
+
+
 PROFILE = """
 name = "own"
 [[messages]]

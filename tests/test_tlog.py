@@ -129,6 +129,19 @@ def test_damage_costs_the_frames_it_touches(tmp_path: Path) -> None:
     assert whole - 16 <= rows < whole
 
 
+@pytest.mark.parametrize(("first", "count"), [(8, 514), (39, 3), (0, 30)])
+def test_a_damaged_beginning_costs_the_frames_it_touches(tmp_path: Path, first: int, count: int) -> None:
+    log, path = telemetry(), tmp_path / "a.bin"
+    path.write_bytes(log.data)
+    whole = sum(len(item) for item in registry.read(path) if isinstance(item, RecordBatch))
+    path.write_bytes(log.data[:first] + log.data[first + count :])
+    found = list(registry.read(path))
+    check(found)
+    assert [item.kind for item in found if isinstance(item, Damage)] == ["corrupt"]
+    rows = sum(len(item) for item in found if isinstance(item, RecordBatch))
+    assert whole - 3 * (2 + count // 30) <= rows < whole
+
+
 def test_frames_of_others_are_told_apart(tmp_path: Path) -> None:
     log, other, path = telemetry(), Telemetry(system=255), tmp_path / "a.tlog"
     other.add("heartbeat", 6, 8, 128, 0, 4, 3, time_us=START_US)

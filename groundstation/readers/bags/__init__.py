@@ -4,16 +4,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from groundstation.base.records import Item
-from groundstation.readers.bags.bag import kind_of
+from groundstation.readers.bags.bag import is_begun, kind_of
 from groundstation.readers.source import Claim, Source
 
 NAME = "bag"
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim a file by its first bytes, and the metadata of a bag of ROS 2."""
+    """Claim a file by its first bytes, the metadata of a bag of ROS 2, and what has lost them but holds a chunk."""
     kind = kind_of(source)
-    return Claim(NAME, kind) if kind else None
+    return Claim(NAME, kind, confidence=1.0 if is_begun(source) else 0.7) if kind else None
 
 
 def claim_by(source: Source, profile: Path) -> Claim:

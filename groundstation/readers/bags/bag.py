@@ -11,7 +11,7 @@ from groundstation.readers.bags.mcap import MAGIC as MCAP_MAGIC
 from groundstation.readers.bags.mcap import Mcap
 from groundstation.readers.bags.messages import Block, Connection, Part
 from groundstation.readers.bags.ros1 import MAGIC as ROS1_MAGIC
-from groundstation.readers.bags.ros1 import Ros1Bag
+from groundstation.readers.bags.ros1 import Ros1Bag, has_chunk
 from groundstation.readers.bags.sqlite import MAGIC as SQLITE_MAGIC
 from groundstation.readers.bags.sqlite import Ros2Sqlite
 from groundstation.readers.source import Source
@@ -35,7 +35,14 @@ def kind_of(source: Source) -> str:
     if source.head.startswith(SQLITE_MAGIC):
         return "ROS 2" if all(table in source.head for table in _TABLES) else ""
     kind = next((name for magic, (name, _container) in _CONTAINERS.items() if source.head.startswith(magic)), "")
+    if not kind and has_chunk(source.head):
+        return "ROS 1"
     return "" if kind == "MCAP" and _is_ours(source) else kind
+
+
+def is_begun(source: Source) -> bool:
+    """Whether a file has the first bytes of a bag, or is the metadata of one."""
+    return source.head.lstrip().startswith(METADATA_MARK) or source.head.startswith(tuple(_CONTAINERS))
 
 
 def _is_ours(source: Source) -> bool:
@@ -138,4 +145,7 @@ def _parts(file: Source) -> Iterator[Part]:
         if file.head.startswith(magic):
             yield from container(file)
             return
+    if has_chunk(file.head):
+        yield from Ros1Bag(file)
+        return
     yield Damage("corrupt", file.name, 1, "file of the bag that is none")

@@ -11,6 +11,7 @@ import re
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import BinaryIO, NamedTuple
 
 import lz4.frame
@@ -28,6 +29,8 @@ MESSAGE, HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
 MAX_HEADER_BYTES = 1 << 20
 MAX_CHUNK_BYTES = 256 << 20  # decompressed; recorders close a chunk at 768 kB
 SEARCH_BYTES = 1 << 20
+BEYOND_BYTES = 4096  # room for a header that begins within a record and ends behind it
+LOOKED_AT, MOST_TRIED = 1 << 16, 200  # bytes of a file without the first ones of a bag, and headers in them
 # Every record's header has the field "op" of one byte: 4 bytes of length, "op=", the number.
 _OP = re.compile(rb"\x04\0\0\0op=[\x02-\x07]")
 _OP_OUTSIDE = re.compile(rb"\x04\0\0\0op=[\x04-\x06]")  # of records that stand in no chunk
@@ -83,6 +86,23 @@ def _head_at(data: bytes, at: int, size: int) -> _Head | None:
     return _Head(op, fields, data_at, data_at + int.from_bytes(data[data_at - 4 : data_at], "little"))
 
 
+def _heads_in(block: bytes, ops: re.Pattern[bytes]) -> Iterator[tuple[int, _Head]]:
+    """Headers of records in some bytes, told by their operation, with where each begins."""
+    for match in ops.finditer(block):
+        # The fields of a header have no order: it begins at one of the lengths before.
+        for back in range(4, min(match.start(), 512) + 1):
+            head = _head_at(block, match.start() - back, len(block))
+            if head is not None and match.end() <= head.data_at - 4:
+                yield match.start() - back, head
+                break
+
+
+def has_chunk(head: bytes) -> bool:
+    """Whether a chunk of a bag begins in the first bytes of a file, whatever stands before it."""
+    heads = islice(_heads_in(head[:LOOKED_AT], _OP_OUTSIDE), MOST_TRIED)
+    return any(one.op == CHUNK and {b"compression", b"size"} <= one.fields.keys() for _, one in heads)
+
+
 @dataclass
 class _Gathered:
     """Messages of one connection in a chunk."""
@@ -120,7 +140,7 @@ class Ros1Bag:
             yield Damage("dropped_channel", "the whole log", self._unknown, what)
 
     def _records(self, stream: BinaryIO, size: int) -> Iterator[Part]:
-        at = len(MAGIC)
+        at = len(MAGIC) if self._source.head.startswith(MAGIC) else 0
         while at < size:
             head = self._read_head(stream, at, size)
             if head is None:
@@ -138,12 +158,23 @@ class Ros1Bag:
                     self._skipped.add(at, place, self._count)
                 at = place
                 continue
+            if not is_cut and (place := self._record_inside(stream, head, size)):
+                self._skipped.add(at, place, self._count)  # bytes are missing in it, and its length leads too far
+                at = place
+                continue
             if head.op == CHUNK:
                 stream.seek(head.data_at)
                 yield from self._chunk(head, stream.read(min(head.end, size) - head.data_at), at, is_cut)
             elif head.op in (MESSAGE, CONNECTION):
                 yield from self._messages(_read(stream, at, head.end - at), bytes_place(at, head.end))
             at = head.end if not is_cut else size
+
+    def _record_inside(self, stream: BinaryIO, head: _Head, size: int) -> int:
+        """Where the next record begins within one behind which none does; 0 for a record that ends where it says."""
+        if head.end >= size or self._read_head(stream, head.end, size) is not None:
+            return 0
+        place = self._next_record(stream, head.data_at, min(size, head.end + BEYOND_BYTES), _OP_OUTSIDE)
+        return place if place < head.end else 0
 
     def _read_head(self, stream: BinaryIO, at: int, size: int) -> _Head | None:
         data = _read(stream, at, 4096)
@@ -157,14 +188,10 @@ class Ros1Bag:
         """Where a record begins from ``start`` on, told by its operation; ``size`` when none does."""
         at = start
         while at < size:
-            block = _read(stream, at, SEARCH_BYTES + 64)
-            for match in ops.finditer(block):
-                # The fields of a header have no order: it begins at one of the lengths before.
-                for back in range(4, min(match.start(), 512) + 1):
-                    begin = match.start() - back
-                    head = _head_at(block, begin, size)
-                    if head is not None and at + head.data_at <= size and match.end() <= head.data_at - 4:
-                        return at + begin
+            block = _read(stream, at, min(SEARCH_BYTES, size - at) + 64)
+            for begin, head in _heads_in(block, ops):
+                if at + head.data_at <= size:
+                    return at + begin
             if len(block) <= SEARCH_BYTES:
                 return size
             at += SEARCH_BYTES

@@ -1,6 +1,8 @@
 """MAVLink telemetry as ground stations record it (.tlog): frames, each behind the time of receipt."""
 
+import re
 from collections.abc import Iterator
+from itertools import islice
 
 from groundstation.base.records import Item
 from groundstation.readers.source import Claim, Source
@@ -9,19 +11,30 @@ NAME = "tlog"
 _STX = {0xFE: (6, 8), 0xFD: (10, 12)}  # first byte of a frame -> bytes before the payload, and without it
 _FIRST_US, _LAST_US = 946_684_800_000_000, 4_102_444_800_000_000  # 2000 and 2100
 _FRAMES = 3  # in a row are looked at
+_START = re.compile(rb"\0(?=[\x03-\x0e].{6}[\xfd\xfe])", re.DOTALL)  # a time of this century before a frame
+_LOOKED_AT, _MOST_TRIED = 1 << 16, 200
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim a file that begins with times of this century, each before a frame."""
-    head, at, found = source.head, 0, 0
+    """Claim a file of times of this century, each before a frame: at its beginning, or in its first 64 KiB."""
+    if _frames_at(source.head, 0):
+        return Claim(NAME)
+    begins = islice(_START.finditer(source.head[:_LOOKED_AT]), _MOST_TRIED)
+    is_one = any(_frames_at(source.head, one.start()) == _FRAMES for one in begins)
+    return Claim(NAME, confidence=0.7) if is_one else None
+
+
+def _frames_at(head: bytes, at: int) -> int:
+    """How many frames stand one behind the other from there on, up to three; 0 where something else is among them."""
+    found = 0
     while found < _FRAMES and at + 10 <= len(head):
         sizes = _STX.get(head[at + 8])
         if sizes is None or not _FIRST_US <= int.from_bytes(head[at : at + 8], "big") < _LAST_US:
-            return None
+            return 0
         is_signed = head[at + 8] == 0xFD and len(head) > at + 10 and head[at + 10] & 1
         at += 8 + sizes[1] + head[at + 9] + (13 if is_signed else 0)
         found += 1
-    return Claim(NAME) if found else None
+    return found
 
 
 def read(source: Source) -> Iterator[Item]:
