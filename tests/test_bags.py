@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
+from rosbags.rosbag1 import Writer as Ros1Writer
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.records import Damage, RecordBatch, Remark
@@ -359,6 +360,23 @@ def test_a_damaged_record_costs_little_of_the_rest(tmp_path: Path, form: str) ->
     path.write_bytes(data[:at] + bytes(b ^ 0x5A for b in data[at : at + 600]) + data[at + 600 :])
     rows, damages = rows_of(path)
     assert damages and whole > rows > 0.9 * whole
+
+
+def test_several_nodes_may_publish_on_one_topic(tmp_path: Path) -> None:
+    """Each has a connection of its own in a bag of ROS 1; their messages interlace."""
+    made, path = small_flight(is_ros1=True), tmp_path / "a.bag"
+    rows = [(time_ns, message) for topic, time_ns, message in made.rows if topic == "/nav/imu"]
+    with Ros1Writer(path) as writer:
+        kind = rows[0][1].__msgtype__
+        nodes = [writer.add_connection("/nav/imu", kind, typestore=made.types, callerid=name) for name in ("/a", "/b")]
+        for at, (time_ns, message) in enumerate(rows):
+            writer.write(nodes[at % 2], time_ns, made.types.serialize_ros1(message, kind))
+    found = list(registry.read(path))
+    check(found)
+    (batch,) = [one for one in found if isinstance(one, RecordBatch) and one.topic == "raw.nav/imu"]
+    assert len(rows) > 20 and batch.record_index.tolist() == list(range(len(rows)))
+    assert batch.device_time_ns.values.tolist() == [time_ns for time_ns, _ in rows]
+    assert convert_log(open_log(path), tmp_path / "out.mcap").info.ledger.topics["raw.nav/imu"].rows == len(rows)
 
 
 @pytest.mark.parametrize(("first", "count"), [(3511, 23), (906, 2003), (2, 714), (0, 4000)])

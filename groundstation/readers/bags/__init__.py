@@ -13,7 +13,7 @@ NAME = "bag"
 def sniff(source: Source) -> Claim | None:
     """Claim a file by its first bytes, the metadata of a bag of ROS 2, and what has lost them but holds a chunk."""
     kind = kind_of(source)
-    return Claim(NAME, kind, confidence=1.0 if is_begun(source) else 0.7) if kind else None
+    return Claim(NAME, kind, confidence=1.0 if is_begun(source) else 0.5) if kind else None
 
 
 def claim_by(source: Source, profile: Path) -> Claim:

@@ -87,7 +87,9 @@ Part: TypeAlias = Block | Damage
 
 
 def joined(gathered: dict[int, list[Block]]) -> list[Block]:
-    """One block for each connection, in the order of their numbers; all share one buffer.
+    """One block for each connection, in the order of their numbers, its messages in that of the log.
+
+    All share one buffer. Several nodes may publish on one topic: then the blocks of a connection interlace.
 
     Parameters
     ----------
@@ -103,7 +105,7 @@ def joined(gathered: dict[int, list[Block]]) -> list[Block]:
         if len(buffers) == 1
         else np.concatenate([np.zeros(0, np.uint8), *buffers.values()])
     )
-    return [
+    united = (
         Block(
             several[0].connection,
             buffer,
@@ -114,4 +116,12 @@ def joined(gathered: dict[int, list[Block]]) -> list[Block]:
             np.concatenate([block.record_index for block in several]),
         )
         for _number, several in sorted(gathered.items())
+    )
+    return [
+        block if is_ascending(block.record_index) else block.take(np.argsort(block.record_index)) for block in united
     ]
+
+
+def is_ascending(values: Int64Array) -> bool:
+    """Whether each value is larger than the one before."""
+    return bool((values[1:] > values[:-1]).all())

@@ -21,7 +21,7 @@ def sniff(source: Source) -> Claim | None:
         return Claim(NAME)
     begins = islice(_START.finditer(source.head[:_LOOKED_AT]), _MOST_TRIED)
     is_one = any(_frames_at(source.head, one.start()) == _FRAMES for one in begins)
-    return Claim(NAME, confidence=0.7) if is_one else None
+    return Claim(NAME, confidence=0.6) if is_one else None
 
 
 def _frames_at(head: bytes, at: int) -> int:
