@@ -250,10 +250,11 @@ def test_a_topic_that_breaks_off_is_told_with_what_is_missing(end: int, told: in
     """Ten seconds, and a twentieth of the log, are allowed; 60 records are missing of one that stops at 40 of 100 s."""
     rows = np.arange(101)
     batches = [surveyed_topic("ins", rows), surveyed_topic("gnss", rows[: end + 1]), surveyed_topic("raw.x", rows[:20])]
+    batches.append(surveyed_topic("link.B", rows[:20]))  # another aircraft gets out of reach
     ledger = survey([LogHeader("t"), *batches]).ledger
     found = [finding for finding in ledger_findings(ledger) if finding.code == "data.breaks_off"]
     assert [(one.topic, one.count) for one in found if one.severity == "warn"] == ([("gnss", told)] if told else [])
-    assert [(one.topic, one.count) for one in found if one.severity == "info"] == [("raw.x", 81)]
+    assert [(one.topic, one.count) for one in found if one.severity == "info"] == [("link.B", 81), ("raw.x", 81)]
     assert ledger.loses_data is bool(told)  # exit code 3
 
 

@@ -1,11 +1,12 @@
 """Topics that end before the others do: records that their rate leads one to expect, and that no log holds."""
 
 from groundstation.base.records import Damage
-from groundstation.base.signals import is_canonical
+from groundstation.base.signals import is_canonical, kind_of
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.ledger import LedgerCounts
 
 BREAKS_OFF = "breaks_off"
+COME_AND_GO = ("link", "satellite")  # kinds of topics about others, who get out of reach: no loss
 
 
 def broken_off(ledger: LedgerCounts) -> tuple[Damage, ...]:
@@ -14,8 +15,8 @@ def broken_off(ledger: LedgerCounts) -> tuple[Damage, ...]:
     Returns
     -------
     tuple of Damage
-        One a topic, with the records missing by its rate. Only canonical topics lose data: nothing is estimated from
-        raw ones.
+        One a topic, with the records missing by its rate. Only canonical topics lose data, as nothing is estimated from
+        raw ones, and of those none of a kind that comes and goes.
     """
     limits, end_ns = ledger.thresholds.gaps, ledger.end_ns
     allowed_s = max(limits.end_s, limits.end_share * (end_ns - ledger.start_ns) / NS_PER_S)
@@ -27,5 +28,6 @@ def broken_off(ledger: LedgerCounts) -> tuple[Damage, ...]:
         rows = round(missing_s * topic.nominal_rate_hz)
         what = f"{topic.topic} ends {missing_s:.1f} s before the log does, records missing by its rate"
         place = f"after {ledger.clock.text(topic.last_ns)}"
-        found.append(Damage(BREAKS_OFF, place, rows, what, topic.topic, is_canonical(topic.topic)))
+        is_loss = is_canonical(topic.topic) and kind_of(topic.topic) not in COME_AND_GO
+        found.append(Damage(BREAKS_OFF, place, rows, what, topic.topic, is_loss))
     return tuple(found)
