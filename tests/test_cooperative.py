@@ -71,14 +71,14 @@ def test_transition_against_the_matrix_exponential(interpreted: None) -> None:
 def test_global_transition_is_that_of_the_error_propagation_of_the_simulation(request: pytest.FixtureRequest) -> None:
     """Two independent writings of the same physics: the simulation's Runge-Kutta and the filter's matrices."""
     errors = replace(GLOBAL.errors, gyro_s=1e12, clock_s=1e12, baro_s=1e12)
-    scenario = replace(GLOBAL, errors=errors, duration_s=600.0)
+    scenario = replace(GLOBAL, errors=errors, duration_s=240.0)
     simulated = simulate_session(scenario, 3)
     exact = simulate_session(scenario, 3, scale=0.0)  # dead reckoning without errors: the matrices along the truth
     settings = believed(scenario)
     request.getfixturevalue("interpreted")  # from here on: the simulation's loops are compiled for other tests too
-    for track, truth in zip(exact.session.vehicles, simulated.truth, strict=True):
+    for track, truth in list(zip(exact.session.vehicles, simulated.truth, strict=True))[:2]:
         assert isinstance(track, DeadReckoning)
-        end = aircraft_of(track, "ecef", settings).step(truth.states[0], 0.0, 600.0)[0]
+        end = aircraft_of(track, "ecef", settings).step(truth.states[0], 0.0, 240.0)[0]
         grown = truth.states[-1] - truth.states[0]
         assert end[:2] == pytest.approx(truth.states[-1, :2], abs=2e-3 * float(np.abs(grown[:2]).max()))
         assert end[2:4] == pytest.approx(truth.states[-1, 2:4], abs=2e-3 * float(np.abs(grown[2:4]).max()))

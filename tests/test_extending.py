@@ -83,9 +83,9 @@ def patched(module: str, difference: str) -> str:
 
 
 def copy_of_the_package(folder: Path) -> None:
-    """With the loops that are compiled already, but nothing that another process may be writing just now."""
+    """With what is compiled already, but nothing that another process may be writing just now."""
     for part in ("groundstation", "schemas"):
-        shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("*.pyc*", "*.tmp.*"))
+        shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("*.pyc.*", "*.tmp.*"))
 
 
 def rotor(folder: Path) -> None:

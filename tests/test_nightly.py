@@ -102,7 +102,8 @@ def run_all(source: str, out: str, cluster: str, timeout_s: float = math.inf) ->
     return {Path(one.source).name: one for one in outcomes}
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(300, marks=pytest.mark.slow)])
+@pytest.mark.slow  # with two logs too, as it has to wait for one that hangs
+@pytest.mark.parametrize("count", [2, 300])
 def test_a_night_over_a_bucket(bucket: str, cluster: str, hostile: Path, tmp_path: Path, count: int) -> None:
     kinds = make_logs(tmp_path / "logs", count)
     source, out = f"{bucket}/logs", f"{bucket}/out"
