@@ -5,12 +5,13 @@ import os
 import socket
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from PIL import Image
 from rerun.experimental import View, ViewerClient
 
@@ -18,6 +19,9 @@ from groundstation.viewer.launch import viewer_command
 
 PATIENCE_S = 30.0
 WINDOW, SMALL = "1280x800", 400  # pixels; a small picture is enough to see whether anything moves
+ALL_OR_SOME = pytest.mark.parametrize(
+    "is_every", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["one of a kind", "every view"]
+)
 SATURATED = 25  # difference of the highest and the lowest colour channel: series and states are colourful, axes are not
 
 
@@ -126,6 +130,11 @@ def settled(client: ViewerClient, view_id: str | None = None, max_size: int | No
             return now
         last = now
     raise TimeoutError("the picture did not come to rest")
+
+
+def chosen(views: Sequence[View], is_every: bool) -> list[View]:
+    """Views of a page to take pictures of: every one, or of each class the first."""
+    return list(views) if is_every else list({view.view_class: view for view in reversed(views)}.values())
 
 
 def pages(client: ViewerClient, at_rest: bool = True) -> Iterator[tuple[str, list[View]]]:
