@@ -20,15 +20,17 @@ $(BIN)/python:
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "Python has no venv module: install it (Debian: apt-get install python3-venv)"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 
+# uv installs in a third of pip's time. It does not read pip's settings: pip does it where these name an index of their
+# own, and where uv fails.
+INSTALL = { ! $(BIN)/python -m pip config list | grep -q '\.index-url=' && $(PIP) 'uv>=0.9,<1' && \
+	$(BIN)/uv pip install --quiet --python $(BIN)/python -e '$(1)'; } || $(PIP) -e '$(1)'
+
 $(RUNTIME): pyproject.toml | $(BIN)/python
-	$(PIP) -e .
+	@$(call INSTALL,.)
 	@touch $@
 
-# uv installs what the tests need in a fifth of pip's time. It does not read pip's settings: pip does it where these name
-# an index of their own, and where uv fails.
 $(DEV): pyproject.toml | $(BIN)/python
-	@{ ! $(BIN)/python -m pip config list | grep -q '\.index-url=' && $(PIP) 'uv>=0.9,<1' && \
-		$(BIN)/uv pip install --quiet --python $(BIN)/python -e '.[dev]'; } || $(PIP) -e '.[dev]'
+	@$(call INSTALL,.[dev])
 	@touch $@ $(RUNTIME)
 
 demo: $(RUNTIME) ## run the main job on sample_logs/ into demo_results/

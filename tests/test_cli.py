@@ -120,7 +120,7 @@ def test_settings_beside_logs_are_no_logs_and_what_is_skipped_is_told_by_reason(
     for name in ("a.txt", "b.txt", "stations.toml", "settings.toml"):
         (logs / name).write_text("notes", encoding="utf-8")
     (logs / "alt.csv").write_text("time_s,baro.pressure_altitude_m\n0,1\n1,1\n2,1\n", encoding="utf-8")
-    arguments = ("run", str(logs), "-o", str(tmp_path / "out"), "--no-pdf")
+    arguments = ("run", str(logs), "-o", str(tmp_path / "out"), "--no-pdf", "-j", "1")
     _, planned, err = groundstation(*arguments, "--dry-run")
     assert planned == "alt.csv  to run\n" and "skipped 2 files" in err and "toml" not in err
     assert not (tmp_path / "out").exists()

@@ -388,6 +388,7 @@ def test_shuffling_the_aircraft_shuffles_the_answer() -> None:
             assert two == pytest.approx(one, abs=1e-4), name
 
 
+@pytest.mark.slow
 def test_dropping_a_third_of_the_ranges_leaves_the_filter_honest() -> None:
     thinned = replace(LOCAL, link=replace(LOCAL.link, lost_share=1.0 / 3.0))
     whole, fewer = (len(simulate_session(one, 1).session.ranges) for one in (LOCAL, thinned))

@@ -39,6 +39,13 @@ class Scratch:
     def groundstation(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         return groundstation(self.folder, *arguments)
 
+    def python(self, program: str) -> str:
+        """What a program prints that imports the copy."""
+        command = [sys.executable, "-c", program]
+        run = subprocess.run(command, cwd=self.folder, capture_output=True, text=True, check=False, timeout=LONGEST_S)
+        assert run.returncode == 0, run.stderr
+        return run.stdout
+
 
 def groundstation(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """The command of the package that lies in a folder."""
@@ -219,24 +226,18 @@ def test_records_of_a_reader_are_those_of_the_log(scratch: Scratch) -> None:
     converted = groundstation(scratch.folder, "convert", "whole.rotor", "-o", "whole.mcap")
     assert converted.returncode == 0, converted.stderr
     program = "import groundstation as g; t = g.open('whole.mcap').tables['rotor']; print(*t.values('speed_hz')[:3])"
-    shown = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=scratch.folder,
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=LONGEST_S,
-    )
-    assert shown.stdout.split() == [str(300.0 / 60.0), str(301.0 / 60.0), str(302.0 / 60.0)]
+    assert scratch.python(program).split() == [str(300.0 / 60.0), str(301.0 / 60.0), str(302.0 / 60.0)]
 
 
 def test_a_tab_of_its_own_takes_the_place_of_the_generic_one(scratch: Scratch) -> None:
     generic = Contents(next(scratch.flight.glob("*.rrd"))).text("/gnss_noise/answer")
     carry_out("A tab", scratch.folder)  # the last test: the copy has another tab from here on
-    (mcap,) = scratch.flight.glob("*.mcap")
-    run = scratch.groundstation("run", str(mcap), "-o", "own", "--no-pdf", "-j", "1", "--config", "c.toml")
-    assert run.returncode == 0, run.stderr
-    contents = Contents(next((scratch.folder / "own").glob("*/*.rrd")))
+    scratch.python(
+        "from pathlib import Path; import groundstation; from groundstation.viewer.recording import write_recording;"
+        f"flight = groundstation.open({str(scratch.flight)!r});"
+        "write_recording(Path('own.rrd'), flight.flight, flight.results)"
+    )
+    contents = Contents(scratch.folder / "own.rrd")
     assert contents.text("/gnss_noise/answer") == generic
     speed_mps = contents.scalars("/gnss_noise/speed")[1]
     assert speed_mps.size and np.isfinite(speed_mps).all()

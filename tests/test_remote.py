@@ -85,8 +85,9 @@ def test_a_run_elsewhere_gives_what_a_run_here_gives(
 
 
 def test_what_is_finished_elsewhere_is_not_done_again(
-    memory: str, finished_run: Callable[..., Outcome], tmp_path: Path
+    memory: str, finished_run: Callable[..., Outcome], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    leave_blank(monkeypatch)
     out, source = f"{memory}out", f"{memory}logs"
     RemoteFolder(source).write(SHORT.name, SHORT.read_bytes())
     told: list[str] = []
@@ -94,15 +95,14 @@ def test_what_is_finished_elsewhere_is_not_done_again(
     def listen(event: Event) -> None:
         told.append(event.text if event.kind == "stage" else "")
 
-    with sketching():
-        run_many([source], out, Configuration(), jobs=1, with_pdf=False)
-        (again,) = run_many([source], out, Configuration(), jobs=1, with_pdf=False, listen=listen)
+    run_many([source], out, Configuration(), jobs=1, with_pdf=False)
+    (again,) = run_many([source], out, Configuration(), jobs=1, with_pdf=False, listen=listen)
     assert again.state == "done" and set(told) == {""}
     run_many([source], out, SETTINGS, jobs=1, listen=listen)
     assert "estimating" in told and "converting" not in told
     copy = fetched(out, tmp_path / "copy")
     (copy / ".lock").touch()
-    assert_equal_runs(copy, Path(finished_run(SHORT.stem, SETTINGS).folder).parent)
+    assert_equal_runs(copy, Path(finished_run(SHORT.stem, SETTINGS, is_blank=True).folder).parent)
 
 
 def test_a_flight_elsewhere_loses_its_pdf_and_keeps_what_somebody_put_there(
@@ -339,6 +339,7 @@ def test_a_scheduler_that_goes_away_is_told_in_one_line(tmp_path: Path, caplog: 
         worker.kill()
 
 
-def test_a_scheduler_that_does_not_answer_is_told(tmp_path: Path) -> None:
+def test_a_scheduler_that_does_not_answer_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("groundstation.pipeline.many_flights.cluster.CONNECT_S", 1.0)
     with pytest.raises(UsageError, match="no scheduler answers"):
         run_many([SHORT], tmp_path / "out", Configuration(), scheduler="tcp://127.0.0.1:1")

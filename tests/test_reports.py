@@ -224,6 +224,7 @@ def test_nothing_from_a_log_becomes_markup(tmp_path: Path) -> None:
     assert re.search(r'bottom-left \{ content: "[A-Za-z0-9_-]*"; \} \}\s*$', style) and "<" not in style[7:]
 
 
+@pytest.mark.slow  # test_run.py tells it of a sample log
 def test_equal_input_gives_equal_bytes_in_any_process(tmp_path: Path) -> None:
     save(tmp_path, example(heading_result()), MANIFEST)
     files = write_flight_report(tmp_path).paths

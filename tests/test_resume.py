@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import wait
 from pathlib import Path
 
@@ -28,7 +28,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
-from groundstation.reports.drawing import sketching
+from tests.blank_figures import blank_figures
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 SHORT = SAMPLES / "taxi-short.csv"
@@ -53,7 +53,14 @@ def assert_equal_runs(one: Path, other: Path) -> None:
 @pytest.fixture(scope="module")
 def finished(finished_run: Callable[..., Outcome]) -> Path:
     """OUT of a run of the short sample: shared, to be copied."""
-    return Path(finished_run(SHORT.stem).folder).parent
+    return Path(finished_run(SHORT.stem, is_blank=True).folder).parent
+
+
+@pytest.fixture(autouse=True)
+def no_figures() -> Iterator[None]:
+    """Nothing is asked of figures here: they are blank in every run that is compared."""
+    with blank_figures():
+        yield
 
 
 def copied(finished: Path, target: Path) -> Path:
@@ -92,7 +99,7 @@ def test_what_is_finished_is_not_done_again(
     assert (planned.text, told) == ("finished, nothing to do", set())
     assert times(flight_in(out)) == before
     assert_equal_runs(out, finished)
-    first = finished_run(SHORT.stem)
+    first = finished_run(SHORT.stem, is_blank=True)
     assert (outcome.text, outcome.state, outcome.flight_id) == (first.text, first.state, first.flight_id)
 
 
@@ -107,13 +114,13 @@ def test_a_changed_setting_keeps_the_mcap_and_gives_what_a_new_run_gives(
     assert planned.text.startswith("to analyse again")
     assert "converting" not in told and {"estimating", "recording", "reporting"} <= told
     assert mcap.stat().st_ino == before
-    assert_equal_runs(out, Path(finished_run(SHORT.stem, SETTINGS).folder).parent)
+    assert_equal_runs(out, Path(finished_run(SHORT.stem, SETTINGS, is_blank=True).folder).parent)
     assert plan_many([SHORT], out, SETTINGS)[0].text == "finished, nothing to do"
 
 
 def test_results_alone_are_those_of_a_whole_run_which_makes_the_rest_later(finished: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    command = ["run", str(SHORT), "-o", str(out), "--only", "results", "-q"]
+    command = ["run", str(SHORT), "-o", str(out), "--only", "results", "-q", "-j", "1"]
     assert CliRunner().invoke(app, command).exit_code == 0
     made, whole = promised_files(out), promised_files(finished)
     assert {path.suffix for path in out.rglob("*.*")}.isdisjoint({".rrd", ".html", ".pdf"})
@@ -146,8 +153,7 @@ def test_a_limit_of_the_ledger_redoes_everything(finished: Path) -> None:
 
 def test_the_pdf_alone_is_made_again(finished: Path, tmp_path: Path) -> None:
     out = copied(finished, tmp_path / "out")
-    with sketching():
-        _outcome, told = stages([SHORT], out, Configuration(), with_pdf=False)
+    _outcome, told = stages([SHORT], out, Configuration(), with_pdf=False)
     assert told == {"reporting"} and not (flight_in(out) / "report.pdf").exists()
     _outcome, told = stages([SHORT], out, Configuration())
     assert told == {"reporting"}
@@ -295,7 +301,23 @@ def test_two_runs_do_not_write_into_one_folder(finished: Path) -> None:
         run_many([SHORT], finished, Configuration())
 
 
+def die_or_run(job: Job, listen: Listener) -> Outcome:
+    """What a worker of the next test does: the log named "killer" ends its process, another one takes a moment."""
+    if job.name == "killer":
+        os.kill(os.getpid(), signal.SIGKILL)
+    time.sleep(0.3)
+    return Outcome(job.log, "done", "")
+
+
 def test_a_process_that_dies_takes_its_own_log_alone(tmp_path: Path) -> None:
+    jobs = [Job(Path(name), tmp_path, Configuration()) for name in ("a", "killer", "b", "c")]
+    ended = dict(side_by_side(enumerate(jobs), die_or_run, workers=2, listen=silent))
+    assert [ended[number].state for number in range(4)] == ["done", "failed", "done", "done"]
+    assert ended[1].text == "killer: its process died (killed, or out of memory)" and ended[1].code == 1
+
+
+@pytest.mark.slow
+def test_a_run_goes_on_when_a_process_is_killed(tmp_path: Path) -> None:
     logs = tmp_path / "logs"
     logs.mkdir()
     for number, name in enumerate(("a", "killer", "z")):

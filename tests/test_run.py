@@ -170,6 +170,7 @@ def mutated(data: bytes, rng: np.random.Generator) -> bytes:
     return bytes(changed)
 
 
+@pytest.mark.usefixtures("unpainted")
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_damaged_log_ends_in_one_line_or_in_results(tmp_path: Path, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -180,6 +181,7 @@ def test_a_damaged_log_ends_in_one_line_or_in_results(tmp_path: Path, seed: int)
     assert "internal error" not in outcome.text and "\n" not in outcome.text
 
 
+@pytest.mark.usefixtures("unpainted")
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_damaged_mcap_ends_in_one_line_or_in_results(good: Outcome, tmp_path: Path, seed: int) -> None:
     rng = np.random.default_rng(100 + seed)

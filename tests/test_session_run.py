@@ -237,6 +237,7 @@ def called(*arguments: str | Path) -> int:
     return int(ended.value.code or 0)
 
 
+@pytest.mark.slow
 def test_any_number_of_processes_gives_equal_bytes(
     out: Path, logs: Path, configuration: Configuration, tmp_path: Path
 ) -> None:

@@ -65,6 +65,7 @@ def test_the_fixed_point_is_where_it_is_asked_for() -> None:
         assert abs(moved.north_m + 4000.0) <= MOVED_M
 
 
+@pytest.mark.slow
 def test_the_published_distance_belongs_to_its_fixed_point_alone() -> None:
     wanted = {name: plan for name, plan in placements().items() if name.startswith(("0 m", "200 m", "430 m before"))}
     table = placement_table(wanted, lambda _text: None)

@@ -81,6 +81,7 @@ def test_trials_are_flown_in_processes_and_told_with_their_limits() -> None:
     assert answer.at(TOUCHDOWN).height_m < 2.0
 
 
+@pytest.mark.slow
 def test_drawn_bearings_err_as_the_formulas_say_and_refute_category_two_laterally() -> None:
     table = bearing_table(1500, 5)
     near = (table["before_threshold_m"] <= 2000.0) & (table["bearing_sigma_deg"] == 1.0)

@@ -266,6 +266,7 @@ def test_words_of_the_claim_follow_the_table(claimed: tuple[RunOutcome, ...]) ->
     assert "not as its square" in limit_text(steep)
 
 
+@pytest.mark.slow
 def test_study_has_its_tables_and_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each kind of incomplete figure is flown by a test of its own, and two points are a sweep, too."""
     incomplete = dict(list(INCOMPLETE.items())[:2])

@@ -119,6 +119,7 @@ def test_every_study_that_is_listed_can_be_called(tmp_path: Path) -> None:
         assert (code, "a file that exists" in told) == (2, True)
 
 
+@pytest.mark.slow
 def test_study_writes_page_and_tables(tmp_path: Path) -> None:
     code, text, _ = groundstation("study", "heading", "-o", str(tmp_path), "--runs", "10")
     assert code == 0
