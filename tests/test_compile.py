@@ -48,6 +48,12 @@ def sign(value: int) -> float:
     return 1.0 if value > 0 else -1.0
 
 
+@in_place
+def beyond(shape_of: np.ndarray, row: int) -> int:
+    """Rows of a table behind one; its values are not looked at."""
+    return shape_of.shape[0] - row - 1
+
+
 @scanner
 def count_of(data: np.ndarray, wanted: int, weights: np.ndarray) -> int:
     """Weighted number of bytes of a value; ``weights`` are used up."""
@@ -91,7 +97,7 @@ def mean(values: np.ndarray) -> float:
 def kept_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of compiled code of its own, and loops that have found nothing yet."""
     monkeypatch.setattr(compiling, "_cache_folder", lambda: tmp_path)
-    for loop in (total, is_above, inside, sign, count_of):
+    for loop in (total, is_above, inside, sign, beyond, count_of):
         monkeypatch.setattr(loop, "_linked", {})
         monkeypatch.setattr(loop, "_is_missing", {})
     return tmp_path
@@ -180,6 +186,14 @@ def test_an_array_that_is_only_read_may_be_read_only_and_one_that_is_written_may
     highs = np.full(4, 9.0)
     highs.flags.writeable = False
     assert inside(highs - 1.0, Limits(2.0, highs, (1,))) == 4
+
+
+def test_an_array_that_is_not_even_read_may_be_read_only(kept_here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    table = np.ones((4, 2))
+    table.flags.writeable = False
+    assert beyond(table, 1) == 2
+    (linked,) = beyond._linked.values()
+    assert not linked.would_write((table, 1))
 
 
 def test_a_loop_is_pickled_by_its_name(kept_here: Path) -> None:

@@ -23,11 +23,12 @@ INTEGER, NUMBER = "integer", "number"
 _DTYPES = ["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64", "bool"]
 ARRAY_DTYPES = {np.dtype(name): name for name in _DTYPES}  # in the byte order of this machine
 ENTRY, SUFFIX = "groundstation_entry", ".machine_code"
-LAYOUT = 2  # of what is kept
+LAYOUT = 3  # of what is kept
 OWN_ARGUMENTS = 3  # of an entry, before those of its loop: numba's answer and error, and where the result goes
 _RESULTS: dict[Any, type] = {int: ctypes.c_int64, bool: ctypes.c_int64, float: ctypes.c_double, None: ctypes.c_int64}
 _NO_BYTES = ctypes.c_char * 0
 _NUMBERS = count()  # every library has a name of its own
+_NOT_WRITTEN = {b"readonly", b"readnone"}  # what LLVM says of an array that is only read, or not touched at all
 _HARMLESS = frozenset(("memset", "memcpy", "memmove", "memcmp", "sqrt", "sin", "cos", "exp", "log", "pow", "atan2"))
 
 
@@ -222,12 +223,12 @@ def object_file(module: Any, entry: str, forms: Sequence[Form]) -> bytes | None:
 
 
 def _written(module: Any, forms: Sequence[Form]) -> bytes:
-    """Which arrays LLVM could not prove to be only read, in the order of :func:`plain_forms`."""
+    """Which arrays LLVM could not prove to be left as they are, in the order of :func:`plain_forms`."""
     arguments = list(module.get_function(ENTRY).arguments)[OWN_ARGUMENTS:]
     may_write = []
     for form in plain_forms(forms):
         dimensions = 0 if isinstance(form, str) else form[1]
-        may_write.append(dimensions > 0 and b"readonly" not in arguments[0].attributes)
+        may_write.append(dimensions > 0 and _NOT_WRITTEN.isdisjoint(arguments[0].attributes))
         arguments = arguments[1 + dimensions :]
     return bytes(may_write)
 
