@@ -33,7 +33,7 @@ class Rates:
             total |= power
         total[~own.any(axis=1)] = False
         rows, columns = np.nonzero(total)
-        return frozen(rows), frozen(columns)
+        return frozen(np.ascontiguousarray(rows)), frozen(np.ascontiguousarray(columns))
 
     def transition(self, values: FloatArray, seconds: FloatArray, density: FloatArray) -> Transition:
         """Transition over each of k steps; a white noise enters half before and half after it (trapezoidal rule).
@@ -58,7 +58,8 @@ class Rates:
         rows, columns = self.reach()
         entries = np.empty((len(seconds), len(rows)))
         given, over = (frozen(np.ascontiguousarray(part, dtype=np.float64)) for part in (values, seconds))
-        series.exponentials(self.size, self.rows, self.columns, given, over, rows, columns, entries)
+        scratch = np.empty((2, self.size, self.size))
+        series.exponentials(self.size, self.rows, self.columns, given, over, rows, columns, scratch, entries)
         noise, diagonal = 0.5 * np.outer(seconds, density), np.arange(self.size)
         return Transition.sparse(self.size, rows, columns, entries, diagonal, diagonal, noise, noise)
 
@@ -74,6 +75,6 @@ class Rates:
         from groundstation.estimators.kalman import series
 
         out, x = np.empty((len(values) // every, self.size)), np.array(start, dtype=np.float64)
-        entries = frozen(np.ascontiguousarray(values))
-        series.carry_by_rates(self.rows, self.columns, entries, float(step_s), every, x, out)
+        entries, scratch = frozen(np.ascontiguousarray(values)), np.empty((2, self.size))
+        series.carry_by_rates(self.rows, self.columns, entries, float(step_s), every, x, scratch, out)
         return out

@@ -6,16 +6,14 @@ Source: C. Moler, C. Van Loan, Nineteen dubious ways to compute the exponential 
 method 1: good for small steps and nothing else.
 """
 
-import numpy as np
-
-from groundstation.base.compile import compiled
+from groundstation.base.compile import in_place
 from groundstation.base.records import Int64Array
 from groundstation.estimators.kalman.arrays import FloatArray
 
 ORDER = 4
 
 
-@compiled
+@in_place
 def exponentials(
     size: int,
     rows: Int64Array,
@@ -24,6 +22,7 @@ def exponentials(
     seconds: FloatArray,
     at_rows: Int64Array,
     at_columns: Int64Array,
+    scratch: FloatArray,
     out: FloatArray,
 ) -> None:
     """Fill ``out`` (k, e) with the entries of exp(A t) at ``at_rows``, ``at_columns`` (e,), for each of k matrices A.
@@ -34,8 +33,10 @@ def exponentials(
         Where A has entries.
     rates : ndarray, shape (k, m)
     seconds : ndarray, shape (k,)
+    scratch : ndarray, shape (2, size, size)
+        Overwritten.
     """
-    E, B = np.zeros((size, size)), np.zeros((size, size))
+    E, B = scratch[0], scratch[1]
     for k in range(len(seconds)):
         for i in range(size):
             for j in range(size):
@@ -58,9 +59,16 @@ def exponentials(
             out[k, e] = E[at_rows[e], at_columns[e]]
 
 
-@compiled
+@in_place
 def carry_by_rates(
-    rows: Int64Array, columns: Int64Array, rates: FloatArray, step_s: float, every: int, x: FloatArray, out: FloatArray
+    rows: Int64Array,
+    columns: Int64Array,
+    rates: FloatArray,
+    step_s: float,
+    every: int,
+    x: FloatArray,
+    scratch: FloatArray,
+    out: FloatArray,
 ) -> None:
     """Carry a state forward in equal steps, each with rates of its own, without forming a matrix.
 
@@ -72,11 +80,13 @@ def carry_by_rates(
         Steps between two leads.
     x : ndarray, shape (n,)
         Changed in place.
+    scratch : ndarray, shape (2, n)
+        Overwritten.
     out : ndarray, shape (leads, n)
         Filled: the state after every ``every`` steps.
     """
     n = len(x)
-    term, new = np.zeros(n), np.zeros(n)
+    term, new = scratch[0], scratch[1]
     for lead in range(out.shape[0]):
         for part in range(every):
             k = lead * every + part
