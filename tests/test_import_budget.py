@@ -22,7 +22,8 @@ NOT_NEEDED = (  # to look at a log, check or convert it
 BY_VERB = """
 import os, sys
 from groundstation.cli.main import main
-try: main({arguments!r})
+sys.argv[1:] = {arguments!r}
+try: main()
 except SystemExit as stop: assert not stop.code, stop.code
 """
 BY_OPEN = "import sys, groundstation\ngroundstation.open({arguments[0]!r})\n"
@@ -64,3 +65,41 @@ def test_compiled_loops_are_found_again_without_their_compiler(suffix: str, tmp_
     convert = ["convert", str(log), "-q", "--force", "-o", str(tmp_path / "out.mcap")]
     assert CliRunner().invoke(app, convert).exit_code == 0  # compiles, where that was not done before
     assert loaded(BY_VERB, *convert, names=(*NOT_NEEDED, "pyarrow")) == []
+
+
+BY_RATES = """
+import sys
+import numpy as np
+from groundstation.estimators.kalman.rates import Rates
+rates = Rates(2, np.array([0]), np.array([1]))
+rates.transition(np.ones((3, 1)), np.ones(3), np.ones(2))
+rates.carried(np.ones((4, 1)), 1.0, 2, np.ones(2))
+"""
+
+
+def test_transitions_by_rates_are_found_again_without_their_compiler() -> None:
+    loaded(BY_RATES)  # compiles, where that was not done before
+    assert loaded(BY_RATES, names=("numba", "scipy")) == []
+
+
+@pytest.mark.parametrize("verb", ["run", "report"])
+def test_a_run_and_its_report_do_without_pandas(verb: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    run = ["run", str(SAMPLE), "-o", str(out), "-q", "-j", "1", "--no-pdf"]
+    assert CliRunner().invoke(app, run).exit_code == 0  # compiles, where that was not done before
+    again = {"run": [*run, "--redo"], "report": ["report", str(out), "-q"]}[verb]
+    assert loaded(BY_VERB, *again, names=("pandas", "numba", "scipy.linalg", "scipy.optimize")) == []
+
+
+def test_pandas_is_found_where_it_is_needed() -> None:
+    program = """
+import sys, pyarrow as pa
+from groundstation.base.without_pandas import spare_pandas, with_pandas
+spare_pandas()
+pa.array(["text"])
+assert "pandas" not in sys.modules
+with with_pandas():
+    import ppigrf
+assert pa.table(dict(x=[3.0])).to_pandas()["x"].sum() == 3.0
+"""
+    assert loaded(program, names=("pandas",)) == ["pandas"]

@@ -79,3 +79,27 @@ def values(array: Any, filler: float | int) -> NDArray[Any]:
         return np.zeros(0, dtype)
     numbers = np.frombuffer(array.buffers()[1], dtype, count=len(array), offset=array.offset * dtype.itemsize)
     return np.where(is_valid(array), numbers, dtype.type(filler)) if array.null_count else numbers
+
+
+def column(array: Any) -> NDArray[Any]:
+    """What ``to_numpy`` gives of an array or a chunked one, shape (n,): numbers, bools, text as objects.
+
+    Arrays with nulls and other types, which our own files do not have, are left to pyarrow.
+
+    Examples
+    --------
+    >>> column(pa.chunked_array([texts(["a"]), texts(["b"])])).tolist()
+    ['a', 'b']
+    >>> column(flags(np.array([True, False]))).tolist(), column(pa.nulls(1, pa.float64())).tolist()
+    ([True, False], [nan])
+    """
+    whole = array.combine_chunks() if isinstance(array, pa.ChunkedArray) else array
+    kind = whole.type
+    if whole.null_count == 0:
+        if pa.types.is_boolean(kind):
+            return mask(whole)
+        if pa.types.is_integer(kind) or str(kind) in _FLOATS:
+            return values(whole, 0)
+        if pa.types.is_string(kind):
+            return np.array(whole.to_pylist(), dtype=object)
+    return np.asarray(whole.to_numpy(zero_copy_only=False))

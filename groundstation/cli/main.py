@@ -14,6 +14,7 @@ from typer.models import CommandInfo
 
 from groundstation.base.errors import UsageError
 from groundstation.base.version import __version__
+from groundstation.base.without_pandas import spare_pandas
 from groundstation.cli import fleets, flights, plans, rules, simulated, watching
 from groundstation.cli.application import (
     DATA_LOST,
@@ -52,6 +53,7 @@ from groundstation.cli.application import (
 __all__ = ["app", "fleets", "flights", "main", "plans", "rules", "simulated", "watching"]  # the modules hold more verbs
 
 
+WITHOUT_PANDAS = frozenset(("run", "watch", "report", "view", "compare", "cooperative"))
 PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have an ``examine``; a test compares them
 
 
@@ -426,6 +428,8 @@ def main(arguments: Any = None) -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a code page that lacks a sign loses no answer
+    if arguments is None and sys.argv[1:2] and sys.argv[1] in WITHOUT_PANDAS and "--scheduler" not in sys.argv:
+        spare_pandas()  # a process of its own; what Dask imports is Dask's affair
     _application_for(sys.argv[1:] if arguments is None else arguments)(arguments)
 
 

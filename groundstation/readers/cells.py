@@ -14,10 +14,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from groundstation.base import arrow_values as arrow
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import MAX_TEXT_CHARACTERS, BoolArray, Column, Int64Array
 from groundstation.base.timescales import iso_to_utc_ns
-from groundstation.readers import arrow_values as arrow
 
 MAX_TIME_NS = 2**62  # UTC until 2116; sums and differences of two such times fit 64 bits
 _NUMBER = r"^[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?|(?i:nan|inf|infinity))$"

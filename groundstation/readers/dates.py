@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pyarrow.compute as pc
 
+from groundstation.base import arrow_values as arrow
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.readers import arrow_values as arrow
 from groundstation.readers.cells import MAX_TIME_NS, Cells
 
 _NS_PER_DAY = 86_400 * NS_PER_S

@@ -250,12 +250,14 @@ def _write_parquet(path: Path, figure: FigureData) -> None:
 def _read_parquet(path: Path) -> FigureData:
     import pyarrow.parquet as pq
 
+    from groundstation.base import arrow_values as arrow
+
     columns, names = {}, OLD_COLUMNS.get(path.stem, {})
     try:
         with pq.ParquetFile(path) as file:  # read_table would import pandas
             table = file.read(use_threads=False)
         for name in table.column_names:
-            values = table.column(name).to_numpy()
+            values = arrow.column(table.column(name))
             columns[names.get(name, name)] = values.astype(np.str_) if values.dtype.kind == "O" else values
         digits = json.loads((table.schema.metadata or {}).get(b"digits", b"{}"))
         return FigureData(path.stem, columns, {names.get(name, name): int(places) for name, places in digits.items()})

@@ -162,9 +162,11 @@ def check_rows_of(table: Any) -> tuple[NDArray[np.intp], dict[str, NDArray[Any]]
 
 def _flat(column: Any) -> tuple[NDArray[np.intp], dict[str, Any]]:
     """Lists of rows as columns, and the list that each is from."""
+    from groundstation.base import arrow_values as arrow
+
     whole = column.combine_chunks()
     parts = whole.flatten()
-    counts = np.diff(whole.offsets.to_numpy())
+    counts = np.diff(arrow.column(whole.offsets))
     names = [field.name for field in parts.type]
     return np.repeat(np.arange(len(whole)), counts), dict(zip(names, parts.flatten(), strict=True))
 
@@ -173,13 +175,15 @@ def _values(array: Any, missing: float) -> NDArray[Any]:
     """Values of Arrow; ``missing`` stands for a number or a flag that is not there."""
     import pyarrow as pa
 
+    from groundstation.base import arrow_values as arrow
+
     if pa.types.is_string(array.type):
         return np.array(array.to_pylist(), dtype=object)
     if pa.types.is_boolean(array.type):
-        return np.asarray(array.cast(pa.int8()).fill_null(int(np.nan_to_num(missing))).to_numpy(zero_copy_only=False))
+        return arrow.column(array.cast(pa.int8()).fill_null(int(np.nan_to_num(missing))))
     if pa.types.is_floating(array.type):
         array = array.fill_null(missing)
-    return np.asarray(array.to_numpy(zero_copy_only=False))
+    return arrow.column(array)
 
 
 def _rows_of(fields: Mapping[str, str]) -> Any:
@@ -246,21 +250,25 @@ def _arrow(column: FlightColumn, values: list[Any]) -> Any:
 def _numpy(column: FlightColumn, array: Any) -> NDArray[Any]:
     import pyarrow as pa
 
+    from groundstation.base import arrow_values as arrow
+
     if column.kind == "time":
         missing = np.iinfo(np.int64).min  # NaT
-        return np.asarray(array.cast(pa.int64()).fill_null(missing).to_numpy()).view("datetime64[ns]")
+        return arrow.column(array.cast(pa.int64()).fill_null(missing)).view("datetime64[ns]")
     if column.kind in TEXTS:
         texts = array.cast(pa.string()).fill_null("").to_pylist()
         is_wide = len(texts) * max(map(len, texts), default=0) > MOST_WIDE_CHARACTERS
         return np.array(texts, dtype=object if is_wide else np.str_)
     if column.kind == "flag":
-        return np.asarray(array.to_numpy().astype(np.bool_))
-    return np.asarray(array.cast(pa.float64()).fill_null(math.nan).to_numpy())
+        return arrow.column(array).astype(np.bool_)
+    return arrow.column(array.cast(pa.float64()).fill_null(math.nan))
 
 
 def _lists(array: Any) -> list[NDArray[np.int32]]:
+    from groundstation.base import arrow_values as arrow
+
     whole = array.combine_chunks()
     if len(whole) == 0:
         return []
-    offsets, values = whole.offsets.to_numpy(), whole.values.to_numpy()
+    offsets, values = arrow.column(whole.offsets), arrow.column(whole.values)
     return [values[start:end] for start, end in pairwise(offsets.tolist())]

@@ -135,12 +135,14 @@ class Keys(Mapping[str, Key]):
         """Places of the flights of each month, months and places in order."""
         import pyarrow.compute as pc
 
+        from groundstation.base import arrow_values as arrow
+
         days = pc.utf8_slice_codeunits(self.table.column("flight_id"), 0, DAY_CHARACTERS).combine_chunks()
         encoded = days.dictionary_encode()
         month_of_day = list(map(month_of, encoded.dictionary.to_pylist()))
         months = sorted(set(month_of_day))
         numbers = np.array([months.index(one) for one in month_of_day], dtype=np.intp)
-        number = numbers[encoded.indices.to_numpy()]
+        number = numbers[arrow.column(encoded.indices)]
         return {month: np.flatnonzero(number == place) for place, month in enumerate(months)}
 
     def names_at(self, places: NDArray[np.intp]) -> list[str]:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from groundstation.base.errors import GroundstationError, UnclaimedLogError
+from groundstation.base.without_pandas import spare_pandas
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener
@@ -93,6 +94,7 @@ def _run(sender: Connection, batch: Batch) -> None:
     signal.signal(signal.SIGTERM, _interrupted)
     threading.Thread(target=_end_with_the_watch, name="parent", daemon=True).start()
     lock = threading.Lock()  # events come from several threads
+    spare_pandas()
 
     def send(message: object) -> None:
         with lock, suppress(OSError):

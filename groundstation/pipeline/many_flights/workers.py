@@ -16,6 +16,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.connection import wait as wait_for
 from typing import Any, Generic, Protocol, TypeVar
 
+from groundstation.base.without_pandas import spare_pandas
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
@@ -187,6 +188,7 @@ def _begin(sender: Connection) -> None:
     global _tell, _tell_begin
     _tell = _teller(sender)
     _tell_begin = partial(_send, sender)
+    spare_pandas()
     threading.Thread(target=_end_with_the_run, name="parent", daemon=True).start()
 
 
