@@ -27,7 +27,7 @@ from groundstation.base.units import NS_PER_S
 
 SIZES_KB = (20, 2_000, 15_000)  # and 60_000 by --sizes-kb
 VERBS = ("info", "check", "convert")
-WHOLE_VERBS = ("run", "report")  # minutes for a long log: asked for by name
+WHOLE_VERBS = ("run", "report", "view")  # minutes for a long log: asked for by name; report and view need the run
 SOURCES: dict[str, tuple[Path, Callable[[Path, Path, int], None]]] = {
     "csv": (ROOT / "sample_logs" / "taxi-good.csv", repeated_csv),
     "ulg": (LOGS / "ulog" / "Proto_FLT09_REENCODED_fixedwing.ulg", repeated_ulog),
@@ -35,6 +35,14 @@ SOURCES: dict[str, tuple[Path, Callable[[Path, Path, int], None]]] = {
 }
 READ_CSV = "import sys, pandas; pandas.read_csv(sys.argv[1], comment='#')"
 PARSE_ULOG = "import sys; from pyulog import ULog; ULog(sys.argv[1])"
+VIEW = """
+import sys
+import groundstation.viewer.launch as launch
+launch.open_viewer = lambda *_, **__: 0  # the viewer itself is Rerun's
+from groundstation.cli.main import main
+sys.argv[1:] = ["view", sys.argv[1], "--web"]
+main()
+"""
 API = "import sys, groundstation; groundstation.open(sys.argv[1])"
 
 
@@ -63,7 +71,7 @@ class Timed:
         self.runs.append((wall_s, usage.ru_utime + usage.ru_stime))
 
     def line(self) -> str:
-        """Median seconds, or why there are none."""
+        """Median seconds of wall and processor, or why there are none."""
         if self.why_not:
             return f"  {self.name:34} {self.why_not}"
         wall_s, processor_s = (statistics.median(of) for of in zip(*self.runs, strict=True))
@@ -103,8 +111,8 @@ def peers(log: Path, out: Path) -> Iterator[tuple[str, list[str]]]:
         yield "mcap info", ["mcap", "info", str(log)]
 
 
-def commands(log: Path, work: Path, verbs: list[str], against: Path | None) -> list[Timed]:
-    """What is run on a log: our verbs, the same of another checkout, the peers'."""
+def commands(log: Path, work: Path, verbs: list[str], against: Path | None, *, is_alone: bool) -> list[Timed]:
+    """What is run on a log: our verbs, the same of another checkout, the peers' unless ours are alone."""
     found = []
     for label, root in (("groundstation", ROOT), *([("against", against)] if against else [])):
         environment = without_bytecode_switch() | {"PYTHONPATH": str(root)}
@@ -112,12 +120,17 @@ def commands(log: Path, work: Path, verbs: list[str], against: Path | None) -> l
         for verb in verbs:
             target = str(work / f"{label}_{verb}")
             written = {"convert": ["--force", "-q", "-o", f"{target}.mcap"], "run": ["--redo", "-q", "-o", target]}
-            place = str(work / f"{label}_run") if verb == "report" else str(log)
             if verb == "convert" and log.suffix == ".mcap":
                 continue
-            found.append(Timed(f"{label} {verb}", [*ours, verb, place, *written.get(verb, [])], environment))
+            place = str(work / f"{label}_run")
+            if verb == "view":
+                for name, what in (("LOG", str(log)), ("OUT", place)):
+                    found.append(Timed(f"{label} view {name}", [sys.executable, "-c", VIEW, what], environment))
+                continue
+            what = place if verb == "report" else str(log)
+            found.append(Timed(f"{label} {verb}", [*ours, verb, what, *written.get(verb, [])], environment))
         found.append(Timed(f"{label}.open(log)", [sys.executable, "-c", API, str(log)], environment))
-    for name, command in peers(log, work):
+    for name, command in () if is_alone else peers(log, work):
         program = shutil.which(command[0], path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
         if program is None:
             print(f"  {name}: {command[0]} is not installed, left out")
@@ -129,7 +142,7 @@ def commands(log: Path, work: Path, verbs: list[str], against: Path | None) -> l
 def measure(log: Path, options: argparse.Namespace) -> None:
     """Run all commands on a log by turns and print their medians."""
     with tempfile.TemporaryDirectory() as folder:
-        timed = commands(log, Path(folder), options.verbs, options.against)
+        timed = commands(log, Path(folder), options.verbs, options.against, is_alone=options.no_peers)
         if options.cold:
             for one in timed:
                 cold = Timed(f"{one.name}, cold", one.command, {**one.environment, "NUMBA_CACHE_DIR": f"{folder}/new"})
@@ -152,6 +165,7 @@ def main() -> None:
     parser.add_argument("--formats", nargs="+", default=[*SOURCES, "mcap"], metavar="SUFFIX")
     parser.add_argument("--sizes-kb", nargs="+", type=int, default=SIZES_KB, metavar="KB")
     parser.add_argument("--verbs", nargs="+", default=list(VERBS), help=f"of {', '.join((*VERBS, *WHOLE_VERBS))}")
+    parser.add_argument("--no-peers", action="store_true", help="our verbs alone")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--cold", action="store_true", help="also with nothing compiled")
     parser.add_argument(
