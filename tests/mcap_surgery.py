@@ -5,7 +5,8 @@ import zlib
 from mcap.opcode import Opcode
 from mcap.records import ChunkIndex, Footer, MetadataIndex, Statistics
 
-from groundstation.store.framing import MAGIC, parse_record, read_message_index, to_bytes
+from groundstation.store.framing import parse_record, read_message_index, to_bytes
+from groundstation.store.marks import MAGIC
 from tests.fuzz.bases import mcap_starts
 
 PREFIX = 9

@@ -20,7 +20,8 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.readers import registry
-from groundstation.store.info import COPY_NAME, METADATA_NAME, StoreInfo
+from groundstation.store.info import COPY_NAME, StoreInfo
+from groundstation.store.marks import METADATA_NAME
 from groundstation.store.reader import read_info
 from groundstation.store.writer import StoreWriter
 from tests.dataflash_writer import flight_log

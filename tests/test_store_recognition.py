@@ -18,8 +18,9 @@ from groundstation.base.records import Column, Damage, RecordBatch
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.verbs.describe import describe
 from groundstation.store.channel import CHUNK_SPAN_NS
-from groundstation.store.framing import MAGIC, to_bytes
+from groundstation.store.framing import to_bytes
 from groundstation.store.info import COPY_NAME, StoreInfo
+from groundstation.store.marks import MAGIC
 from groundstation.store.recognition import is_groundstation_mcap, is_mostly_mcap
 from groundstation.store.writer import StoreWriter
 from tests.fuzz.bases import dataflash, flat_csv, mcap_starts, ulog

@@ -20,8 +20,9 @@ from groundstation.base.records import Damage, LogHeader, RecordBatch
 from groundstation.store import walk
 from groundstation.store.channel import CHUNK_SPAN_NS
 from groundstation.store.foreign import ForeignLost, ForeignMcap, ForeignMessages, UnknownChannel
-from groundstation.store.framing import MAGIC, MAX_CHUNK_BYTES, to_bytes
+from groundstation.store.framing import MAX_CHUNK_BYTES, to_bytes
 from groundstation.store.info import StoreInfo
+from groundstation.store.marks import MAGIC
 from groundstation.store.reader import read, read_info
 from groundstation.store.schema import canonical_type
 from tests.test_store import assert_same, batch_of, joined, written

@@ -16,7 +16,6 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Header, Schema
 
 from groundstation.store.framing import (
-    MAGIC,
     MAX_CHUNK_BYTES,
     MAX_RECORD_BYTES,
     ChunkError,
@@ -29,12 +28,12 @@ from groundstation.store.framing import (
     read_chunk_head,
     read_summary,
 )
-from groundstation.store.messages import HEAD, RECORD_PREFIX, ByteArray, Messages
+from groundstation.store.marks import MAGIC, RECORD_PREFIX, SEARCH_BYTES
+from groundstation.store.messages import HEAD, ByteArray, Messages
 from groundstation.store.sequences import Sequences
 from groundstation.store.walk import find_messages
 
 PEEK_BYTES = 64
-SEARCH_BYTES = 1 << 20
 _CHUNK = re.compile(rb"\x06(?=[\0-\xff]{5}\0{3})")  # opcode and a length below 2**40
 _MESSAGE = re.compile(rb"\x05(?=[\0-\xff]{3}\0{5})")
 _KNOWN_OPCODES = frozenset(range(Opcode.HEADER, Opcode.DATA_END + 1))

@@ -31,9 +31,9 @@ from mcap.records import (
 )
 
 from groundstation.base.records import Int64Array
-from groundstation.store.messages import HEAD, MESSAGE_OPCODE, RECORD_PREFIX, ByteArray, Messages
+from groundstation.store.marks import MAGIC, RECORD_PREFIX
+from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, Messages
 
-MAGIC = b"\x89MCAP0\r\n"
 MAX_CHUNK_BYTES = 64 << 20  # of a decompressed chunk; the writer's have about one megabyte
 MAX_RECORD_BYTES = 64 << 20  # of any record that is read whole
 FOOTER_BYTES = RECORD_PREFIX + 20

@@ -14,7 +14,6 @@ from groundstation.base.salvage import salvaged
 from groundstation.base.serial import to_json_exactly
 from groundstation.store.shape import sound_damages, sound_remarks
 
-METADATA_NAME = "groundstation"
 COPY_NAME = "groundstation_copy"  # the same record before the end of data: one flip cannot take both
 FORMAT_VERSION = "1"
 MAX_START_NS = 1 << 62  # first sample in the year 2116: later ones are damage

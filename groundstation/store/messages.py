@@ -22,7 +22,6 @@ HEAD = np.dtype(
     ]
 )
 MESSAGE_OPCODE = 5
-RECORD_PREFIX = 9  # opcode and length, which the length does not count
 
 
 @dataclass(frozen=True)

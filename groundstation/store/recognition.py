@@ -5,14 +5,7 @@ import re
 from pathlib import Path
 from typing import BinaryIO
 
-from mcap.opcode import Opcode
-from mcap.records import Header, Schema
-
-from groundstation.store.framing import MAGIC, parse_record
-from groundstation.store.info import METADATA_NAME
-from groundstation.store.messages import RECORD_PREFIX
-from groundstation.store.recovery import SEARCH_BYTES, chunk_bytes, definitions_in, is_own_schema
-from groundstation.store.schema import PACKAGE
+from groundstation.store.marks import HEADER_OPCODE, MAGIC, METADATA_NAME, PACKAGE, RECORD_PREFIX, SEARCH_BYTES
 
 HEAD_BYTES = 4096  # of a sound file are enough to recognise it
 _LIBRARY = "groundstation "
@@ -44,6 +37,8 @@ def is_mostly_mcap(path: str | os.PathLike[str]) -> bool:
 
     At least half, a quarter where it begins as one. Else another log may stand in it, of which a part was overwritten.
     """
+    from groundstation.store.recovery import chunk_bytes
+
     try:
         with Path(path).open("rb") as file:
             size = os.fstat(file.fileno()).st_size
@@ -72,9 +67,13 @@ def _is_of_another_program(head: bytes) -> bool:
     """Whether there is a whole header with a library that is not ours with some characters damaged."""
     start = len(MAGIC) + RECORD_PREFIX
     length = int.from_bytes(head[len(MAGIC) + 1 : start], "little")
-    if not head.startswith(MAGIC + bytes([Opcode.HEADER])) or length > HEAD_BYTES:
+    if not head.startswith(MAGIC + bytes([HEADER_OPCODE])) or length > HEAD_BYTES:
         return False
-    header = parse_record(Opcode.HEADER, head[start : start + length])
+    from mcap.records import Header
+
+    from groundstation.store.framing import parse_record
+
+    header = parse_record(HEADER_OPCODE, head[start : start + length])
     if not isinstance(header, Header) or not header.library.isprintable():
         return False
     alike = sum(one == other for one, other in zip(header.library, _LIBRARY, strict=False))
@@ -99,6 +98,10 @@ def _defines(file: BinaryIO, start: int) -> bool:
     file.seek(start)
     if PACKAGE.encode() + b"." not in file.read(SEARCH_BYTES):
         return False
+    from mcap.records import Schema
+
+    from groundstation.store.recovery import definitions_in, is_own_schema
+
     found = definitions_in(file, start, start + SEARCH_BYTES)
     return any(isinstance(record, Schema) and is_own_schema(record) for record, _ in found)
 

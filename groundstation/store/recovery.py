@@ -21,7 +21,6 @@ from groundstation.base.errors import GroundstationError
 from groundstation.store.channel import COLUMNS_KEY, DERIVED_KEY
 from groundstation.store.framing import (
     INDEX_ENTRY,
-    MAGIC,
     MAX_CHUNK_BYTES,
     MAX_RECORD_BYTES,
     ChunkError,
@@ -34,15 +33,15 @@ from groundstation.store.framing import (
     read_message_index,
     split_messages,
 )
-from groundstation.store.info import COPY_NAME, METADATA_NAME, is_intact
-from groundstation.store.messages import RECORD_PREFIX, Messages
-from groundstation.store.schema import PACKAGE, message_type, own_columns
+from groundstation.store.info import COPY_NAME, is_intact
+from groundstation.store.marks import MAGIC, METADATA_NAME, PACKAGE, RECORD_PREFIX, SEARCH_BYTES
+from groundstation.store.messages import Messages
+from groundstation.store.schema import message_type, own_columns
 
 # A chunk record of the writer: this text stands 37 bytes from its start, zstd's magic number 8 bytes after it.
 SIGNATURE = struct.pack("<I4s", 4, b"zstd")
 SIGNATURE_AT = 37
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-SEARCH_BYTES = 1 << 20
 PEEK_BYTES = 64
 # Opcode and length of what may be a schema or channel record of less than 16 MiB.
 _DEFINITION = re.compile(rb"[\x03\x04](?=[\x00-\xff]{3}\x00{5})")

@@ -20,9 +20,9 @@ from google.protobuf.descriptor_pool import DescriptorPool
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.signals import TOPICS, kind_of
+from groundstation.store.marks import PACKAGE
 
 DESCRIPTORS = Path(__file__).with_name("descriptors.binpb")
-PACKAGE = "groundstation"
 # Message of each canonical kind. `truth` has the fields of `ins`.
 MESSAGE_OF_KIND: Mapping[str, str] = {
     kind: "".join(word.capitalize() for word in kind.split("_")) for kind in TOPICS if kind != "truth"

@@ -13,7 +13,8 @@ import numpy as np
 
 from groundstation.base.compile import in_place
 from groundstation.base.records import BoolArray, Int64Array
-from groundstation.store.messages import HEAD, MESSAGE_OPCODE, RECORD_PREFIX, ByteArray, Messages
+from groundstation.store.marks import RECORD_PREFIX
+from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, Messages
 from groundstation.store.schema import WireField
 
 INTERPRETED_BYTES = 200_000  # in all, about 0.2 s of the interpreter

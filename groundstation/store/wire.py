@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Column, Int64Array
-from groundstation.store.messages import HEAD, MESSAGE_OPCODE, RECORD_PREFIX, ByteArray, Messages, at_any_byte
+from groundstation.store.marks import RECORD_PREFIX
+from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, Messages, at_any_byte
 from groundstation.store.schema import WireField, varint
 from groundstation.store.walk import locate_fields
 

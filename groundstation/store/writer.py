@@ -35,9 +35,9 @@ from groundstation.base.signals import is_canonical, kind_of
 from groundstation.base.version import __version__
 from groundstation.store.channel import ChannelWriter, Chunk, TopicWriter
 from groundstation.store.derived import LOG_TOPIC, LocationFixWriter, LogWriter, Origin, PoseWriter
-from groundstation.store.framing import MAGIC, chunk_head, message_index, to_bytes
-from groundstation.store.info import COPY_NAME, METADATA_NAME, StoreInfo
-from groundstation.store.schema import PACKAGE
+from groundstation.store.framing import chunk_head, message_index, to_bytes
+from groundstation.store.info import COPY_NAME, StoreInfo
+from groundstation.store.marks import MAGIC, METADATA_NAME, PACKAGE
 
 LIBRARY = f"groundstation {__version__}"
 # Higher levels save 4 to 7 % of recorded flights and read random mantissas a quarter slower: docs/decisions/005.

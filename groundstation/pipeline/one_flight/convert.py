@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
-from importlib import metadata as installed
 from itertools import chain
 from pathlib import Path
 
@@ -68,6 +67,8 @@ def convert_log(
 
 
 def _convert_recorded(log: Log, target: Path, limits: Thresholds, references: References) -> Converted:
+    from importlib import metadata as installed
+
     from groundstation.integrity.ledger_findings import ledger_findings
     from groundstation.integrity.ordering import corrected
     from groundstation.integrity.survey import survey

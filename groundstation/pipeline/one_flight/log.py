@@ -110,13 +110,14 @@ def open_log(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()
         When no reader claims it, or it is an MCAP of another program.
     """
     from groundstation.readers.registry import identify
-    from groundstation.store.reader import read_info
 
     path = as_log(path)
     if not path.is_file():
         raise UnreadableLogError(str(path), "no regular file", "a recorded log")
     size = path.stat().st_size
     if _is_store(path, profile):
+        from groundstation.store.reader import read_info
+
         info = read_info(path)  # the flight is that of the log, whichever of the two is run
         name, sha256 = info.source_name or path.name, info.source_sha256 or sha256_of(path)
         source = Source(name, sha256, size, f"groundstation-mcap of {info.reader}")
