@@ -25,6 +25,7 @@ from groundstation.estimators.magnetic.before_lift_off import (
     find_ground_runs,
     least_speed_mps,
 )
+from groundstation.estimators.magnetic.entered import corrections_entered
 from groundstation.estimators.magnetic.estimate import estimate_deviation
 from groundstation.estimators.magnetic.gyros import EARTH_DEG_PER_H, GyroDrift, gyro_drift
 from groundstation.estimators.magnetic.settings import MagneticSettings
@@ -307,6 +308,18 @@ def test_a_correction_entered_on_board_leaves_the_taxi_before_it_out(before: flo
     assert found.aligned_at_s is not None
     assert found.aligned_at_s > entered_s
     assert abs(found.aligned_error_deg) < SIGMAS * found.aligned_sigma_deg < 0.5
+
+
+@pytest.mark.parametrize(("before", "change_deg"), [(math.nan, -1.0), (0.0, -1.0), (-1.5, 0.5)])
+def test_a_correction_is_entered_where_its_value_changes_or_first_appears(before: float, change_deg: float) -> None:
+    time_ns = START_NS + np.array([1, 2, 3, 4, 5]) * NS_PER_S
+    values = np.array([before, before, -1.0, math.nan, -1.0])
+    onboard = table("onboard", time_ns, {"correction_entered_deg": values})
+    assert corrections_entered(Flight({"onboard": onboard}, {}, START_NS, True, "made.csv")) == [
+        (3.0, -1.0, change_deg)
+    ]
+    first = table("onboard", time_ns, {"correction_entered_deg": np.full(5, -1.0)})
+    assert corrections_entered(Flight({"onboard": first}, {}, START_NS, True, "made.csv")) == []
 
 
 # Gyros

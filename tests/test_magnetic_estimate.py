@@ -22,7 +22,7 @@ from groundstation.results.magnetic import LETTERS, MagneticResult
 from groundstation.simulation.flight import simulate
 from groundstation.simulation.scenario import load_scenario
 from groundstation.tables.table import Flight, Table
-from tests.magnetic_example import EIGHT, HARD_NT, LEVEL, SOFT, Made, make, taxi_heading
+from tests.magnetic_example import EIGHT, HARD_NT, LEVEL, SOFT, Made, make, table, taxi_heading
 
 EXACT_DEG = 1e-9
 FROM_GRID_DEG = 1e-3  # A to E are read off a curve sampled every half degree
@@ -336,6 +336,21 @@ def test_a_figure_alone_leaves_nothing_to_judge_by() -> None:
     result = estimated(make(turns=EIGHT), settings=MagneticSettings(held_out_samples_min=2000))
     assert (result.verdict, result.residual_rms_deg) == ("undecided", None)
     assert state_of(result, "held_out") == "not_measured"
+
+
+@pytest.mark.parametrize(("before", "is_told"), [(np.nan, True), (0.0, True), (-1.0, False)])
+def test_a_correction_entered_after_the_alignment_is_told(before: float, is_told: bool) -> None:
+    """It stands nowhere before it is entered, as in a log whose field is absent until then, or changes."""
+    made = make()
+    aligned_at_s = estimated(made).alignment.aligned_at_s
+    assert aligned_at_s is not None
+    times_s = np.array([aligned_at_s - 2.0, aligned_at_s - 1.0, aligned_at_s + 5.0, aligned_at_s + 6.0])
+    time_ns = made.flight.start_ns + np.round(times_s * NS_PER_S).astype(np.int64)
+    values = np.array([before, before, -1.0, -1.0])
+    onboard = table("onboard", time_ns, {"correction_entered_deg": values})
+    flight = replace(made.flight, tables={**made.flight.tables, "onboard": onboard})
+    remarks = estimated(replace(made, flight=flight)).remarks
+    assert any("a correction of -1.00 deg was entered" in remark for remark in remarks) == is_told
 
 
 def test_low_altitude_is_told() -> None:

@@ -12,6 +12,7 @@ from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.samples import choose_topics
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.known import AircraftData
+from groundstation.estimators.magnetic.entered import corrections_entered
 from groundstation.estimators.magnetic.gyros import GyroDrift, gyro_drift
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.heading import HeadingResult
@@ -149,7 +150,7 @@ def alignment_window(flight: Flight, phases: Phases, settings: MagneticSettings)
         if not begun:
             raise NotAssessableError(ANALYSIS, f"no event {settings.alignment_event!r} before lift-off")
         start_s, is_by_event, since = begun[-1], True, f"the event {settings.alignment_event!r}"
-    entered = [time for time in _corrections_s(flight) if start_s < time < end_s]
+    entered = [one.time_s for one in corrections_entered(flight) if start_s < one.time_s < end_s]
     if entered:
         start_s, since = entered[-1], f"the correction entered at {entered[-1]:.0f} s"
     if settings.release_event:
@@ -164,17 +165,6 @@ def event_times_s(flight: Flight, name: str) -> list[float]:
     for topic in topics_of_kind("event", flight.topics()):
         texts, time_s = flight[topic].text("name"), flight.time_s(topic)
         found += [float(time) for time, text in zip(time_s, texts, strict=True) if name in text.split(EVENT_SEPARATOR)]
-    return sorted(found)
-
-
-def _corrections_s(flight: Flight) -> list[float]:
-    """Flight seconds at which a heading correction was entered or changed on board, in order of time."""
-    found: list[float] = []
-    for topic in topics_of_kind("onboard", flight.topics()):
-        entered = flight[topic].values("correction_entered_deg")
-        rows = np.flatnonzero(np.isfinite(entered))
-        is_new = np.diff(entered[rows], prepend=np.nan) != 0.0
-        found += [float(time) for time in flight.time_s(topic)[rows[is_new & (rows > 0)]]]
     return sorted(found)
 
 

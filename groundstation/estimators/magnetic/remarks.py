@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from groundstation.base.angles import wrap_180
-from groundstation.base.signals import topics_of_kind
 from groundstation.estimators.inertial.kind import UNAIDED
+from groundstation.estimators.magnetic.entered import corrections_entered
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.magnetic import MagneticResult
 from groundstation.tables.table import Flight
@@ -63,15 +63,11 @@ def _between_branches(result: MagneticResult) -> list[str]:
 def _entered(flight: Flight, result: MagneticResult) -> list[str]:
     """A correction entered on board after the alignment moves the INS heading, perhaps."""
     aligned_at_s = result.alignment.aligned_at_s
-    for topic in topics_of_kind("onboard", flight.topics()):
-        entered = flight[topic].values("correction_entered_deg")
-        known = np.isfinite(entered)
-        values, time_s = entered[known], flight.time_s(topic)[known]
-        changed = np.flatnonzero(np.diff(values) != 0.0) + 1
-        late = [row for row in changed if aligned_at_s is not None and time_s[row] > aligned_at_s]
-        if late:
-            return [
-                f"a correction of {values[late[-1]]:+.2f} deg was entered at {time_s[late[-1]]:.0f} s, after the "
-                "alignment: if the INS heading carries it, A and the table are off by as much"
-            ]
-    return []
+    if aligned_at_s is None:
+        return []
+    late = [one for one in corrections_entered(flight) if one.time_s > aligned_at_s and one.change_deg != 0.0]
+    return [
+        f"a correction of {one.correction_deg:+.2f} deg was entered at {one.time_s:.0f} s, after the "
+        "alignment: if the INS heading carries it, A and the table are off by as much"
+        for one in late[-1:]
+    ]
