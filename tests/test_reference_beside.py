@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.records import Column
 from groundstation.base.timescales import GPS_EPOCH_NS, leap_seconds_at
 from groundstation.base.units import NS_PER_S
+from groundstation.cli.main import app
 from groundstation.pipeline.many_flights.references import judged_by
 from groundstation.pipeline.one_flight import reference as beside
 from groundstation.pipeline.one_flight.analyse import analyse
@@ -257,3 +259,20 @@ def test_what_is_read_along_with_a_reference_counts_in_what_a_run_need_not_do_ag
     (tmp_path / "smrmsg_20260504.out").write_bytes(b"still others")
     assert open_log(sbet).source.sha256 != sha256, "they are a part of the log"
     assert open_log(sbet).source.name == sbet.name
+
+
+def test_a_log_for_which_a_reference_is_expected_is_not_finished_by_a_run_that_expected_none(
+    folder: Path, tmp_path: Path
+) -> None:
+    elsewhere = tmp_path / "elsewhere.csv"
+    elsewhere.write_text(
+        "# start_utc: 2001-01-01T00:00:00Z\ntime_s,ins.latitude_deg,ins.longitude_deg\n0,1,1\n1,1,1\n", encoding="utf-8"
+    )
+    log = tmp_path / "logs" / "flight.csv"
+    log.parent.mkdir()
+    log.write_bytes((folder / "flight.csv").read_bytes())
+    run = ["-o", str(tmp_path / "out"), "-q", "--only", "results", "--reference", str(elsewhere)]
+    assert CliRunner().invoke(app, ["run", str(log.parent), *run]).exit_code == 0
+    refused = CliRunner().invoke(app, ["run", str(log), *run])
+    assert refused.exit_code == 1
+    assert "a reference of" in refused.output

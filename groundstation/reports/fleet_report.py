@@ -60,7 +60,7 @@ def on_paper(document: Document) -> Document:
 
 
 def fleet_report_html(document: Document, fleet: FleetResults) -> str:
-    """Render the report of a fleet as a complete HTML document, every flight in its table with links."""
+    """Render the report of a fleet as a complete HTML document, its flights in a table with links."""
     script = (TEMPLATES / "fleet.js").read_text(encoding="utf-8").strip()
     return render(
         "fleet.html.j2",

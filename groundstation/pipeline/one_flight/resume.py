@@ -138,18 +138,27 @@ def _digest(*parts: Any) -> str:
 
 
 def _layouts_of(configuration: Configuration) -> list[str]:
-    """The content of the profile, the ICDs and the references; the name of a shipped ICD."""
-    profile = [_content_of(configuration.profile)] if configuration.profile else []
-    icds = [_content_of(one) if Path(one).is_file() else one for one in configuration.icds]
-    return [*profile, *icds, *(_content_of(str(path)) for path in configuration.references.paths)]
+    """The content of the profile, the ICDs and the references; the name of a shipped ICD.
+
+    Whether a reference is expected counts: without one of its time a log is then refused, else it is run.
+    """
+    profile = [_content_of(configuration.profile, "a profile")] if configuration.profile else []
+    icds = [_content_of(one, "an ICD") if Path(one).is_file() else one for one in configuration.icds]
+    references = [_content_of(str(path), "a reference") for path in configuration.references.paths]
+    return [
+        *profile,
+        *icds,
+        *references,
+        *(["expected"] if references and configuration.references.is_expected else []),
+    ]
 
 
-def _content_of(file: str) -> str:
+def _content_of(file: str, expected: str) -> str:
     """Digest of a file, of all files of a bag, and of what is read along with a reference."""
     try:
         return digest_of(as_log(Path(file)))
     except OSError as error:
-        raise GroundstationError(file, error.strerror or "cannot be read", "a profile") from error
+        raise GroundstationError(file, error.strerror or "cannot be read", expected) from error
 
 
 def remember_reports(flight: "Finished", *, with_pdf: bool) -> None:
