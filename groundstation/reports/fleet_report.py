@@ -1,5 +1,7 @@
 """The report of a folder of flights: one self-contained HTML file with every flight, and its PDF."""
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +12,7 @@ from groundstation.reports.figures import drawn_by
 from groundstation.reports.fleet import DRAWERS
 from groundstation.reports.flight_report import Written, write_pages
 from groundstation.reports.page import TEMPLATES, digest_of, render
-from groundstation.reports.painting import with_painted_figures
+from groundstation.reports.painting import document_begun
 from groundstation.results.fleet import FleetResults
 
 PAGE = "summary.html"
@@ -42,8 +44,24 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True,
     OSError
         When a file cannot be written.
     """
-    document = with_painted_figures(lambda: fleet_document(fleet), painters)
-    return write_pages(out / PAGE, fleet_report_html(document, fleet), on_paper(document), with_pdf=with_pdf)
+    with fleet_report_begun(out, fleet, with_pdf=with_pdf, painters=painters) as finish:
+        return finish()
+
+
+@contextmanager
+def fleet_report_begun(
+    out: Path, fleet: FleetResults, *, with_pdf: bool = True, painters: int = 1
+) -> Iterator[Callable[[], Written]]:
+    """Begin a report, parameters as of :func:`write_fleet_report`: the other painters paint while this process does
+    something else. Yields what finishes it.
+    """
+    with document_begun(lambda: fleet_document(fleet), painters) as finish:
+
+        def finished() -> Written:
+            document = finish()
+            return write_pages(out / PAGE, fleet_report_html(document, fleet), on_paper(document), with_pdf=with_pdf)
+
+        yield finished
 
 
 def fleet_document(fleet: FleetResults) -> Document:

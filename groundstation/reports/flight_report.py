@@ -1,7 +1,8 @@
 """The report of one flight: one self-contained HTML file and its PDF, made from the saved results alone."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from groundstation.chapters.parts import Document
 from groundstation.chapters.plan import is_plan
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.page import TEMPLATES, live_figures, render
-from groundstation.reports.painting import with_painted_figures
+from groundstation.reports.painting import document_begun, with_painted_figures
 from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.reports.sections import flight_sections
 from groundstation.reports.steer_card import write_exports
@@ -56,11 +57,27 @@ def write_flight_report(
     UnreadableLogError
         When the folder has no saved results.
     """
+    with flight_report_begun(folder, answer_types, with_pdf=with_pdf, painters=painters) as finish:
+        return finish()
+
+
+@contextmanager
+def flight_report_begun(
+    folder: Path, answer_types: Mapping[str, type[Answer]], *, with_pdf: bool = True, painters: int = 1
+) -> Iterator[Callable[[], Written]]:
+    """Begin a report, parameters as of :func:`write_flight_report`: the other painters paint while this process does
+    something else. Yields what finishes it.
+    """
     saved = load(folder, answer_types)
     exports, problem = write_exports(saved, with_pdf=with_pdf)  # first: the report links to those that are there
-    document = flight_document(saved, painters)
-    written = write_pages(folder / REPORT, flight_report_html(document), document, with_pdf=with_pdf)
-    return Written((*written.paths, *exports), "; ".join(filter(None, (written.problem, problem))))
+    with document_begun(lambda: sketched_document(saved), painters) as finish:
+
+        def finished() -> Written:
+            document = finish()
+            written = write_pages(folder / REPORT, flight_report_html(document), document, with_pdf=with_pdf)
+            return Written((*written.paths, *exports), "; ".join(filter(None, (written.problem, problem))))
+
+        yield finished
 
 
 def write_pages(page: Path, html: str, document: Document, *, with_pdf: bool) -> Written:

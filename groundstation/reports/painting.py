@@ -35,16 +35,33 @@ def with_painted_figures(tell: Callable[[], Document], processes: int = 1) -> Do
     ``processes`` paint side by side; equal bytes whatever their number. Who gathers sketches gets a document with
     these.
     """
+    with document_begun(tell, processes) as finish:
+        return finish()
+
+
+@contextmanager
+def document_begun(tell: Callable[[], Document], processes: int = 1) -> Iterator[Callable[[], Document]]:
+    """Tell a document, and let other processes paint its figures while this one does something else.
+
+    Yields what finishes it: this process then paints with the others.
+    """
     if is_sketching():
-        return tell()
+        document = tell()
+        yield lambda: document
+        return
     with sketching() as sketches:
         document = tell()
-    pictures = painted(sketches, processes)
-    sections = (
-        replace(section, parts=tuple(_painted(part, pictures) for part in section.parts))
-        for section in document.sections
-    )
-    return replace(document, sections=tuple(sections))
+    with painting_begun(sketches, processes) as finish:
+
+        def finished() -> Document:
+            pictures = finish()
+            sections = (
+                replace(section, parts=tuple(_painted(part, pictures) for part in section.parts))
+                for section in document.sections
+            )
+            return replace(document, sections=tuple(sections))
+
+        yield finished
 
 
 def _painted(part: Part, pictures: Mapping[str, Svg]) -> Part:
@@ -60,26 +77,36 @@ def painted(sketches: Mapping[str, Sketch], processes: int = 1) -> dict[str, Svg
     processes : int
         How many paint side by side, this one among them. One where the system cannot fork, or figures are few.
     """
+    with painting_begun(sketches, processes) as finish:
+        return finish()
+
+
+@contextmanager
+def painting_begun(sketches: Mapping[str, Sketch], processes: int = 1) -> Iterator[Callable[[], dict[str, Svg]]]:
+    """Let other processes begin to paint, as :func:`painted` has it; what is yielded paints with them to the end.
+
+    matplotlib is not loaded for that: each process loads it, side by side, where it is not there already.
+    """
     keys = list(sketches)
     others = min(processes, len(keys) // 2) - 1 if CAN_FORK and len(keys) >= FEWEST else 0
     if others < 1:
-        return {key: _paint(key, sketches[key]) for key in keys}
-    import matplotlib.backends.backend_svg
-    import matplotlib.figure  # noqa: F401 - loaded once for all
-
+        yield lambda: {key: _paint(key, sketches[key]) for key in keys}
+        return
     started = time.monotonic()
-    pictures: dict[str, Svg] = {}
     at_work: list[_Painter] = []
     with _queue(len(keys)) as queue, ExitStack() as painters:
         with suppress(OSError):  # no further process is allowed, or there is nowhere to write: those at work go on
             for _ in range(others):
                 at_work.append(painters.enter_context(_painter(keys, sketches, queue)))
-        for number in _taken(queue):
-            pictures[keys[number]] = _paint(keys[number], sketches[keys[number]])
-        now = time.monotonic()
-        for painter in at_work:
-            pictures |= painter.delivered(now + max(LATE_S, LATE * (now - started)))
-    return {key: pictures[key] if key in pictures else _paint(key, sketches[key]) for key in keys}
+
+        def finish() -> dict[str, Svg]:
+            pictures = {keys[number]: _paint(keys[number], sketches[keys[number]]) for number in _taken(queue)}
+            now = time.monotonic()
+            for painter in at_work:
+                pictures |= painter.delivered(now + max(LATE_S, LATE * (now - started)))
+            return {key: pictures[key] if key in pictures else _paint(key, sketches[key]) for key in keys}
+
+        yield finish
 
 
 @contextmanager

@@ -29,7 +29,7 @@ from groundstation.pipeline.many_flights.inputs import (
 from groundstation.pipeline.one_flight.cores import cores
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
-from groundstation.reports.fleet_report import write_fleet_report
+from groundstation.reports.fleet_report import fleet_report_begun
 from groundstation.reports.index import IndexRow, Kind
 from groundstation.results.file_names import INDEX_CSV, INDEX_JSON
 
@@ -94,10 +94,11 @@ def _write_beside(
         for name in (FLEET_PAGE, FLEET_PDF, FLEET_RECORDING):
             (out / name).unlink(missing_ok=True)
         return problems
-    from groundstation.viewer.fleet import write_fleet_recording
+    with fleet_report_begun(out, fleet, with_pdf=with_pdf, painters=painters) as finish:
+        from groundstation.viewer.fleet import write_fleet_recording  # Rerun is loaded while the others paint
 
-    problem = write_fleet_report(out, fleet, with_pdf=with_pdf, painters=painters).problem
-    write_fleet_recording(out / FLEET_RECORDING, fleet)
+        write_fleet_recording(out / FLEET_RECORDING, fleet)
+        problem = finish().problem
     return [*problems, Outcome(str(out), "skipped", f"{out}: {problem}")] if problem else problems
 
 

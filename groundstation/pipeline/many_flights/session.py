@@ -32,7 +32,7 @@ from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.pipeline.one_flight.resume import versions
-from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
+from groundstation.reports.flight_report import PDF, REPORT, flight_report_begun, write_flight_report
 from groundstation.results.file_names import MANIFEST
 from groundstation.results.files import load_document, load_manifest, save, save_manifest
 from groundstation.results.flight import FlightResults, Source
@@ -242,12 +242,14 @@ def _run_into(partial: Path, job: SessionJob, watch: Stopwatch) -> Outcome:
 
 def _show(partial: Path, assembled: AssembledSession, results: FlightResults, job: SessionJob, watch: Stopwatch) -> str:
     """Write the recording and the reports of saved results; returns what went wrong."""
-    from groundstation.viewer.session import write_session_recording
+    report = flight_report_begun(partial, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters)
+    with watch.entered("reporting", report) as finish:
+        with watch.stage("recording"):  # while the other painters are at the report's figures
+            from groundstation.viewer.session import write_session_recording  # Rerun is loaded after they were forked
 
-    with watch.stage("recording"):
-        write_session_recording(partial / f"{results.flight_id}.rrd", assembled, results)
-    with watch.stage("reporting"):
-        return write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters).problem
+            write_session_recording(partial / f"{results.flight_id}.rrd", assembled, results)
+        with watch.stage("reporting"):
+            return finish().problem
 
 
 def _flights(partial: Path, job: SessionJob) -> tuple[list[Flight], tuple[LogOfSession, ...], list[Finding]]:
@@ -268,7 +270,7 @@ def _flights(partial: Path, job: SessionJob) -> tuple[list[Flight], tuple[LogOfS
             converted = convert_log(log, mcap, job.configuration.thresholds)
             info, has_lost = converted.info, converted.has_lost_data
         if has_lost:
-            text = f"{source.name} lost data; `groundstation check` tells what"
+            text = f"{source.name} lost data; `groundstation check` shows what"
             damaged.append(Finding("warn", "session.lost_data", text, place=source.name))
         flights.append(_read(mcap, info))
         where = _seen_from_a_folder_in(job.out, mcap) if log.is_store else str(mcap.relative_to(partial))
@@ -327,10 +329,10 @@ def _assumed(job: SessionJob) -> Iterator[Finding]:
     shipped = {"session": f"sigma of a range, {settings.range_sigma_m:g} m", "cooperative": "sigmas of the INS"}
     told = [what for table, what in shipped.items() if not tables.get(table)]
     if told:
-        text = f"shipped values, as no settings state them: {', '.join(told)}; the computed sigmas rest on these"
+        text = f"not set, so shipped values are used: {', '.join(told)}; the computed sigmas depend on them"
         yield Finding("info", "session.assumed_sigmas", text)
     if job.stations == Stations():
-        text = "no ground stations and no origin: worked on the globe, 13 states an aircraft"
+        text = "no ground stations and no origin: computed on the globe, 13 states per aircraft"
         yield Finding("info", "session.no_stations", text)
 
 

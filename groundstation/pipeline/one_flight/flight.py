@@ -5,9 +5,10 @@ import shutil
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
+from typing import TypeVar
 
 from groundstation.base.errors import UnclaimedLogError, UnreadableLogError
 from groundstation.base.findings import SEVERITIES, Severity, worst
@@ -23,7 +24,7 @@ from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, Keys, Step, keys_of, remember_reports
-from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
+from groundstation.reports.flight_report import PDF, REPORT, flight_report_begun, write_flight_report
 from groundstation.reports.steer_card import write_exports
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
@@ -32,6 +33,7 @@ from groundstation.results.manifest import Resume
 from groundstation.tables.table import Flight
 
 PARTIAL_PREFIX = ".partial-"
+Inside = TypeVar("Inside")
 
 
 @dataclass
@@ -51,6 +53,14 @@ class Stopwatch:
             yield
         finally:
             self.times_s[text] = self.times_s.get(text, 0.0) + time.perf_counter() - started
+
+    @contextmanager
+    def entered(self, text: str, context: AbstractContextManager[Inside]) -> Iterator[Inside]:
+        """A context that is entered as part of a stage; what is done within it has stages of its own."""
+        with ExitStack() as contexts:
+            with self.stage(text):
+                inside = contexts.enter_context(context)
+            yield inside
 
 
 @dataclass(frozen=True)
@@ -184,12 +194,14 @@ def _show(partial: Path, flight: Flight, results: FlightResults, job: Job, watch
     """Write the recording and the reports of saved results, where they are asked for; returns what went wrong."""
     if job.only_results:
         return _export(partial)
-    from groundstation.viewer.recording import write_recording
+    report = flight_report_begun(partial, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters)
+    with watch.entered("reporting", report) as finish:
+        with watch.stage("recording"):  # while the other painters are at the report's figures
+            from groundstation.viewer.recording import write_recording  # Rerun is loaded after they were forked
 
-    with watch.stage("recording"):
-        write_recording(partial / f"{results.flight_id}.rrd", flight, results)
-    with watch.stage("reporting"):
-        return write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters).problem
+            write_recording(partial / f"{results.flight_id}.rrd", flight, results)
+        with watch.stage("reporting"):
+            return finish().problem
 
 
 def _export(folder: Path) -> str:
@@ -264,7 +276,7 @@ def sentence(results: FlightResults) -> str:
     if not results.not_assessable:
         return "not assessable: no analysis applies"
     first, *others = results.not_assessable
-    more = f" (of {len(others)} more the report says why)" if others else ""
+    more = f" (and {len(others)} more: see the report)" if others else ""
     return f"not assessable: {first.analysis}: {first.reason}{more}"
 
 
