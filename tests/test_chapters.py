@@ -189,7 +189,7 @@ def test_estimates_stand_side_by_side() -> None:
 
 
 def test_the_aircrafts_own_figures_stand_beside_ours() -> None:
-    table = grid(heading(example(heading_result())), "Ground result beside the aircraft's own")
+    table = grid(heading(example(heading_result())), "Ground result and the aircraft's own")
     rows = {row[0]: row[1:] for row in table.rows}
     assert rows["Heading error"] == ("+1.038°", "+1.020°", "−0.018°")
     assert rows["Correction"] == ("−1.05°", "−1.00°", "")
@@ -202,13 +202,13 @@ def test_runway_lever_arm_and_standstill_are_told() -> None:
     assert runway == ("12", "119.72°", "120.71°", "+0.990°", "0.050°", "−0.048°")
     arm = facts(section.appendix, "Lever arm, time offset, drift")
     assert arm["Lever arm, antenna ahead of the main gear"] == ("+4.12 m (σ 0.35 m)", "estimated")
-    assert arm["GNSS latency taken out"] == ("+0.100 s (σ 0.010 s)", "from the motion")
+    assert arm["GNSS latency removed"] == ("+0.100 s (σ 0.010 s)", "from the motion")
     assert arm["Azimuth drift"][0] == "+0.80 °/h (σ 0.70 °/h)"
     still = facts(section.appendix, "GNSS at standstill")
     assert still["Interval"] == ("0:25 – 0:55", "300 samples")
     assert still["Mean velocity, north / east"][0] == "+0.0031 m/s / −0.0035 m/s"
     assert still["Length of the mean vector"] == ("0.0047 m/s", "gated; 0.97 bound 0.0094 m/s")
-    assert still["Make-up of the velocity error"][0] == "white 0.040 m/s, correlated 0.020 m/s over 4.1 s"
+    assert still["Parts of the velocity error"][0] == "white 0.040 m/s, correlated 0.020 m/s over 4.1 s"
 
 
 def test_what_is_unknown_is_an_em_dash() -> None:
@@ -238,7 +238,7 @@ def test_intervals_chosen_by_hand_are_told_where_they_are_known() -> None:
     )
     assert part.pairs == [
         ("Left out by hand", "+03:10 – +03:15", "towed"),
-        ("Used by hand against the gates", "1 – 2", ""),
+        ("Used by hand despite the gates", "1 – 2", ""),
     ]
     assert not [one for one in heading(example(heading_result())).parts if getattr(one, "title", "") == part.title]
 
@@ -257,9 +257,7 @@ def test_a_receiver_that_holds_its_velocity_has_no_flat_lines_at_standstill() ->
     assert still is not None
     section = heading(example(heading_result(standstill=replace(still, velocity_is_held=True))))
     assert not [part for part in section.parts if isinstance(part, Figure) and part.name.startswith("standstill")]
-    assert notes(section.parts) == [
-        "The receiver holds its velocity when standing, so its error at standstill cannot be seen."
-    ]
+    assert notes(section.parts) == ["The receiver holds its velocity at standstill, so its error there cannot be seen."]
 
 
 def test_every_figure_of_a_chapter_has_a_drawer() -> None:

@@ -98,7 +98,7 @@ def test_calibration_is_judged_from_enough_starts_only(independent: int, nees: f
     cells = row(section, HONEST, "60 min")
     assert cells[1] == str(independent)
     assert cells[-4:] == (f"{nees:.2f}", "0.60 … 1.50", "1.80", verdict)
-    judged = "At 10, 30, 60, 90 and 120 min too few to judge: fewer than 5 independent starts."
+    judged = "At 10, 30, 60, 90 and 120 min not judged: fewer than 5 independent starts."
     assert notes(section)[1].endswith(judged) == (independent < 5)
 
 
@@ -107,7 +107,7 @@ def test_horizons_not_judged_are_not_among_every_horizon() -> None:
         replace(row, independent_starts=6 if row.horizon_min < 60.0 else 2) for row in forecast_result().calibration
     )
     told = notes(chapter(calibration=calibration, **with_coverage(1.0)))[1]
-    assert "wider than needed at 1, 5, 10 and 30 min. At 60, 90 and 120 min too few to judge" in told
+    assert "wider than needed at 1, 5, 10 and 30 min. At 60, 90 and 120 min not judged" in told
 
 
 def test_nothing_is_called_honest_from_too_few_starts() -> None:
@@ -116,7 +116,7 @@ def test_nothing_is_called_honest_from_too_few_starts() -> None:
         for minutes in (1, 5, 10, 30, 60, 90, 120)
     )
     section = chapter(calibration=calibration)
-    assert notes(section)[1] == "Whether its σ is honest cannot be judged: fewer than 5 independent starts."
+    assert notes(section)[1] == "Its σ cannot be judged: fewer than 5 independent starts."
     assert tones(section)[1] == "unknown"
     assert not [note for note in notes(section) if "honest on this flight" in note]
 
@@ -176,11 +176,11 @@ def test_windows_are_held_against_the_model_that_they_are_of() -> None:
 
 def test_captions_say_which_starts_and_how_many_states() -> None:
     section = chapter()
-    assert "These starts are not those of the table of skill: they come every 60 s from 10 min" in (
+    assert "These starts are not those of the skill table: they come every 60 s from 10 min" in (
         grid(section, "Outages by phase of flight").caption
     )
     assert grid(section, "Coupled model").caption.startswith("Sixteen states")
-    assert grid(section, SKILL).caption.replace("\u202f", " ").startswith("Starts every 300 s from 1:20:00 of flight")
+    assert grid(section, SKILL).caption.replace("\u202f", " ").startswith("Starts every 300 s from flight time 1:20:00")
 
 
 def test_rows_of_the_smaller_tables() -> None:

@@ -110,8 +110,8 @@ def test_a_state_that_was_seen_or_has_grown_keeps_its_number(sigma: float, obser
 
 def test_of_an_ins_of_unknown_kind_the_differences_are_told_and_what_it_was_judged_by() -> None:
     section = chapter(**{**AIDED, "kind": "unknown", "kind_reason": "it stood still all the time."})
-    assert section.headline == "Whether GNSS corrects this INS cannot be told"
-    assert notes(section)[0].startswith("Whether GNSS corrects this INS cannot be told: it stood still all the time. ")
+    assert section.headline == "It is not known whether GNSS corrects this INS"
+    assert notes(section)[0].startswith("It is not known whether GNSS corrects this INS: it stood still all the time. ")
     assert tones(section)[0] == "unknown" and "ins_kind" in notes(section)[0]
     assert not [text for text in every_text(section) if "naided INS" in text]
     assert "States" not in titles(section) and "INS − GNSS" in titles(section)
@@ -122,7 +122,9 @@ def test_of_an_aided_ins_the_differences_are_told_and_no_state() -> None:
     assert section.headline == "GNSS corrects this INS: within 3.0\u202fm of it (95 %)"
     assert section.claim is not None and section.claim.headline == section.headline
     assert [figure[:2] for figure in section.claim.figures] == [("INS − GNSS, position", "3.0\u202fm")]
-    assert notes(section)[0].startswith("GNSS corrects this INS already: its own mode says so. What GNSS takes out")
+    assert notes(section)[0].startswith(
+        "GNSS corrects this INS already: its own mode says so. Errors that GNSS removes"
+    )
     assert row(section, "INS − GNSS", "Position north, m") == ("+0.20", "1.00", "2.50", "9.00", "600")
     assert row(section, "Innovations of the INS's own filter", "Velocity east, m/s") == (
         *("−0.010", "0.100", "0.300", "0.200", "91.0%", "4.0%", "3000"),
@@ -133,13 +135,13 @@ def test_of_an_aided_ins_the_differences_are_told_and_no_state() -> None:
 def test_reopening_and_other_ins_are_told() -> None:
     section = chapter(reopened=2, other_ins=("ins.1", "ins.2"))
     assert notes(section)[1] == (
-        "GNSS was rejected for so long that the filter was opened to it again, 2 times: the noise of INS class "
-        "navigation does not fit this INS or this receiver."
+        "The filter rejected GNSS for so long that it was opened again, 2 times: the noise of INS class navigation "
+        "does not fit this INS or this receiver."
     )
     assert facts(section, FIGURES)["Pair used"][1] == "not used: ins.1, ins.2"
     assert facts(section, FIGURES)["Filter opened again"][0] == "2 times"
-    assert "to it again, once: " in notes(chapter(reopened=1))[1]
-    assert not [note for note in notes(chapter()) if "was opened to it again" in note]
+    assert "that it was opened again, once: " in notes(chapter(reopened=1))[1]
+    assert not [note for note in notes(chapter()) if "was opened again" in note]
 
 
 def test_settings_are_spelled_as_in_the_file_and_noise_of_the_class_stands_apart() -> None:
@@ -165,7 +167,7 @@ def with_share(share: float, *, raised: bool) -> dict[str, Any]:
         (0.95, False, "good", "the filter is consistent"),
         (0.80, False, "warn", "the filter is overconfident"),
         (0.80, True, "warn", "the filter is overconfident"),
-        (0.995, False, "warn", "the filter claims less than it knows"),
+        (0.995, False, "warn", "the filter is too careful, its sigmas are too large"),
         (0.995, True, "plain", "innovations cannot show whether the filter is consistent"),
         (1.0, True, "plain", "innovations cannot show whether the filter is consistent"),
     ],
@@ -182,7 +184,7 @@ def test_raised_noise_has_no_limits() -> None:
     assert north == ("North", "0.970", "noise raised", "99.0%", "15 210", "12", "0.610 m/s", "744 m")
     assert east[2] == "noise raised"
     assert rows(chapter(), "Consistency of the filter")[0][2] == "0.93 … 1.07"
-    assert "says anything of consistency" in grid(chapter(), "Consistency of the filter").caption
+    assert "neither NIS nor the share inside shows consistency" in grid(chapter(), "Consistency of the filter").caption
 
 
 def test_azimuth_is_told_with_its_reason() -> None:

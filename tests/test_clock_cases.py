@@ -296,7 +296,7 @@ def test_the_report_has_the_clocks_in_tables(tmp_path: Path) -> None:
     case = next(case for case in CASES if case.name == "a backward step of 5 s")
     parts = quality(example(None, clock=found_in(case, tmp_path).clock.document())).parts
     grids = {part.title: part.rows for part in parts if isinstance(part, Grid)}
-    (step,), (relation,) = grids["Steps of the recorder's clock"], grids["The recorder's clock by others"]
+    (step,), (relation,) = grids["Steps of the recorder clock"], grids["Recorder clock against other clocks"]
     assert step[2] == "−5.000" and relation[0] == "GNSS · raw.recorder.gnss_time_utc_s"
     assert str(relation[4]).endswith("ppm") and "±" in str(relation[4])
     facts = [part for part in parts if isinstance(part, Facts)]

@@ -308,7 +308,7 @@ def test_the_page_is_whole_and_says_what_differs(folders: dict[str, Path], tmp_p
     comparison, *saved = compare(folders["good"], folders["faster"])
     html = comparison_html(comparison, *saved)
     assert html == comparison_html(comparison, *saved)
-    assert "heading.taxi_speed_min_mps" in html and "Both come from one log: their noise is shared" in html
+    assert "heading.taxi_speed_min_mps" in html and "Both come from one log: they share its noise" in html
     assert (
         re.findall(r'(?:src|href)="(?!#|compare\.csv)[^"]*"', re.sub(r"<svg.*?</svg>", "", html, flags=re.DOTALL)) == []
     )

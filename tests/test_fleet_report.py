@@ -183,7 +183,7 @@ def test_the_table_of_a_large_fleet_has_what_is_of_note_and_the_last(monkeypatch
     assert len(names) == 12 and noted <= set(names) and names == sorted(names)
     others = [name for name in fleet.flights["flight_id"].tolist() if name not in noted]
     assert set(names) - noted == set(others[len(noted) - 12 :])
-    assert "12 of 40 flights: those of note" in flights.caption_of(fleet)
+    assert "12 of 40 flights: notable ones first" in flights.caption_of(fleet)
 
 
 def test_every_flight_has_a_row_with_its_figures(usual: FleetResults, html: str) -> None:

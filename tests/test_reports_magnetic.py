@@ -28,8 +28,8 @@ from tests.saved import load
 from tests.test_magnetic_run import figure_eight
 from tests.test_reports import Page, report
 
-FIGURES = ("Deviation by heading", "Error where no fit has seen", "Figures as flown", "Both branches")
-TABLES = ("Coefficients", "Steer card", "Gates", "Methods side by side", "Turns of steady bank", "Figures apart")
+FIGURES = ("Deviation by heading", "Error on data that no fit used", "Figures as flown", "Both branches")
+TABLES = ("Coefficients", "Steer card", "Gates", "Methods side by side", "Turns of steady bank", "Each figure alone")
 
 
 @pytest.fixture(scope="module")

@@ -8,12 +8,15 @@ from groundstation.chapters.wording import ABSENT, clean, number, sentence
 from groundstation.results.acceptance import ENSEMBLE, Acceptance, InsRow, Judgement, Limit
 
 CLAIMS = {
-    "type": "The claim is on all INS of the kind flown. Flights of one INS are alike: they count by their correlation.",
-    "units": "The claim is on all INS of the kind flown. Every INS counts once at most, however often it flew.",
+    "type": (
+        "The claim is on all INS of the kind flown. Flights of one INS are correlated: they count as fewer "
+        "independent flights."
+    ),
+    "units": "The claim is on all INS of the kind flown. Each INS counts at most once, however often it flew.",
     "these": "The claim is on the INS flown alone. Each of their flights counts.",
 }
 ROLES = ("Prepared", "Checked", "Approved")
-NOT_MEASURED = "Acceleration, roll, pitch and attitude rate are not judged: nothing in the logs is a reference of them."
+NOT_MEASURED = "Acceleration, roll, pitch and attitude rate are not judged: the logs hold no reference for them."
 ALL = "All"
 LONGEST = 32
 
@@ -25,13 +28,13 @@ def sections(found: Acceptance) -> tuple[Section, ...]:
 
 
 def _acceptance(found: Acceptance) -> tuple[Section, ...]:
-    lead = "Is the share of flights that the standard asks for within its limits, and how sure is that?"
+    lead = "Does the share of flights that the standard requires stay within its limits, and with what confidence?"
     return (
         Section("limits", "Limits", lead, kept((_standard(found), _limits(found), *_notes(found)))),
-        Section("ins", "By INS", "What each INS shows, and what all show together.", _by_ins(found)),
+        Section("ins", "By INS", "Results of each INS, and of all together.", _by_ins(found)),
         Section("errors", "Errors against time", "Radial error, INS minus reference.", _drawings(found)),
         Section("flights", "Flights", "", kept((_included(found), _excluded(found)))),
-        Section("configuration", "Configuration", "What the figures were found with.", _configuration(found)),
+        Section("configuration", "Configuration", "Versions and settings behind the figures.", _configuration(found)),
         Section("signatures", "Signatures", "", (Signatures(ROLES),)),
     )
 
@@ -40,7 +43,7 @@ def _irig261(found: Acceptance) -> tuple[Section, ...]:
     left_out = len(found.flights) - len(found.included)
     functional = f"{number(len(found.included), 0)} flights gave errors of a free INS"
     if left_out:
-        functional += f", {number(left_out, 0)} did not: the table of flights left out has the reasons"
+        functional += f", {number(left_out, 0)} did not (reasons: table of flights left out)"
     judged = kept((_limits(found), *_notes(found)))
     conclusions = (Note(headline(found) + ".", MARKS[found.decision].tone), *judged)
     return (
@@ -70,12 +73,12 @@ def _standard(found: Acceptance) -> Part:
     pairs = [
         ("Standard", clean(standard.title), ""),
         ("Source", clean(standard.source), ""),
-        ("How far it was read", clean(standard.read), ""),
+        ("What was read of it", clean(standard.read), ""),
         ("Claim", CLAIMS[standard.claim], ""),
         (
             "Confidence",
             stated(standard.confidence),
-            "one-sided, exact binomial limits of effective numbers of flights",
+            "one-sided; exact binomial limits with the effective number of flights",
         ),
     ]
     return Facts("What is judged", [pair for pair in pairs if pair[1]])
@@ -103,10 +106,10 @@ def _limits(found: Acceptance) -> Grid | None:
             place = f" ({clean(limit.paragraph)})" if limit.paragraph else ""
             rows.append((f"{clean(limit.title)}{place}", *_judged(limit, one)))
     caption = (
-        "Worth: independent flights that they count as. Within, at least: lower limit of the share of flights within. "
-        "Share stays below: an order statistic, the largest flight but so many as may be over. Reference ratio: limit "
-        "over the error of the reference, both 95 %, the smallest of the flights. More flights: independent ones, none "
-        "over; in brackets at the present share."
+        "Worth: number of independent flights that they count as. Within, at least: lower limit of the share of "
+        "flights within. Share stays below: order statistic, the largest error without the flights that may be over. "
+        "Reference ratio: limit over the error of the reference, both 95 %, smallest of the flights. More flights: "
+        "independent flights needed if none is over; in brackets, at the present share."
     )
     return Grid("All flights", LIMIT_HEADS, rows, caption) if rows else None
 
@@ -133,8 +136,8 @@ def _notes(found: Acceptance) -> tuple[Part, ...]:
             told = (
                 f"{clean(found.limit(one.limit).title)}: {number(one.flights, 0)} flights of "
                 f"{number(one.ins_units, 0)} INS count as {number(one.effective_flights, 1)}: the correlation within "
-                f"an INS is taken as {number(one.correlation, 2)}. Of these INS alone, every flight counted, at least "
-                f"{at_least(one.share_low_these)} of flights are within."
+                f"an INS is assumed to be {number(one.correlation, 2)}. For these INS alone, every flight counts: at "
+                f"least {at_least(one.share_low_these)} of flights are within."
             )
             notes.append(Note(told, "unknown"))
     return tuple(notes)
@@ -180,8 +183,9 @@ def _rates(found: Acceptance) -> Grid:
     ]
     caption = (
         "Median, largest: radial error rate of a flight, nmi/h, the slope through the origin of its error over time. "
-        "CEP50, R95, 2drms: the same slope of what half and 95 % of the flights stay within at a time, and of twice "
-        "their root mean square; three flights at least. Along, across: 95 % of the flights' largest errors, nmi."
+        "CEP50, R95, 2drms: the same slope for the error that half and 95 % of the flights stay within at each time, "
+        "and for twice their root mean square; at least three flights. Along, across: 95 % of the flights' largest "
+        "errors, nmi."
     )
     return Grid("Position", heads, rows, caption)
 
@@ -201,7 +205,7 @@ def _others(found: Acceptance) -> Grid:
         for row in found.rows
     ]
     caption = (
-        "Velocity: INS minus GNSS over all epochs. Heading: magnitude of the error on taxi, rejected ones left out."
+        "Velocity: INS minus GNSS over all epochs. Heading: magnitude of the error on taxi, without rejected ones."
     )
     return Grid("Velocity, heading, alignment", heads, rows, caption)
 
@@ -212,7 +216,7 @@ def _limits_by_ins(found: Acceptance) -> Grid | None:
         if one.ins != ENSEMBLE:
             limit = found.limit(one.limit)
             rows.append((f"{clean(one.ins)[:LONGEST]}: {clean(limit.title)}", *_judged(limit, one)))
-    caption = "Each INS for itself, its flights taken as independent."
+    caption = "Each INS alone; its flights count as independent."
     return Grid("Limits by INS", (Head("INS: limit"), *LIMIT_HEADS[1:]), rows, caption) if rows else None
 
 
@@ -262,5 +266,5 @@ def _configuration(found: Acceptance) -> tuple[Part, ...]:
         ("Accuracy ratio wanted", number(found.standard.accuracy_ratio_min, 1), "limit over error of the reference"),
     ]
     settings = [(name, clean(", ".join(values)), "") for name, values in found.settings.items()]
-    caption = "Settings of the INS analysis in force; several values where flights differ."
+    caption = "Settings of the INS analysis; several values where flights differ."
     return kept((Facts("Versions", pairs), Facts("Settings", settings, caption, compact=True) if settings else None))

@@ -47,7 +47,7 @@ def front(found: Acceptance) -> Front:
         pairs,
         verdict=MARKS[found.decision],
         headline=headline(found),
-        sentences=told or ("The standard states no limit: errors are told, nothing is judged.",),
+        sentences=told or ("The standard states no limit: errors are reported, nothing is judged.",),
         figures=_figures(found, whole),
     )
 
@@ -71,7 +71,7 @@ def headline(found: Acceptance) -> str:
 def _told(found: Acceptance, one: Judgement) -> str:
     limit = found.limit(one.limit)
     if one.decision == "not flown":
-        return f"{clean(limit.title)}: none flown, nothing is said of them."
+        return f"{clean(limit.title)}: none flown, not judged."
     asked = f"wanted {wanted(limit)} on {stated(limit.share)}"
     if not one.flights:
         return (
@@ -84,7 +84,7 @@ def _told(found: Acceptance, one: Judgement) -> str:
         f"{stated(found.standard.confidence)} confidence at least {at_least(one.share_low)} are within{worth}."
     )
     if one.not_measured:
-        told += f" On {number(one.not_measured, 0)} more what it bounds was not measured: they are not judged."
+        told += f" {number(one.not_measured, 0)} more not judged: the limited quantity was not measured."
     return f"{told} {_missing(one)}".strip()
 
 
@@ -123,7 +123,7 @@ def _missing(one: Judgement) -> str:
     if not one.over:
         return f"{more}."
     at_share = (
-        "at the present share none would do"
+        "no number suffices at the present share"
         if one.more_at_present_share is None
         else f"{number(one.more_at_present_share, 0)} at the present share"
     )

@@ -5,7 +5,7 @@ from groundstation.chapters.wording import ABSENT, any_value, clock, number, per
 from groundstation.results.inertial import Difference, InertialResult, OwnInnovation
 
 TITLE = "INS against GNSS"
-HEADLINES = {"gnss_aided": "GNSS corrects this INS", "unknown": "Whether GNSS corrects this INS cannot be told"}
+HEADLINES = {"gnss_aided": "GNSS corrects this INS", "unknown": "It is not known whether GNSS corrects this INS"}
 LEAD = "INS − GNSS shows how closely this INS follows its receiver, not how good either of them is."
 PLACES = {"m": 2, "mps": 3}
 
@@ -45,10 +45,10 @@ def _claim(answer: InertialResult, headline: str) -> Claim:
 
 def _why(answer: InertialResult) -> Note:
     reason = typeset(answer.kind_reason).strip().rstrip(".")
-    unseen = "What GNSS takes out cannot be seen against GNSS, so nothing is estimated, corrected or forecast."
+    unseen = "Errors that GNSS removes cannot be seen against GNSS, so nothing is estimated, corrected or forecast."
     if answer.kind == "gnss_aided":
         return Note(f"GNSS corrects this INS already: {reason}. {unseen}")
-    text = f"{HEADLINES[answer.kind]}: {reason}. {unseen} An aircraft file that states ins_kind decides it."
+    text = f"{HEADLINES[answer.kind]}: {reason}. {unseen} To decide it, state ins_kind in the aircraft file."
     return Note(text, "unknown")
 
 
@@ -73,8 +73,8 @@ def _innovations(answer: InertialResult) -> Grid | None:
         cells.append((_title(row), *_sizes(row), *judged, number(row.samples, 0)))
     heads = (Head("Innovation"), *(Head(title, True) for title in (*titles, "Samples")))
     caption = (
-        f"GNSS − what the INS's own filter predicted, from topic {answer.own_filter}. A mean far from zero or many "
-        "samples beyond the gate: the filter and its receiver disagree."
+        f"GNSS − what the INS's own filter predicted, from topic {answer.own_filter}. A mean far from zero, or many "
+        "samples beyond the gate, show that the filter and its receiver disagree."
     )
     return Grid("Innovations of the INS's own filter", heads, cells, caption) if cells else None
 

@@ -9,8 +9,8 @@ from groundstation.chapters.wording import ABSENT, any_value, number, significan
 from groundstation.results.comparison import Comparison, Delta, Value
 
 SHARED = (
-    "Both come from {}: their noise is shared, and what differs follows from {} alone. A difference within the stated "
-    "sigmas is no proof that they do not matter."
+    "Both come from {}: they share its noise, and all differences come from {} alone. A difference within the stated "
+    "sigmas does not prove that these do not matter."
 )
 
 
@@ -45,7 +45,7 @@ def answers(comparison: Comparison) -> Section:
     differing = sum(delta.is_different for delta in comparison.deltas)
     caption = (
         f"The main answers, and any other that differs beyond its sigma; {differing} of {len(comparison.deltas)} "
-        "common answers differ at all: compare.csv. σ of the difference from the sigmas that both state, taken as "
+        "common answers differ at all (see compare.csv). σ of the difference: from the sigmas of both, taken as "
         "independent; empty where one states none."
     )
     lead = "Answers that both flights have; names as in summary.json."
@@ -68,7 +68,7 @@ def settings(comparison: Comparison) -> Section | None:
     if not comparison.settings:
         return None
     rows = [(pair.name, _value(pair.a), _value(pair.b)) for pair in comparison.settings]
-    lead = "What was set, what each analysis used, and versions, where they are not the same."
+    lead = "Settings as set and as each analysis used them, and versions, where A and B differ."
     grid = Grid("", (Head("Setting"), Head("A", True), Head("B", True)), rows)
     return Section("settings", "Settings that differ", lead, (grid,))
 
@@ -80,7 +80,7 @@ def findings(comparison: Comparison) -> Section | None:
         ("B", comparison.findings_b, comparison.not_assessable_b),
     )
     grids = [
-        Grid(f"{letter} alone", (Head("Severity"), Head("Finding"), Head("Code")), rows)
+        Grid(f"Only in {letter}", (Head("Severity"), Head("Finding"), Head("Code")), rows)
         for letter, findings, reasons in sides
         if (
             rows := [
@@ -89,8 +89,8 @@ def findings(comparison: Comparison) -> Section | None:
             ]
         )
     ]
-    lead = "What was noticed in only one of the two, by severity, code and topic."
-    return Section("findings", "Findings of one alone", lead, grids) if grids else None
+    lead = "Findings that only one of the two has, by severity, code and topic."
+    return Section("findings", "Findings of only one", lead, grids) if grids else None
 
 
 def _finding_rows(findings: Sequence[Finding]) -> list[tuple[Cell, ...]]:

@@ -10,8 +10,8 @@ from groundstation.results.flight import FlightResults
 
 TITLE = "Control of the session"
 LEAD = (
-    "How aircraft should move, within their bounds, for the accuracy of one of them: the covariance of the "
-    "centralised filter along each law of control. Nothing is simulated and no measurement is used."
+    "How aircraft should move, within their bounds, for the accuracy of one of them: covariance of the centralised "
+    "filter under each control law. Nothing is simulated and no measurement is used."
 )
 LAWS: Mapping[str, str] = {
     UNCONTROLLED: "No control",
@@ -34,12 +34,13 @@ SEARCH_HEADS = (
     Head("Nearest aircraft, m", True),
 )
 SEARCH_CAPTION = (
-    "Gain left: most that any control within the bounds still gains to first order, over the loss (of a law of each "
-    "step: in its worst step). Starts apart: worst start over the best. At a bound: share of all control values."
+    "Gain left: the most that any control within the bounds can still gain to first order, over the loss (for a law "
+    "of each step: in its worst step). Starts apart: worst start over the best. At a bound: share of all control "
+    "values."
 )
 CONTROL_HEADS = (
     *(Head("Aircraft"), Head("Control"), Head("Unit"), Head("Start", True), Head("Low", True), Head("High", True)),
-    *(Head("Most change in 1 s", True), Head("At the end", True)),
+    *(Head("Largest change in 1 s", True), Head("At the end", True)),
 )
 
 
@@ -78,7 +79,7 @@ def _east(row: LawRow) -> str:
 def _above(answer: ControlPlan) -> tuple[Part, ...]:
     best, before = answer.law(answer.recommended), answer.law(UNCONTROLLED)
     if best is before:
-        return (Note("No aircraft may be controlled: this is the accuracy as it flies."),)
+        return (Note("No aircraft may be controlled: this is the accuracy without control."),)
     who = ", ".join(dict.fromkeys(row.aircraft for row in answer.controls))
     told = f"{title_of(best.law)}: {who} controlled over {number(answer.duration_s, 0, 's')}."
     figures = (
@@ -105,7 +106,7 @@ def _laws(answer: ControlPlan) -> Grid:
         )
         for row in answer.laws
     ]
-    return Grid(f"Laws of control, accuracy of {answer.judged}", LAW_HEADS, rows, LAW_CAPTION, ("control_measures",))
+    return Grid(f"Control laws, accuracy of {answer.judged}", LAW_HEADS, rows, LAW_CAPTION, ("control_measures",))
 
 
 def _controls(answer: ControlPlan) -> Grid | None:

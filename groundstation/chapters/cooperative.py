@@ -33,11 +33,11 @@ ALGORITHM_HEADS = (
 )
 COST_HEADS = (
     *(Head("Algorithm"), Head("Spectral radius", True), Head("Used", True), Head("Gated", True), Head("Lost", True)),
-    *(Head("Messages", True), Head("Bytes a slot", True)),
+    *(Head("Messages", True), Head("Bytes per slot", True)),
 )
 COST_CAPTION = (
-    "Spectral radius of the joint error map, worst window: above 1 errors feed themselves. Messages and bytes are what "
-    "a data link would carry for the algorithm."
+    "Spectral radius of the joint error map, worst window: above 1 errors grow. Messages and bytes are what a data "
+    "link would carry for the algorithm."
 )
 ALGORITHM_CAPTION = (
     "NEES: squared error over its computed variance, 2 is honest; the limits count aircraft, not epochs. Diverges: "
@@ -51,14 +51,14 @@ GEOMETRY_HEADS = (
     *(Head("Aircraft"), Head("Sources", True), Head("HDOP", True), Head("GDOP", True), Head("det(H'H)", True)),
     *(Head("least det", True), Head("least eigenvalue", True), Head("Gram determinant", True)),
 )
-GEOMETRY_CAPTION = "Medians over the session where not said otherwise; det(H'H) of two sources is sin² of their angle."
+GEOMETRY_CAPTION = "Medians over the session unless noted; det(H'H) of two sources is sin² of their angle."
 LINK_HEADS = (
     *(Head("Receiver"), Head("Source"), Head("Ranges", True), Head("Used", True), Head("Gated", True)),
     *(Head("Residual, mean, m", True), Head("RMS, m", True), Head("NIS", True)),
 )
 CLOCK_HEADS = (
     *(Head("Aircraft"), Head("Log"), Head("UTC"), Head("Ranges", True), Head("Offset, s", True), Head("Leaps", True)),
-    Head("Offset taken off"),
+    Head("Offset removed"),
 )
 
 
@@ -138,13 +138,17 @@ def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -
     figures = [("2σ_r", number(best.two_sigma_r_m, 1, "m"), "worst aircraft at the end, as computed")]
     if reckoned is not None and reckoned is not best:
         figures.append(
-            ("Dead reckoning alone", number(reckoned.two_sigma_r_m, 1, "m"), "2σ_r of the same, as computed")
+            (
+                "Dead reckoning alone",
+                number(reckoned.two_sigma_r_m, 1, "m"),
+                "2σ_r, worst aircraft at the end, as computed",
+            )
         )
     if is_number(best.rms_m):
         limits = f"NEES {number(best.nees, 2)}, 95 % limits {number(best.nees_low, 2)} to {number(best.nees_high, 2)}"
         figures.append(("RMS error", number(best.rms_m, 1, "m"), limits))
         figures.append(("Over the bound", number(best.bound_ratio, 2), "RMS error over that of Cramér and Rao"))
-    figures.append(("Data link", number(best.bytes_per_slot, 0, "bytes"), "a slot, for this algorithm"))
+    figures.append(("Data link", number(best.bytes_per_slot, 0, "bytes"), "per slot, for this algorithm"))
     return Front(
         f"Session of {names_or_count(answer.vehicle_names)}",
         pairs,
@@ -179,13 +183,13 @@ def _reason(answer: CooperativeResult, best: AlgorithmRow) -> str:
     name = title_of(best.algorithm)
     if best.rms_m is None:
         return (
-            f"{name} is the algorithm to trust by its construction: no log holds a truth, so nothing judges the errors "
-            "or whether the computed sigma is honest."
+            f"{name} is the algorithm to trust by design: no log holds a truth, so neither the errors nor the computed "
+            "sigma can be checked."
         )
     if not _is_safe(best):
         return (
-            f"Against the truth every algorithm diverges or is overconfident; {name} is the default, and its sigma is "
-            "not to be trusted."
+            f"Against the truth every algorithm diverges or is overconfident; {name} is the default, but do not trust "
+            "its sigma."
         )
     if best.algorithm != answer.default_algorithm:
         return (
@@ -298,7 +302,10 @@ def _links(answer: CooperativeResult) -> Grid | None:
         )
         for row in ordered[:MOST_LINKS]
     ]
-    caption = "Residuals of the default algorithm, worst first; NIS: squared over their computed variance, 1 is honest."
+    caption = (
+        "Residuals of the default algorithm, worst first; NIS: squared residual over its computed variance, 1 is "
+        "honest."
+    )
     if len(ordered) > len(rows):
         caption += f" {len(ordered) - len(rows)} more in summary.json."
     return Grid("Links", LINK_HEADS, rows, caption, ("cooperative_links",)) if rows else None
@@ -308,7 +315,7 @@ def _clocks(results: FlightResults) -> Grid | None:
     data = results.figure_with_rows("session_clocks")
     if data is None:
         return None
-    caption = "Offset: log time less time of transmission and travel, against the group; absent without UTC or ranges."
+    caption = "Offset: log time minus time of transmission and travel, against the group; absent without UTC or ranges."
     return Grid("Clocks of the logs", CLOCK_HEADS, _clock_rows(data), caption, ("session_clocks",))
 
 

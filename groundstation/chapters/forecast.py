@@ -24,7 +24,10 @@ from groundstation.results.inertial import InertialResult
 HONESTY_TONES: dict[str, Tone] = {"within limits": "good", "too sure": "warn"}
 COMPARED = ("last_estimate", "windows")  # beside the shipped method in the calibration table
 TITLE = "Forecast without GNSS"
-LEAD = "GNSS taken away at many moments of this flight: the radial error built up since, against what GNSS showed."
+LEAD = (
+    "GNSS is withheld at many moments of this flight: the radial error that grows after each, against the recorded "
+    "GNSS."
+)
 
 
 def forecast(results: FlightResults) -> Section | None:
@@ -84,8 +87,8 @@ def _skill(answer: ForecastResult) -> Grid | None:
     heads = _heads("RMS radial error, m", (f"{lead:g} min" for lead in horizons))
     step = number(answer.start_step_s, 0, "s")
     caption = (
-        f"Starts every {step} from {clock(answer.first_start_s)} of flight time on, as far as each horizon "
-        "fits; ✓ the least on this flight. Neighbouring starts share most of their data."
+        f"Starts every {step} from flight time {clock(answer.first_start_s)}, while the horizon fits into the flight; "
+        "✓ smallest on this flight. Neighbouring starts share most of their data."
     )
     return Grid("Skill by method and horizon", heads, rows, caption, ("forecast_growth",))
 
@@ -109,7 +112,7 @@ def _default_in_detail(answer: ForecastResult) -> Grid | None:
         for lead, row in sorted(rows_of(answer, answer.default_method).items())
     ]
     heads = _heads("Horizon", ("Starts", "RMS, m", "Median, m", "95 %, m", "In 95 % band", "Before scaling"))
-    caption = "Short term: up to 10 min; long term: beyond. Before scaling: with the σ of the model as it comes."
+    caption = "Short term: up to 10 min; long term: beyond. Before scaling: with the unscaled σ of the model."
     return Grid("The shipped method in detail", heads, rows, caption) if rows else None
 
 
@@ -119,8 +122,7 @@ def _calibration(answer: ForecastResult) -> list[Grid]:
     heads = (*_heads("Horizon", titles), Head("NEES is"))
     caption = (
         "NEES: mean squared error over the variance claimed, 1 is honest; its 95 % limits come from the number of "
-        f"independent starts, and below {FEWEST_STARTS} of those nothing is judged. σ scale: what the model's σ was "
-        "multiplied by."
+        f"independent starts; fewer than {FEWEST_STARTS} are not judged. σ scale: factor on the model's σ."
     )
     grids: list[Grid] = []
     for name in dict.fromkeys((answer.default_method, *COMPARED)):
@@ -160,7 +162,7 @@ def _gaps(gaps: tuple[GapRow, ...]) -> Grid | None:
     heads = _heads("Length", ("Gaps", "Forward, m", "RTS, m", "Forward in 95 %", "RTS in 95 %"))
     caption = (
         "Largest radial error in each gap, RMS over the gaps. Forward: forecast, for use on board; RTS: smoothed with "
-        "what came after, for the reference trajectory."
+        "the data after the gap, for the reference trajectory."
     )
     return Grid("Gaps with GNSS on both sides", heads, rows, caption) if rows else None
 
@@ -178,8 +180,9 @@ def _phases(phases: tuple[PhaseRow, ...]) -> Grid | None:
     ]
     heads = _heads("Begins in", ("Length", "Starts", "Shipped, RMS m", "Raw INS, RMS m"))
     caption = (
-        "Lengths in min:s. These starts are not those of the table of skill: they come every 60 s from 10 min after "
-        "the first epoch on, when the filter has hardly settled, so the numbers differ from the skill at equal lengths."
+        "Lengths in min:s. These starts are not those of the skill table: they come every 60 s from 10 min after the "
+        "first epoch, when the filter has hardly settled. The numbers therefore differ from the skill at equal "
+        "lengths."
     )
     return Grid("Outages by phase of flight", heads, rows, caption) if rows else None
 
@@ -195,7 +198,7 @@ def _coupled(coupled: tuple[CoupledRow, ...]) -> Grid | None:
     ]
     heads = _heads("Horizon", ("Coupled, RMS m", "Gain"))
     caption = (
-        "Sixteen states (six of each channel, coupled, azimuth and its drift, accelerometer biases) against two "
-        "separate channels; last estimate of both."
+        "Sixteen states (six of each channel, coupled, azimuth and its drift, accelerometer biases) compared with two "
+        "separate channels; both with the last estimate."
     )
     return Grid("Coupled model", heads, rows, caption) if rows else None

@@ -59,9 +59,9 @@ def _honesty(answer: ForecastResult) -> Note | None:
     unjudged = [lead for lead in known if lead in few]
     why = f"fewer than {FEWEST_STARTS} independent starts"
     if not shares:
-        text = f"{start}Whether its σ is honest cannot be judged: {why}." if unjudged else start.strip()
+        text = f"{start}Its σ cannot be judged: {why}." if unjudged else start.strip()
         return Note(text, "warn" if start else "unknown") if text else None
-    left = f" {_where(unjudged, list(known)).capitalize()} too few to judge: {why}." if unjudged else ""
+    left = f" {_where(unjudged, list(known)).capitalize()} not judged: {why}." if unjudged else ""
     low, high = percent(min(shares.values())), percent(max(shares.values()))
     held = low if low == high else f"{low} to {high} (by horizon)"
     text = f"{start}The 95 % band of the forecast held {held} of the errors: "

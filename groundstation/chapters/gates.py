@@ -15,7 +15,7 @@ STATES = {
 }
 HEADS = (Head("State"), Head("Gate"), Head("Figure", True), Head("Limit", True), Head("Reason"))
 INFORMS = "informs"
-CAPTION = "Accept asks for every gate but those that inform."
+CAPTION = "Accept requires every gate except those that only inform."
 
 
 def gate_grid(gates: Sequence[Gate]) -> Grid | None:

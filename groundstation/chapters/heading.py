@@ -16,9 +16,9 @@ LEAD = "On straight taxi the nose points where the aircraft moves: INS heading �
 WORKINGS = ("density", "convergence", "spectrum")
 STANDSTILL_FIGURES = (Figure("standstill.components"), Figure("standstill.mean_speed"))
 AIRCRAFT = "aircraft."  # what begins the names of settings of the aircraft file
-HELD = "The receiver holds its velocity when standing, so its error at standstill cannot be seen."
+HELD = "The receiver holds its velocity at standstill, so its error there cannot be seen."
 UNKNOWN_REASON = "the log does not hold what the method needs"
-USES = {"exclude": "Left out by hand", "force": "Used by hand against the gates"}
+USES = {"exclude": "Left out by hand", "force": "Used by hand despite the gates"}
 ESTIMATE_HEADS = (Head("Estimate"), Head("Value", True), Head("95 %", True), Head("Meaning"))
 SEGMENT_HEADS = (
     *(Head("Straight taxi"), Head("Samples", True), Head("Track", True), Head("Speed", True)),
@@ -82,13 +82,13 @@ def _estimates(answer: HeadingResult) -> Grid:
             "Heading error, robust and weighted by speed",
             value["error"],
             interval(answer.confidence95_deg, 3, "°"),
-            "corrected by; correlation, steady sideslip and mounting allowed for",
+            "used for the correction; interval allows for correlation, steady sideslip, mounting",
         ),
         (
             "Heading error, running mean of Markelov 2015",
             value["paper_error"],
             f"± {value['precision']} (e)",
-            "e is right for white errors only",
+            "e holds for white errors only",
         ),
         ("Heading error without lever arm", value["uncorrected_error"], ABSENT, ""),
         ("Standard deviation of the differences", number(answer.estimate_sd_deg, 3, "°"), ABSENT, ""),
@@ -113,7 +113,7 @@ def _onboard(answer: HeadingResult) -> Grid | None:
     ]
     status = onboard.status
     caption = f"Status reported by the aircraft: {status}." if status else "The aircraft reported no status."
-    return Grid("Ground result beside the aircraft's own", ONBOARD_HEADS, rows, caption)
+    return Grid("Ground result and the aircraft's own", ONBOARD_HEADS, rows, caption)
 
 
 def _onboard_figures(answer: HeadingResult, onboard: OnboardComparison) -> tuple[tuple[str, str, str], ...]:
@@ -139,7 +139,7 @@ def _runway(answer: HeadingResult) -> Grid | None:
         )
         for check in answer.runway
     ]
-    caption = "A second reference: the nose on the centre line."
+    caption = "A second reference: the nose points along the centre line."
     return Grid("Runway check", RUNWAY_HEADS, rows, caption) if rows else None
 
 
@@ -168,7 +168,7 @@ def _standstill_facts(still: Standstill | None) -> Facts | None:
             "other reading of Markelov 2015; not gated",
         ),
         ("Raw samples above 0.2 m/s", share, ""),
-        ("Make-up of the velocity error", _make_up(still), ""),
+        ("Parts of the velocity error", _make_up(still), ""),
     )
     return Facts("GNSS at standstill", pairs)
 
@@ -205,9 +205,9 @@ def _spread(answer: HeadingResult) -> Facts | None:
         return None
     wander = f"over {number(answer.wander_s, 0, 's')}"
     pairs = (
-        ("Own error of a segment, σ", number(answer.segment_spread_deg, 3, "°"), "from what segments say"),
+        ("Own error of a segment, σ", number(answer.segment_spread_deg, 3, "°"), "from the spread of the segments"),
         ("Wander of INS heading minus path, σ", number(answer.wander_spread_deg, 3, "°"), wander),
-        ("Steady sideslip and mounting left, σ", number(answer.steady_sigma_deg, 3, "°"), answer.steady_origin),
+        ("Remaining steady sideslip and mounting, σ", number(answer.steady_sigma_deg, 3, "°"), answer.steady_origin),
         *(
             ("Step of the INS heading", number(step.size_deg, 2, "°", signed=True), f"at {clock(step.time_s)}")
             for step in answer.steps
@@ -226,7 +226,7 @@ def _latency(answer: HeadingResult) -> list[tuple[str, str, str]]:
     if not is_number(answer.latency_used_s):
         return []
     value = _with_sigma(answer.latency_used_s, answer.latency_used_sigma_s, 3, "s")
-    return [("GNSS latency taken out", value, f"from the {answer.latency_origin}")]
+    return [("GNSS latency removed", value, f"from the {answer.latency_origin}")]
 
 
 def _settings(settings: Mapping[str, float | str | bool]) -> tuple[Facts | None, Facts | None]:

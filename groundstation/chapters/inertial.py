@@ -33,7 +33,7 @@ NOISE = "noise."  # what begins the names of those settings that the class gives
 PLACES = {"m": 1, "mps": 3, "arcsec": 1, "dph": 4, "dphph": 4}
 CONSISTENT = (0.93, 0.97)  # shares of innovations inside their 95 % band that pass for it
 TITLE = "INS errors"
-LEAD = "A Kalman filter finds the errors of the INS against GNSS, north and east apart. Error = INS − truth."
+LEAD = "A Kalman filter estimates the errors of the INS against GNSS, north and east separately. Error = INS − truth."
 
 
 def inertial(results: FlightResults) -> Section | None:
@@ -76,7 +76,7 @@ def _conclusions(answer: InertialResult) -> list[Note]:
     if answer.reopened > 0:
         times = "once" if answer.reopened == 1 else f"{number(answer.reopened, 0)} times"
         text = (
-            f"GNSS was rejected for so long that the filter was opened to it again, {times}: the noise of INS class "
+            f"The filter rejected GNSS for so long that it was opened again, {times}: the noise of INS class "
             f"{answer.ins_class or ABSENT} does not fit this INS or this receiver."
         )
         notes.append(Note(text, "warn"))
@@ -131,7 +131,9 @@ def _in_words(channels: Channels) -> str:
             "consistent."
         )
     is_close = max(shares.values()) <= CONSISTENT[1]
-    return f"{text}: " + ("the filter is consistent." if is_close else "the filter claims less than it knows.")
+    return f"{text}: " + (
+        "the filter is consistent." if is_close else "the filter is too careful, its sigmas are too large."
+    )
 
 
 def _figures_of_merit(answer: InertialResult) -> Facts:
@@ -140,7 +142,7 @@ def _figures_of_merit(answer: InertialResult) -> Facts:
         (
             "Radial error rate, median / 95 %",
             " / ".join(_rates(answer)),
-            "position error over time since the first epoch, epochs later than ten minutes",
+            "position error over time since the first epoch, without the first ten minutes",
         ),
         ("Velocity error, RMS", number(answer.velocity_error_rms_mps, 3, "m/s"), "both channels together"),
         ("Largest radial error", number(answer.largest_radial_error_m, 0, "m"), "against GNSS"),
@@ -168,9 +170,9 @@ def _states(answer: InertialResult) -> Grid | None:
     for channel in answer.channels:
         heads += [Head(channel.name.capitalize(), True), *(Head(title, True) for title in ("± σ", "Seen", "From"))]
     caption = (
-        "At the last time GNSS was there. Seen: observability, 1 − σ/σ without GNSS; near 0 the data say nothing of "
-        "the state. From: flight time since when it stays above one half. Not estimated: the class holds the state at "
-        "zero, and its σ never moved."
+        "At the last GNSS epoch. Seen: observability, 1 − σ/σ without GNSS; near 0 the data do not show the state. "
+        "From: flight time from which it stays above one half. Not estimated: the class holds the state at zero and "
+        "its σ constant."
     )
     return Grid("States", heads, rows, caption, ("inertial_states",))
 
@@ -210,9 +212,9 @@ def _state_cells(state: StateEstimate | None, places: int) -> tuple[str, ...]:
 def _consistency(channels: Channels) -> Grid:
     titles = ("NIS", "95 % limits", "Inside 95 %", "Innovations", "Rejected", "Velocity RMS", "Position RMS")
     caption = (
-        "NIS: mean normalised innovation squared, 1 where the noise model is right. Noise raised: slow GNSS errors are "
-        "covered by a larger white noise; then NIS stays below 1, has no limits, and neither it nor the share inside "
-        "says anything of consistency."
+        "NIS: mean normalised innovation squared, 1 where the noise model is right. Noise raised: slow GNSS errors "
+        "are covered by a larger white noise; NIS then stays below 1 and has no limits, and neither NIS nor the share "
+        "inside shows consistency."
     )
     heads = (Head("Channel"), *(Head(title, True) for title in titles))
     return Grid("Consistency of the filter", heads, [_consistency_row(channel) for channel in channels], caption)
@@ -233,11 +235,11 @@ def _consistency_row(channel: ChannelResult) -> tuple[str, ...]:
 
 
 def _outages(outages: tuple[RealOutage, ...]) -> Grid | None:
-    numeric = (Head(title, True) for title in ("Length", "Off on return", "σ claimed"))
-    heads = (Head("Flight time"), Head("Without"), *numeric, Head(""))
+    numeric = (Head(title, True) for title in ("Length", "Error on return", "σ claimed"))
+    heads = (Head("Flight time"), Head("Missing"), *numeric, Head(""))
     caption = (
-        "The filter went over to the forecast by itself; off on return: forecast against the first position difference "
-        "seen again."
+        "The filter changed to the forecast by itself. Error on return: forecast against the first position "
+        "difference afterwards."
     )
     return Grid("Outages in the log", heads, [_outage_row(one) for one in outages], caption) if outages else None
 

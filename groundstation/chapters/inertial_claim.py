@@ -17,7 +17,7 @@ def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -
     rate, most = answer.radial_error_rate_50_nmiph, number(answer.radial_error_rate_95_nmiph, 2, "nmi/h")
     drift = number(rate, 2, "nmi/h")
     headline = (
-        f"Unaided INS, drifts {drift}" if is_number(rate) else "INS errors measured, too short a flight for a drift"
+        f"Unaided INS, drifts {drift}" if is_number(rate) else "INS errors measured, flight too short for a drift"
     )
     found = (
         ("INS drift", drift, f"median; 95 % of the time below {most}"),

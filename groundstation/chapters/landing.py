@@ -37,10 +37,11 @@ TITLE = "Approaches"
 TONES: dict[str, Tone] = {"stabilised": "good", "not stabilised": "warn", "not measured": "unknown"}
 MOST_TOLD = 6
 HOW = (
-    "How computed: a final leads straight to a touchdown, or on the guidance to a height from which a climb follows. "
-    "Deviations become metres by the course sector, two dots to its edge, and 0.12 of the glide angle a dot. With "
-    "runway and localizer known, position minus localizer is the error across the course, without GNSS: generalised "
-    "least squares, with tolerances of course line, bends, width, steps and runway bearing in the covariance."
+    "How computed: a final leads straight to a touchdown, or follows the guidance down to a height where a climb "
+    "begins. Deviations are converted to metres by the course sector (two dots to its edge) and by 0.12 of the glide "
+    "angle per dot. If runway and localizer are known, position minus localizer is the error across the course, "
+    "without GNSS: generalised least squares, with tolerances of course line, bends, width, steps and runway bearing "
+    "in the covariance."
 )
 
 
@@ -54,7 +55,7 @@ def landing(results: FlightResults) -> Section | None:
     for one in told:
         parts += _approach(one)
     if len(answer.approaches) > MOST_TOLD:
-        parts.append(Note(f"Approaches {MOST_TOLD + 1} to {len(answer.approaches)} stand in the table above alone."))
+        parts.append(Note(f"Approaches {MOST_TOLD + 1} to {len(answer.approaches)} are only in the table above."))
     parts += [_left_out(answer), *(Note(sentence(remark)) for remark in answer.remarks)]
     workings = (
         *(_basis(one) for one in told),
@@ -137,7 +138,9 @@ def _overview(answer: LandingResult) -> Grid:
         *(Head(title) for title in ("", "Approach", "Flight time", "Guidance", "From the gates")),
         *(Head(title, True) for title in titles),
     )
-    caption = "RMS of the guidance deviations while established: within half a dot of the course, one of the path."
+    caption = (
+        "RMS of the guidance deviations while established: within half a dot of the course and one dot of the path."
+    )
     return Grid("Approaches", heads, [_row(one) for one in answer.approaches], caption, ("landing_path",))
 
 
@@ -177,17 +180,18 @@ def _told(one: Approach) -> str:
     told = [_accuracy(error) for error in one.position_errors[:2]]
     if one.protection is not None:
         told.append(
-            "No reference: protection levels bound the error with the integrity the receiver claims, they are no error."
+            "No reference: protection levels bound the error at the integrity that the receiver claims; they are not "
+            "errors."
         )
     if not one.guidance_topic:
-        told.append("The log has no guidance; deviations are those of the positions from their own line.")
+        told.append("The log has no guidance; deviations are those of the positions from a line through them.")
     return " ".join(told)
 
 
 def _accuracy(error: PositionError) -> str:
     if error.state == "measured":
         return (
-            f"With the localizer for reference, {error.topic} is {number(error.error_m, 0, 'm', signed=True)} across "
+            f"With the localizer as reference, {error.topic} is {number(error.error_m, 0, 'm', signed=True)} across "
             f"the course at the threshold (95 % {interval(error.confidence95_m, 0, 'm')}), right positive."
         )
     return f"Error of {error.topic} across the course not measured: {typeset(error.reason)}."
@@ -229,7 +233,7 @@ def _touchdown(one: Approach) -> Facts | None:
     pairs = [
         ("Time", f"{clock(down.time_s)} ± {number(down.time_sigma_s, 1, 's')}", f"by {typeset(down.found_by)}"),
         ("Place", f"{number(down.latitude_deg, 5, '°')}, {number(down.longitude_deg, 5, '°')}", "as recorded"),
-        ("Behind the threshold", number(down.past_threshold_m, 0, "m"), typeset(one.runway.place_reason)),
+        ("Beyond the threshold", number(down.past_threshold_m, 0, "m"), typeset(one.runway.place_reason)),
         ("Ground speed", number(down.ground_speed_mps, 1, "m/s"), ""),
         ("Sink rate", number(down.sink_rate_mps, 2, "m/s"), "over the last 3 s"),
         ("Peak normal acceleration", number(down.peak_load_g, 2, "g"), "within 2 s, spikes of single samples left out"),
@@ -244,19 +248,19 @@ def _error(one: Approach, error: PositionError) -> Grid | Facts | None:
         pairs = [
             ("At the threshold", _with_sigma(error.error_m, error.sigma_m), interval(error.confidence95_m, 0, "m")),
             ("Growth", rate, "along the final"),
-            ("On the roll-out", _with_sigma(error.rollout_error_m, error.rollout_sigma_m), "centre line for truth"),
-            ("Roll-out less final", _with_sigma(error.change_m, error.change_sigma_m), "one check of the other"),
-            ("Per hour", number(error.drift_nmi_per_h, 2, "nmi/h"), "over the flight so far, this direction alone"),
-            ("Residuals", number(error.residual_ratio, 2), "RMS over what is expected"),
+            ("On the roll-out", _with_sigma(error.rollout_error_m, error.rollout_sigma_m), "centre line as truth"),
+            ("Roll-out − final", _with_sigma(error.change_m, error.change_sigma_m), "each checks the other"),
+            ("Per hour", number(error.drift_nmi_per_h, 2, "nmi/h"), "over the flight so far, across the course only"),
+            ("Residuals", number(error.residual_ratio, 2), "RMS over expected RMS"),
             *((f"σ by {part.name}", number(part.sigma_m, 1, "m"), "") for part in error.parts),
         ]
         return Facts(f"Approach {one.number}: {error.topic} across the course, by the localizer", tuple(pairs))
     if not is_number(error.change_m):
         return None
     pair = (
-        "Roll-out less final",
+        "Roll-out − final",
         _with_sigma(error.change_m, error.change_sigma_m),
-        "what a straight line leaves open",
+        "on the course of the final, continued",
     )
     return Facts(f"Approach {one.number}: {error.topic} across the course", (pair,))
 
@@ -283,7 +287,7 @@ def _protection(one: Approach) -> Facts | None:
         ("Horizontal, greatest", number(found.horizontal_max_m, 1, "m"), _limit(found.horizontal_alarm_limit_m)),
         ("Vertical, greatest", number(found.vertical_max_m, 1, "m"), _limit(found.vertical_alarm_limit_m)),
         ("Within the alarm limits", percent(found.within_share), f"of {number(found.epochs, 0)} epochs"),
-        ("Would stay within those of", "; ".join(found.operations) or ABSENT, "ICAO Annex 10, table 3.7.2.4-1"),
+        ("Meets the alarm limits of", "; ".join(found.operations) or ABSENT, "ICAO Annex 10, table 3.7.2.4-1"),
     )
     return Facts(f"Approach {one.number}: protection levels", pairs)
 
@@ -307,22 +311,22 @@ def _basis(one: Approach) -> Facts:
         (
             "Course sector",
             f"{number(runway.localizer_width_m, 0, 'm')} at the threshold",
-            f"antenna {number(runway.localizer_distance_m, 0, 'm')} behind it",
+            f"antenna {number(runway.localizer_distance_m, 0, 'm')} beyond it",
         ),
         (
             "Path",
             number(runway.glide_angle_deg, 2, "°"),
-            f"{number(runway.threshold_crossing_height_m, 0, 'm')} high there",
+            f"{number(runway.threshold_crossing_height_m, 0, 'm')} above the threshold",
         ),
     ]
     if one.sensitivity is not None and is_number(one.sensitivity.ratio):
         value = f"{number(one.sensitivity.ratio, 2)} ± {number(one.sensitivity.sigma, 2)}"
-        pairs.append(("Positions over guidance", value, "1 where sense and width of the course fit"))
-    return Facts(f"Approach {one.number}: what it rests on", tuple(pairs), compact=False)
+        pairs.append(("Positions over guidance", value, "1 if sense and width of the course are right"))
+    return Facts(f"Approach {one.number}: basis", tuple(pairs), compact=False)
 
 
 def _left_out(answer: LandingResult) -> Note | None:
     if not answer.left_out:
         return None
     rows = "; ".join(f"{clock(one.time_s)} {typeset(one.reason)}" for one in answer.left_out[:5])
-    return Note(f"Not told as approaches: {rows}.")
+    return Note(f"Not counted as approaches: {rows}.")

@@ -9,30 +9,32 @@ from groundstation.results.landing_beacons import BeaconApproachRow, BeaconLandi
 
 TITLE = "Landing by locators"
 LEAD = (
-    "Deviations from course and glide path by the relative bearings of two locators and a beacon beside the runway, "
-    "and the radio altitude: no GNSS and no ILS are used. Figures after ± hold 95 % of the errors of one axis."
+    "Deviations from course and glide path, from the relative bearings of two locators and a beacon beside the "
+    "runway, and from radio altitude. No GNSS and no ILS are used. ± holds 95 % of the errors of one axis."
 )
 HOW = (
-    "How computed: three bearings give along, right and heading off the course, so that crab cancels; height above the "
-    "glide path is radio altitude less threshold crossing height and distance times the tangent of the glide angle. "
-    "Near the circle through the three beacons, which crosses the course at the locators, bearings give no place."
+    "How computed: three bearings give the distances along and right of the course and the heading off it, so that "
+    "crab cancels. Height above the glide path is radio altitude minus threshold crossing height minus distance times "
+    "the tangent of the glide angle. Near the circle through the three beacons, which crosses the course at the "
+    "locators, bearings give no position."
 )
 APPROACH_HEADS = (
-    *(Head("Approach"), Head("Flight time"), Head("From, m", True), Head("To, m", True), Head("Places", True)),
-    *(Head("Without", True), Head("Distance shrinks, m/s", True), Head("Ground speed, m/s", True)),
-    *(Head("Heading less INS, °", True), Head("Terrain, m", True)),
+    *(Head("Approach"), Head("Flight time"), Head("From, m", True), Head("To, m", True), Head("Positions", True)),
+    *(Head("No position", True), Head("Closing speed, m/s", True), Head("Ground speed, m/s", True)),
+    *(Head("Heading − INS, °", True), Head("Terrain, m", True)),
 )
 APPROACH_CAPTION = (
-    "From and to: distance before the threshold. Ground speed and heading of the INS show whether bearings and beacons "
-    "belong together; terrain is rise and fall of the ground under the approach that the site file does not tell."
+    "From and to: distance before the threshold. Ground speed and heading of the INS show whether bearings and "
+    "beacons belong together; terrain: rise and fall of the ground under the approach that the site file does not "
+    "hold."
 )
 ROW_HEADS = (
     *(Head("Approach"), Head("Before the threshold, m", True), Head("Right of course, m", True)),
     *(Head("Above glide path, m", True), Head("Lateral accuracy"), Head("Vertical accuracy")),
 )
 ROW_CAPTION = (
-    "Means over a second; ± is what a single one of them may err by. Accuracy: the most demanding category whose 95 % "
-    "figure is met; those of CAT II and III are ILS look-alike values."
+    "Means over one second; ±: error of a single mean. Accuracy: the most demanding category whose 95 % figure is "
+    "met; those of CAT II and III are ILS look-alike values."
 )
 
 

@@ -17,8 +17,8 @@ from groundstation.results.landing_ranges import (
 
 TITLE = "Landing by ranges"
 LEAD = (
-    "What accuracy an approach by ranges to reference points has along the glide path: the covariance of its filter at "
-    "the true path, held against the accuracy of the categories, and errors of simulated approaches against it."
+    "Accuracy of an approach by ranges to reference points along the glide path: covariance of its filter on the true "
+    "path, compared with the accuracy of the categories and with errors of simulated approaches."
 )
 POINT_HEADS = (
     Head("Reference point"),
@@ -48,8 +48,8 @@ TRIAL_HEADS = (
     *(Head("RMS over σ up", True), Head("Filter")),
 )
 TRIAL_CAPTION = (
-    "Squared error of the place over its computed covariance, 3 is honest, with limits of so many independent "
-    "approaches; errors drawn from the model that the scenario states."
+    "NEES: squared position error over its computed covariance, 3 is honest; limits for this number of independent "
+    "approaches. Errors are drawn from the model that the scenario states."
 )
 
 

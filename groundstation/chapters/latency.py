@@ -10,9 +10,9 @@ TITLE = "Latency between sensors"
 LEAD = "How much later than the INS each sensor shows the same motion."
 HEADS = (
     *(Head("Sensor"), Head("Quantity"), Head("State"), Head("Latency, s", True), Head("95 % interval", True)),
-    *(Head("Windows", True), Head("Motion in 1 s / left, RMS", True), Head("Basis, or why not")),
+    *(Head("Windows", True), Head("Motion in 1 s / residual, RMS", True), Head("Basis, or why not")),
 )
-CAPTION = "Windows: degrees of freedom of the interval, of those used."
+CAPTION = "Windows: degrees of freedom of the interval, of the windows used."
 
 
 def latency(results: FlightResults) -> Section | None:

@@ -37,18 +37,18 @@ from groundstation.results.magnetic import (
 TITLE = "Magnetic deviation"
 LEAD = "Opposite turns of equal bank show what to add to the magnetic heading, east positive."
 HOW = (
-    "How computed: field levelled by roll and pitch of the INS; magnetic minus INS true heading averaged in bins of 1° "
-    "on each branch, then over both; A to E by least squares. Hard and soft iron are fitted with the attitude, and "
-    "from the constancy of the field's modulus. Level flight outside the figures, which no fit has seen, judges all "
+    "How computed: field levelled by roll and pitch of the INS; magnetic minus INS true heading averaged in bins of "
+    "1° on each branch, then over both; A to E by least squares. Hard and soft iron are fitted with the attitude, and "
+    "from the constancy of the field's modulus. Level flight outside the figures, which no fit used, judges all "
     "three. error(c) = A + B sin c + C cos c + D sin 2c + E cos 2c, c the uncorrected magnetic heading."
 )
 TONES: dict[str, Tone] = {"accept": "good", "reject": "bad", "undecided": "unknown"}
 MEANING = {
-    "A": "constant: mounting, INS heading and declination besides",
+    "A": "constant: mounting; also INS heading and declination",
     "B": "semicircular, sin: iron fore and aft",
     "C": "semicircular, cos: iron athwart",
     "D": "quadrantal, sin: soft iron",
-    "E": "quadrantal, cos: soft iron askew",
+    "E": "quadrantal, cos: oblique soft iron",
 }
 MOST_TURNS = 24
 
@@ -63,7 +63,7 @@ def magnetic(results: FlightResults) -> Section | None:
         *_conclusions(answer),
         _coefficients(answer),
         _card(answer),
-        Note("To print, and for programs, every degree:", files=(STEER_CARD, DEVIATION_CSV)),
+        Note("Card to print, and every degree for programs:", files=(STEER_CARD, DEVIATION_CSV)),
         Figure("magnetic.deviation"),
         gate_grid(answer.gates),
         _methods(answer),
@@ -99,7 +99,7 @@ def _claim(answer: MagneticResult) -> Claim:
     residual = answer.residual_rms_deg
     left = None if residual is None else residual.after
     before = None if residual is None else residual.before
-    remark = f"RMS left of {number(before, 2, '°')}, on level flight no fit has seen"
+    remark = f"RMS left of {number(before, 2, '°')}, on level flight that no fit used"
     has_figure = is_number(left)
     return Claim(
         Rank.MAGNETIC if answer.verdict in ("accept", "reject") else Rank.MAGNETIC_OPEN,
@@ -117,7 +117,7 @@ def _claim(answer: MagneticResult) -> Claim:
 def _conclusions(answer: MagneticResult) -> list[Note]:
     residual = answer.residual_rms_deg
     left = (
-        f" On level flight that no fit has seen the heading error was {number(residual.before, 2, '°')} RMS; "
+        f" On level flight that no fit used the heading error was {number(residual.before, 2, '°')} RMS; "
         f"{number(residual.after, 2, '°')} is left after correction."
         if residual
         else ""
@@ -134,18 +134,18 @@ def _coefficients(answer: MagneticResult) -> Grid:
         cells = [MEANING[letter]]
         for row in methods:
             value, sigma = row.coefficients_deg.get(letter), number(row.coefficients_sigma_deg.get(letter), 3)
-            cells.append(f"{number(value, 3, signed=True)} ± {sigma}" if is_number(value) else "not seen")
+            cells.append(f"{number(value, 3, signed=True)} ± {sigma}" if is_number(value) else "not observable")
         rows.append((letter, *cells))
     heads = (Head(""), Head("Meaning"), *(Head(f"{METHOD_TITLES[row.name]}, °", True) for row in methods))
     parts = "; ".join(f"{part.name} {number(part.sigma_deg, 3, '°')}" for part in answer.a_parts)
     caption = (
-        "Of the error in level flight, declination removed, ± standard deviation. The deviation to add has the "
-        f"opposite signs. σ of A by the table is the quadrature of: {parts}."
+        "Coefficients of the error in level flight, declination removed, ± standard deviation. The deviation to add "
+        f"has the opposite signs. σ of A by the table is the quadrature of: {parts}."
     )
     if is_number(answer.attitude_wander_deg):
         wander = number(answer.attitude_wander_deg, 3, "°")
-        caption += f" Roll and pitch of the INS are taken to be wrong by {wander} in the mean of the figure: "
-        caption += "whatever else changes over minutes counts as that."
+        caption += f" Roll and pitch of the INS are assumed to err by {wander} in the mean of the figure: "
+        caption += "this covers all other changes over minutes."
     return Grid("Coefficients", heads, rows, caption)
 
 
@@ -173,16 +173,22 @@ def _card(answer: MagneticResult) -> Grid | None:
 
 def _methods(answer: MagneticResult) -> Grid:
     titles = ("Before, °", "After, °", "Mean after, °", "Condition", "Fit, nT")
-    heads = (Head("Method"), Head("State"), *(Head(title, True) for title in titles), Head("Why, or what it lacks"))
+    heads = (
+        Head("Method"),
+        Head("State"),
+        *(Head(title, True) for title in titles),
+        Head("Reason, or what is missing"),
+    )
     held = answer.held_out
     flown = (
         f"{number(held.seconds, 0, 's')} of level flight on {number(held.heading_sectors, 0)} of 12 sectors of heading"
         if held
-        else "nothing was left to hold out"
+        else "no level flight left to hold out"
     )
     caption = (
-        f"Before, after: RMS error of the magnetic heading on the part no fit has seen ({flown}). Condition: number of "
-        "the scaled normal problem; large means hardly observable. Fit: RMS of the field left, per axis."
+        f"Before, after: RMS error of the magnetic heading on the part that no fit used ({flown}). Condition: "
+        "condition number of the scaled normal problem; large means hardly observable. Fit: RMS of the residual "
+        "field, per axis."
     )
     rows = [_method(row, row.name == answer.recommended_method) for row in answer.methods]
     return Grid("Methods side by side", heads, rows, caption)
@@ -236,7 +242,7 @@ def _swings(answer: MagneticResult) -> Grid | None:
     ]
     heads = (Head("Figure"), *(Head(f"{letter}, °", True) for letter in LETTERS), Head("From the others, °", True))
     caption = "Each figure by its own table; from the others: RMS of the difference of the curves over the circle."
-    return Grid("Figures apart", heads, rows, caption)
+    return Grid("Each figure alone", heads, rows, caption)
 
 
 def _basis(answer: MagneticResult) -> Facts:
@@ -249,13 +255,13 @@ def _basis(answer: MagneticResult) -> Facts:
     horizontal, down = (number(value, 0, "nT") for value in (declination.horizontal_nt, declination.down_nt))
     pairs = (
         (
-            "INS heading error taken off",
+            "INS heading error removed",
             _with_sigma(alignment.error_deg, alignment.sigma_deg),
             sentence(alignment.origin),
         ),
         *_gyros(alignment),
         (
-            "Declination taken off",
+            "Declination removed",
             _with_sigma(declination.value_deg, declination.sigma_deg),
             f"{declination.model}; field {horizontal} horizontal, {down} down",
         ),
@@ -268,7 +274,7 @@ def _basis(answer: MagneticResult) -> Facts:
         ("Forecast bank bias of the table", bias or ABSENT, "average of opposite banks minus level flight, RMS"),
         ("Sensors", f"{answer.magnetometer_topic} against {answer.ins_topic}", ""),
     )
-    return Facts("What it rests on", pairs)
+    return Facts("Basis", pairs)
 
 
 def _gyros(alignment: Alignment) -> tuple[tuple[str, str, str], ...]:
@@ -279,7 +285,7 @@ def _gyros(alignment: Alignment) -> tuple[tuple[str, str, str], ...]:
     told = ", ".join(
         f"{number(value, 2, signed=True)} ± {number(sigma, 2)}" for value, sigma in zip(values, sigmas, strict=True)
     )
-    return (("Gyro drift at standstill", f"{told} °/h", "forward, right, down; beyond the rotation of the earth"),)
+    return (("Gyro drift at standstill", f"{told} °/h", "forward, right, down; earth rotation removed"),)
 
 
 def _with_sigma(value: float, sigma: float) -> str:

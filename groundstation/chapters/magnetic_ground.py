@@ -13,9 +13,9 @@ MOST_RUNS = 40
 TITLE = "Heading sensor on ground runs"
 LEAD = "On straight ground runs the nose points along the GNSS track: reading + declination − track is the error."
 HOW = (
-    "How computed: runs of steady heading, ground contact proven; one noise model for all, correlated over seconds. "
-    "A to E (A level, B and C semicircular, D and E quadrantal) with an error of its own for each run (iron in the "
-    "ground, loads) integrated out; what the directions do not show counts in σ of the rest."
+    "How computed: runs of steady heading, ground contact proven; one noise model for all, correlated over seconds. A "
+    "to E (A level, B and C semicircular, D and E quadrantal) with a separate error of each run (iron in the ground, "
+    "loads) integrated out; coefficients that the directions do not show add to σ of the others."
 )
 
 
@@ -89,7 +89,7 @@ def _runs(runs: Sequence[GroundRun]) -> Grid:
         Head("Reason"),
     )
     left = f" {len(runs) - MOST_RUNS} later runs are left out." if len(runs) > MOST_RUNS else ""
-    caption = f"Mean reading and true track. Noise is σ of the run alone; ± holds slip and declination too.{left}"
+    caption = f"Mean reading and true track. Noise is σ of the run alone; ± includes slip and declination.{left}"
     rows = [_run(run) for run in runs[:MOST_RUNS]]
     return Grid("Ground runs", heads, rows, caption, ("magnetic_ground_epochs",))
 
@@ -113,19 +113,19 @@ def _coefficients(answer: GroundDeviation) -> Grid:
     rows: list[tuple[Cell, ...]] = [_coefficient(row) for row in answer.coefficients]
     if answer.along:
         axis, told = answer.along.axis_deg, _with_sigma(answer.along.value_deg, answer.along.sigma_deg)
-        rows.append((f"B and C on {number(axis, 0, '°')}", told, "Times the cosine of heading less that axis."))
+        rows.append((f"B and C on {number(axis, 0, '°')}", told, "Multiply by the cosine of heading minus that axis."))
     caption = (
         "error(c) = A + B sin c + C cos c + D sin 2c + E cos 2c, c the uncorrected magnetic heading, ± standard "
         "deviation, that of the declination in A. The deviation to add has the opposite signs."
     )
-    heads = (Head(""), Head("Value, °", True), Head("What is not seen"))
+    heads = (Head(""), Head("Value, °", True), Head("What is not observable"))
     return Grid("Ground runs: coefficients", heads, rows, caption)
 
 
 def _coefficient(row: GroundCoefficient) -> tuple[Cell, ...]:
     if is_number(row.value_deg):
         return row.letter, _with_sigma(row.value_deg, row.sigma_deg), ""
-    return row.letter, "not observable", f"{sentence(row.reason)} ± {number(row.sigma_deg, 1, '°')} open."
+    return row.letter, "not observable", f"{sentence(row.reason)} Unknown within ± {number(row.sigma_deg, 1, '°')}."
 
 
 def _repeats(answer: GroundDeviation) -> Grid | None:
@@ -141,7 +141,10 @@ def _repeats(answer: GroundDeviation) -> Grid | None:
     if not rows:
         return None
     titles = ("Near", "Runs", "Spread, °", "Expected, °")
-    caption = "Standard deviation of the errors of runs on about one heading, and what their noise and slip would make."
+    caption = (
+        "Standard deviation of the errors of runs on about one heading, and the value expected from their noise and "
+        "slip."
+    )
     return Grid("Ground runs: repeated headings", tuple(Head(title, True) for title in titles), rows, caption)
 
 
@@ -157,10 +160,10 @@ def _basis(answer: GroundDeviation) -> Facts:
         ),
         ("Widest gap between headings", number(answer.widest_gap_deg, 0, "°"), ""),
         (
-            "What a run has of its own",
+            "Own error of a run",
             number(answer.place_sigma_deg, 2, "°"),
-            "standard deviation beyond noise and slip, with what was taken for likely beforehand",
+            "standard deviation beyond noise and slip, prior included",
         ),
         ("Epochs in no run", left_out or ABSENT, ""),
     )
-    return Facts("Ground runs: what they rest on", pairs)
+    return Facts("Ground runs: basis", pairs)

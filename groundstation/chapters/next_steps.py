@@ -18,7 +18,7 @@ TAXI = "taxi straight above 6 m/s for 20 s before take-off"
 # What helps against a gate of the heading correction that failed or was not measured: line, advice. First come first.
 BY_GATE = {
     "taxi_seconds": ("Fly", "taxi straight for {limit} or more before take-off"),
-    "before_take_off": ("Fly", "taxi straight before take-off: that after landing does not count"),
+    "before_take_off": ("Fly", "taxi straight before take-off: taxi after landing does not count"),
     "half_width": ("Fly", "taxi straight for longer"),
     "precision": ("Fly", "taxi straight for longer"),
     "whole_half_width": ("Fly", "taxi the other way too, or state the sigmas of sideslip and mounting"),

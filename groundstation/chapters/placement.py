@@ -10,8 +10,8 @@ from groundstation.results.placement import GIVEN, PlacementPlan
 
 TITLE = "Placement of ground points"
 LEAD = (
-    "Where ground points should stand for the accuracy of an aircraft on a given way: by the geometry at one point of "
-    "it, and by the covariance of the filter along it."
+    "Where ground points should stand for the accuracy of an aircraft on a given path: by the geometry at one point "
+    "of the path, and by the covariance of the filter along it."
 )
 CRITERIA: Mapping[str, str] = {
     "determinant": "Largest det(H'H)",
@@ -19,18 +19,18 @@ CRITERIA: Mapping[str, str] = {
     "dop": "Least dilution",
     "covariance": "Least weighted variance",
 }
-OVERS: Mapping[str, str] = {"fixed": "fixed point", "way": "worst point of the way", "lost": "one point lost"}
+OVERS: Mapping[str, str] = {"fixed": "fixed point", "way": "worst point of the path", "lost": "one point lost"}
 DESIGN_HEADS = (
     *(Head("Design"), Head("det(H'H)", True), Head("DOP", True), Head("2σ north, m", True), Head("2σ east, m", True)),
     *(Head("2σ up, m", True), Head("Worst north, m", True), Head("Worst east, m", True), Head("Worst up, m", True)),
 )
 DESIGN_CAPTION = (
-    "det(H'H), DOP and 2σ at the fixed point, 2σ as the filter has it on its way there; worst: largest 2σ over the "
-    "part of the way that counts."
+    "det(H'H), DOP and 2σ at the fixed point, 2σ of the filter when it arrives there; worst: largest 2σ over the part "
+    "of the path that counts."
 )
 PLACE_HEADS = (
     *(Head("Point"), Head("North, m", True), Head("East, m", True), Head("Height, m", True), Head("Placed")),
-    *(Head("To what is kept out, m", True), Head("Below the way, m", True)),
+    *(Head("To keep-out area, m", True), Head("Below the path, m", True)),
 )
 LOST_HEADS = (
     *(Head("Design"), Head("Lost"), Head("2σ north, m", True), Head("2σ east, m", True), Head("2σ up, m", True)),
@@ -39,7 +39,9 @@ SEARCH_HEADS = (
     *(Head("Design"), Head("Converged"), Head("Gain left", True), Head("Starts", True), Head("Starts apart", True)),
     *(Head("Iterations", True), Head("Evaluations", True)),
 )
-SEARCH_CAPTION = "Gain left: to first order within a hundredth of the rectangle, over the loss. Apart: worst over best."
+SEARCH_CAPTION = (
+    "Gain left: first-order gain within a hundredth of the rectangle, over the loss. Starts apart: worst over best."
+)
 
 
 def placement(results: FlightResults) -> Section | None:
@@ -81,7 +83,7 @@ def _headline(answer: PlacementPlan) -> str:
 def _above(answer: PlacementPlan) -> tuple[Part, ...]:
     best, given = answer.design(answer.recommended), answer.design(GIVEN)
     at = f"north {number(answer.fixed_north_m, 0, 'm')}, height {number(answer.fixed_height_m, 0, 'm')}"
-    told = f"{design_title(best.design)}, for {answer.judged}; the fixed point: {at}."
+    told = f"{design_title(best.design)}, for {answer.judged}; fixed point: {at}."
     figures = tuple(
         (
             f"2σ {axis}, fixed point",

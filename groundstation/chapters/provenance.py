@@ -12,8 +12,8 @@ ON_TOP = ("aircraft", "flight", "start_utc")  # of the page
 MOST_METADATA = 8
 REST = "More metadata in summary.json."
 CHECKS = (
-    "All numbers and settings stand in summary.json and tables/*.csv; listed here are settings that were set. "
-    "Versions, configuration: manifest.json."
+    "All numbers and settings are in summary.json and tables/*.csv; this report lists only settings that were set. "
+    "Versions and configuration are in manifest.json."
 )
 
 

@@ -50,7 +50,7 @@ STEP_HEADS = (
 )
 CLOCK_HEADS = (
     *(Head("Other clock"), Head("From"), Head("Length, s", True)),
-    *(Head("Other less recorder"), Head("Drift of the recorder"), Head("Scatter, s", True)),
+    *(Head("Other − recorder"), Head("Drift of the recorder"), Head("Scatter, s", True)),
 )
 CLOCK_CAPTION = "±: standard error; positive drift: the recorder is fast. Drift does not change corrected time."
 DAMAGE_HEADS = (Head("Kind"), Head("What"), Head("Where"), Head("Count", True), Head("Data lost"))
@@ -103,13 +103,13 @@ def _clock_steps(clock: Clock) -> Grid | None:
         )
         for step in clock.steps[:MOST_ENTRIES]
     ]
-    return Grid("Steps of the recorder's clock", STEP_HEADS, rows) if rows else None
+    return Grid("Steps of the recorder clock", STEP_HEADS, rows) if rows else None
 
 
 def _other_clocks(clock: Clock) -> Grid | None:
     """The recorder's clock by the others of the log: segments, the breaks between them, errors that have a name."""
     rows = [row for relation in clock.relations for row in _relation_rows(relation)]
-    title = "The recorder's clock by others"
+    title = "Recorder clock against other clocks"
     return Grid(title, CLOCK_HEADS, rows[:MOST_TOPICS], CLOCK_CAPTION) if rows else None
 
 

@@ -9,7 +9,7 @@ from groundstation.results.forecast import METHODS
 from groundstation.results.reference import ClaimRow, ClaimState, ErrorRow, Placed, Quantity, ReferenceResult, title_of
 
 TITLE = "Against the reference"
-LEAD = "What recordings and answers are worth, by a reference that none of them has seen. Error = subject − reference."
+LEAD = "Errors of recordings and answers against a reference that none of them used. Error = subject − reference."
 PLACES = {"m": 2, "mps": 3, "deg": 3}
 STATES: dict[ClaimState, Mark] = {
     "consistent": Mark("good", "consistent"),
@@ -22,10 +22,12 @@ ALIGNMENTS = {"none": "as it is", "shift": "shifted", "shift_and_yaw": "shifted 
 WIDE = 10.0  # an interval so many times as long as its figure says nothing
 QUANTITIES: tuple[Quantity, ...] = ("position", "velocity", "attitude")
 CAPTIONS: dict[Quantity, str] = {
-    "position": "Intervals of 95 % by the number of samples that are independent; a dash where those are too few. "
-    "Along and cross: to the motion of the reference, right positive; horizontal: length; vertical: up.",
-    "velocity": "As those of position.",
-    "attitude": "Subject − reference; the mounting of the one against the other is in them.",
+    "position": (
+        "95 % intervals from the number of independent samples; a dash where there are too few. Along and cross: "
+        "relative to the motion of the reference, right positive; horizontal: length; vertical: up."
+    ),
+    "velocity": "As for position.",
+    "attitude": "Subject − reference; includes the mounting between the two.",
 }
 
 
@@ -49,9 +51,9 @@ def reference(results: FlightResults) -> Section | None:
         _paths(answer),
         _relative(answer),
         Note(
-            "An error that subject and reference share is not seen: a reference from the same antenna repeats its "
-            "multipath, one from the same INS its mounting. Heading errors have the mounting of the one against the "
-            "other in them, heights the geoid model where one of the two is above sea level."
+            "An error common to subject and reference is not seen: a reference from the same antenna repeats its "
+            "multipath, one from the same INS its mounting. Heading errors include the mounting between the two; "
+            "height errors include the geoid model where one of the two is above sea level."
         ),
     )
     workings = kept((setting_facts(answer.settings, "reference"),))
@@ -61,7 +63,7 @@ def reference(results: FlightResults) -> Section | None:
 def _claim(answer: ReferenceResult) -> Claim:
     if not answer.is_judge:
         headline = f"the reference judges nothing: {typeset(answer.reason)}"
-        return Claim(Rank.REFERENCE, Mark("unknown", "No judge"), headline, remark="the reference judges nothing")
+        return Claim(Rank.REFERENCE, Mark("unknown", "Not judged"), headline, remark="the reference judges nothing")
     rows = [row for row in answer.errors if row.axis in ("horizontal", "heading") and row.quantity != "velocity"]
     figures = tuple((_name(row), _of(row, row.spread.rmse, unit=True), _around(row)) for row in rows)
     sure = [row for row in answer.claims if row.state == "too_sure"]
@@ -76,15 +78,15 @@ def _claim(answer: ReferenceResult) -> Claim:
 
 
 def _about(answer: ReferenceResult) -> Facts:
-    step = f"a sample in {significant(answer.interval_s)} s"
+    step = f"one sample every {significant(answer.interval_s)} s"
     pairs = (
         ("Reference", answer.reference, step),
         (
-            "Covers of the flight",
+            "Share of the flight covered",
             percent(answer.covered_share, 1),
             f"longest gap {number(answer.longest_gap_s, 1, 's')}",
         ),
-        ("Estimators saw of it", "nothing", "it judges what they answered without it"),
+        ("Used by the estimators", "nothing", "their answers are independent of it"),
     )
     return Facts("The reference", pairs)
 
@@ -138,9 +140,9 @@ def _claims(answer: ReferenceResult) -> Grid | None:
         for row in answer.claims
     ]
     caption = (
-        "Share of the errors inside the 95 % that subject and reference claim together. A lasting error counts once "
-        "however long it is watched. σ: RMS over the flight; of a horizontal error that of north and east together. "
-        "What tells no σ claims nothing and is left out; a reference without σ counts as exact."
+        "Share of the errors inside the 95 % that subject and reference claim together. A lasting error counts once, "
+        "however long it lasts. σ: RMS over the flight; for a horizontal error, north and east together. A subject "
+        "without σ claims nothing and is left out; a reference without σ counts as exact."
     )
     return Grid("Claimed against seen", heads, cells, caption, ("reference_checks",)) if cells else None
 
@@ -183,18 +185,20 @@ def _forecasts(answer: ReferenceResult) -> Grid | None:
         for row in answer.forecasts
     ]
     method = METHODS.get(answer.forecasts[0].method, "") if answer.forecasts else ""
-    caption = f"Replayed outages, method: {method}. What built up by the reference, not by the GNSS that was withheld."
+    caption = (
+        f"Replayed outages, method: {method}. Errors against the reference, not against the GNSS that was withheld."
+    )
     return Grid("Forecast", heads, cells, caption) if cells else None
 
 
 def _placed(answer: ReferenceResult) -> Grid | None:
     heads = (
         *(Head("Subject"), Head("Arm forward, m", True), Head("Arm right, m", True), Head("Arm")),
-        *(Head("Later by, s", True), Head("95 %", True), Head("RMS before, m", True), Head("RMS judged, m", True)),
-        Head("What it rests on"),
+        *(Head("Latency, s", True), Head("95 %", True), Head("RMS before, m", True), Head("RMS judged, m", True)),
+        Head("Basis"),
     )
     caption = (
-        "The arm leads from the reference's point to the subject's, in body axes; turns show it. What is not "
+        "Arm: from the point of the reference to that of the subject, in body axes; turns show it. An arm that is not "
         "observable stays in the errors, and so does a latency."
     )
     cells = [
@@ -216,9 +220,9 @@ def _placed(answer: ReferenceResult) -> Grid | None:
 
 def _arm(row: Placed) -> Mark:
     if row.arm_state == "not_observable":
-        return Mark("unknown", "not observable, stays in")
+        return Mark("unknown", "not observable, not removed")
     within = "" if row.arm_half_width_m is None else f" ± {number(row.arm_half_width_m, 2)} (95 %)"
-    where = "taken out" if row.is_arm_taken_out else "stays in"
+    where = "removed" if row.is_arm_taken_out else "not removed"
     return Mark("good" if row.is_arm_taken_out else "plain", f"{row.arm_state}{within}, {where}")
 
 
@@ -233,14 +237,14 @@ def _paths(answer: ReferenceResult) -> Grid | None:
         )
         for row in answer.paths
     ]
-    caption = "Absolute trajectory error. What a shift takes away is constant: a datum, an arm that does not turn."
+    caption = "Absolute trajectory error. A shift removes what is constant: a datum, an arm that does not turn."
     return Grid("Whole path", heads, cells, caption) if cells else None
 
 
 def _relative(answer: ReferenceResult) -> Grid | None:
     heads = (
         *(Head("Subject"), Head("Over", True), Head("RMS, m", True), Head("95 %", True), Head("Median, m", True)),
-        *(Head("Largest, m", True), Head("Of the way", True), Head("Independent of pairs", True)),
+        *(Head("Largest, m", True), Head("Of the distance", True), Head("Independent of pairs", True)),
     )
     cells = [
         (
@@ -255,7 +259,7 @@ def _relative(answer: ReferenceResult) -> Grid | None:
         )
         for row in answer.relative
     ]
-    caption = "Change of the horizontal position error over a time or a way, from every sample on."
+    caption = "Change of the horizontal position error over a time or distance, from each sample on."
     return Grid("Relative error", heads, cells, caption) if cells else None
 
 

@@ -6,7 +6,7 @@ from groundstation.results.flight import FlightResults
 from groundstation.results.together import JoinedLog, JoinedStretch, JoinMethod, Together
 
 TITLE = "Logs of this flight"
-LEAD = "How the clock of each log stands to that of the flight, and which of several sources the analyses use."
+LEAD = "How the clock of each log relates to that of the flight, and which of several sources the analyses use."
 METHODS: dict[JoinMethod, str] = {
     "own_clock": "clock of the flight",
     "gnss_time": "GNSS time of both",
@@ -17,14 +17,14 @@ METHODS: dict[JoinMethod, str] = {
 GOOD_S = 0.05  # half of an interval that analyses of headings and latencies can live with
 LOG_HEADS = (
     *(Head("Log"), Head("Topics"), Head("Read by"), Head("Records", True), Head("Placed by")),
-    *(Head("Correlation", True), Head("What it rests on")),
+    *(Head("Correlation", True), Head("Basis")),
 )
 STRETCH_HEADS = (
     *(Head("Log"), Head("From, s", True), Head("To, s", True), Head("Placed by"), Head("Offset, s", True)),
     *(Head("95 %, s", True), Head("95 % at worst, s", True), Head("Drift, ppm", True), Head("95 %, ppm", True)),
 )
 STRETCH_CAPTION = (
-    "Offset: clock of the flight less that of the log, in the middle of the stretch. Drift: positive where the clock "
+    "Offset: clock of the flight minus that of the log, in the middle of the stretch. Drift: positive where the clock "
     "of the log is fast."
 )
 SOURCE_HEADS = (Head("Kind"), Head("Used"), Head("Why"), Head("Others"))
@@ -61,7 +61,7 @@ def _claim(answer: Together) -> Claim:
     widths = [one.largest_half_width95_s for log in others for one in log.stretches]
     known = [width for width in widths if width is not None]
     if len(known) < len(widths):
-        mark, headline = Mark("warn", "By file time"), "nothing tells how well the clocks agree"
+        mark, headline = Mark("warn", "By file time"), "it is not known how well the clocks agree"
     else:
         worst = max(known, default=0.0)
         mark = Mark("good", "Joined") if worst <= GOOD_S else Mark("warn", "Joined roughly")

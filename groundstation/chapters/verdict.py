@@ -60,11 +60,11 @@ def steady_terms(heading: HeadingResult) -> str:
     measured, sigma = heading.confidence95_measured_deg, heading.steady_sigma_deg
     if measured is None or not all(map(is_number, measured)) or not is_number(sigma):
         return ""
-    driven = "the directions driven leave" if heading.directions else "this taxi cannot show"
+    driven = "the directions driven do not remove" if heading.directions else "this taxi cannot show"
     origin = "as the aircraft file states" if heading.steady_origin == "aircraft file" else "shipped figures"
     return (
-        f"95 % interval {interval(heading.confidence95_deg, 3, '°')} with the steady sideslip and mounting that "
-        f"{driven} (σ {number(sigma, 2, '°')}, {origin}), {interval(measured, 3, '°')} by this taxi alone."
+        f"95 % interval {interval(heading.confidence95_deg, 3, '°')}, including steady sideslip and mounting that "
+        f"{driven} (σ {number(sigma, 2, '°')}, {origin}); {interval(measured, 3, '°')} from this taxi alone."
     )
 
 

@@ -73,10 +73,10 @@ def readme_text(simulated: list[Simulated]) -> str:
 _HEAD = """\
 # Sample logs
 
-Simulated: no aircraft was recorded. Logs and this page are written by `make_sample_logs` of
-groundstation/simulation/samples.py; tests/test_sample_logs.py makes them again and compares every byte. One alone:
+These logs are simulated: no aircraft was recorded. `make_sample_logs` of groundstation/simulation/samples.py writes the
+logs and this page; tests/test_sample_logs.py makes them again and compares every byte. To write one log:
 `groundstation simulate NAME -o DIR`. The format is the flat CSV: `#` lines of metadata, one time column,
-`<topic>.<field>` columns; an empty cell is no sample.
+`<topic>.<field>` columns; an empty cell means no sample.
 
 | log | what it shows | minutes | above 6 m/s on wheels, s | verdict to expect |
 |---|---|---|---|---|"""
@@ -84,7 +84,7 @@ _TRUTH_HEAD = """
 ## The truth behind them
 
 Heading error = INS heading - true heading at log second 0; it grows by the drift. The parking heading is that of the
-nose; the reference is what a theodolite gave (it stands in the log's metadata, with its own error). The antenna is
+nose. The reference is the reading of a theodolite, with its own error; the log's metadata hold it. The antenna is
 ahead of the middle of the main-gear axle.
 
 | log | heading error, deg | drift, deg/h | parking heading, deg | reference, deg | antenna ahead, m | seed |

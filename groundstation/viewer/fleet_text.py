@@ -19,8 +19,8 @@ WIDEST_CELL = 90  # a panel of its own has room for more than one beside charts
 EVERY_ONE = "flights.parquet"
 SAFE_PATH = re.compile(r"[A-Za-z0-9_-]+(/[A-Za-z0-9_-]+)*\.rrd")  # what needs no quoting in a link
 LINKS = (
-    "The name of a flight is a link to its recording; it opens in a viewer that was started in the folder of fleet.rrd "
-    "(groundstation view does that), or that looks at groundstation serve."
+    "The name of a flight is a link to its recording; it opens in a viewer that was started in the folder of "
+    "fleet.rrd (groundstation view does that), or that is connected to groundstation serve."
 )
 
 

@@ -30,9 +30,7 @@ def viewer_executable() -> Path:
     for place in (folder / "Rerun.app" / "Contents" / "MacOS" / "Rerun", folder / name):
         if place.is_file():
             return place
-    raise GroundstationError(
-        "the Rerun viewer", f"nothing in {folder}", "the executable of rerun-sdk", "install it anew"
-    )
+    raise GroundstationError("the Rerun viewer", f"nothing in {folder}", "the executable of rerun-sdk", "reinstall it")
 
 
 def require_display(environment: Mapping[str, str], platform: str = sys.platform) -> None:

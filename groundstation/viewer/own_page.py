@@ -58,7 +58,7 @@ def page_files(executable: Path, environment: Mapping[str, str]) -> dict[str, tu
             port = _told_port(process, Path(folder) / "log")
             return {path: _fetched(port, path) for path in FILES}
         except OSError as error:
-            raise GroundstationError("the Rerun web viewer", f"does not give its page ({error})") from error
+            raise GroundstationError("the Rerun web viewer", f"does not serve its page ({error})") from error
         finally:
             process.kill()
             process.wait()
@@ -75,7 +75,7 @@ def _told_port(process: "subprocess.Popen[bytes]", log: Path) -> int:
             if page and "web-viewer" in line:
                 return int(page[1])
         time.sleep(0.05)
-    raise GroundstationError("the Rerun web viewer", f"did not start: {text.strip()[-200:] or 'it said nothing'}")
+    raise GroundstationError("the Rerun web viewer", f"did not start: {text.strip()[-200:] or 'no output'}")
 
 
 def _fetched(port: int, path: str) -> tuple[str, bytes]:

@@ -77,7 +77,7 @@ def save_stream(path: Path, identity: str, send: Callable[[rr.RecordingStream], 
         rerun_bindings.flush_and_cleanup_orphaned_recordings()  # else the threads and buffers of each one stay
         temporary.replace(path)
     except (OSError, RuntimeError) as error:  # Rerun's own are RuntimeErrors
-        raise GroundstationError(str(path), str(error), next_step="check the folder and the space left") from error
+        raise GroundstationError(str(path), str(error), next_step="check the folder and the free space") from error
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -18,11 +18,12 @@ from groundstation.results.fleet import AircraftRow, FleetResults
 RATE = "radial_error_rate_50_nmiph"
 WORST_RATE = "radial_error_rate_95_nmiph"
 HEADING_LEAD = (
-    "Does an aircraft's INS, or its mounting, err in one direction? The mean of each over its flights; those with the "
-    "verdict reject enter no mean."
+    "Does an aircraft's INS, or its mounting, err in one direction? The mean of each over its flights; flights with "
+    "the verdict reject are left out."
 )
 RATE_LEAD = (
-    "How fast the position of the unaided INS drifts: radial error over time, half of each flight below the rate shown."
+    "How fast the position of the unaided INS drifts: radial error over time; half of each flight is below the rate "
+    "shown."
 )
 
 
@@ -59,9 +60,9 @@ def _table(fleet: FleetResults) -> Grid:
         for place, row in enumerate(fleet.by_aircraft)
     ]
     caption = (
-        "Every flight counts as one. Between flights: σ of the true errors, what the flights' own standard errors "
-        "explain taken away; unexplained: its share of the variance. Within: σ of the samples about the mean of their "
-        "flight. No interval for a single flight, nor for several aircraft together."
+        "Every flight counts as one. Between flights: σ of the true errors, without what the flights' own standard "
+        "errors explain; unexplained: its share of the variance. Within: σ of the samples about the mean of their "
+        "flight. There is no interval for a single flight, or for several aircraft together."
     )
     return Grid("Error by aircraft", heads, rows, caption)
 
@@ -76,7 +77,7 @@ def ins(fleet: FleetResults) -> Section | None:
     parts = []
     if other := int(np.sum(has_rate & ~unaided)):
         told = plural(other, "flight is left out: its INS is", "flights are left out: their INS is")
-        parts.append(Note(f"{told} aided by GNSS, or may be, and the rate says nothing about it.", "unknown"))
+        parts.append(Note(f"{told} aided by GNSS, or may be, so the rate does not show its drift.", "unknown"))
     if not unaided.any():
         return Section("ins", title, RATE_LEAD, parts)
     rates, worst = unaided_figures(fleet, RATE), unaided_figures(fleet, WORST_RATE)
@@ -116,4 +117,9 @@ def _rate_table(rates: dict[str, Any], worst: dict[str, Any]) -> Grid:
         )
         for name, own in sorted(rates.items())
     ]
-    return Grid("Error rate by aircraft, nmi/h", heads, rows, "Over the flights; half of the time of each below.")
+    return Grid(
+        "Error rate by aircraft, nmi/h",
+        heads,
+        rows,
+        "Over the flights; each flight is below its rate half of the time.",
+    )

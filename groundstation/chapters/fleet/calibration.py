@@ -4,14 +4,14 @@ from groundstation.chapters.parts import Figure, Grid, Head, Mark, Note, Section
 from groundstation.chapters.wording import number, percent, typeset
 from groundstation.results.fleet import FleetCalibration, FleetResults
 
-LEAD = "Are the stated intervals honest? Of something known independently, 95 % should lie inside."
+LEAD = "Are the stated intervals honest? 95 % of the independent checks should lie inside."
 
 
 def build(fleet: FleetResults) -> Section:
     """Build the chapter."""
     title = "Calibration"
     if not fleet.calibration:
-        text = "No flight has anything independent to check its answers by."
+        text = "No flight has an independent check of its answers."
         return Section("calibration", title, LEAD, (Note(text, "unknown"),))
     return Section("calibration", title, LEAD, (Figure("fleet.calibration"), _table(fleet)))
 
@@ -38,8 +38,8 @@ def _table(fleet: FleetResults) -> Grid:
         for row in fleet.calibration
     ]
     caption = (
-        "z: residual over its stated sigma, honest are 0 and 1. For the heading, flights with the verdict reject are "
-        "left out. What was found on board rests on the samples we use too: more than 95 % inside is what to expect of "
-        "it. Positions by a reference: of every flight as many samples as are independent."
+        "z: residual over its stated sigma; mean 0 and σ 1 are honest. For the heading, flights with the verdict "
+        "reject are left out. The value found on board uses the same samples: expect more than 95 % inside. Positions "
+        "by a reference: each flight counts with its number of independent samples."
     )
     return Grid("Checks", heads, rows, caption)

@@ -38,7 +38,7 @@ def _normals(fleet: FleetResults) -> Grid:
         )
         for place, one in enumerate(fleet.normals)
     ]
-    caption = "Merged from number, mean and sum of squares of each flight: what all samples in one array would give."
+    caption = "Merged from number, mean and sum of squares of each flight: the same as all samples in one array."
     return Grid("Fitted normals", heads, rows, caption)
 
 

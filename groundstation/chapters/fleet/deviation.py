@@ -34,9 +34,9 @@ def _table(rows: tuple[DeviationRow, ...]) -> Grid:
     )
     caption = (
         "Error = A + B sin c + C cos c + D sin 2c + E cos 2c, c the uncorrected magnetic heading. After: RMS in level "
-        "flight no fit has seen, after correction. Differs: RMS over the circle of the difference from the mean of the "
-        "aircraft's other flights; expected: what the standard deviations lead to where nothing changed; marked where "
-        f"it is more than {CHANGED:g} times that. {ADVISORY}"
+        "flight that no fit used, after correction. Differs: RMS over the circle of the difference from the mean of "
+        "the aircraft's other flights; expected: from the standard deviations if nothing changed; marked where it is "
+        f"more than {CHANGED:g} times that. {ADVISORY}"
     )
     return Grid("Deviation of every flight", heads, [_cells(row) for row in rows], caption)
 

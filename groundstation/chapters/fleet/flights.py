@@ -15,7 +15,7 @@ from groundstation.results.fleet import FleetResults
 
 KEY = "flights"
 MOST_LINES = 10_000  # of the table on the page: 7 MB
-LEAD = "Every flight of the fleet, with what is out of the ordinary about it."
+LEAD = "Every flight of the fleet, with remarks on what is unusual."
 GRAVITY: tuple[Tone, ...] = ("bad", "warn", "plain")
 HEADS = (
     *(Head("Flight"), Head("Aircraft"), Head("Start, UTC"), Head("Verdict")),
@@ -23,8 +23,9 @@ HEADS = (
     *(Head("INS, nmi/h", True), Head("60 min, m", True), Head("Remarks")),
 )
 CAPTION = (
-    "Error: INS heading − true heading; ± 95 %: half of its interval; reference: corrected parking heading less it; "
-    "INS: radial error rate, half of the time below; 60 min: RMS error of the forecast after that long without GNSS."
+    "Error: INS heading − true heading; ± 95 %: half of its interval; reference: corrected parking heading minus "
+    "reference; INS: radial error rate, half of the time below; 60 min: RMS error of the forecast after 60 min "
+    "without GNSS."
 )
 LINKED = (("recording", "rrd"), ("mcap", "mcap"))
 
@@ -69,7 +70,8 @@ def caption_of(fleet: FleetResults) -> str:
     if len(fleet) <= MOST_LINES:
         return CAPTION
     some = (
-        f"{number(MOST_LINES, 0)} of {plural(len(fleet), 'flight')}: those of note, the gravest first, then the last."
+        f"{number(MOST_LINES, 0)} of {plural(len(fleet), 'flight')}: notable ones first, most severe on top, then the "
+        "latest."
     )
     return f"{CAPTION} {some} All of them are in flights.parquet."
 
@@ -138,7 +140,7 @@ def build(fleet: FleetResults) -> Section:
     heads = (*(HEADS[place] for place in shown), HEADS[-1])
     rows = [(*(line.cells[place] for place in shown), _joined(line.remarks)) for line in every]
     caption = (
-        f"First what is of note, {number(noted, 0)} of {plural(len(fleet), 'flight')}: failed, rejected, outliers, "
+        f"Notable flights first, {number(noted, 0)} of {plural(len(fleet), 'flight')}: failed, rejected, outliers, "
         "outside the limits, the first of a new level, or with severe findings."
     )
     return Section(KEY, "Flights", LEAD, (Grid("Flights", heads, rows, caption),))

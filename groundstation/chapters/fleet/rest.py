@@ -20,10 +20,10 @@ STATED: dict[str, tuple[str, Callable[[float], str]]] = {
 
 def outliers(fleet: FleetResults) -> Section:
     """Build the chapter on outliers, the farthest first."""
-    lead = "Flights with a figure far from those of the same aircraft. They are told, not taken out."
+    lead = "Flights with a figure far from those of the same aircraft. They are listed, not removed."
     if not fleet.outliers:
         fewest = fleet.stated.get("fewest_flights_for_outliers")
-        needed = "" if fewest is None else f" Judged are aircraft with at least {number(fewest, 0)} flights."
+        needed = "" if fewest is None else f" Only aircraft with at least {number(fewest, 0)} flights are judged."
         return Section("outliers", "Outliers", lead, (Note(f"No outlier.{needed}"),))
     heads = (
         *(Head("Flight"), Head("Aircraft"), Head("Quantity"), Head("Value", True)),
@@ -38,8 +38,8 @@ def outliers(fleet: FleetResults) -> Section:
         for one in sorted(fleet.outliers, key=lambda one: -abs(one.z))
     ]
     caption = (
-        "Usual: median of the aircraft; robust σ: distance from it, of the logarithm for figures that are positive. "
-        "The farthest first."
+        "Usual: median of the aircraft; robust σ: distance from it, for positive figures on a logarithmic scale. The "
+        "farthest first."
     )
     return Section("outliers", "Outliers", lead, (Grid("Outliers", heads, rows, caption),))
 
@@ -59,13 +59,13 @@ def method(fleet: FleetResults) -> Section:
         (
             "Heading error",
             "INS heading − true heading",
-            "of a sample: INS heading − GNSS track; what is entered is its negative",
+            "of a sample: INS heading − GNSS track; the value to enter is its negative",
         ),
         ("Merging", "n, mean and sum of squares", "Chan, Golub, LeVeque (1983), never means of means"),
         ("Mean of an aircraft", "random effects, Student", "each flight counts as one; Hedges (1983)"),
         (
             "Change of level",
-            "ranks, cut in two again and again",
+            "ranks, split in two repeatedly",
             "Pettitt (1979), Scott and Knott (1974); p from random orders",
         ),
         ("Control limits", "level ± L σ", "σ from the median of successive differences; L is 3 for a long series"),
@@ -78,5 +78,5 @@ def method(fleet: FleetResults) -> Section:
         "Every figure comes from the saved results of the flights; fleet.parquet holds a row for each flight, "
         "samples.parquet the samples. Equal results give this report byte for byte."
     )
-    parts = (Facts("Definitions", definitions), Facts("Rates and limits kept to", stated), note)
+    parts = (Facts("Definitions", definitions), Facts("Rates and limits used", stated), note)
     return Section("method", "How it was computed", "What the words mean, and how often the tests are wrong.", parts)

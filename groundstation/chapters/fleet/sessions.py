@@ -15,8 +15,8 @@ HEADS = (
     Head("Warnings", True),
 )
 CAPTION = (
-    "2σ_r: computed, worst aircraft at the end; INS alone: the same of dead reckoning. A flight in a session is in the "
-    "table of the flights as well."
+    "2σ_r: computed, worst aircraft at the end; INS alone: the same for dead reckoning. A flight of a session is also "
+    "in the table of the flights."
 )
 LONGEST_NAMES = 40
 

@@ -10,8 +10,8 @@ from groundstation.results.forecast import HORIZONS_MIN, METHODS
 
 HEADLINE_MIN = 60.0
 LEAD = (
-    "GNSS taken away on paper at many moments of every flight: radial position error built up since, over all starts "
-    "of all flights."
+    "GNSS is withheld in the analysis at many moments of every flight: the radial position error that grows after "
+    "each, over all starts of all flights."
 )
 
 
@@ -26,7 +26,7 @@ def build(fleet: FleetResults) -> Section | None:
     if aided := len(set(aided_ids.tolist()).intersection(fleet.skill_flights["flight_id"].tolist())):
         told = plural(aided, "flight has", "flights have")
         text = (
-            f"{told} an INS that is aided by GNSS, or may be: their starts are in here, and look better than they are."
+            f"{told} an INS that is aided by GNSS, or may be: their starts are included and look better than they are."
         )
         parts.append(Note(text, "warn"))
     parts += [Figure("fleet.growth"), _by_horizon(rows, shipped)]
@@ -99,7 +99,7 @@ def _in_detail(fleet: FleetResults, rows: list[FleetSkill]) -> Grid:
         if row.method in shipped
     ]
     caption = (
-        "Median and worst of the flights' own RMS. Outages of one flight overlap: the band is judged over flights, "
-        "each by its NEES where it has starts enough."
+        "Median and worst of the flights' own RMS. Outages of one flight overlap, so the band is judged over flights, "
+        "each by its NEES where it has enough starts."
     )
     return Grid("The shipped method in detail", heads, table, caption)

@@ -75,11 +75,11 @@ def paths(results: FlightResults) -> Drawing | None:
 
     between = answer.duration_s / (TICKS_ON_A_WAY - 1)
     caption = (
-        f"Ways from above: {title_of(answer.recommended)}; dashed without control. Small dots stand {between:g} s "
-        "apart, the large one at the end." + (" Triangles: ground points." if points is not None else "")
+        f"Paths from above: {title_of(answer.recommended)}; dashed: without control. Small dots are {between:g} s "
+        "apart, the large one is at the end." + (" Triangles: ground points." if points is not None else "")
     )
     names = ("control_paths", *(("control_points",) if points is not None else ()))
-    return Drawing("Ways", caption, "Ways of the aircraft.", d.draw("control-paths", 112, paint), names)
+    return Drawing("Paths", caption, "Paths of the aircraft.", d.draw("control-paths", 112, paint), names)
 
 
 def measures(results: FlightResults) -> Drawing | None:
@@ -113,8 +113,8 @@ def measures(results: FlightResults) -> Drawing | None:
                 layout.legend_above(axes, 3)
 
     caption = (
-        f"Accuracy of {answer.judged} as the centralised filter computes it, and geometry of its sources, along every "
-        "law. Laws of each step that agree lie over each other."
+        f"Accuracy of {answer.judged} as the centralised filter computes it, and geometry of its sources, under every "
+        "control law. Laws of each step that agree overlap."
     )
     svg = d.draw("control-measures", height, paint)
     return Drawing("Accuracy and geometry", caption, "Two sigma and geometry with time.", svg, ("control_measures",))
@@ -150,9 +150,9 @@ def law(results: FlightResults) -> Drawing | None:
             if not number:
                 layout.legend_above(axes, 3)
 
-    caption = "The laws of control with time; straight grey: no control; dashed: bounds."
+    caption = "The control laws with time; straight grey: no control; dashed: bounds."
     svg = d.draw("control-law", height, paint)
-    return Drawing("Laws of control", caption, "Controls with time.", svg, ("control_paths",))
+    return Drawing("Control laws", caption, "Controls with time.", svg, ("control_paths",))
 
 
 def _unwrapped(data: FigureData, rows: NDArray[np.bool_], start_deg: float) -> NDArray[np.float64]:

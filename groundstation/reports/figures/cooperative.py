@@ -200,7 +200,7 @@ def geometry(results: FlightResults) -> Drawing | None:
 
     caption = (
         "Geometry of the sources that each aircraft hears in a frame: dilution, and determinant and least eigenvalue "
-        "of H'H, horizontal directions alone; a line ends where an aircraft hears nothing."
+        "of H'H, horizontal directions only; a line ends where an aircraft hears none."
         + (" Grey: the other aircraft, numbers in the table." if _is_crowd(answer) else "")
     )
     svg = d.draw("cooperative-geometry", height, paint)
@@ -236,8 +236,9 @@ def links(results: FlightResults) -> Drawing | None:
         layout.legend_above(axes, 10)
 
     caption = (
-        f"Residuals of the ranges over their computed sigma, {title_of(answer.default_algorithm)}"
-        f"{'' if _is_crowd(answer) else ', by receiver'}; what is beyond {ceiling:.0f} is drawn at the edge."
+        "Residuals of the ranges over their computed sigma, "
+        f"{title_of(answer.default_algorithm)}{'' if _is_crowd(answer) else ', by receiver'}; values beyond "
+        f"{ceiling:.0f} are drawn at the edge."
     )
     svg = d.draw("cooperative-links", 66, paint)
     return Drawing("Residuals of the links", caption, "Residuals of the ranges with time.", svg, ("cooperative_links",))

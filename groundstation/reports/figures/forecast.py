@@ -57,8 +57,8 @@ def growth(results: FlightResults) -> Drawing | None:
         axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), labelspacing=0.7)
 
     caption = (
-        "Error built up since the start, root mean square over all starts. About one Schuler period (84 min) ahead a "
-        "mainly oscillating error has come round, and the raw INS looks good for a moment."
+        "Error built up since the start, root mean square over all starts. After about one Schuler period (84 min) a "
+        "mainly oscillating error returns to its start, so the raw INS looks good for a moment."
     )
     alt = "RMS error against horizon for each forecast method, logarithmic axes."
     return Drawing("How the error grows", caption, alt, d.draw("growth", 90, paint), ("forecast_growth",))
@@ -85,9 +85,9 @@ def calibration(results: FlightResults) -> Drawing | None:
             axes.set_xlabel("horizon, min without GNSS")
 
     caption = (
-        "Left: how many errors the claimed bands held; on the dashed lines they are honest, below too narrow. Right: "
-        "squared error over claimed variance; above the shaded limits the forecast is overconfident. "
-        f"Hollow: fewer than {FEWEST_STARTS} independent starts, not to be judged."
+        "Left: share of the errors inside the claimed bands; bands on the dashed lines are honest, below them too "
+        "narrow. Right: squared error over claimed variance; above the shaded limits the forecast is overconfident. "
+        f"Hollow: fewer than {FEWEST_STARTS} independent starts, not judged."
     )
     alt = "Coverage of the claimed bands and NEES by horizon."
     return Drawing("Calibration of the shipped method", caption, alt, d.draw("calibration", 64, paint))
@@ -150,7 +150,7 @@ def hindcast_map(results: FlightResults) -> Drawing | None:
 
     caption = (
         f"Forecast started at {number(len(starts), 0)} moments of the flight: radial error by start and horizon, both "
-        "maps on one scale, its top shared by the worst 2 %. White: beyond the end of the flight, or no GNSS."
+        "maps on one scale, clipped at the worst 2 %. White: beyond the end of the flight, or no GNSS."
     )
     alt = "Maps of the forecast error by start and horizon for the shipped method and the raw INS."
     return Drawing("Hindcast map", caption, alt, d.draw("map-hindcast", 74, paint), ("forecast_map",))

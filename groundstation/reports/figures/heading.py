@@ -209,7 +209,7 @@ def taxi(results: FlightResults) -> Drawing | None:
                 d.lanes(axes, start[mine], end[mine], state[mine], states, {"used": d.USED})
                 axes.tick_params(labelleft=axes is strips[0])
 
-    caption = "The lanes show which epochs are used, and what kept the others out."
+    caption = "The lanes show which epochs are used, and why the others are not."
     alt = "INS heading, GNSS track and ground speed during the taxi with lanes for each gate."
     names = ("heading_samples",) if lanes is None else ("heading_samples", "heading_lanes")
     height = 12.0 + lane_mm + (3.0 if states else 0.0) + 83.0
@@ -278,7 +278,7 @@ def forest(results: FlightResults) -> Drawing | None:
     more = f" The first {len(shown)} of {len(segments)} segments." if len(shown) < len(segments) else ""
     blue = "; blue: directions of travel" if answer.directions else ""
     caption = (
-        f"Bars: ± 1.96 σ. Green: straight segments{blue}; black: the whole run, thick: by this taxi alone. Opposite "
+        f"Bars: ± 1.96 σ. Green: straight segments{blue}; black: the whole run, thick: from this taxi alone. Opposite "
         f"directions that disagree point to side-slip or mounting.{more}"
     )
     alt = "Forest plot of the heading error by segment and by direction."
@@ -320,7 +320,7 @@ def spectrum(results: FlightResults) -> Drawing | None:
         axes.set_ylabel("spectral density, °²/Hz")
         layout.legend_above(axes)
 
-    caption = "The low end counts for the error of the mean: slow GNSS errors sit there; sway averages out."
+    caption = "The low end sets the error of the mean: slow GNSS errors are there; sway averages out."
     alt = "Spectral density of the heading residuals with the fitted noise model, logarithmic axes."
     drawn = d.draw("spectrum", 60, paint)
     return Drawing("Spectrum of the residuals", caption, alt, drawn, ("heading_spectrum",))

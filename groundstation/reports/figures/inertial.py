@@ -46,7 +46,7 @@ def state(results: FlightResults, name: str) -> Drawing | None:
 
     caption = (
         "Grey: INS − GNSS; green: estimate, shaded ± 1.96 σ; black: smoothed with data on both sides (RTS). Yellow "
-        "ground: nothing to compare, the filter forecasts."
+        "background: nothing to compare, the filter forecasts."
     )
     alt = f"North and east {name} error over flight time with the estimate and its band."
     svg = d.draw(f"inertial-{name}", 106, paint)
@@ -74,8 +74,8 @@ def tilt_and_drift(results: FlightResults) -> Drawing | None:
                     layout.legend_above(axes)
 
     caption = (
-        "States GNSS does not measure: what the filter infers of them. A band that does not shrink means that the "
-        "flight does not show the state."
+        "States that GNSS does not measure, as the filter infers them. If a band does not shrink, the flight does not "
+        "show the state."
     )
     alt = "Platform tilt and gyro drift of both channels over flight time with 95 % bands."
     svg = d.draw("inertial-tilt", 104, paint)
@@ -147,8 +147,8 @@ def radial(results: FlightResults) -> Drawing | None:
         layout.legend_above(axes)
 
     caption = (
-        "Distance from GNSS. While it is there the corrected track follows it as far as the filter trusts it; on "
-        "yellow ground there was nothing to compare with."
+        "Distance from GNSS. With GNSS, the corrected track follows it as far as the filter trusts it; on yellow "
+        "background there was nothing to compare."
     )
     alt = "Radial position error of the INS and of the corrected track over flight time, logarithmic axis."
     svg = d.draw("inertial-radial", 66, paint)
@@ -187,8 +187,8 @@ def innovations(results: FlightResults) -> Drawing | None:
 
     caption = (
         "Innovation (measured − predicted position) over its own σ. If the noise model is right, 95 % lie between the "
-        "dashed lines and nothing slow is seen; waves mean slow GNSS errors or an INS the model does not know. With "
-        "the noise raised nearly all lie inside, which proves nothing."
+        "dashed lines without slow waves; waves mean slow GNSS errors or an INS that the model does not describe. "
+        "With the noise raised nearly all lie inside, which proves nothing."
     )
     alt = "Normalised innovations of both channels over flight time with limits at 1.96."
     svg = d.draw("inertial-innovations", 80, paint)
@@ -220,7 +220,7 @@ def observability(results: FlightResults) -> Drawing | None:
             if place == 1:
                 axes.legend(loc="center left", bbox_to_anchor=(1.03, 0.5))
 
-    caption = "1 − σ/σ without GNSS, for each state: 0 means the flight says nothing of it, 1 that it is known."
+    caption = "1 − σ/σ without GNSS, for each state: 0: the flight does not show it; 1: it is known."
     alt = "Observability of the six states of both channels over flight time."
     svg = d.draw("inertial-observability", 58, paint)
     return Drawing("Observability", caption, alt, svg, ("inertial_observability",))
@@ -242,7 +242,7 @@ def differences(results: FlightResults, quantity: str) -> Drawing | None:
             axes.set_ylabel(f"{channel}, {UNITS[quantity]}")
             layout.time_axis(axes, low, high, title=channel == "east")
 
-    caption = "Every epoch in which both were there. A slow wave here is no Schuler oscillation."
+    caption = "Every epoch with both INS and GNSS. A slow wave here is not a Schuler oscillation."
     alt = f"INS minus GNSS, {quantity} north and east, over flight time."
     svg = d.draw(f"inertial-differences-{quantity}", 80, paint)
     return Drawing(f"INS − GNSS, {quantity}", caption, alt, svg, ("inertial_differences",))

@@ -181,8 +181,8 @@ def protection(results: FlightResults, of: str) -> Drawing | None:
         layout.legend_above(axes, 4)
 
     caption = (
-        "Of two kinds of protection level the greater. The error itself is not known: a Stanford plot has no points to "
-        "draw, only whether the receiver would have had to alarm."
+        "The greater of two kinds of protection level. The error itself is not known, so a Stanford plot is not "
+        "possible; the figure only shows whether the receiver should have raised an alarm."
     )
     alt = "Protection levels against alarm limits over flight time."
     svg = d.draw(f"landing-protection-{of}", 62, paint)

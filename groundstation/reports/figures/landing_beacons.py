@@ -35,7 +35,7 @@ def deviations(results: FlightResults) -> Drawing | None:
                 rows = np.flatnonzero((number == one.approach) & (before < FARTHEST_M) & (before > NEAREST_M))
                 x, y = before[rows] / M_PER_KM, numbers(data, f"{column}_m")[rows]
                 half = _running_median(LINEAR_95 * numbers(data, f"{column}_sigma_m")[rows])
-                name = "95 % of one place" if one.approach == 1 else None
+                name = "95 % of one position" if one.approach == 1 else None
                 axes.fill_between(x, -half, half, color=d.FILL, linewidth=0, label=name, zorder=0.5)
                 d.dots(axes, x, y, colour, 2.6, label=f"approach {one.approach}", zorder=4)
             for limit in dict.fromkeys(limits):
@@ -53,9 +53,9 @@ def deviations(results: FlightResults) -> Drawing | None:
                 layout.legend_above(axes, 4)
 
     caption = (
-        "Every place found by three bearings (dots) and the 95 % band of a single one about zero. Dashed: limits of "
-        "the categories, the outermost named; dotted: locators. Distance: of a straight flight through all places. "
-        "What lies beyond the axes is cut."
+        "Every position found by three bearings (dots) and the 95 % band of a single one about zero. Dashed: limits "
+        "of the categories, the outermost named; dotted: locators. Distance: of a straight flight through all "
+        "positions. Points beyond the axes are cut."
     )
     alt = "Deviation from course and from glide path against distance, with bands and category limits."
     return Drawing("Deviations", caption, alt, d.draw("landing-beacons", 126, paint), ("landing_beacons_path",))

@@ -98,9 +98,9 @@ def accuracy(results: FlightResults) -> Drawing | None:
                 layout.legend_above(axes, 3)
 
     caption = (
-        "What 95 % of the errors stay within, by the covariance of the filter along the true path: the radius in the "
-        "plane, 1.96 σ of one axis. Dashed: accuracy of the categories (CAT II and III: ILS look-alike; the line below "
-        "CAT II is CAT IIIB). The upright line is the threshold."
+        "Bound of 95 % of the errors, by the covariance of the filter along the true path: radius in the plane, 1.96 "
+        "σ of one axis. Dashed: accuracy of the categories (CAT II and III: ILS look-alike; the line below CAT II is "
+        "CAT IIIB). The vertical line is the threshold."
     )
     alt = "Horizontal and vertical 95 % error along the approach, with the limits of the categories."
     return Drawing("Accuracy", caption, alt, d.draw("landing-accuracy", 120, paint), ("landing_ranges_path",))
@@ -141,8 +141,8 @@ def trials(results: FlightResults) -> Drawing | None:
                     layout.legend_above(axes, 1)
 
     caption = (
-        f"Estimate minus truth of {min(answer.trial_count, MOST_TRIALS)} simulated approaches in the 95 % band that "
-        "the filter computes of the first of them; errors beyond the axes are cut."
+        f"Estimate minus truth of {min(answer.trial_count, MOST_TRIALS)} simulated approaches, and the 95 % band that "
+        "the filter computes for the first of them; errors beyond the axes are cut."
     )
     alt = "Errors of simulated approaches to the right and up, within the computed bands."
     svg = d.draw("landing-trials", height, paint)

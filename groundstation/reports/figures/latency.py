@@ -41,8 +41,8 @@ def search(results: FlightResults) -> Drawing | None:
         layout.legend_above(axes, 4)
 
     caption = (
-        "RMS left between sensor and INS by latency tried: a sharp valley is motion that tells. Shaded: 95 % interval."
-        + (f" The first {MOST_PAIRS} pairs." if len(known) > MOST_PAIRS else "")
+        "RMS residual between sensor and INS for each latency tried. A sharp minimum means that the motion shows the "
+        "latency. Shaded: 95 % interval." + (f" The first {MOST_PAIRS} pairs." if len(known) > MOST_PAIRS else "")
     )
     alt = "Residual between sensors and INS against the latency tried, one line for each pair."
     return Drawing("Search", caption, alt, d.draw("latency-search", 66, paint), ("latency_search",))

@@ -82,13 +82,13 @@ def held_out(results: FlightResults) -> Drawing | None:
         layout.legend_above(left, 2)
 
     caption = (
-        f"Level flight that no fit has seen, n = {number(len(time), 0)} drawn, against flight time and heading; "
-        f"after: by the {METHOD_TITLES[method]}. Judged by the same INS and declination: an error of theirs "
-        "common to the whole flight does not show."
+        f"Level flight that no fit used, n = {number(len(time), 0)} drawn, against flight time and heading; after: by "
+        f"the {METHOD_TITLES[method]}. Judged by the same INS and declination: their errors common to the whole flight "
+        "do not show."
     )
     alt = "Residual heading error before and after correction on the held-out part."
     sketch = d.draw("magnetic-held-out", 70, paint)
-    return Drawing("Error where no fit has seen", caption, alt, sketch, ("magnetic_samples",))
+    return Drawing("Error on data that no fit used", caption, alt, sketch, ("magnetic_samples",))
 
 
 def track(results: FlightResults) -> Drawing | None:
@@ -151,8 +151,8 @@ def branches(results: FlightResults) -> Drawing | None:
         layout.legend_above(axes, 4)
 
     caption = (
-        f"Magnetic minus INS true heading, declination in it, as in the patent. What is odd in bank cancels in the "
-        f"average; one branch is never used alone. Bins interpolated: {number(int(filled.sum()), 0)} of 360."
+        "Magnetic minus INS true heading, declination in it, as in the patent. Errors that are odd in bank cancel in "
+        f"the average; one branch is never used alone. Bins interpolated: {number(int(filled.sum()), 0)} of 360."
     )
     alt = "Compass error against magnetic heading on right and left turns with their average."
     names = ("magnetic_samples", "magnetic_table")
@@ -185,6 +185,8 @@ def modulus(results: FlightResults) -> Drawing | None:
         panels[0].set_ylabel("modulus of the field, µT")
         layout.legend_above(panels[-1], 4)
 
-    caption = "Readings of the figures alone. A modulus that still waves after the fit is iron the model does not know."
+    caption = (
+        "Readings of the figures alone. If the modulus still waves after the fit, the model does not describe all iron."
+    )
     alt = "Modulus of the magnetic field over flight time before and after the fit."
     return Drawing("Modulus of the field", caption, alt, d.draw("magnetic-modulus", 70, paint), ("magnetic_modulus",))

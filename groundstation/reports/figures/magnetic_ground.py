@@ -52,7 +52,7 @@ def ground_runs(results: FlightResults) -> Drawing | None:
 
     caption = (
         f"Magnetic heading + declination − track, n = {len(used)} runs with ± 1.96 σ (noise, slip and declination, the "
-        "last common to all). Line and shade: the curve with its 95 % band, drawn only where it is known well enough. "
+        "last common to all). Line and shade: the curve with its 95 % band, drawn only where it is accurate enough. "
         "Epochs beyond the axis are cut."
     )
     alt = "Error of the installed heading sensor against magnetic heading, one bar for each straight ground run."

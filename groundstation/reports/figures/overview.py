@@ -61,7 +61,7 @@ def track_map(results: FlightResults) -> Drawing | None:
     start = f"{number(origin[0], 5, '°')}, {number(origin[1], 5, '°')}"
     caption = f"Ring: start ({start})."
     if used.any():
-        caption += " Green: straight taxi the heading error was taken from."
+        caption += " Green: straight taxi used for the heading error."
     if corrected is not None:
         size = f", drawn {number(larger, 0)} times their size" if larger > 1 else ""
         caption += f" Ellipses: 95 % of the corrected position{size}."
@@ -240,7 +240,7 @@ def states(results: FlightResults) -> Drawing | None:
         layout.time_axis(axes, min(float(times.min()), 0.0), float(times.max()))
 
     flags = [name for name in dict.fromkeys(lane.tolist()) if name not in ("mode", "arming")]
-    caption = "What the log itself says of flight mode and arming"
+    caption = "Flight mode and arming as logged"
     caption += f"; ground contact by its {', '.join(flags)}." if flags else "."
     caption += f" {len(modes) - MOST_MODES} more modes in the table." if len(modes) > MOST_MODES else ""
     alt = "Strips of flight mode, arming and ground contact over flight time."

@@ -46,7 +46,7 @@ def accuracy_map(results: FlightResults) -> Drawing | None:
         if way is not None:
             mine = texts(way, "design") == answer.recommended
             along, up = (numbers(way, f"{axis}_m")[mine] / M_PER_KM for axis in ("east", "north"))
-            d.line(axes, along, up, d.INK, 1.0, label="way")
+            d.line(axes, along, up, d.INK, 1.0, label="path")
         _marks(axes, answer.fixed_east_m, answer.fixed_north_m, "x", 6.0, "fixed point", color=d.GNSS)
         if points is not None:
             _stand(axes, points, answer)
@@ -59,7 +59,7 @@ def accuracy_map(results: FlightResults) -> Drawing | None:
 
     caption = (
         f"Root of the weighted variance at the fixed point if {answer.moved} stood elsewhere, the other points as "
-        f"recommended ({design_title(answer.recommended)}). White: no place, or the map ends."
+        f"recommended ({design_title(answer.recommended)}). White: not allowed, or outside the map."
     )
     names = tuple(
         name
@@ -94,7 +94,7 @@ def _stand(axes: Any, points: FigureData, answer: PlacementPlan) -> None:
     east, north = (numbers(points, f"{axis}_m") for axis in ("east", "north"))
     given = (design == GIVEN) & placed
     _marks(axes, east[given], north[given], "o", 4.5, "as given")
-    for is_placed, mark, name in ((True, "*", "placed"), (False, "^", "stands already")):
+    for is_placed, mark, name in ((True, "*", "placed"), (False, "^", "already there")):
         mine = (design == answer.recommended) & (placed == is_placed)
         if not mine.any():
             continue
@@ -130,6 +130,6 @@ def accuracy(results: FlightResults) -> Drawing | None:
             if not number:
                 layout.legend_above(axes, 2)
 
-    caption = "Accuracy along the way as the filter computes it, every design; from the first ranges on."
+    caption = "Accuracy along the path as the filter computes it, for every design, from the first ranges on."
     svg = d.draw("placement-accuracy", height, paint)
-    return Drawing("Accuracy along the way", caption, "Two sigma with time.", svg, ("placement_accuracy",))
+    return Drawing("Accuracy along the path", caption, "Two sigma with time.", svg, ("placement_accuracy",))

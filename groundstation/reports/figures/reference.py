@@ -115,9 +115,7 @@ def track(results: FlightResults) -> Drawing | None:
         axes.set_ylabel(f"north, {unit}")
         layout.legend_above(axes)
 
-    caption = (
-        "From where the reference begins. Every error of position, the constant ones as well, is in its place here."
-    )
+    caption = "Origin: where the reference begins. All position errors are shown, constant ones too."
     alt = "Plan view of the reference and of what was recorded and estimated."
     return Drawing("Plan view", caption, alt, d.draw("reference-track", 102, paint), ("reference_track",))
 

@@ -51,8 +51,8 @@ def components(results: FlightResults) -> Drawing | None:
         _plane(layout.place(figure, 121, 12, 174, 65), north[inside], east[inside], reach, still)
 
     caption = (
-        f"The aircraft stands: what GNSS reports is its error. n = {number(count, 0)}. "
-        f"Right: in the plane; circle: {RAW_LIMIT_MPS} m/s (2 σ stated for GLONASS and GPS); cross: mean."
+        f"The aircraft stands still: the GNSS velocity is its error. n = {number(count, 0)}. Right: in the plane; "
+        f"circle: {RAW_LIMIT_MPS} m/s (2 σ stated for GLONASS and GPS); cross: mean."
     )
     alt = "North and east velocity at standstill over time, and scattered in the plane around zero."
     return Drawing(
@@ -103,8 +103,8 @@ def mean_speed(results: FlightResults) -> Drawing | None:
         layout.legend_above(axes)
 
     caption = (
-        "Mean speed over overlapping intervals. Longer averaging moves the density below the limit: 10 s that fail ask "
-        "for more time, not for rejection."
+        "Mean speed over overlapping intervals. Longer averaging moves the density below the limit: if 10 s fail, "
+        "measure longer instead of rejecting."
     )
     alt = "Densities of the mean speed for two interval lengths against the limit of 0.01 m/s."
     return Drawing(

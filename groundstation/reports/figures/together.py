@@ -49,8 +49,8 @@ def motion(results: FlightResults, label: str) -> Drawing | None:
 
     caption = (
         f"Above: {quantity(shown.signal)[0]} of {log.reference_topic} and {log.topic} on the clock of the flight. "
-        f"Below: {log.topic} less {log.reference_topic}; peaks where the motion changes would tell of clocks that do "
-        "not agree."
+        f"Below: {log.topic} minus {log.reference_topic}; peaks where the motion changes mean that the clocks do not "
+        "agree."
     )
     alt = f"{shown.signal} of {log.reference_topic} and {log.topic} over flight time, and their difference."
     sketch = d.draw(f"together-{name}", BOTTOM_MM + 2 * (PANEL_MM + GAP_MM), paint)

@@ -56,9 +56,9 @@ def checks(fleet: FleetResults) -> Drawing:
                 panel.set_ylabel("checks")
 
     caption = (
-        "Above: share of the checks inside with its exact 95 % interval; honest sigmas have the dashed line in it. "
-        "Below: where the checks fell in the distribution claimed for them; honest is flat (dotted), heaped at both "
-        "ends too sure, heaped in the middle too careful, heaped at one end off in one direction."
+        "Above: share of the checks inside with its exact 95 % interval; with honest sigmas it contains the dashed "
+        "line. Below: where the checks fell in the distribution claimed for them; flat (dotted) is honest, high at "
+        "both ends too sure, high in the middle too careful, high at one end biased."
     )
     alt = "Share of checks inside the stated interval, and histograms of their probability integral transform."
     return Drawing("Checks inside the stated interval", caption, alt, d.draw("fleet-calibration", height, paint))

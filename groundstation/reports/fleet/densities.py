@@ -164,7 +164,7 @@ def by_aircraft(fleet: FleetResults) -> Drawing:
                 axes.set_ylabel("1/°")
 
     caption = (
-        f"The same for each aircraft, black the normal fitted to its samples. More than {MOST_LINES_OF_A_PANEL} "
+        f"The same for each aircraft; black: the normal fitted to its samples. More than {MOST_LINES_OF_A_PANEL} "
         f"flights are drawn as bands that hold 90 % and 50 % of them at each place.{left_out(len(shown), len(counts))}"
     )
     alt = "A panel for each aircraft with the densities of its flights and the normal fitted to them."

@@ -38,7 +38,7 @@ def control(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     if answer is None or section is None or paths is None:
         return None
     recorder.document("control/answer", markdown(section))
-    left = [_space(recorder, answer, paths, results), document("Laws of control", "control/answer")]
+    left = [_space(recorder, answer, paths, results), document("Control laws", "control/answer")]
     columns = [left, _laws(recorder, answer, paths), _measures(recorder, answer, results)]
     shown = [rrb.Vertical(contents=column) for column in columns if column]
     return rrb.Horizontal(contents=shown, column_shares=[1.6, 1.0, 1.0][: len(shown)], name="Control")

@@ -21,7 +21,7 @@ from groundstation.viewer.views import document, figure_of, numbers, plot
 THIN, BOLD = 0.8, 1.8
 MARGIN = 1.08
 FAN_HEIGHT, GROWTH_HEIGHT = 140.0, 115.0
-SHOWN = Line("GNSS showed", colours.GNSS, BOLD)
+SHOWN = Line("recorded GNSS", colours.GNSS, BOLD)
 FORECAST = Line("forecast", colours.ANSWER, BOLD)
 CLAIMED = Line("95 % as claimed", colours.HONEST, THIN)
 
@@ -119,7 +119,7 @@ def _starts(
             low, high = band
             chart.band("claimed", minutes[rows], low[rows], high[rows], CLAIMED.colour, at_s)
         chart.curves("latest", [(minutes[rows], values[rows], line) for values, line in curves], at_s)
-        chart.note("start", f"GNSS taken away at {_clock(start)}", at_s)
+        chart.note("start", f"GNSS withheld at {_clock(start)}", at_s)
 
 
 # ---------------------------------------------------------------------------------------------------- skill

@@ -43,7 +43,7 @@ def inertial(recorder: Recorder, results: FlightResults) -> rrb.Container | None
     if section is None or results.answer(InertialResult) is None:
         return None
     recorder.document("inertial/answer", markdown(section))
-    right: list[rrb.View] = [document("What GNSS says of this INS", "inertial/answer")]
+    right: list[rrb.View] = [document("Errors of this INS against GNSS", "inertial/answer")]
     states = figure_of(results, "inertial_states", "time_s", "north_position_m", "east_position_m")
     pages = aided_pages(recorder, results)
     if states is not None:

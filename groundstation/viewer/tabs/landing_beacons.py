@@ -43,7 +43,7 @@ def _approach(recorder: Recorder, one: BeaconApproachRow, data: FigureData) -> r
     column = {name: numbers(data, name)[mine] for name in data.columns}
     time_s, path = column["time_s"], f"landing_beacons/{one.approach}"
     run = Run(float(time_s[0]), float(time_s[-1]))
-    band, dots = Line("95 % of one place", colours.HONEST, BOLD), Line("deviation", colours.ANSWER, SMALL)
+    band, dots = Line("95 % of one position", colours.HONEST, BOLD), Line("deviation", colours.ANSWER, SMALL)
     views: list[rrb.View] = []
     for name, title, most in DEVIATIONS:
         half = np.clip(LINEAR_95 * column[f"{name}_sigma_m"], 0.0, most)

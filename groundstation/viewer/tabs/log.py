@@ -28,7 +28,7 @@ def log(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Conta
     if _gaps(recorder, results):
         left.append(rrb.TextLogView(name="Gaps in time", origin="/log/gaps", columns=columns))
     recorder.document("log/by_gravity", markdown(findings(results)))
-    gravest = document("Findings, the gravest first", "log/by_gravity")
+    gravest = document("Findings, most severe first", "log/by_gravity")
     column = rrb.Vertical(contents=left, row_shares=[2.0, 1.0][: len(left)])
     return rrb.Horizontal(contents=[column, gravest], name="Log")
 

@@ -142,7 +142,7 @@ def _errors(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     for name, title, shade in (("error_before_deg", "before", colours.SAMPLES), (column, "after", colours.ANSWER)):
         values = numbers(figure, name)[mine]
         recorder.dots(f"magnetic/error/{title}", time_ns, values, Line(f"{title}, deg", shade, DOT))
-    title = "Error of magnetic heading where no fit has seen, deg: before grey, after green"
+    title = "Error of magnetic heading on data that no fit used, deg: before grey, after green"
     return [plot(title, "magnetic/error", legend=False)]
 
 

@@ -153,7 +153,7 @@ def _list(table_of_topic: Table) -> str:
         text = table(["field", "value"], [[head, column[0]] for head, column in zip(heads, cells, strict=True)])
     else:
         text = table(heads, [list(row) for row in zip(*cells, strict=True)])
-    told = [f"{len(table_of_topic)} rows, most of them of one time: a list, not a series."]
+    told = [f"{len(table_of_topic)} rows, most with the same time: a list, not a series."]
     if len(rows) < len(table_of_topic) or len(shown) < len(names):
         told.append(f"Shown: {len(rows)} rows, {len(shown)} of {len(names)} fields.")
     return "\n\n".join([" ".join(told) if len(table_of_topic) > 1 else "One record.", text])
@@ -325,15 +325,15 @@ def _about(
         rows.append([markdown_text(topic), str(len(flight[topic])), str(sum(len(one.fields) for one in own)), shown])
     parts = [
         "# What is shown here",
-        "Long topics are thinned for the screen: of every stretch the rows with the lowest and the highest value "
-        "of each series are kept, and both sides of each gap. No value is altered. The MCAP beside this recording "
-        "holds every row. Fields that only repeat the time of their row are not drawn; topics that are lists "
-        "(parameters, definitions, single records) are tables.",
+        "Long topics are thinned for the screen: in every stretch the rows with the lowest and the highest value of "
+        "each series are kept, and both sides of each gap. No value is altered. The MCAP beside this recording holds "
+        "every row. Fields that only repeat the time of their row are not drawn; topics that are lists (parameters, "
+        "definitions, single records) are tables.",
         table(["topic", "rows", "numeric fields", "shown"], rows),
     ]
     if left_out:
         names = ", ".join(markdown_text(name) for name in left_out)
-        parts.append(f"Texts that change more than {MAX_LANE_ROWS} times are no lanes and are not shown: {names}.")
+        parts.append(f"Texts that change more than {MAX_LANE_ROWS} times have no lane and are not shown: {names}.")
     if without_page:
         names = ", ".join(markdown_text(topic) for topic in without_page)
         parts.append(f"{len(without_page)} topics beyond the first {MAX_TOPICS} have no page: {names}.")
