@@ -112,7 +112,7 @@ def test_without_a_site_file_only_the_change_is_measured() -> None:
     one = only(simulate_approach(load_approach("ils-approach")))
     (error,) = one.position_errors
     assert one.runway.placed_by == "positions" and error.state == "not measured" and error.error_m is None
-    assert "positions themselves" in error.reason and error.change_m is not None
+    assert "these positions placed the runway" in error.reason and error.change_m is not None
     assert one.touchdown is not None and one.touchdown.past_threshold_m is None
 
 
@@ -220,7 +220,7 @@ def test_facts_of_the_recorded_approaches() -> None:
 
 @pytest.mark.real_log
 def test_the_recorded_file_without_positions_is_refused() -> None:
-    with pytest.raises(NotAssessableError, match="nowhere established"):
+    with pytest.raises(NotAssessableError, match="never established"):
         found(open_flight(real_log("approach/coreg.hdf5")).flight)
 
 

@@ -100,7 +100,7 @@ def test_a_log_in_which_nothing_survives_has_one_answer(tmp_path: Path) -> None:
         ["run", "-o", str(tmp_path / "out")],
     ):
         code, out, err = groundstation(*verb, str(log))
-        assert code == 1 and err.startswith("error: flight.BIN: no record that could be read"), (verb, code, err)
+        assert code == 1 and err.startswith("error: flight.BIN: no readable record"), (verb, code, err)
         assert err.count("\n") == 1 and ("format:" in out) == (verb == ["info"])
 
 
@@ -140,7 +140,7 @@ def test_an_interrupted_run_says_how_to_go_on(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setattr("groundstation.pipeline.many_flights.batch.run_many", interrupted)
     code, out, err = groundstation("run", str(tmp_path), "-o", "out")
     assert (code, out) == (130, "")
-    assert err == "interrupted: out keeps what is finished; the same command again goes on with the rest\n"
+    assert err == "interrupted: out keeps what is finished; the same command continues with the rest\n"
 
 
 @pytest.mark.parametrize("verb", [verb for verb in VERBS if verb != "plan"])

@@ -216,7 +216,7 @@ def test_a_clock_that_stays_at_1970_is_no_rolled_over_week_and_gives_no_date() -
     (relation,) = found.clock.relations
     assert relation.segments and not relation.mistakes
     assert [one.text for one in ledger_findings(found.ledger) if "start_utc" in one.text] == []
-    assert relation_of(np.full(100, np.nan), 1.0).reason == "no reading that could be believed"
+    assert relation_of(np.full(100, np.nan), 1.0).reason == "no plausible reading"
 
 
 HUGE, TINY = 1.7e308, 5e-324

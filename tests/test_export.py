@@ -159,7 +159,7 @@ def test_the_number_of_positions_that_sbet_leaves_out_is_told(tmp_path: Path) ->
     track = track_of("ins")
     lacking = {**track.columns, "roll_deg": np.where(np.arange(len(track)) < 3, math.nan, track.column("roll_deg"))}
     told = _written_alone(WRITERS_OF_ONE[".out"], tmp_path / "a.out", (replace(track, columns=lacking),), False)
-    assert told == f"ins ({len(track) - 3}, 3 left out that lack what the format needs)"
+    assert told == f"ins ({len(track) - 3}, 3 left out: they lack what the format needs)"
     assert (tmp_path / "a.out").stat().st_size == (len(track) - 3) * 136
 
 

@@ -88,7 +88,7 @@ def test_without_names_every_format_is_taken(
     ("answer", "count"),
     [
         (Answer(0, "flight", "", 0.1), 0),
-        (Answer(1, "", "error: a.csv: no record that could be read\n", 0.1), 0),
+        (Answer(1, "", "error: a.csv: no readable record\n", 0.1), 0),
         (Answer(1, "", "error: a.csv: internal error (IndexError: 0); please report it\n", 0.1), 1),
         (Answer(1, "", "error: a.csv: one\nerror: two\n", 0.1), 1),
         (Answer(3, "", "x.py:1: RuntimeWarning: overflow\n", 0.1), 1),

@@ -467,7 +467,7 @@ def test_site_file_and_log_that_disagree_are_told() -> None:
         (
             SiteData,
             {"runways": [{"name": "09", "true_bearing_deg": 90, "latitude_deg": 48}]},
-            r"file, key runways\[0\].longitude_deg: found nothing, expected a value beside latitude_deg",
+            r"file, key runways\[0\].longitude_deg: found nothing, expected a value, as latitude_deg has one",
         ),
         (
             SiteData,

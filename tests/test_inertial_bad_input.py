@@ -214,7 +214,7 @@ def test_of_an_ins_at_rest_the_differences_alone_are_told(flight: Flight) -> Non
     assert isinstance(result, InertialResult) and result.kind == "unknown" and "below 5 m/s" in result.kind_reason
     assert result.channels == () and result.differences and set(found.answers) == {"inertial"}
     assert [finding.code for finding in found.findings["inertial"]] == ["inertial.unknown_kind"]
-    assert "whether GNSS corrects this INS cannot be told (95 %" in found.reasons["forecast"]
+    assert "it is not known whether GNSS corrects this INS (95 %" in found.reasons["forecast"]
 
 
 def test_what_is_stated_of_the_ins_decides(flight: Flight) -> None:
@@ -223,7 +223,7 @@ def test_what_is_stated_of_the_ins_decides(flight: Flight) -> None:
     kinds = [
         (found.answers["inertial"].kind, found.answers["inertial"].kind_reason) for found in (by_head, by_aircraft)
     ]
-    assert kinds == [("gnss_aided", "the head of the log says so"), ("unaided", "the aircraft file says so")]
+    assert kinds == [("gnss_aided", "the log header says so"), ("unaided", "the aircraft file says so")]
     assert by_aircraft.answers["inertial"].channels
     assert answered(replace(flight, metadata={"ins_kind": "strapdown"})).answers["inertial"].kind == "unaided"
 

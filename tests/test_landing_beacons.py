@@ -225,7 +225,7 @@ def test_without_any_altitude_the_ground_is_told_to_be_taken_for_level() -> None
     flight = replace(simulated.flight, tables=tables | {"ins": replace(ins, columns=kept)})
     found = LANDING_BEACONS.run(flight, known_of(simulated, places), SETTINGS)
     (told,) = [one for one in found.findings if one.code == "landing_beacons.terrain"]
-    assert told.severity == "warn" and "for level" in told.text
+    assert told.severity == "warn" and "level ground" in told.text
 
 
 @pytest.mark.parametrize(

@@ -128,7 +128,7 @@ def test_correlated_ranges_taken_for_white_make_a_filter_overconfident() -> None
     assert honest.is_consistent
     assert not white.is_consistent
     assert white.overconfidence_right > 3.0
-    assert any("takes the correlated" in remark for remark in answer.remarks)
+    assert any("treats the correlated" in remark for remark in answer.remarks)
 
 
 def test_drawn_errors_have_the_covariance_of_the_model() -> None:
@@ -188,7 +188,7 @@ def test_spans_are_where_the_figures_meet_the_limits() -> None:
         (lambda: StraightPath(runway_length_m=0.0), "runway_length_m"),
         (lambda: StraightPath(runway_length_m=150.0), "runway that the glide path meets"),
         (lambda: RangeApproach("", points=()), "one ground point"),
-        (lambda: RangeApproach("", points=(PAIR[0], PAIR[0])), "stands twice"),
+        (lambda: RangeApproach("", points=(PAIR[0], PAIR[0])), "given twice"),
         (lambda: RangeApproach("", points=(GroundPoint("under", 0.0, 0.0, 15.0),)), "off the path"),
         (
             lambda: RangeApproach("", points=PAIR, noise=RangeNoise(interval_s=0.001), path=StraightPath(30_000.0)),

@@ -171,7 +171,7 @@ def test_an_ins_that_gnss_corrects_gives_the_same_latency_less_surely() -> None:
     free, row = row_of(flown(), "gnss"), row_of(flown(), "gnss", kinds={"ins": "gnss_aided"})
     assert (row.state, row.latency_s) == (free.state, free.latency_s) == ("observed", free.latency_s)
     assert row.sigma_s == pytest.approx(np.hypot(free.sigma_s or 0.0, 0.03))
-    assert "GNSS corrects this INS, whose filter may hide 0.03 s of it" in row.reason
+    assert "GNSS corrects this INS, whose filter may hide 0.03 s of latency" in row.reason
     flight = flown()
     by_mode = changed(flight, "ins", with_column("mode", np.full(len(flight["ins"]), "gnss_aided")))
     assert row_of(by_mode, "gnss").reason == row.reason
@@ -190,7 +190,7 @@ def every(step: int) -> Callable[[Table], Table]:
         ("ins", lambda table: replace(table, time_ns=-(-table.time_ns // TICK_NS) * TICK_NS), "coarser than its rate"),
         ("gnss", lambda table: table.take(slice(0, 1)), "no samples"),
         ("gnss", lambda table: table.take(slice(0, 300)), "fewer than two stretches"),
-        ("ins", lambda table: table.take(slice(0, 2)), "hardly any samples"),
+        ("ins", lambda table: table.take(slice(0, 2)), "too few samples"),
         ("gnss", lambda table: with_column("velocity_east_mps", np.zeros(len(table)))(table), ""),
         ("ins", lambda table: with_column("velocity_east_mps", np.zeros(len(table)))(table), ""),
         ("gnss", later(40.0), ""),

@@ -331,7 +331,7 @@ def test_a_heading_that_the_ins_logs_is_corrected_by_the_curve(first: Path, pair
     assert np.max(np.abs(one.deviation_deg - other.deviation_deg)) < 0.2
     assert np.max(np.abs(one.deviation_deg)) > 1.0
     (told,) = (one.text for one in applied_to(flight, by_summary).results.findings if one.code == APPLIED)
-    assert "found for magnetometer: right only where that is the same sensor" in told
+    assert "found for magnetometer: correct only if that is the same sensor" in told
 
 
 def test_another_aircraft_and_a_worse_heading_are_warned_of(

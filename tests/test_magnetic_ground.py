@@ -274,7 +274,7 @@ def test_one_direction_does_not_tell_a_from_b_and_c() -> None:
     assert all(item.value_deg is None for item in answer.coefficients)
     assert "B" in answer.coefficient("A").reason and "C" in answer.coefficient("A").reason
     assert answer.along is None
-    assert any(remark.startswith("A: not told from") for remark in answer.remarks)
+    assert any(remark.startswith("A: not separable from") for remark in answer.remarks)
 
 
 def test_opposite_runs_show_a_and_one_axis() -> None:
@@ -415,7 +415,7 @@ def test_two_runs_are_not_taken_for_more_than_they_are() -> None:
     ("name", "used", "rejected", "found_letters", "reason"),
     [
         ("g1000/log_210623_141501_TEST1.csv", 5, 2, "ABC", ""),
-        ("g1000/log_220416_161856_LFQA.csv", 0, 0, "", "no straight ground run that counts: at 123 s: short: 3.0 s"),
+        ("g1000/log_220416_161856_LFQA.csv", 0, 0, "", "no valid straight ground run: at 123 s: short: 3.0 s"),
         ("g1000/log_220417_125002_LFQA.csv", 4, 1, "ABC", ""),
         ("g1000/log_220502_135932_EGPN.csv", 2, 0, "", ""),
     ],

@@ -124,7 +124,7 @@ def test_a_warning_stands_in_the_line_of_the_plan(tmp_path: Path) -> None:
     on_one_line = LEAST.replace("east_m = 1000", "east_m = 0").replace("east_m = 2000", "east_m = 0")
     file, out = scenario(tmp_path, on_one_line), str(tmp_path / "out")
     code, text, _ = groundstation("plan", "session", file, "-o", out, "--no-pdf")
-    assert code == 0 and "warning: the sources do not tell north and east apart" in text
+    assert code == 0 and "warning: the sources do not separate north and east" in text
     assert groundstation("plan", "session", file, "-o", out, "--no-pdf", "--fail-on", "warn")[0] == 4
 
 
@@ -138,7 +138,7 @@ def test_a_warning_stands_in_the_line_of_the_plan(tmp_path: Path) -> None:
         (('control = ["speed"]', 'control = ["height"]'), "control"),
         (('control = ["speed"]', "speed_low_mps = 300"), "speed_mps"),
         (('control = ["speed"]', "is_exact = true"), "is exact"),
-        (('name = "Q"', 'name = "P"'), "stands twice"),
+        (('name = "Q"', 'name = "P"'), "given twice"),
         (('title = "short"', 'title = "short"\njudged = "nobody"'), "judged"),
     ],
 )

@@ -146,7 +146,7 @@ def test_what_cannot_judge_is_refused_in_one_line(folder: Path, flown: Flight, t
     own = tmp_path / "own.csv"
     write_flat_csv(own, flown, with_truth=True)
     for used, references, told in (
-        (log, [other_day], "expected one of the time of flight.csv"),
+        (log, [other_day], "expected one that covers flight.csv"),
         (log, [good, folder / "references" / ".." / "references" / "sbet.out"], "several references"),
         (no_time, [good], "a log without UTC"),
         (log, [drifting], "no UTC"),
@@ -275,4 +275,4 @@ def test_a_log_for_which_a_reference_is_expected_is_not_finished_by_a_run_that_e
     assert CliRunner().invoke(app, ["run", str(log.parent), *run]).exit_code == 0
     refused = CliRunner().invoke(app, ["run", str(log), *run])
     assert refused.exit_code == 1
-    assert "a reference of" in refused.output
+    assert "a reference that covers" in refused.output

@@ -89,7 +89,7 @@ def test_a_setting_that_chooses_data_needs_the_log(out: Path, tmp_path: Path) ->
     assert found.changed == 0 and found.need_log == found.judged
     told = {row.subject: row.needs_log for row in found.rows}
     assert told["heading"] == "taxi_speed_min_mps, aircraft"
-    assert "need the log" in rules_text(found)
+    assert "are not sure without the log" in rules_text(found)
 
 
 def test_criteria_of_an_approach_are_judged_again(out: Path, tmp_path: Path) -> None:

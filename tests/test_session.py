@@ -452,7 +452,7 @@ def test_ranges_that_contradict_the_stated_sigmas_are_a_warning(
     sure = CooperativeSettings(ins=belief, gate_sigma=0.0)
     found = run_analyses((COOPERATIVE,), session, SessionKnown(settings={"cooperative": sure}))
     (finding, *_) = (one for one in found.findings["cooperative"] if one.code == "cooperative.too_sure")
-    assert finding.severity == "warn" and "where 1 is right" in finding.text
+    assert finding.severity == "warn" and "instead of 1;" in finding.text
     assert "sigma too small" in COOPERATIVE.sentence(found.answers)
 
 

@@ -53,7 +53,7 @@ def test_a_link_to_an_aircraft_of_another_day_is_told() -> None:
     a, b = flight("a", "A", "B", (0, 10)), flight("b", "B", "A", (110, 120))
     groups, apart = searched(a, b)
     assert groups == []
-    assert apart["a"] == "ranges to B, in no session: no flight of these overlaps, 100 s away at the least"
+    assert apart["a"] == "ranges to B, in no session: none of their flights overlaps, 100 s away at least"
     assert apart.keys() == {"a", "b"}
     assert searched(a) == ([], {}), "of an aircraft that is nowhere there is nothing to tell"
 
@@ -81,7 +81,7 @@ def test_logs_that_follow_each_other_go_with_those_of_their_time() -> None:
     assert searched(*parts)[0] == [["a1", "b1"], ["a2", "b2"]]
     groups, apart = searched(flight("a", "A", "", (0, 20)), *parts[2:])
     assert groups == [["a", "b1"]]
-    assert "are in one with another of B" in apart["b2"]
+    assert "are in one with another B flight" in apart["b2"]
 
 
 def test_two_recorders_of_one_aircraft_both_stay() -> None:
@@ -431,7 +431,7 @@ def test_logs_that_do_not_overlap_and_a_peer_without_a_log(
     outcomes = run_many([copied], tmp_path / "out", configuration, jobs=1, with_pdf=False)
     told = sessions_in(outcomes)
     assert [one.state for one in told] == ["skipped", "skipped"]
-    assert all("in no session: no flight of these overlaps, " in one.text for one in told)
+    assert all("in no session: none of their flights overlaps, " in one.text for one in told)
     assert [row["kind"] for row in rows_of(tmp_path / "out")] == ["flight"] * 2
     assert session_folders(tmp_path / "out") == []
 

@@ -83,7 +83,7 @@ def test_leap_seconds_in_one_log_are_named_and_the_motion_is_believed(twice: Twi
     late = TimedLog(retimed(other.flight, both.own_ns + LEAP_NS), other.gnss_time)
     found = relate(first, late)
     assert found.method == "motion"
-    assert "as many as the leap seconds" in found.remarks[0]
+    assert "equal to the leap seconds" in found.remarks[0]
     assert abs(both.with_own(both.own_ns + LEAP_NS).errors(found)[0][1]) <= LIVELY_S
 
 

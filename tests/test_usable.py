@@ -101,7 +101,7 @@ def test_inertial_is_told_by_kind_cover_and_length() -> None:
     (lacking,) = usability_of_flight("inertial", holed, ORDINARY).shortfalls
     assert lacking.spans_s == (pytest.approx(out_s, abs=2.0),)
     brief = without_rows(without_rows(flight, "gnss", time_s < 1200.0), "ins", flight.time_s("ins") < 1200.0)
-    assert "20 min with GNSS, one Schuler period" in usability_of_flight("inertial", brief, ORDINARY).text
+    assert "20 min with GNSS; one Schuler period" in usability_of_flight("inertial", brief, ORDINARY).text
     usability, _ = agreeing("inertial", without_rows(flight, "gnss", time_s < 200.0))
     assert "s with INS and GNSS together" in usability.text
 
@@ -138,7 +138,7 @@ def test_a_session_is_judged_together() -> None:
     assert usability_of_session("cooperative", flights, ORDINARY, stations).state == "yes"
     alone = usability_of_session("cooperative", flights[:1], ORDINARY, Stations())
     assert alone.state == "in part"
-    assert "of whom no log is named" in alone.text
+    assert "but no log of them is named" in alone.text
     deaf = [flight.without("link") for flight in flights]
     assert "no ranges to another aircraft" in usability_of_session("cooperative", deaf, ORDINARY, stations).text
     blind = [flight.without("ins") for flight in flights]

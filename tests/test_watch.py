@@ -213,5 +213,5 @@ def test_a_watch_that_is_killed_goes_on_and_ends_at_ctrl_c(
     second.send_signal(signal.SIGINT)
     _, error = second.communicate(timeout=LONG_S)
     assert second.returncode == 0
-    assert error.strip().endswith("the same command goes on with the rest")
+    assert error.strip().endswith("the same command continues with the rest")
     assert not list(out.glob(".partial-*"))

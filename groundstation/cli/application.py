@@ -104,26 +104,28 @@ Parameters = ParamSpec("Parameters")
 ProgressMode = Literal["auto", "none", "json"]
 FailOnMode = Literal["none", "warn", "fail"]
 
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing but errors on the terminal.")]
-Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more; show where an internal error came from.")]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print only errors on the terminal.")]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print more; show where an internal error came from.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
 FailOn = Annotated[FailOnMode, typer.Option("--fail-on", help="Exit 4 at a finding this severe or worse.")]
-Force = Annotated[bool, typer.Option("-f", "--force", help="Overwrite what is there.")]
+Force = Annotated[bool, typer.Option("-f", "--force", help="Overwrite existing results.")]
 Jobs = Annotated[int, typer.Option("-j", "--jobs", help="Processes; 0: one per core.", min=0)]
 Together = Annotated[
     bool,
     typer.Option("--together", help="The logs are of one flight: put them on one clock, by GNSS time or by motion."),
 ]
-NoPdf = Annotated[bool, typer.Option("--no-pdf", help="Leave report.pdf and steer_card.pdf out.")]
+NoPdf = Annotated[bool, typer.Option("--no-pdf", help="Do not write report.pdf and steer_card.pdf.")]
 Only = Annotated[
     Literal["results"] | None,
-    typer.Option("--only", help="results: no recording and no report, of a flight or of all; a later run makes them."),
+    typer.Option(
+        "--only", help="results: write no recordings and no reports, of each flight or of all; a later run writes them."
+    ),
 ]
 Store = Annotated[
     str,
     typer.Option(
         "--store",
-        help="A Delta table that takes the rows of the flights, too; several runs may write into one.",
+        help="A Delta table that also gets the rows of the flights; several runs may write into one.",
         metavar="delta:PATH|URL",
     ),
 ]
@@ -131,7 +133,7 @@ Timeout = Annotated[
     float | None,
     typer.Option(
         "--timeout",
-        help="Longest time for one log; one that takes longer has failed. Left out: none.",
+        help="Longest time for one log; one that takes longer fails. Default: no limit.",
         metavar="SECONDS",
         min=1.0,
     ),
@@ -147,7 +149,7 @@ IcdFiles = Annotated[
     list[str] | None,
     typer.Option(
         "--icd",
-        help="ICD (DTS YAML) that tells what the words of 1553 and ARINC-429 buses mean, or the name of a shipped one; "
+        help="ICD (DTS YAML) that defines the words of 1553 and ARINC-429 buses, or the name of a shipped one; "
         "may be repeated.",
         metavar="FILE",
     ),
@@ -175,8 +177,8 @@ ReferenceFiles = Annotated[
     list[Path] | None,
     typer.Option(
         "--reference",
-        help="Reference beside the log (SBET, .pos, another log), or a folder of them: judges the results, is seen by "
-        "no estimator.",
+        help="Reference for the log (SBET, .pos, another log), or a folder of them: it judges the results; no "
+        "estimator uses it.",
         metavar="FILE",
         readable=False,
     ),

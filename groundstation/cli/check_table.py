@@ -50,7 +50,7 @@ def text_of(one: Checked, everything: bool = False) -> str:
     if shown:
         parts.append(_topics(shown))
     if len(shown) < len(topics):
-        parts[-1] += f"\n{len(topics) - len(shown)} more topics of the source without anything odd (-v lists them)"
+        parts[-1] += f"\n{len(topics) - len(shown)} more topics of the source without irregularities (-v lists them)"
     tables = (_gaps(topics), _stuck(topics), _outside(topics), _counters(topics), _damages(one.ledger))
     parts += [table for table in tables if table]
     findings = [finding for finding in one.findings if everything or not _is_usual(finding)]
@@ -101,10 +101,18 @@ def _clock(clock: Clock) -> str:
             breaks.append([name, one.kind, f"{one.time} ± {one.time_sigma_s:.1f} s", step, change])
         for mistake in relation.mistakes:
             breaks.append([name, "error", mistake.time or "", mistake.text, ""])
-    heads = ["other clock", "from", "length s", "readings", "other less recorder", "drift of the recorder", "scatter s"]
+    heads = [
+        "other clock",
+        "from",
+        "length s",
+        "readings",
+        "other minus recorder",
+        "drift of the recorder",
+        "scatter s",
+    ]
     parts.append(_titled("recorder by other clocks (± 1 sigma)", heads, lines, right=(2, 3, 6)))
     heads = ["other clock", "break", "at", "step s", "drift change ppm"]
-    parts.append(_titled("where the clocks part", heads, breaks))
+    parts.append(_titled("where the clocks diverge", heads, breaks))
     return "\n\n".join(part for part in parts if part)
 
 

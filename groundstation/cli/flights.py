@@ -33,13 +33,13 @@ SIGNIFICANCE = {None: "", True: "beyond", False: "within"}
 def clip(
     flight: Annotated[Path, typer.Argument(help="Flight folder, MCAP or log.", metavar="X", readable=False)],
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="MCAP to write; its recording stands beside it.", metavar="FILE")
+        Path, typer.Option("-o", "--output", help="MCAP to write; its recording goes next to it.", metavar="FILE")
     ],
     start: Annotated[
         str | None, typer.Option("--from", help="Flight seconds, +mm:ss or ISO UTC.", metavar="TIME")
     ] = None,
     end: Annotated[
-        str | None, typer.Option("--to", help="The same; what is recorded before it.", metavar="TIME")
+        str | None, typer.Option("--to", help="End, in the same forms; not included.", metavar="TIME")
     ] = None,
     topics: Annotated[
         list[str] | None, typer.Option("--topics", help="Topic or pattern to keep; may be repeated.", metavar="GLOB")
@@ -48,20 +48,20 @@ def clip(
         bool,
         typer.Option(
             "--anonymous",
-            help="Turn all longitudes by a secret angle, move dates by weeks, replace names, leave texts, raw topics, "
-            "magnetometer and satellites out. Latitude, height, time of day and the shape of the track stay: who knows "
-            "where such flights are flown may still find the place.",
+            help="Turn all longitudes by a secret angle, move dates by weeks, replace names, omit texts, raw topics, "
+            "magnetometer and satellites. Latitude, height, time of day and the shape of the track stay: someone who "
+            "knows where such flights are flown may still find the place.",
         ),
     ] = False,
     seed: Annotated[
         int | None,
         typer.Option(
             "--seed",
-            help="Of --anonymous: the same for all logs of a session, and a secret like a password; left out: random.",
+            help="For --anonymous: the same for all logs of a session, secret like a password. Default: random.",
             min=0,
         ),
     ] = None,
-    no_recording: Annotated[bool, typer.Option("--no-recording", help="Leave the recording out.")] = False,
+    no_recording: Annotated[bool, typer.Option("--no-recording", help="Write no recording.")] = False,
     config: ConfigFile = None,
     profile: Profile = None,
     force: Force = False,
@@ -78,7 +78,7 @@ def clip(
     from groundstation.pipeline.verbs.clip import clip as cut
 
     if seed is not None and not anonymous:
-        raise UsageError("--seed", "it without --anonymous", "both")
+        raise UsageError("--seed", "no --anonymous", "both")
     with listener("none" if quiet else progress) as listen:
         outcome = cut(
             flight,
@@ -110,8 +110,8 @@ def export(
         list[str] | None,
         typer.Option(
             "--track",
-            help="Topic of the log (gnss, ins ...), or corrected and smoothed of a flight folder; may be repeated. "
-            "Left out: all, or the first that the format can hold.",
+            help="Topic of the log (gnss, ins ...); of a flight folder also corrected or smoothed; may be repeated. "
+            "Default: all, or the first that the format can hold.",
             metavar="NAME",
         ),
     ] = None,
@@ -119,12 +119,12 @@ def export(
         list[str] | None,
         typer.Option(
             "--figure",
-            help="What a figure of a flight folder shows, as CSV, in place of tracks: its name in tables/; may be "
+            help="Write the data of a figure of a flight folder as CSV, not tracks: its name in tables/; may be "
             "repeated.",
             metavar="NAME",
         ),
     ] = None,
-    figures: Annotated[bool, typer.Option("--figures", help="The same of all figures.")] = False,
+    figures: Annotated[bool, typer.Option("--figures", help="The same for all figures.")] = False,
     config: ConfigFile = None,
     profile: Profile = None,
     force: Force = False,
@@ -140,7 +140,7 @@ def export(
 
     if figure or figures:
         if tracks or (figure and figures):
-            raise UsageError("--figure", "--track or --figures beside it", "it without them")
+            raise UsageError("--figure", "--track or --figures too", "--figure alone")
         outcome = export_figures(flight, output, tuple(figure or ()), force=force)
     else:
         settings = load_configuration(config, profile=profile)
@@ -161,7 +161,7 @@ def compare(
         Align | None,
         typer.Option(
             "--align",
-            help="Event that both clocks are aligned on; left out: utc for one log, else first-movement where "
+            help="Event to align both clocks on. Default: utc for two runs of one log, else first-movement if "
             "both show it, else start.",
         ),
     ] = None,

@@ -79,12 +79,12 @@ def info(
     profile: Profile = None,
     icd: IcdFiles = None,
     suggest_icd: Annotated[
-        bool, typer.Option("--suggest-icd", help="Print the beginning of an ICD for what is on its buses.")
+        bool, typer.Option("--suggest-icd", help="Print a draft ICD for what is on its buses.")
     ] = False,
     json: Json = False,
     verbose: Verbose = False,
 ) -> int | None:
-    """Tell what a log is: format, clock, span, topics with rows, rates, fields; its buses (word by word with -v)."""
+    """Show what a log is: format, clock, span, topics with rows, rates, fields; its buses (word by word with -v)."""
     from groundstation.cli import printing
     from groundstation.pipeline.verbs import describe
 
@@ -95,7 +95,7 @@ def info(
     shown = printing.as_json(description.to_dict()) if json else printing.description(description, everything=verbose)
     typer.echo(shown)
     if not description.has_records:
-        say(f"error: {log.name}: no record that could be read")
+        say(f"error: {log.name}: no readable record")
         return FAILED
     return DATA_LOST if description.has_lost_data else DONE
 
@@ -108,8 +108,8 @@ def check(
         str,
         typer.Option(
             "--for",
-            help="Say in the first line whether the log can be used for this analysis: yes, no, in part, and what is "
-            "missing where. Exit 4 at no; with --fail-on warn at in part too. Logs of one session are judged together.",
+            help="The first line says whether the log can be used for this analysis: yes, no, in part, and what is "
+            "missing where. Exit 4 at no; with --fail-on warn also at in part. Logs of a session are judged together.",
             metavar=PURPOSES,
         ),
     ] = "",
@@ -127,7 +127,7 @@ def check(
 ) -> int | None:
     """Print the integrity ledger: rates, coverage, gaps, losses and odd values of every topic. Writes nothing.
 
-    With --for, what the log can be used for stands in the first line.
+    With --for, the first line says whether the log can be used for that analysis.
     """
     from groundstation.cli import check_table, printing
     from groundstation.cli.progress import listener
@@ -205,7 +205,7 @@ def run(
         str,
         typer.Option(
             "--apply",
-            help="Add a magnetic deviation to the log: the flight's own, or that in another's folder, summary.json or "
+            help="Add a magnetic deviation to the log: the flight's own, or one from a flight folder, summary.json or "
             "deviation.csv.",
             metavar="own|PATH",
         ),
@@ -215,7 +215,7 @@ def run(
         Path | None,
         typer.Option(
             "--stations",
-            help="Ground stations of the sessions found (TOML); left out: stations.toml beside the logs.",
+            help="Ground stations of the sessions found (TOML). Default: stations.toml beside the logs.",
             metavar="FILE",
             readable=False,
         ),
@@ -223,8 +223,8 @@ def run(
     no_pdf: NoPdf = False,
     only: Only = None,
     store: Store = "",
-    redo: Annotated[bool, typer.Option("--redo", help="Do again what an earlier run finished.")] = False,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done; write nothing.")] = False,
+    redo: Annotated[bool, typer.Option("--redo", help="Repeat what an earlier run finished.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Show what would be done; write nothing.")] = False,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -235,7 +235,7 @@ def run(
 
     Flights of several aircraft that ranged to one another over a data link are then analysed as a session.
 
-    An OUT of an earlier run is continued: what it finished with the same logs and settings is not done again.
+    An OUT of an earlier run is continued: what it finished with the same logs and settings is not repeated.
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
@@ -248,7 +248,7 @@ def run(
     configuration = judged_by(applying(settings, apply), reference or (), is_one_log=is_one_log)
     if together and (dry_run or scheduler or stations is not None or timeout is not None or store):
         beside = "--dry-run, --scheduler, --stations, --timeout or --store"
-        raise UsageError("--together", f"{beside} beside it", "it without them")
+        raise UsageError("--together", beside, "--together without them")
     if dry_run:
         plan = partial(plan_many, with_pdf=not no_pdf, only_results=only == "results")
         planned = plan(paths, output, configuration, redo=redo, stations=stations)
@@ -272,7 +272,7 @@ def run(
                 listen=listen,
             )
     except KeyboardInterrupt:
-        say(f"interrupted: {output} keeps what is finished; the same command again goes on with the rest")
+        say(f"interrupted: {output} keeps what is finished; the same command continues with the rest")
         return INTERRUPTED
     printing.outcomes(outcomes, as_json_text=json, quiet=quiet, with_times=verbose)
     return printing.worst_code(outcomes)
@@ -293,13 +293,13 @@ def report(
     ] = "",
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Folder for the acceptance; left out: OUT.", metavar="DIR"),
+        typer.Option("-o", "--output", help="Folder for the acceptance. Default: OUT.", metavar="DIR"),
     ] = None,
     fail_on: Annotated[
         FailOnMode,
         typer.Option(
             "--fail-on",
-            help="With --standard: exit 4 where it is failed (fail), or not passed for want of flights (warn).",
+            help="With --standard: exit 4 if it is failed (fail), or also if flights are too few to pass (warn).",
         ),
     ] = "none",
     no_pdf: NoPdf = False,
@@ -313,7 +313,7 @@ def report(
     if standard:
         return fleets.acceptance(out, standard, output, fail_on, with_pdf=not no_pdf, quiet=quiet, json=json)
     if output is not None or fail_on != "none":
-        raise UsageError("report", "-o or --fail-on without --standard", "--standard NAME beside it")
+        raise UsageError("report", "-o or --fail-on without --standard", "--standard NAME too")
     from groundstation.pipeline.many_flights.publishing import report_again
 
     paths, problems = report_again(out, with_pdf=not no_pdf)
@@ -330,7 +330,7 @@ def view(
         str,
         typer.Argument(
             help="Folder that `run` or `compare` made, flight folder, recording, MCAP or log; or the address that "
-            "`serve` tells.",
+            "`serve` prints.",
             metavar="FLIGHT",
         ),
     ],
@@ -338,7 +338,7 @@ def view(
     host: Annotated[str, typer.Option("--host", help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[
         int | None,
-        typer.Option("--port", help="Port; left out: 9090 for --web, or any free one.", min=1, max=65535),
+        typer.Option("--port", help="Port. Default: 9090 for --web, else any free one.", min=1, max=65535),
     ] = None,
     profile: Profile = None,
     verbose: Verbose = False,
@@ -378,7 +378,7 @@ def cooperative(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            help="Logs, MCAPs or flight folders, one of each aircraft; or a session, to run it again.",
+            help="Logs, MCAPs or flight folders, one per aircraft; or a session, to run it again.",
             metavar="LOG",
             readable=False,
         ),

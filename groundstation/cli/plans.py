@@ -20,7 +20,7 @@ from groundstation.cli.application import (
 )
 
 plans = typer.Typer(
-    help="Plan a session of several aircraft, or a landing by ranges, for the accuracy one needs.",
+    help="Plan a session of several aircraft, or a landing by ranges, for the accuracy needed.",
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

@@ -27,9 +27,7 @@ def _tell_of_compiling() -> None:
     from groundstation.base.compile import keeps_nothing
 
     if keeps_nothing():
-        sys.stderr.write(
-            "no compiled code is kept here yet: what a log above 64 kB needs is compiled first, some seconds\n"
-        )
+        sys.stderr.write("no compiled code is kept here yet: logs above 64 kB wait some seconds while it is compiled\n")
 
 
 def _as_json(event: Event) -> None:

@@ -42,9 +42,7 @@ def test(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Table to write (CSV).", metavar="FILE")] = None,
     fail_on: Annotated[
         FailOnMode,
-        typer.Option(
-            "--fail-on", help="Exit 4 where a verdict changes (warn), or one that was accepted no longer is (fail)."
-        ),
+        typer.Option("--fail-on", help="Exit 4 if a verdict changes (warn), or if one is no longer accepted (fail)."),
     ] = "none",
     force: Force = False,
     quiet: Quiet = False,
@@ -53,9 +51,9 @@ def test(
 ) -> int | None:
     """List which verdicts would change under other limits, and why, from the gates that the flights saved.
 
-    A setting that chooses data or changes what is measured needs the log: it is named, the rest is judged.
+    A setting that chooses data or changes what is measured needs the log: it is named; the rest is judged.
 
-    With -v every gate with another limit is listed, not those of changed verdicts alone.
+    With -v, list every gate with another limit, not only those of changed verdicts.
     """
     from groundstation.cli.text import as_json, printable
     from groundstation.pipeline.verbs.export import require_place
@@ -109,7 +107,7 @@ def rules_text(found: "RulesTest", *, everything: bool = False) -> str:
     )
     reasons = sorted({row.needs_log for row in found.rows if row.needs_log})
     needs = [
-        f"{found.need_log} verdicts need the log to be sure: other settings changed too ({'; '.join(reasons)})"
+        f"{found.need_log} verdicts are not sure without the log: other settings changed too ({'; '.join(reasons)})"
     ] * bool(reasons)
     return "\n".join(([columns([heads, *told])] if told else []) + [totals, *needs])
 

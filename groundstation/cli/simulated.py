@@ -49,21 +49,23 @@ def study(
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the tables.", metavar="DIR")],
     runs: Annotated[int, typer.Option("--runs", help="Simulated runs of each family or case.", min=10)] = 200,
-    seed: Annotated[int, typer.Option("--seed", help="Seed; families and cases take those that follow from it.")] = 71,
+    seed: Annotated[int, typer.Option("--seed", help="Seed; those of families and cases follow from it.")] = 71,
     recorded: Annotated[
         Path | None,
         typer.Option("--recorded", help="Folder of recorded robots (cooperative only): run on them.", metavar="FOLDER"),
     ] = None,
     minutes: Annotated[
         float | None,
-        typer.Option("--minutes", help="End after so long (heading only); the same command goes on.", min=0.1),
+        typer.Option(
+            "--minutes", help="Stop after so many minutes (heading only); the same command continues.", min=0.1
+        ),
     ] = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
     progress: Progress = "auto",
 ) -> int | None:
-    """Monte Carlo behind the published figures, with ours beside them; or every algorithm on recorded robots."""
+    """Run the Monte Carlo behind the published figures, ours beside them; or every algorithm on recorded robots."""
     from groundstation.cli.progress import listener
     from groundstation.pipeline.verbs.synthesis import study_to
 

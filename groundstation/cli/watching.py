@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 @answers_with_exit_code
 def watch(
     folder: Annotated[
-        Path, typer.Argument(help="Folder that logs arrive in, with its sub-folders.", metavar="FOLDER", readable=False)
+        Path, typer.Argument(help="Folder where logs arrive, with its sub-folders.", metavar="FOLDER", readable=False)
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.", metavar="OUT")],
     every: Annotated[
@@ -52,7 +52,7 @@ def watch(
             max=86_400.0,
         ),
     ] = 30.0,
-    once: Annotated[bool, typer.Option("--once", help="Look twice, run what is ready, and end.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="Look twice, run what is ready and stop.")] = False,
     config: ConfigFile = None,
     aircraft: AircraftFile = None,
     site: SiteFile = None,
@@ -77,7 +77,7 @@ def watch(
 ) -> int | None:
     """Run what arrives in a folder, once it has stopped growing, until Ctrl-C; index and fleet page stay current.
 
-    It may be killed at any moment: the same command again goes on with what is not finished.
+    It may be killed at any moment: the same command continues with what is not finished.
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
@@ -110,6 +110,6 @@ def watch(
                 printing.outcomes(fresh(outcomes), as_json_text=json, quiet=quiet, with_times=verbose)
                 every_outcome += outcomes if once else ()
         except KeyboardInterrupt:
-            say(f"stopped: {output} keeps what is finished; the same command goes on with the rest")
+            say(f"stopped: {output} keeps what is finished; the same command continues with the rest")
             return DONE
     return printing.worst_code(tuple(every_outcome))

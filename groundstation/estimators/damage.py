@@ -32,7 +32,7 @@ def damage_finding(
         told.append(f"{len(damaged) - SHOWN} more damaged spans")
     told += gaps
     place = "+" + duration_text(damaged[0].start_s) if damaged else ""
-    text = f"{subject}: rests on samples in or around {'; '.join(told)}"
+    text = f"{subject}: uses samples in or around {'; '.join(told)}"
     return Finding(severity, code, text, "", place, len(damaged) + len(gaps))
 
 

@@ -121,7 +121,7 @@ class Runway:
             missing, other = "latitude_deg", "longitude_deg"
             if self.longitude_deg is None:
                 missing, other = other, missing
-            raise SettingsError(missing, "nothing", f"a value beside {other}, or neither of the two")
+            raise SettingsError(missing, "nothing", f"a value, as {other} has one, or neither")
 
 
 @dataclass(frozen=True)

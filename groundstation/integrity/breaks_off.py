@@ -26,7 +26,7 @@ def broken_off(ledger: LedgerCounts) -> tuple[Damage, ...]:
         if topic.nominal_rate_hz is None or missing_s <= allowed_s:
             continue
         rows = round(missing_s * topic.nominal_rate_hz)
-        what = f"{topic.topic} ends {missing_s:.1f} s before the log does, records missing by its rate"
+        what = f"{topic.topic} ends {missing_s:.1f} s before the log does, records missing at its rate"
         place = f"after {ledger.clock.text(topic.last_ns)}"
         is_loss = is_canonical(topic.topic) and kind_of(topic.topic) not in COME_AND_GO
         found.append(Damage(BREAKS_OFF, place, rows, what, topic.topic, is_loss))

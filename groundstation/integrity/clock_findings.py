@@ -73,9 +73,7 @@ def _times(ledger: LedgerCounts) -> Iterator[Finding]:
         text = f"{counted(clock.missing_times, 'record')} without a time: placed by their neighbours"
         yield Finding(severity, "clock.missing_times", text, count=clock.missing_times)
     if clock.implausible_times:
-        text = (
-            f"{counted(clock.implausible_times, 'record')} with a time that cannot be true: placed by their neighbours"
-        )
+        text = f"{counted(clock.implausible_times, 'record')} with an impossible time: placed by their neighbours"
         yield Finding("warn", "clock.implausible_times", text, count=clock.implausible_times)
     if clock.stale_times:
         text = (
@@ -102,7 +100,7 @@ def _absolute(clock: ClockModel) -> Iterator[Finding]:
     """Whether the time is UTC, and where the clock began."""
     if clock.start == "unset":
         began = f"the clock began at {utc_ns_to_iso(clock.first_device_ns)}: it was not set"
-        yield Finding("warn", "clock.unset", began + ("" if clock.is_absolute else ", and never in the log"))
+        yield Finding("warn", "clock.unset", began + ("" if clock.is_absolute else ", not even later in the log"))
     if clock.is_absolute:
         return
     text = "the log has no absolute time: times count from its own zero"
@@ -115,20 +113,20 @@ def _absolute(clock: ClockModel) -> Iterator[Finding]:
     known = next((one for one in dated if one.segments[-1].offset_ns >= FIRST_NS), None)  # else it was not set either
     if known is not None:
         zero = known.offset_text(known.segments[-1], has_utc=False)
-        text += f"; by {known.name} the log's {zero}, which start_utc can state"
+        text += f"; by {known.name}, the log's {zero}: state it as start_utc"
     yield Finding("info", "clock.no_utc", text)
 
 
 def _relation(relation: ClockRelation, clock: ClockModel, most_ppm: float) -> Iterator[Finding]:
     for mistake in relation.mistakes:
         place = "" if mistake.time_ns is None else clock.text(mistake.time_ns)
-        text = f"{relation.name} less the recorder's: {mistake.text}" + (f", a step at {place}" if place else "")
+        text = f"{relation.name} minus the recorder's: {mistake.text}" + (f", a step at {place}" if place else "")
         yield Finding("warn", f"clock.{mistake.kind}", text, place=place)
     for one in relation.breaks:
         place = f"{clock.text(one.time_ns)} ± {one.time_sigma_s:.1f} s"
         if one.kind == "step":
             step = f"{one.step_s:+.3f} ± {one.step_sigma_s:.3f} s"
-            text = f"{relation.name} less the recorder's stepped by {step} at {place}"
+            text = f"{relation.name} minus the recorder's stepped by {step} at {place}"
             yield Finding("warn", "clock.relation_step", text, place=place)
         else:
             change = "" if one.drift_change_ppm is None else f" by {one.drift_change_ppm:+.1f} ppm"

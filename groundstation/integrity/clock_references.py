@@ -169,7 +169,7 @@ def _relation(readings: _Readings, clock: ClockModel, settings: RelationSettings
     index, columns = readings.sampler.all()
     told_ns, good = _told(reference, columns) if len(index) else (index, np.zeros(0, dtype=bool))
     if not good.any():
-        return ClockRelation(reference.clock, source, reason="no reading that could be believed")
+        return ClockRelation(reference.clock, source, reason="no plausible reading")
     own_ns = clock.time_ns(index, Column(columns["device"]))[good]
     told_ns = told_ns[good]
     order = np.argsort(own_ns, kind="stable")

@@ -12,7 +12,7 @@ _NEAR_S = 0.35  # of whole seconds: receivers are late by less
 _LEAP_S = range(13, 21)  # GPS time less UTC since 1999, and for some years to come
 _MISTAKES = {
     "week_number": "GPS week number off by {weeks:+d} weeks (it rolls over every 1024)",
-    "leap_seconds": "{seconds:+.2f} s: as many as the leap seconds between GPS time and UTC",
+    "leap_seconds": "{seconds:+.2f} s: equal to the leap seconds between GPS time and UTC",
     "time_zone": "{seconds:+.2f} s: whole quarters of an hour, as between time zones",
 }
 

@@ -200,7 +200,7 @@ class Judge:
         if not both or speed is None or speed[1] <= self._limits.moving_mps:
             return ""
         moved_m = speed[2] * self._seconds(stretch)
-        return f"the speed of {speed[0]} makes {moved_m:.0f} m meanwhile" if moved_m > enough_m else ""
+        return f"the speed of {speed[0]} covers {moved_m:.0f} m meanwhile" if moved_m > enough_m else ""
 
     def _why_heading(self, topic: str, name: str, stretch: Stretch, least: float) -> str:
         """Another heading or track turns; a track counts only where the aircraft moves."""
@@ -230,4 +230,4 @@ class Judge:
             return f"a value lasts {usual:.2f} samples otherwise" if usual <= FINE else ""
         if speed[1] <= self._limits.moving_mps:
             return ""
-        return f"{speed[0]} says at least {speed[1]:.0f} m/s, and a value lasts {usual:.1f} samples otherwise"
+        return f"{speed[0]} shows at least {speed[1]:.0f} m/s, and a value lasts {usual:.1f} samples otherwise"

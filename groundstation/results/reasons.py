@@ -1,6 +1,7 @@
 """Reasons why an analysis could not run, for readers who do not know the method."""
 
-NO_GROUND_RUN = ("ground speed never above", "no straight taxi", "no GNSS epoch with ground contact proven")
+NO_CONTACT = "no GNSS epoch with ground contact proven"
+NO_GROUND_RUN = ("ground speed never above", "no straight taxi", NO_CONTACT)
 WHAT_HEADING_NEEDS = (
     "The method needs a straight run on the ground at taxi speed, where the nose points along the motion, with ground "
     "contact proven; this log has none, or hardly any"

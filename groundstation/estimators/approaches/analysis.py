@@ -92,7 +92,7 @@ def _finals(
     path = path_of(flight, settings)
     ends = ends_of(path, known.phases, settings)
     if not ends:
-        raise NotAssessableError("landing", "no landing in the log, and no descent on a guidance that a climb follows")
+        raise NotAssessableError("landing", "no landing in the log, and no guided descent followed by a climb")
     found = [final_of(path, end, known.site, settings) for end in ends[:MOST_APPROACHES]]
     left_out = tuple(one for one in found if isinstance(one, LeftOutApproach))
     finals = [one for one in found if isinstance(one, Final)]
@@ -226,7 +226,7 @@ def _position_errors(
     if final.established is None:
         return ()
     if SATELLITES in source:
-        reason = "what guided is a satellite receiver, no localizer"
+        reason = "guidance was by a satellite receiver, not a localizer"
         return (PositionError(path.position_topic, "not measured", reason, 0),)
     if sensitivity is not None and not fits(sensitivity):
         reason = f"positions move by {sensitivity.ratio:.2f} of what the localizer shows: no reference"
@@ -290,7 +290,7 @@ def _claim(errors: tuple[PositionError, ...], runway: RunwayUsed) -> str:
     bound_m = max(abs(end) for end in measured.confidence95_m)
     met = axis_category_met(bound_m, "horizontal")
     text = (
-        f"{measured.topic} within {bound_m:.0f} m across the course at the threshold, with the localizer for reference"
+        f"{measured.topic} within {bound_m:.0f} m across the course at the threshold, with the localizer as reference"
     )
     return f"{text}: {'the figure of ' + met.label if met else 'no category'} across the course"
 
@@ -325,7 +325,7 @@ LANDING = Analysis(
     name="landing",
     title="approaches and landings against their runway, localizer and glide path",
     subject="approach",
-    needs="positions, a height, a landing or a go-around; guidance deviations and a site file with the runway say more",
+    needs="positions, a height, a landing or a go-around; guidance deviations and a site file with the runway add more",
     settings=LandingSettings,
     answer=LandingResult,
     run=_run,

@@ -48,7 +48,7 @@ COLUMNS: tuple[AnswerColumn[LandingResult], ...] = (
     AnswerColumn(
         "landing_go_arounds",
         "count",
-        "of them broken off",
+        "of these, go-arounds",
         lambda landing: sum(one.outcome == "go-around" for one in landing.approaches),
     ),
     AnswerColumn(

@@ -171,7 +171,7 @@ def _too_short(
         return f"flown at {fast:.0f} m/s at most, less than {settings.speed_min_mps:.0f}"
     height = path.altitude_m[first:last]
     if np.isfinite(height).any() and np.nanmax(height) - np.nanmin(height) < settings.final_height_min_m:
-        return f"a descent of {np.nanmax(height) - np.nanmin(height):.0f} m alone"
+        return f"a descent of only {np.nanmax(height) - np.nanmin(height):.0f} m"
     return ""
 
 

@@ -40,7 +40,7 @@ def _of(one: Approach) -> list[Finding]:
             found.append(Finding("info", "landing.position_error", text, error.topic, place))
     for height in one.height_errors:
         if height.state == "measured" and height.error_m is not None and height.sigma_m is not None:
-            text = f"{name}: altitude of {height.topic} is {height.error_m:+.1f} m on the runway"
+            text = f"{name}: altitude of {height.topic} is off by {height.error_m:+.1f} m on the runway"
             text = f"{text} (sigma {height.sigma_m:.1f} m)"
             found.append(Finding("info", "landing.height_error", text, height.topic, place))
     if one.runway.placed_by == "positions":

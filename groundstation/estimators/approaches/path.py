@@ -201,4 +201,4 @@ def _guidance_told(flight: "Flight", settings: LandingSettings) -> str:
         lateral = np.where(altitude_m > settings.final_height_min_m, lateral, np.nan)
     if on_guidance(flight.seconds(table.time_ns), lateral, vertical, settings):
         return ""
-    return f"; {topic} is nowhere established in flight for {settings.established_min_s:.0f} s"
+    return f"; {topic} is never established in flight for {settings.established_min_s:.0f} s"

@@ -131,7 +131,7 @@ def position_error(
     told = PositionError(
         positions.topic,
         "not measured",
-        "the runway was placed by these positions themselves: only what changes after the final shows",
+        "these positions placed the runway: only changes after the final show",
         len(used),
         change_m=change_m,
         change_sigma_m=change_sigma_m,

@@ -250,7 +250,7 @@ def _findings(site: Site, designs: list[Design], answer: PlacementPlan) -> tuple
     given = np.array([[site.plan.points[one].north_m, site.plan.points[one].east_m] for one in site.placed])
     for number, moved in zip(site.placed, np.linalg.norm(site.given - given, axis=1).tolist(), strict=True):
         if moved > ON_EDGE_M:
-            text = f"{site.plan.points[number].name} may not stand where it is given: moved by {moved:.0f} m"
+            text = f"{site.plan.points[number].name} cannot be placed where it is given: moved by {moved:.0f} m"
             found.append(Finding("warn", "placement.given_kept_out", text))
     if not row.has_converged:
         text = f"the placement has not converged: a first-order gain of {row.gap:.2g} of its loss is left"
@@ -260,10 +260,10 @@ def _findings(site: Site, designs: list[Design], answer: PlacementPlan) -> tuple
         found.append(Finding("info", "placement.several_minima", text))
     found += _on_places(site, next(one for one in designs if one.name == answer.recommended), answer)
     if not np.isfinite(row.dop):
-        text = f"the points do not tell {' and '.join(asked.axes)} apart at the fixed point"
+        text = f"the points do not separate {' and '.join(asked.axes)} at the fixed point"
         found.append(Finding("warn", "placement.singular", text))
     elif row.dop > POOR_DOP:
-        text = f"dilution of precision {row.dop:.0f} at the fixed point: the points stand nearly on one line"
+        text = f"dilution of precision {row.dop:.0f} at the fixed point: the points are nearly on one line"
         found.append(Finding("warn", "placement.poor_geometry", text))
     return tuple(found)
 
@@ -274,10 +274,10 @@ def _on_places(site: Site, best: Design, answer: PlacementPlan) -> list[Finding]
     for number, region, where in zip(site.placed, site.regions, best.places, strict=True):
         at_edge = np.minimum(where - region.low_m, region.high_m - where).min() <= ON_EDGE_M
         if at_edge:
-            text = f"{site.plan.points[number].name} stands at the edge of the rectangle: what is best may lie beyond"
+            text = f"{site.plan.points[number].name} is at the edge of the rectangle: the best place may lie outside"
             found.append(Finding("warn", "placement.at_edge", text))
     for row in answer.places_of(answer.recommended):
         if row.below_way_m is not None and row.is_placed and row.below_way_m < site.plan.placement.overflown_m:
-            text = f"{row.point} stands under the way, {row.below_way_m:.0f} m below it: an obstacle, and hard to hear"
+            text = f"{row.point} is under the path, {row.below_way_m:.0f} m below it: an obstacle, and hard to hear"
             found.append(Finding("warn", "placement.under_way", text))
     return found

@@ -61,7 +61,7 @@ class Site:
             name = self.plan.points[self.placed[number]].name
             raise GroundstationError(
                 self.plan.title,
-                f"no place for {name}: the rectangle is kept out altogether",
+                f"no place for {name}: keep_out covers the whole rectangle",
                 "an allowed place",
                 "widen the rectangle or take a keep_out away",
             )

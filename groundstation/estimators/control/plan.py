@@ -89,7 +89,7 @@ def _require_distance(session: Session) -> None:
         raise GroundstationError(
             plan.title,
             f"{one} {links.range_m[epoch, link]:.2g} m from {other} at {(epoch + 1) * plan.step_s:g} s",
-            f"a way that stays {NEAREST_M:g} m away from every source",
+            f"a path that stays {NEAREST_M:g} m away from every source",
             "move the start, the track or the source",
         )
 
@@ -236,7 +236,7 @@ def _findings(session: Session, flown: dict[str, Flown], answer: ControlPlan) ->
     found: list[Finding] = []
     if not session.motion.bounds:
         found.append(
-            Finding("info", "control.nothing_controlled", "no aircraft may be controlled: accuracy as it flies")
+            Finding("info", "control.nothing_controlled", "no aircraft may be controlled: accuracy without control")
         )
     if not row.has_converged:
         text = f"the law has not converged: a first-order gain of {row.gap:.2g} of its loss is left"
@@ -245,20 +245,18 @@ def _findings(session: Session, flown: dict[str, Flown], answer: ControlPlan) ->
         text = f"starts end up to {100.0 * row.start_spread:.0f} % apart: the best of {row.starts} is taken"
         found.append(Finding("info", "control.several_minima", text))
     if best.geometry.is_singular[-1]:
-        text = f"the sources do not tell {' and '.join(session.plan.control.axes)} apart at the end"
+        text = f"the sources do not separate {' and '.join(session.plan.control.axes)} at the end"
         found.append(Finding("warn", "control.singular", text))
     elif row.dop > POOR_DOP:
-        text = f"dilution of precision {row.dop:.0f} at the end: the sources stand nearly on one line"
+        text = f"dilution of precision {row.dop:.0f} at the end: the sources are nearly on one line"
         found.append(Finding("warn", "control.poor_geometry", text))
     if row.least_separation_m is not None and row.least_separation_m < KEPT * session.plan.separation_m:
         why = (
-            "start, bounds or a law of one step ahead leave no more"
-            if session.motion.bounds
-            else "nobody is controlled"
+            "start, bounds or the one-step law allow no more" if session.motion.bounds else "no aircraft is controlled"
         )
         text = f"aircraft come within {row.least_separation_m:.0f} m of each other: {why}"
         found.append(Finding("warn", "control.separation", text))
     if session.motion.bounds and answer.gain < LEAST_GAIN:
-        text = f"control gains {100.0 * (answer.gain - 1.0):.1f} % of accuracy: the bounds or the time leave no more"
+        text = f"control gains {100.0 * (answer.gain - 1.0):.1f} % of accuracy: the bounds or the time allow no more"
         found.append(Finding("info", "control.no_gain", text))
     return tuple(found)

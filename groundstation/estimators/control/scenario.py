@@ -87,7 +87,7 @@ class PlannedAircraft:
             bounds = f"within speed_low_mps and speed_high_mps, [{self.speed_low_mps:g}, {self.speed_high_mps:g}]"
             raise SettingsError("speed_mps", found, bounds)
         if len(set(self.control)) < len(self.control):
-            raise SettingsError("control", "a name that stands twice", 'some of "speed", "heading"')
+            raise SettingsError("control", "a name given twice", 'some of "speed", "heading"')
 
 
 @dataclass(frozen=True)
@@ -261,7 +261,7 @@ class Control:
 def check_criterion(axes: tuple[Axis, ...], weights: tuple[float, ...]) -> None:
     """Refuse no axes, an axis that stands twice, and weights that are all zero."""
     if not axes or len(set(axes)) < len(axes):
-        raise SettingsError("axes", "none, or one that stands twice", 'some of "north", "east", "up", "clock"')
+        raise SettingsError("axes", "none, or one given twice", 'some of "north", "east", "up", "clock"')
     if sum(weights) <= 0.0:
         raise SettingsError("weight_north", "weights that are all zero", "at least one above zero")
 
@@ -305,7 +305,7 @@ class SessionPlan:
             raise SettingsError("aircraft", found, f"1 to {MOST_AIRCRAFT} aircraft, 0 to {MOST_POINTS} points")
         names = [*(one.name for one in self.aircraft), *(point.name for point in self.points)]
         if len(set(names)) < len(names) or "" in names:
-            raise SettingsError("aircraft", "a name that is empty or stands twice", "one for each aircraft and point")
+            raise SettingsError("aircraft", "a name that is empty or given twice", "one for each aircraft and point")
         if not 1 <= self.steps <= MOST_STEPS or abs(self.steps * self.step_s - self.duration_s) > 1e-6:
             expected = f"1 to {MOST_STEPS} whole steps of {self.step_s:g} s"
             raise SettingsError("duration_s", f"{self.duration_s:g} s", expected)

@@ -50,11 +50,10 @@ def _run(session: "Session", known: SessionKnown, settings: CooperativeSettings)
 def _examine(session: "Session", _known: SessionKnown, settings: CooperativeSettings) -> tuple[Shortfall, ...]:
     """Whether ranges between the vehicles, or to ground points, are left when what cannot be used is left out."""
     from groundstation.estimators.cooperative.arrays import PEER, POINT
-    from groundstation.estimators.cooperative.events import prepare
+    from groundstation.estimators.cooperative.events import prepare, require_vehicles
 
     prepared = prepare(session, settings)
-    if not prepared.vehicles:
-        raise NotAssessableError("cooperative", "no vehicle with dead reckoning")
+    require_vehicles(prepared)
     if not any(kind in (PEER, POINT) for kind in prepared.events.kind):
         raise NotAssessableError("cooperative", "no range over the data link that can be used")
     return tuple(Shortfall(finding.text) for finding in prepared.findings if finding.severity != "info")
@@ -78,9 +77,9 @@ def _too_sure(answer: CooperativeResult) -> tuple[Finding, ...]:
         Finding(
             "warn",
             "cooperative.too_sure",
-            f"ranges of kind {kind} miss their prediction by more than the stated sigmas allow: NIS {nis:.1f} where 1 "
-            "is right; the computed sigma is too small: state the errors of these INS and ranges in [cooperative.ins] "
-            "and [session]",
+            f"ranges of kind {kind} miss their prediction by more than the stated sigmas allow: NIS {nis:.1f} "
+            "instead of 1; the computed sigma is too small: state the errors of these INS and ranges in "
+            "[cooperative.ins] and [session]",
         )
         for kind, nis in innovations_of(answer).items()
         if nis > NIS_MAX
@@ -101,7 +100,7 @@ def _misplaced(answer: CooperativeResult) -> tuple[Finding, ...]:
         if ranges >= LEAST_OF_A_STATION and gated > GATED_SHARE * ranges and others_gated < OTHERS_SHARE * others:
             text = (
                 f"{answer.default_algorithm} rejected {gated} of {ranges} ranges to station {name} and hardly any "
-                "other: its place in the stations file is not where the ranges put it"
+                "other: its place in the stations file contradicts the ranges"
             )
             found.append(Finding("warn", "cooperative.misplaced_station", text, f"link.{name}", name, gated))
     return tuple(found)
@@ -125,7 +124,7 @@ COOPERATIVE = Analysis(
     title="navigation between aircraft: positions from ranges over the data link, by every algorithm",
     subject="navigation between aircraft",
     needs="a session: for each aircraft ins latitude, longitude, height and velocities; link.<peer> pseudorange_m "
-    "with transmission_time_s, and where there are any satellite.<id>; ground stations in a file",
+    "with transmission_time_s, satellite.<id> if any; ground stations in a file",
     settings=CooperativeSettings,
     answer=CooperativeResult,
     run=_run,

@@ -6,13 +6,12 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.estimators.cooperative import figures
 from groundstation.estimators.cooperative.algorithms import run_algorithm
 from groundstation.estimators.cooperative.arrays import KINDS, PEER, POINT, USED
 from groundstation.estimators.cooperative.consistency import Judgement, judge, nees_limits
-from groundstation.estimators.cooperative.events import Prepared, prepare
+from groundstation.estimators.cooperative.events import Prepared, prepare, require_vehicles
 from groundstation.estimators.cooperative.geometry import Geometry, Truth, bound_of, geometry_of
 from groundstation.estimators.cooperative.settings import ALGORITHMS, CooperativeSettings
 from groundstation.estimators.cooperative.tracks import AlgorithmRun
@@ -64,8 +63,7 @@ def estimate_session(
         When no vehicle has dead reckoning.
     """
     prepared = prepare(session, settings)
-    if not prepared.vehicles:
-        raise NotAssessableError("cooperative", "no vehicle with dead reckoning")
+    require_vehicles(prepared)
     truth = truth or {}
     judged = [_judged(prepared, run_algorithm(prepared, settings, name), truth) for name in algorithms]
     default = next((one for one in judged if one.run.algorithm == DEFAULT), judged[-1])
@@ -232,11 +230,12 @@ def _findings(judged: Sequence[Judged], settings: CooperativeSettings) -> list[F
             text = f"{name}: {gated} of {used + gated} measurements rejected at {settings.gate_sigma:g} sigma"
             found.append(Finding(severity, "cooperative.gated", text, count=gated))  # type: ignore[arg-type]
         if counts.get("clock_leaps", 0):
-            text = f"{name}: the clock of a vehicle was taken as leapt {counts['clock_leaps']} times"
+            text = f"{name}: a clock leap of a vehicle was assumed {counts['clock_leaps']} times"
             found.append(Finding("warn", "cooperative.clock_reset", text, count=counts["clock_leaps"]))
         if counts.get("reopened", 0):
-            text = f"{name}: a vehicle was not where it was believed {counts['reopened']} times; its place was opened"
-            found.append(Finding("warn", "cooperative.reopened", text, count=counts["reopened"]))
+            count = counts["reopened"]
+            text = f"{name}: a vehicle was not where it was estimated {count} times; its position was searched again"
+            found.append(Finding("warn", "cooperative.reopened", text, count=count))
     return found
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.ecef import ecef_from_n, geodetic_deg_m
+from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.estimators.cooperative.aircraft import Aircraft, aircraft_of, fleet_of
@@ -61,6 +62,12 @@ class Prepared:
     def fleet(self) -> Fleet:
         """The aircraft for the compiled loops."""
         return fleet_of([vehicle for vehicle in self.vehicles if isinstance(vehicle, Aircraft)])
+
+
+def require_vehicles(prepared: "Prepared") -> None:
+    """Raise NotAssessableError when no vehicle has dead reckoning."""
+    if not prepared.vehicles:
+        raise NotAssessableError("cooperative", "no vehicle with dead reckoning")
 
 
 def prepare(session: Session, settings: CooperativeSettings) -> Prepared:
@@ -121,7 +128,11 @@ def _clean(track: DeadReckoning | Odometry, findings: list[Finding]) -> DeadReck
         else:
             latest = float(track.time_s[row])
     _count(
-        findings, "dead_reckoning", "rows of dead reckoning that are no numbers or step back in time", ~good, track.name
+        findings,
+        "dead_reckoning",
+        "rows of dead reckoning that are not numbers or step back in time",
+        ~good,
+        track.name,
     )
     if not good.any():
         findings.append(
@@ -218,12 +229,10 @@ def _link_events(
     has_bearing = np.isfinite(bearing) & (bearing_sigma > 0.0) & has_heading
     is_peer = peer >= 0
     known = (receiver >= 0) & (is_peer | (point >= 0)) & (receiver != peer)
-    _count(
-        findings, "not_a_number", "link rows without a range and a bearing that are numbers", ~is_number & ~has_bearing
-    )
+    _count(findings, "not_a_number", "link rows whose range and bearing are not numbers", ~is_number & ~has_bearing)
     _count(findings, "negative_range", "negative two-way ranges", negative)
     _count(findings, "absurd_range", f"ranges beyond {AT_MOST_RANGE_M:g} m", absurd)
-    _count(findings, "unknown_peer", "link rows of a vehicle or point that the session does not have", ~known)
+    _count(findings, "unknown_peer", "link rows of a vehicle or point that is not in the session", ~known)
     back = np.concatenate([[False], np.diff(table.time_s) < 0.0]) if n else np.zeros(0, dtype=bool)
     if back.any():
         count = int(back.sum())
@@ -296,8 +305,8 @@ def _satellite_events(
     good &= (table.sigma_m > 0.0) & (table.pseudorange_m > 0.0)
     receiver = _numbers_of(table.receiver, places)
     known = receiver >= 0
-    _count(findings, "satellite_rows", "satellite rows that are no numbers or negative", ~good)
-    _count(findings, "unknown_receiver", "satellite rows of a vehicle that the session does not have", ~known)
+    _count(findings, "satellite_rows", "satellite rows that are not numbers or negative", ~good)
+    _count(findings, "unknown_receiver", "satellite rows of a vehicle that is not in the session", ~known)
     is_there = _is_there(vehicles, receiver, table.time_s)
     _count_away(findings, int((good & known & ~is_there).sum()), "satellite rows")
     kept = good & known & is_there
@@ -317,7 +326,7 @@ def _height_events(
     table = session.heights
     good = np.isfinite(table.height_m) & np.isfinite(table.time_s) & (table.sigma_m > 0.0)
     who = _numbers_of(table.aircraft, places)
-    _count(findings, "height_rows", "rows of heights that are no numbers", ~good)
+    _count(findings, "height_rows", "rows of heights that are not numbers", ~good)
     has_height = np.array([vehicle.height >= 0 for vehicle in vehicles] + [False])
     kept = good & (who >= 0) & has_height[who] & _is_there(vehicles, who, table.time_s)
     return _columns(table.time_s[kept], HEIGHT, who[kept], table.height_m[kept], table.sigma_m[kept] ** 2)

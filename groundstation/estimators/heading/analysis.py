@@ -56,7 +56,7 @@ def _verdict(result: HeadingResult) -> Finding:
 
 def _steps(result: HeadingResult) -> tuple[Finding, ...]:
     """Steps of the INS heading, each by name."""
-    text = "INS heading steps by {size:+.2f} deg at {time:.1f} s: the error is that after it"
+    text = "INS heading steps by {size:+.2f} deg at {time:.1f} s: the heading error is the one after it"
     return tuple(
         Finding("warn", "heading.step", text.format(size=step.size_deg, time=step.time_s), result.ins_topic)
         for step in result.steps

@@ -21,8 +21,8 @@ def _of_the_samples(_heading: HeadingResult) -> None:
 COLUMNS: tuple[AnswerColumn[HeadingResult], ...] = (
     AnswerColumn("verdict", "category", "of the heading correction: accept, reject, extend, undecided"),
     AnswerColumn("verdict_reason", "text", "why, in words"),
-    AnswerColumn("error_deg", "number", "heading error, INS - true, corrected by"),
-    AnswerColumn("standard_error_deg", "number", "of error_deg, errors correlated over seconds allowed for"),
+    AnswerColumn("error_deg", "number", "heading error, INS - true, used for the correction"),
+    AnswerColumn("standard_error_deg", "number", "of error_deg, with errors correlated over seconds"),
     AnswerColumn(
         "confidence95_low_deg",
         "number",
@@ -33,7 +33,7 @@ COLUMNS: tuple[AnswerColumn[HeadingResult], ...] = (
     AnswerColumn(
         "steady_sigma_deg", "number", "steady sideslip and mounting left in error_deg, sigma", is_indexed=False
     ),
-    AnswerColumn("correction_deg", "number", "the number to type; missing unless accepted"),
+    AnswerColumn("correction_deg", "number", "the number to enter; missing unless accepted"),
     AnswerColumn("paper_error_deg", "number", "plain running mean of the paper", is_indexed=False),
     AnswerColumn("precision_deg", "number", "the paper's e"),
     AnswerColumn("quality_deg", "number", "spread of the running mean"),

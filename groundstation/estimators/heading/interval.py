@@ -20,7 +20,7 @@ from groundstation.estimators.heading.sampling import find_mode, sample
 FloatArray = NDArray[np.float64]
 
 # Priors: each parameter is log-normal. (median, sigma of the natural logarithm): two sigma either side reach over
-# 0.007-0.37 m/s, 0.007-0.12 m/s, 0.4-45 s, 0.05-3 deg, 0.1-1.3 Hz, 0.012-0.99, 0.003-0.2 deg, 0.2-5 times,
+# 0.007-0.37 m/s, 0.007-0.12 m/s, 0.36-44 s, 0.05-3 deg, 0.1-1.3 Hz, 0.012-0.99, 0.003-0.2 deg, 0.2-5 times,
 # 0.1-11 arcmin, 0.1-40 arcmin, 8-440 s.
 PRIOR: dict[str, tuple[float, float]] = {
     "white_mps": (0.05, 1.0),

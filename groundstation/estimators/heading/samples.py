@@ -14,6 +14,7 @@ from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.heading.lines import fitted_lines, window_bounds
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.results.reasons import NO_CONTACT
 from groundstation.tables.sources import sources_of_kind
 from groundstation.tables.table import Flight, Table
 
@@ -297,7 +298,7 @@ def _before_lift_off(gnss: Table, on_ground: BoolArray, is_proven: bool, setting
         return slice(0, int(fast[0]) if len(fast) else len(gnss))
     contact = np.flatnonzero(on_ground)
     if not len(contact):
-        raise NotAssessableError("heading", "no GNSS epoch with ground contact proven")
+        raise NotAssessableError("heading", NO_CONTACT)
     time_s = (gnss.time_ns - gnss.time_ns[0]) / NS_PER_S
     off = (~on_ground) & (np.arange(len(gnss)) > contact[0]) & (speed > MOVING_MPS)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], off, [False]]).astype(np.int8)))

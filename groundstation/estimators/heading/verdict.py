@@ -213,14 +213,14 @@ def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings, b
         judged_gate(
             bounds["half_width"],
             "half_width",
-            "half width of the 95 % interval by this taxi alone",
+            "half width of the 95 % interval from this taxi alone",
             figures.half_width_deg,
             unit="deg",
         ),
         judged_gate(
             bounds["whole_half_width"],
             "whole_half_width",
-            "half width of the 95 % interval, steady sideslip and mounting in it",
+            "half width of the 95 % interval with steady sideslip and mounting",
             figures.whole_half_width_deg,
             unit="deg",
             reason=f"{NORMAL_95 * figures.steady_sigma_deg:.2f} deg of it steady: taxi the other way too, log the "

@@ -16,7 +16,8 @@ FAILED = {
     "steps": "{value} steps of the INS heading during the taxi ({reason})",
     "segments": "parts of the taxi disagree: chi-square {value} per part, at most {limit} ({reason})",
     "half_width": "heading error known to +- {value} only, +- {limit} needed",
-    "whole_half_width": "steady sideslip and mounting in it, known to +- {value} only, +- {limit} needed ({reason})",
+    "whole_half_width": "heading error with steady sideslip and mounting known to +- {value} only, "
+    "+- {limit} needed ({reason})",
     "precision": "precision e {value}, at most {limit}",
     "quality": "running mean not settled: spread {value}, at most {limit}",
     "drift": "heading error drifts: {value} sigma, at most {limit}",

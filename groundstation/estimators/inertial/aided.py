@@ -13,7 +13,7 @@ from groundstation.base.normal import NORMAL_95
 from groundstation.base.signals import topics_of_kind
 from groundstation.estimators.inertial.differences import Differences, differences, seconds_covered
 from groundstation.estimators.inertial.figures import differences_figure, own_innovations_figure, plain_track_figure
-from groundstation.estimators.inertial.kind import AIDED, UNKNOWN
+from groundstation.estimators.inertial.kind import AIDED, UNKNOWN, WHY_NOT
 from groundstation.estimators.inertial.model import FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.results.inertial import CHANNELS, Difference, InertialResult, OwnInnovation
@@ -22,10 +22,7 @@ from groundstation.tables.table import Flight
 
 ANY_JUMP_M = 1e5  # no jump is too large to be shown
 UNITS = (("position", "m"), ("velocity", "mps"))
-FINDINGS = {
-    AIDED: ("inertial.gnss_aided", "GNSS corrects this INS already"),
-    UNKNOWN: ("inertial.unknown_kind", "whether GNSS corrects this INS cannot be told"),
-}
+CODES = {AIDED: "inertial.gnss_aided", UNKNOWN: "inertial.unknown_kind"}
 
 
 def compare_aided(
@@ -71,7 +68,7 @@ def compare_aided(
         own_innovations=() if own is None else _innovations(own),
         figures=figures if own is None else (*figures, own_innovations_figure(flight, own)),
     )
-    code, says = FINDINGS[kind[0]]
+    code, says = CODES[kind[0]], WHY_NOT[kind[0]]
     text = f"{says} ({kind[1]}): INS minus GNSS is shown, errors and forecast are not estimated"
     return result, (*compared.findings, Finding("info", code, text, compared.ins_topic))
 

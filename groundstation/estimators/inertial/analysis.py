@@ -49,14 +49,14 @@ def _examine(flight: "Flight", known: Known, settings: InertialSettings) -> tupl
 def _run_forecast(_flight: "Flight", known: Known, settings: InertialSettings) -> Found[ForecastResult]:
     from groundstation.estimators.inertial.estimate import Estimation
     from groundstation.estimators.inertial.forecast import assess_forecast
+    from groundstation.estimators.inertial.kind import AIDED, WHY_NOT
 
     estimation = known.workings_of(Estimation)
     if estimation is None:
         inertial = known.answer(InertialResult)
-        is_unknown = inertial is not None and inertial.kind == "unknown"
-        says = "whether GNSS corrects this INS cannot be told" if is_unknown else "GNSS corrects this INS already"
+        says = WHY_NOT[AIDED if inertial is None else inertial.kind]
         why = f" ({inertial.kind_reason})" if inertial is not None else ""
-        raise NotAssessableError("forecast", f"{says}{why}: nothing of it is estimated")
+        raise NotAssessableError("forecast", f"{says}{why}: its errors are not estimated")
     phases = known.phases
     return Found(assess_forecast(estimation, settings=settings, phase_of=phases.at, take_off_s=take_off_s(phases)))
 
@@ -101,7 +101,7 @@ INERTIAL = Analysis(
     name="inertial",
     title="INS errors estimated against GNSS, two channels of six states (Neusypin et al. 2003)",
     subject="INS errors",
-    needs="ins and gnss positions (velocities too where there are any), five minutes of both together",
+    needs="ins and gnss positions (velocities too if logged), five minutes of both together",
     settings=InertialSettings,
     answer=InertialResult,
     run=_run,
@@ -113,7 +113,7 @@ INERTIAL = Analysis(
 )
 FORECAST = Analysis(
     name="forecast",
-    title="forecast of the INS errors without GNSS, replayed all over the flight",
+    title="forecast of the INS errors without GNSS, replayed throughout the flight",
     subject="forecast of INS errors",
     needs="what inertial needs, of an INS that GNSS does not correct; a calibration needs one Schuler period",
     settings=InertialSettings,

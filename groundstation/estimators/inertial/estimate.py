@@ -243,12 +243,12 @@ def _findings(compared: Differences, run: FilterRun, result: InertialResult) -> 
         found.append(Finding("warn", "inertial.outlier", text, compared.gnss_topic, place, rejected))
     if run.reopened:
         text = (
-            f"GNSS rejected for more than {PATIENCE_S:.0f} s and then believed after all: INS or GNSS jumped unseen, "
+            f"GNSS rejected for more than {PATIENCE_S:.0f} s and then accepted: INS or GNSS jumped undetected, "
             f"or the noise of INS class {result.ins_class} does not fit"
         )
         found.append(Finding("warn", "inertial.reopened", text, compared.gnss_topic, count=run.reopened))
     if result.other_ins:
-        text = f"INS errors are those of {result.ins_topic} alone; not looked at: {', '.join(result.other_ins)}"
+        text = f"INS errors are those of {result.ins_topic} only; not used: {', '.join(result.other_ins)}"
         found.append(Finding("info", "inertial.other_ins", text, count=len(result.other_ins)))
     return [*found, *_outage_findings(compared, result)]
 
@@ -258,12 +258,12 @@ def _outage_findings(compared: Differences, result: InertialResult) -> list[Find
     lost = {"gnss": "no GNSS", "ins": "no INS", "both": "neither INS nor GNSS"}
     if len(result.outages) > OUTAGES_LISTED:
         longest = max(result.outages, key=lambda outage: outage.length_s)
-        text = f"INS and GNSS not together in {len(result.outages)} intervals, the longest {longest.length_s:.0f} s"
+        text = f"INS or GNSS missing in {len(result.outages)} intervals, the longest {longest.length_s:.0f} s"
         place = f"longest from {longest.start_s:.1f} s"
         return [Finding("info", "inertial.outage", text, compared.gnss_topic, place, len(result.outages))]
     found = []
     for outage in result.outages:
-        after = "how the forecast through it came out is not known"
+        after = "the forecast through it could not be checked"
         if outage.jump_m is not None:
             claimed = "" if outage.sigma_m is None else f" (claimed {outage.sigma_m:.0f} m)"
             after = f"the forecast was {outage.jump_m:.0f} m off at its end{claimed}"

@@ -4,7 +4,7 @@ import numpy as np
 
 from groundstation.estimators.analysis import Shortfall
 from groundstation.estimators.inertial.differences import Differences, differences, seconds_covered
-from groundstation.estimators.inertial.kind import AIDED, UNAIDED, kind_of, stated_kind
+from groundstation.estimators.inertial.kind import UNAIDED, WHY_NOT, kind_of, stated_kind
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.known import Known
 from groundstation.tables.sources import said_of
@@ -37,8 +37,7 @@ def examine_inertial(flight: Flight, known: Known, settings: InertialSettings) -
     """
     compared, (kind, reason) = compared_with_kind(flight, known, settings)
     if kind != UNAIDED:
-        says = "GNSS corrects this INS" if kind == AIDED else "whether GNSS corrects this INS cannot be told"
-        return (Shortfall(f"{says} ({reason}): INS minus GNSS is shown, errors are not estimated"),)
+        return (Shortfall(f"{WHY_NOT[kind]} ({reason}): INS minus GNSS is shown, errors are not estimated"),)
     found = []
     time_s, has_gnss = compared.epochs.time_s, compared.epochs.has_gnss
     covered_s = seconds_covered(time_s[has_gnss], settings.outage_s)
@@ -47,8 +46,8 @@ def examine_inertial(flight: Flight, known: Known, settings: InertialSettings) -
         text = f"GNSS for {covered_s:.0f} of {whole_s:.0f} s of the INS"
         found.append(Shortfall(text, _longest_outages(time_s, time_s[has_gnss], settings.outage_s)))
     if covered_s < settings.schuler_fit_s:
-        text = f"{covered_s / 60.0:.0f} min with GNSS, one Schuler period ({settings.schuler_fit_s / 60.0:.1f} min) "
-        found.append(Shortfall(text + "shows tilt and drift apart: till then sigmas rest on the class"))
+        text = f"{covered_s / 60.0:.0f} min with GNSS; one Schuler period ({settings.schuler_fit_s / 60.0:.1f} min) "
+        found.append(Shortfall(text + "is needed to separate tilt from drift: until then sigmas depend on the class"))
     return tuple(found)
 
 

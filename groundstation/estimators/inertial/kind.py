@@ -8,6 +8,7 @@ from groundstation.estimators.inertial.differences import Differences
 from groundstation.estimators.inertial.settings import InertialSettings
 
 UNAIDED, AIDED, UNKNOWN = "unaided", "gnss_aided", "unknown"
+WHY_NOT = {AIDED: "GNSS corrects this INS already", UNKNOWN: "it is not known whether GNSS corrects this INS"}
 STATED = (UNAIDED, AIDED)
 HALF = 0.5
 MINUTE_S, LEAST_MINUTES = 60.0, 5.0
@@ -21,12 +22,12 @@ def stated_kind(aircraft_kind: str, metadata: Mapping[str, str]) -> tuple[str, s
     Examples
     --------
     >>> stated_kind("", {"ins_kind": "GNSS_aided"}), stated_kind("unaided", {"ins_kind": "gnss_aided"})
-    (('gnss_aided', 'the head of the log says so'), ('unaided', 'the aircraft file says so'))
+    (('gnss_aided', 'the log header says so'), ('unaided', 'the aircraft file says so'))
     """
     logged = metadata.get("ins_kind", "").strip().lower()
     if aircraft_kind in STATED:
         return aircraft_kind, "the aircraft file says so"
-    return (logged, "the head of the log says so") if logged in STATED else ("", "")
+    return (logged, "the log header says so") if logged in STATED else ("", "")
 
 
 def kind_of(compared: Differences, settings: InertialSettings, stated: tuple[str, str] = ("", "")) -> tuple[str, str]:

@@ -64,7 +64,7 @@ def plan_replay(run: FilterRun, settings: InertialSettings) -> Plan:
     if past_min < run.model.schuler_period_min:
         reason = (
             f"only {past_min:.0f} min of GNSS before the first replayed outage, less than one Schuler period "
-            f"({run.model.schuler_period_min:.1f} min): the sigma rests on the class"
+            f"({run.model.schuler_period_min:.1f} min): the sigma depends on the class"
         )
     past = int(max(first - begin - PAST_FROM_S, 0.0) / step)
     horizons = tuple(float(horizon) for horizon in HORIZONS_MIN if _judged(run, first, step, horizon) >= LEAST_STARTS)

@@ -69,7 +69,7 @@ def ins_resets(flight: Flight, ins: Table, settings: InertialSettings) -> Resets
     if at.size:
         times = flight.seconds(ins.time_ns[at])
         listed = ", ".join(f"{time:.1f} s" for time in times[:LISTED]) + (" ..." if len(times) > LISTED else "")
-        text = f"INS position jumps by {settings.jump_m:.0f} m or more against its own velocity: taken for a reset"
+        text = f"INS position jumps by {settings.jump_m:.0f} m or more against its own velocity: treated as a reset"
         findings.append(Finding("warn", "inertial.ins_reset", text, ins.topic, listed, int(at.size)))
     return Resets(ins.time_ns[at], tuple(findings))
 
@@ -84,7 +84,7 @@ def unbelieved(
 ) -> tuple[BoolArray, list[Finding]]:
     """GNSS samples that are not compared, shape (n,), with findings that say why, where and how many."""
     checks = (
-        (_without_integrity(gnss), "inertial.gnss_integrity", "GNSS says itself that it has no integrity"),
+        (_without_integrity(gnss), "inertial.gnss_integrity", "GNSS reports that it has no integrity"),
         (_frozen(flight, gnss, ins_at_gnss, settings), "inertial.gnss_frozen", "GNSS position frozen while moving"),
         (
             _displaced(flight, gnss, position_m, reset_ns, settings),

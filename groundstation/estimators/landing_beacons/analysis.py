@@ -145,7 +145,7 @@ def _why_not(speed_mps: float) -> str:
     if not np.isfinite(speed_mps):
         return f"bearings and beacons give too few places: {wrong}"
     if speed_mps <= 0.0:
-        return f"the distance grows along it: {wrong}, or a flight away from it"
+        return f"the distance grows along the approach: {wrong}, or a flight away from the runway"
     return ""
 
 
@@ -162,15 +162,13 @@ def _doubts(
         text = f"heading by the bearings is {told.heading_difference_deg:+.0f} deg off that of the INS"
         doubts.append(("warn", "heading", f"{text}: {NEXT}, or the bearing of the runway"))
     if told.terrain_m > settings.terrain_m:
-        text = f"the ground under it rises and falls by {told.terrain_m:.0f} m by radio altitude against altitude"
+        text = f"the ground height varies by {told.terrain_m:.0f} m (radio altitude against altitude)"
         if runway.ground:
-            text += ", the profile of the site file taken off"
+            text += ", after the profile of the site file is subtracted"
         left_out = f"no deviation from the glide path where it is more than {settings.terrain_m:g} m"
         doubts.append(("warn", "terrain", f"{text}: {left_out}; {GROUND_NEXT}"))
     elif not np.isfinite(told.terrain_m) and not runway.ground:
-        text = (
-            "no altitude to tell radio altitude from terrain: deviations from the glide path take the ground for level"
-        )
+        text = "no altitude to find the terrain: deviations from the glide path assume level ground"
         doubts.append(("warn", "terrain", f"{text}; {GROUND_NEXT}"))
     last_m = float(found.before_m[found.found][-1])
     if last_m > CUT_SHORT_M:
@@ -190,9 +188,9 @@ def _sentence(answers: Answers) -> str:
     last = answer.rows[-1] if answer.rows else None
     where = ""
     if last is not None:
-        where = f": {last.lateral_m:+.0f} +- {last.lateral_95_m:.0f} m of the course"
+        where = f": {last.lateral_m:+.0f} +- {last.lateral_95_m:.0f} m off the course"
         if last.glide_path_m is not None and last.glide_path_95_m is not None:
-            where += f" and {last.glide_path_m:+.0f} +- {last.glide_path_95_m:.0f} m of the glide path"
+            where += f" and {last.glide_path_m:+.0f} +- {last.glide_path_95_m:.0f} m off the glide path"
         where += f" {last.before_threshold_m:.0f} m before the threshold"
     return f"{count} {'approach' if count == 1 else 'approaches'} by bearings{where}"
 
@@ -212,14 +210,12 @@ COLUMNS: tuple[AnswerColumn[BeaconLanding], ...] = (
         "right of the course, nearest to the threshold of the last approach",
         _last(lambda row: row.lateral_m),
     ),
-    AnswerColumn(
-        "landing_beacons_lateral_95_m", "number", "what it may err by, 95 %", _last(lambda row: row.lateral_95_m)
-    ),
+    AnswerColumn("landing_beacons_lateral_95_m", "number", "its 95 % uncertainty", _last(lambda row: row.lateral_95_m)),
     AnswerColumn(
         "landing_beacons_glide_path_m", "number", "above the glide path there", _last(lambda row: row.glide_path_m)
     ),
     AnswerColumn(
-        "landing_beacons_glide_path_95_m", "number", "what it may err by, 95 %", _last(lambda row: row.glide_path_95_m)
+        "landing_beacons_glide_path_95_m", "number", "its 95 % uncertainty", _last(lambda row: row.glide_path_95_m)
     ),
 )
 

@@ -155,7 +155,7 @@ def _remarks(rows: Sequence[TrialRow]) -> list[str]:
     if white:
         last = white[-1]
         remarks.append(
-            f"A filter that takes the correlated range errors for white noise errs at touchdown by "
+            f"A filter that treats the correlated range errors as white noise errs at touchdown by "
             f"{last.overconfidence_right:.1f} times its lateral and {last.overconfidence_up:.1f} times its vertical "
             "sigma."
         )

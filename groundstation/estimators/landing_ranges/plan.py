@@ -29,17 +29,17 @@ def _of_places(scenario: RangeApproach) -> tuple[Finding, ...]:
     places = np.array([(point.before_threshold_m, point.right_m) for point in points])
     width_m = float(np.linalg.svd(places - places.mean(axis=0), compute_uv=False)[-1]) if len(points) > 2 else np.inf
     if np.abs(places[:, 1]).max() < LEAST_WIDTH_M:
-        text = "all points stand on the line of the course: no range tells right from left of it"
+        text = "all points are on the course line: no range separates right from left"
         found.append(Finding("warn", "landing_ranges.on_course", text))
     elif width_m < LEAST_WIDTH_M and scenario.moving is None:
-        text = f"all points stand within {width_m:.0f} m of one line: ranges tell little across it"
+        text = f"all points are within {width_m:.0f} m of one line: ranges show little across it"
         found.append(Finding("warn", "landing_ranges.on_one_line", text))
     slope = np.tan(np.deg2rad(scenario.path.glide_angle_deg))
     for point in points:
         is_under = 0.0 <= point.before_threshold_m <= scenario.path.start_m and abs(point.right_m) < LEAST_WIDTH_M
         below_m = scenario.path.threshold_height_m + slope * point.before_threshold_m - point.up_m
         if is_under and below_m < OVERFLOWN_M:
-            text = f"{point.name} stands under the path, {below_m:.0f} m below it: an obstacle, and hard to hear"
+            text = f"{point.name} is under the path, {below_m:.0f} m below it: an obstacle, and hard to hear"
             found.append(Finding("warn", "landing_ranges.under_path", text))
     return tuple(found)
 

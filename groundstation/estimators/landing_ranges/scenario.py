@@ -172,7 +172,7 @@ class RangeApproach:
             raise SettingsError("points", "none", "one ground point or more")
         names = [point.name for point in self.points]
         if len(set(names)) < len(names):
-            raise SettingsError("points", "a name that stands twice", "one name for each point")
+            raise SettingsError("points", "a name given twice", "one name for each point")
         if self.path.duration_s / self.noise.interval_s > MOST_EPOCHS:
             found = f"{self.noise.interval_s:g} s over {self.path.duration_s:.0f} s"
             raise SettingsError("noise.interval_s", found, f"no more than {MOST_EPOCHS} measurements of a point")

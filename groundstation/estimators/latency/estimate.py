@@ -10,7 +10,7 @@ from groundstation.estimators.inertial.kind import AIDED, HALF
 from groundstation.estimators.latency.fit import DelayFit, fit_delay
 from groundstation.estimators.latency.settings import BOUND95, LatencySettings
 from groundstation.estimators.latency.signals import NotComparableError, compare, pairs_of
-from groundstation.estimators.latency.windows import cut_windows
+from groundstation.estimators.latency.windows import cut_windows, too_few_windows
 from groundstation.results.figures import FigureData
 from groundstation.results.latency import Latencies, Latency, Quantity
 from groundstation.tables.table import Flight, Table
@@ -76,8 +76,7 @@ def _assessed(
         return Latency(*pair, "not_observable", str(reason)), None
     windows = cut_windows(compared.reference, compared.time_s, compared.values, settings)
     if windows is None:
-        text = f"fewer than two stretches of {settings.window_s:g} s in which both are logged without a gap"
-        return Latency(*pair, "not_observable", text), None
+        return Latency(*pair, "not_observable", too_few_windows(settings)), None
     fit = fit_delay(compared.reference, windows, compared.prior_sigma, settings)
     return _row(pair, fit, compared.unit, settings, _is_aided(flight[pair[0]], kinds)), fit
 
@@ -101,7 +100,7 @@ def _row(pair: Pair, fit: DelayFit, unit: str, settings: LatencySettings, is_aid
     rests_on = f"{MOTIONS[pair[2]]} in {fit.windows} windows of {settings.window_s:g} s"
     if is_aided and pair[2] == "velocity":
         hidden_s = settings.aided_sigma_s
-        rests_on += f"; GNSS corrects this INS, whose filter may hide {hidden_s:g} s of it"
+        rests_on += f"; GNSS corrects this INS, whose filter may hide {hidden_s:g} s of latency"
     half_s = float(np.hypot(fit.half_width_s, BOUND95 * hidden_s))
     return replace(
         row,
@@ -119,7 +118,7 @@ def _why_not(quantity: Quantity, fit: DelayFit, settings: LatencySettings) -> st
     if fit.freedom < settings.freedom_min or not half_s <= settings.half_width_max_s:
         return (
             f"too little motion ({MOTIONS[quantity]}): 95 % interval of +- {half_s:.2g} s, limit "
-            f"{settings.half_width_max_s:g} s, on {fit.freedom:.1f} effective windows of at least "
+            f"{settings.half_width_max_s:g} s, on {fit.freedom:.1f} effective windows, limit "
             f"{settings.freedom_min:g}"
         )
     if fit.explained < settings.explained_min:

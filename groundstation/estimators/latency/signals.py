@@ -166,7 +166,7 @@ def _field(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings
     bare = Series(time_s, base, lambda base: base, settings.gap_max_s)
     known = bare.covers(at_s, 0.0)
     if np.count_nonzero(known) < LEAST_SAMPLES:
-        raise NotComparableError("hardly any sample while the attitude is known")
+        raise NotComparableError("too few samples while the attitude is known")
     turning, seen = bare.at(at_s[known])[0].reshape(-1, 3, 3), values[known]
     turning, seen = turning - turning.mean(axis=0), seen - seen.mean(axis=0)
     constant = np.linalg.lstsq(turning.reshape(-1, 3), seen.reshape(-1), rcond=1e-6)[0]
@@ -234,7 +234,7 @@ def _averaged(
     cell = np.floor((time_s - time_s[:1]) / max(step_s, 1e-9) + 1e-6).astype(np.int64)
     starts = np.flatnonzero(np.diff(cell, prepend=-1))
     if len(starts) < LEAST_SAMPLES:
-        raise NotComparableError(f"{table.topic} has hardly any samples")
+        raise NotComparableError(f"{table.topic} has too few samples")
     if len(starts) == len(time_s):
         return time_s, columns
     count = np.diff(np.append(starts, len(time_s)))

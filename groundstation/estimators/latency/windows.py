@@ -153,6 +153,11 @@ class Whitened:
         return np.asarray(rest.reshape(w, n * c, k))
 
 
+def too_few_windows(settings: LatencySettings) -> str:
+    """Why :func:`cut_windows` gives none."""
+    return f"fewer than two stretches of {settings.window_s:g} s in which both are logged without a gap"
+
+
 def cut_windows(reference: Series, time_s: FloatArray, values: FloatArray, settings: LatencySettings) -> Windows | None:
     """Windows of the other's samples, times (n,), values (n, c): those in which the reference moves most; or None.
 

@@ -50,7 +50,9 @@ def align(
     drift, drift_sigma = _drift(used, gyros, prior)
     hours = (figure_at_s - aligned_at_s) / S_PER_H
     sigma = _sigma(used)
-    origin = f"{where}, verdict {used.verdict}" + (" for noise that sigma holds" if used.verdict == "reject" else "")
+    origin = f"{where}, verdict {used.verdict}" + (
+        " for noise that the sigma includes" if used.verdict == "reject" else ""
+    )
     if used is runs.together and runs.since:
         origin += f", after {runs.since}"
     if used is runs.taxi and (runs.why_not or runs.together):

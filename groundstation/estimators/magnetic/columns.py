@@ -35,13 +35,13 @@ COLUMNS: tuple[AnswerColumn[MagneticResult], ...] = (
     AnswerColumn(
         "magnetic_method",
         "category",
-        "method recommended to correct by; the coefficients are its own",
+        "method recommended for the correction; the coefficients are from it",
         lambda magnetic: magnetic.recommended_method,
     ),
     AnswerColumn(
         "magnetic_before_rms_deg",
         "number",
-        "magnetic heading error in level flight no fit has seen, RMS",
+        "magnetic heading error in level flight that no fit used, RMS",
         lambda magnetic: magnetic.residual_rms_deg.before if magnetic.residual_rms_deg else None,
     ),
     AnswerColumn(

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.magnetic.poisson import EarthField
-from groundstation.estimators.magnetic.readings import ANALYSIS, Readings
+from groundstation.estimators.magnetic.readings import ANALYSIS, NO_DATE, PLACE_WANTED, Readings
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.magnetic import DeclinationUsed
 from groundstation.tables.declination import Declination, declination_along
@@ -48,9 +48,9 @@ def earth_field(
 
 def _modelled(flight: Flight, readings: Readings, rows: NDArray[np.intp]) -> Declination:
     if not flight.has_utc:
-        raise NotAssessableError(ANALYSIS, "no date, so no declination", "UTC in the log, or declination_deg stated")
+        raise NotAssessableError(ANALYSIS, *NO_DATE)
     if not np.isfinite(readings.latitude_deg[rows]).any():
-        raise NotAssessableError(ANALYSIS, "no position at the figure", "a position, or declination_deg stated")
+        raise NotAssessableError(ANALYSIS, "no position at the figure", PLACE_WANTED)
     return declination_along(readings.latitude_deg, readings.longitude_deg, readings.altitude_m, int(flight.start_ns))
 
 

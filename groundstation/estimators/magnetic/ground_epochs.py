@@ -23,6 +23,7 @@ from groundstation.estimators.heading.samples import (
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.known import AircraftData, Interval
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
+from groundstation.estimators.magnetic.readings import NO_DATE, PLACE_WANTED
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import DeclinationUsed
 from groundstation.results.magnetic_ground import LeftOut
@@ -149,10 +150,10 @@ def declination_at(
         stated = DeclinationUsed(settings.declination_deg, settings.declination_sigma_deg, "as stated")
         return np.full(len(chosen), settings.declination_deg), stated
     if not flight.has_utc:
-        raise NotAssessableError(ANALYSIS, "no date, so no declination", "UTC in the log, or declination_deg stated")
+        raise NotAssessableError(ANALYSIS, *NO_DATE)
     latitude, longitude = _positions(flight, topics, samples.time_ns[chosen])
     if not np.isfinite(latitude).any():
-        raise NotAssessableError(ANALYSIS, "no position on the ground", "a position, or declination_deg stated")
+        raise NotAssessableError(ANALYSIS, "no position on the ground", PLACE_WANTED)
     try:
         model = declination_along(latitude, longitude, np.zeros(len(chosen)), int(flight.start_ns))
     except NotAssessableError as error:

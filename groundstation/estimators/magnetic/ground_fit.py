@@ -91,7 +91,11 @@ def coefficients_of(
             rows.append(GroundCoefficient(letter, float(fit.values_deg[place]), float(sigma[place]), "found"))
             continue
         others = [LETTERS[k] for k in range(len(LETTERS)) if k != place and abs(correlation[place, k]) > TANGLED]
-        cause = f"not told from {_listed(others)} by these directions" if others else "no runs on headings that show it"
+        cause = (
+            f"not separable from {_listed(others)} by these directions"
+            if others
+            else "no runs on headings that show it"
+        )
         rows.append(GroundCoefficient(letter, None, float(sigma[place]), "not observable", cause))
     return tuple(rows)
 

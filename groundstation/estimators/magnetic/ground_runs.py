@@ -132,7 +132,7 @@ def _why_no_run(
     if rejected:
         told = "; ".join(f"at {run.start_s:.0f} s: {run.reason}" for run in rejected[:3])
         wanted = f"at least {settings.run_min_s:g} s and {settings.samples_min} epochs within"
-        return f"no straight ground run that counts: {told}; wanted {wanted} {settings.heading_change_max_deg:g} deg"
+        return f"no valid straight ground run: {told}; needed: {wanted} {settings.heading_change_max_deg:g} deg"
     told = ", ".join(f"{row.reason} {row.epochs}" for row in left_out)
     return f"no straight run on the ground above {limit:g} m/s; epochs: {told}"
 
@@ -316,10 +316,10 @@ def _remarks(result: GroundDeviation, interval_s: float, settings: MagneticGroun
     """What must be told beside the figures, one line each."""
     declination = result.declination
     told = [
-        "the level of all errors (A) cannot be told from an error of the declination "
+        "the level of all errors (A) cannot be separated from an error of the declination "
         f"({declination.sigma_deg:.2f} deg) or the mounting of the sensor",
-        f"the nose is taken to point along the track on the wheels, {settings.slip_sigma_deg:g} deg a run allowed for "
-        f"slip; the {settings.settle_s:g} s after a turn are left out, so that a heading that lags counts less",
+        f"on its wheels the aircraft is assumed to point along the track, with {settings.slip_sigma_deg:g} deg a run "
+        f"for slip; the {settings.settle_s:g} s after a turn are left out, to reduce the effect of a lagging heading",
     ]
     unseen: dict[str, list[str]] = {}
     for item in result.coefficients:
@@ -341,8 +341,8 @@ def _remarks(result: GroundDeviation, interval_s: float, settings: MagneticGroun
         )
     wide = [row for row in result.repeats if row.spread_deg > 2.0 * row.expected_deg]
     told += [
-        f"{row.runs} runs near {row.magnetic_heading_deg:.0f} deg spread by {row.spread_deg:.2f} deg where noise and "
-        f"slip would make {row.expected_deg:.2f}: iron in the ground or switched loads, perhaps"
+        f"{row.runs} runs near {row.magnetic_heading_deg:.0f} deg spread by {row.spread_deg:.2f} deg; noise and "
+        f"slip explain {row.expected_deg:.2f}: perhaps iron in the ground or switched loads"
         for row in wide
     ]
     return tuple(told)

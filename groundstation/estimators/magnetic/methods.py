@@ -25,7 +25,7 @@ from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.magnetic import LETTERS, Method, MethodName
 
 NO_CIRCULAR = (
-    "cannot see the constant deviation A, for no heading is used; soft iron along the vertical is taken for none: "
+    "cannot observe the constant deviation A, as no heading is used; soft iron along the vertical is assumed zero: "
     "no sigma here covers that"
 )
 WANDER_IN_A_TO_E = np.array([0.3, 1.0, 1.0, 0.3, 0.3])  # what wanders with the turn rate goes into A, D, E
@@ -160,7 +160,7 @@ def recommend(
         left = f"{attitude.held_out_after_deg:.2f} against {table.held_out_after_deg:.2f} deg rms"
         better = "less" if gain_sigmas > 0.0 else "more"
         chosen: MethodName = "poisson_attitude" if gain_sigmas > 0.0 else "compass_table"
-        return chosen, f"{text}; on level flight that no fit has seen the iron leaves {better}: {left}"
+        return chosen, f"{text}; in level flight that no fit used, the iron leaves {better}: {left}"
     sigmas = [_rms_of(row.coefficients_sigma_deg) for row in (table, attitude)]
     if sigmas[1] <= sigmas[0]:
         return "poisson_attitude", f"{text}; the iron fitted with the INS attitude has none"

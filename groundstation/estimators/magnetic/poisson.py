@@ -300,8 +300,8 @@ def _objection(iron: Iron, condition: float, settings: MagneticSettings) -> str:
     if not np.isfinite(condition) or condition > settings.attitude_condition_max:
         return (
             f"condition number {condition:.3g}, at most {settings.attitude_condition_max:g}: the attitudes flown do "
-            "not tell hard from soft iron"
+            "not separate hard from soft iron"
         )
     if not np.isfinite(iron.vector()).all() or np.linalg.cond(iron.soft) > settings.attitude_condition_max:
-        return "the soft iron found is no aircraft's: an axis of the magnetometer does not follow the field"
+        return "the soft iron found is not plausible: an axis of the magnetometer does not follow the field"
     return ""

@@ -24,6 +24,8 @@ ATTITUDE = ("roll_deg", "pitch_deg", "true_heading_deg")
 ALTITUDES = ("altitude_msl_m", "altitude_ellipsoid_m", "pressure_altitude_m")
 LEAST_READINGS = 10
 ANALYSIS = "magnetic"
+NO_DATE = ("no date, so no declination", "UTC in the log, or declination_deg stated")
+PLACE_WANTED = "a position, or declination_deg stated"
 
 
 @dataclass(frozen=True)
@@ -132,7 +134,7 @@ def gather(
     known = attitude.valid(*ATTITUDE) & (np.abs(readings.field_nt).sum(axis=1) > 0.0)
     if np.count_nonzero(known) < LEAST_READINGS:
         raise NotAssessableError(
-            ANALYSIS, f"hardly any reading of {topics[1]} while the attitude of {topics[0]} is known"
+            ANALYSIS, f"too few readings of {topics[1]} while the attitude of {topics[0]} is known"
         )
     return readings.take(known), latency_s
 

@@ -18,7 +18,7 @@ def remarks_on(
     flight: Flight, result: MagneticResult, latency_s: float, kinds: Mapping[str, str], settings: MagneticSettings
 ) -> tuple[str, ...]:
     """One line each."""
-    told = ["A holds the mounting of the magnetometer, the INS heading error and the error of declination besides"]
+    told = ["A also contains the mounting of the magnetometer, the INS heading error and the error of declination"]
     if result.alignment.aligned_at_s is None:
         told.append(
             f"the INS heading is {result.alignment.origin}; a sigma of {settings.alignment_sigma_deg:g} deg is assumed"
@@ -26,14 +26,14 @@ def remarks_on(
     if settings.trusts_aided_heading:
         told.append("the settings state that no magnetometer corrects the INS heading; the log does not show it")
     elif kinds.get(result.ins_topic) != UNAIDED:
-        told.append("whether a magnetometer corrects the INS heading cannot be told from the log; it is taken for free")
+        told.append("the log does not show whether a magnetometer corrects the INS heading; none is assumed")
     low = [turn for turn in result.turns if turn.state == "used" and _below(turn.altitude_m, settings.altitude_min_m)]
     if low:
         told.append(
-            f"flown at {low[0].altitude_m:.0f} m, below {settings.altitude_min_m:g} m: iron on the ground may count"
+            f"flown at {low[0].altitude_m:.0f} m, below {settings.altitude_min_m:g} m: iron on the ground may matter"
         )
     if abs(latency_s) >= LATENCY_TOLD_S:
-        told.append(f"the magnetometer was put back by its latency of {latency_s:+.3f} s")
+        told.append(f"the magnetometer was shifted back by its latency of {latency_s:+.3f} s")
     told += _between_branches(result)
     if result.coverage.interpolated_bins:
         told.append(f"{result.coverage.interpolated_bins} of 360 bins lack readings of a branch and are interpolated")
@@ -55,8 +55,8 @@ def _between_branches(result: MagneticResult) -> list[str]:
     if not half.size or abs(np.mean(half)) < WORTH_TELLING_DEG or rate <= 0.0:
         return []
     return [
-        f"right and left turns differ by twice {np.mean(half):+.2f} deg in the mean, as a magnetometer "
-        f"{-np.mean(half) / rate:+.3f} s late would make them (or iron along the vertical); the average is free of it"
+        f"right and left turns differ by twice {np.mean(half):+.2f} deg in the mean, which a magnetometer "
+        f"{-np.mean(half) / rate:+.3f} s late would cause (or iron along the vertical); the average is free of it"
     ]
 
 
@@ -68,6 +68,6 @@ def _entered(flight: Flight, result: MagneticResult) -> list[str]:
     late = [one for one in corrections_entered(flight) if one.time_s > aligned_at_s and one.change_deg != 0.0]
     return [
         f"a correction of {one.correction_deg:+.2f} deg was entered at {one.time_s:.0f} s, after the "
-        "alignment: if the INS heading carries it, A and the table are off by as much"
+        "alignment: if the INS heading includes it, A and the table are off by that much"
         for one in late[-1:]
     ]

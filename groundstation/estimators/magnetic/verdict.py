@@ -47,7 +47,7 @@ def build_gates(
         _gate(
             bounds,
             "held_out",
-            "rms error after correction where no fit has seen",
+            "rms error after correction in flight that no fit used",
             after,
             "deg",
             reason="no level flight beside the figure",
@@ -64,7 +64,7 @@ def build_gates(
         _gate(
             bounds,
             "dip",
-            "dip of the field in the readings off the model's, in sigmas",
+            "dip of the field, readings against model, in sigmas",
             dip_sigmas,
             is_required=dip_sigmas is not None,
             reason="no model of the field, or no iron fitted",

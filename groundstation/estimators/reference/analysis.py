@@ -39,9 +39,9 @@ def _sentence(answers: Answers) -> str:
 
 REFERENCE = Analysis(
     name="reference",
-    title="errors of GNSS, INS and the answers against a reference, and claimed against seen",
+    title="errors of GNSS, INS and the answers against a reference, and claimed against measured accuracy",
     subject="comparison with the reference",
-    needs="a truth in the log, or beside it by --reference FILE",
+    needs="a truth in the log, or a reference by --reference FILE",
     settings=ReferenceSettings,
     answer=ReferenceResult,
     run=_run,

@@ -25,7 +25,7 @@ def _first(answer: ReferenceResult, kind: str, quantity: str, axis: str) -> str:
 
 
 REFERENCE_COLUMNS: tuple[AnswerColumn[ReferenceResult], ...] = (
-    AnswerColumn("reference", "text", "what the flight was judged by", is_indexed=False),
+    AnswerColumn("reference", "text", "reference that judged the flight", is_indexed=False),
     AnswerColumn(
         "gnss_reference_rmse_m",
         "number",

@@ -45,7 +45,7 @@ def judged(flight: "Flight", known: Known, settings: ReferenceSettings) -> Found
         topic for topic in topics_of_kind("truth", flight.topics()) if any(map(flight[topic].has, FIELDS))
     ]
     if not topics:
-        raise NotAssessableError("reference", "no truth in the log", "", "`--reference FILE` lays one beside it")
+        raise NotAssessableError("reference", "no truth in the log", "", "`--reference FILE` adds one")
     reference = _shifted(flight[topics[0]].unique_times(), settings.clock_offset_s)
     recorded = flight.without("truth")
     subjects = dict(subjects_of(recorded, known))
@@ -59,7 +59,7 @@ def judged(flight: "Flight", known: Known, settings: ReferenceSettings) -> Found
         raise NotAssessableError(
             "reference",
             f"fewer than {settings.samples_min} samples of the log and the reference together",
-            next_step="is the reference of another time, or has it gaps?",
+            next_step="does the reference cover another time, or has it gaps?",
         )
     placed, listed = _placed(as_logged, settings)
     gross_s = _gross_offset_s(subjects, reference, flight.start_ns, settings)

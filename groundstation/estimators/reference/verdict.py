@@ -42,9 +42,9 @@ def standing_of(
     twin = next((row for row in rows if _is_own_solution(row)), None)
     if twin is not None:
         away = f"{1000.0 * twin.spread.rmse:.1f} mm RMS from it"
-        return Standing(False, f"it is the solution of {twin.subject} itself ({away}), no independent one")
+        return Standing(False, f"it is the solution of {twin.subject} itself ({away}), not an independent one")
     if rows and all(row.is_coarse for row in rows):
-        return Standing(False, "its own sigmas are as large as what is seen: the log is no worse than it")
+        return Standing(False, "its own sigmas are as large as the errors found: the log is no worse than it")
     return Standing(True)
 
 
@@ -69,7 +69,7 @@ def _of_reference(answer: ReferenceResult, gross_s: float, interval_s: float) ->
         guess = " (leap seconds: GPS time taken for UTC?)" if round(abs(gross_s)) in LEAP_SECONDS else ""
         text = (
             f"the log shows the motion {abs(gross_s):.2f} s {_sense(gross_s)} than the reference{guess}; "
-            f"[reference] clock_offset_s = {gross_s:.2f} shifts it"
+            f"[reference] clock_offset_s = {gross_s:.2f} corrects it"
         )
         yield Finding("warn", "reference.clock", text, "truth")
         return
@@ -80,8 +80,8 @@ def _of_reference(answer: ReferenceResult, gross_s: float, interval_s: float) ->
                 text = (
                     f"{row.subject} shows its positions {abs(row.clock_offset_s):.3f} s {_sense(row.clock_offset_s)} "
                     "than the reference "
-                    f"(95 %: {low:+.3f} to {high:+.3f} s), which has a sample in {interval_s:.3g} s: a latency, or a "
-                    "clock that is off; it stays in the errors"
+                    f"(95 %: {low:+.3f} to {high:+.3f} s), which has a sample every {interval_s:.3g} s: a latency, or "
+                    "a clock that is off; the errors include it"
                 )
                 yield Finding("warn", "reference.clock", text, row.subject)
     yield from _datum(answer)

@@ -34,7 +34,7 @@ def _run(flight: "Flight", _known: Known, settings: TwoClocksSettings) -> Found[
     try:
         joining = from_json(Joining, json.loads(flight.metadata[TOGETHER]))
     except (ValueError, MismatchError) as error:
-        raise NotAssessableError("together", f"what the MCAP keeps of the joining cannot be read ({error})") from error
+        raise NotAssessableError("together", f"the joining kept in the MCAP cannot be read ({error})") from error
     figures: list[FigureData] = []
     agreement = []
     for log in joining.logs:

@@ -10,7 +10,7 @@ from groundstation.base.quantiles import student_quantile
 from groundstation.estimators.latency.fit import DelayFit, fit_delay
 from groundstation.estimators.latency.settings import LatencySettings
 from groundstation.estimators.latency.signals import SLOW_MPS, rotation_n_from_b
-from groundstation.estimators.latency.windows import Series, Windows, cut_windows
+from groundstation.estimators.latency.windows import Series, Windows, cut_windows, too_few_windows
 from groundstation.estimators.two_clocks.channels import Pair, Side, averaged, running_mean
 from groundstation.estimators.two_clocks.settings import TwoClocksSettings
 
@@ -67,7 +67,7 @@ def fit_motion(
     """
     inside = (pair.other.time_s >= span_s[0]) & (pair.other.time_s <= span_s[1])
     if np.count_nonzero(inside) < settings.overlap_min_s / pair.other.interval_s * 0.5:
-        return "hardly any sample in common"
+        return "too few samples in common"
     other = pair.other.take(inside)
     middle_s, drift, fit = float(np.mean(span_s)), 0.0, None
     is_reference = _is_reference(pair.first, other)
@@ -102,7 +102,7 @@ def fit_motion(
 
 def _why_not(fit: DelayFit, settings: TwoClocksSettings) -> str:
     if fit.explained < settings.explained_min:
-        return f"the one explains {fit.explained:.0%} of the motion of the other"
+        return f"one explains only {fit.explained:.0%} of the motion of the other"
     return "" if fit.is_converged else "no minimum near the place of the first search"
 
 
@@ -165,7 +165,7 @@ def _fit(
     series, _priors, _drift = _series(names, reference, size, middle_s, width_s, settings, fine)
     windows = cut_windows(series, sensor.time_s, sensor.values / size, fine)
     if windows is None:
-        return f"fewer than two stretches of {settings.window_s:g} s in which both are logged without a gap"
+        return too_few_windows(fine)
     middle_s = _middle(series, windows)
     series, priors, drift = _series(names, reference, size, middle_s, width_s, settings, fine)
     return fit_delay(series, windows, priors, fine, wanted=drift), middle_s

@@ -63,13 +63,13 @@ def relate(first: TimedLog, other: TimedLog, *, settings: TwoClocksSettings | No
         prior = by_gnss or _by_file_time(files_lag_s)
         if not prior:
             names = f"{first.name} and {other.name}"
-            raise NotOneFlightError(names, f"nothing puts them on one clock: not GNSS time of both; {why}")
+            raise NotOneFlightError(names, f"cannot be put on one clock: no GNSS time in both; {why}")
         found = replace(base, stretches=prior, reason=f"{_SAYS[prior[0].method]}; {why}")
         if pair is not None:
             _require_no_contradiction(first, other, pair, found, settings)
     elif files_lag_s is not None and not by_gnss and abs(files_lag_s - found.stretches[0].lag_s) > FILES_APART_S:
         gap_s = files_lag_s - found.stretches[0].lag_s
-        text = f"their own times differ by {gap_s:+.1f} s from what the motion says: the motion is believed"
+        text = f"their own times differ by {gap_s:+.1f} s from the motion: the motion is used"
         found = replace(found, remarks=(*found.remarks, text))
     _require_overlap(first, other, found.stretches)
     _require_near(first, other, found, settings)
@@ -144,7 +144,7 @@ def _placed(
     if place.correlation < settings.correlation_min:
         return None, f"the motions do not fit anywhere (correlation {place.correlation:.2f} at best)"
     if not by_gnss and place.rival > settings.rival_share_max:
-        return None, f"the motion fits at more than one place (the next best {place.rival:.0%} as well)"
+        return None, f"the motion fits at more than one place (the next best reaches {place.rival:.0%})"
     return place, ""
 
 
@@ -185,7 +185,9 @@ def _by_motion(
         fit = fit_motion(pair, lag_s, span_s, hidden_s, settings)
         if isinstance(fit, str):
             stretches.append(_unfitted(prior, begin_s, span_s, lag_s, settings))
-            remarks.append(f"from {span_s[0]:.0f} to {span_s[1]:.0f} s of {other.name} the motion does not tell: {fit}")
+            remarks.append(
+                f"from {span_s[0]:.0f} to {span_s[1]:.0f} s of {other.name} the motion gives no result: {fit}"
+            )
             continue
         fitted += 1
         stretch, gap = _settled(begin_s, fit, prior, settings)
@@ -194,7 +196,7 @@ def _by_motion(
             gaps.append(gap)
             if stretch.method == "motion":
                 text = f"GNSS time and motion contradict each other by {gap[0]:+.3f} s{_named(gap[0])}"
-                remarks.append(f"{text}: the motion is believed")
+                remarks.append(f"{text}: the motion is used")
     if not by_gnss and not fitted:
         return None, remarks[-1]
     if len(begins) > 1:
@@ -270,7 +272,7 @@ def _mean(a: float, a_sigma: float, b: float, b_sigma: float) -> tuple[float, fl
 def _named(gap_s: float) -> str:
     whole = round(abs(gap_s))
     is_leap = whole in LEAPS_S and abs(abs(gap_s) - whole) < NEAR_WHOLE_S
-    return ", as many as the leap seconds between GPS time and UTC" if is_leap else ""
+    return ", equal to the leap seconds between GPS time and UTC" if is_leap else ""
 
 
 def _require_overlap(first: TimedLog, other: TimedLog, stretches: tuple[Stretch, ...]) -> None:

@@ -228,7 +228,7 @@ def _sure_enough(flight: FlightError, standard: Standard) -> FlightError:
     if least is None or (known and min(known) >= least):
         return flight
     told = f"{min(known):.1f}" if known else "unknown"
-    return replace(flight, reason=f"accuracy ratio of the reference {told}, wanted {least:g}")
+    return replace(flight, reason=f"accuracy ratio of the reference {told}, {least:g} needed")
 
 
 def _unit_of(saved: SavedFlight, topic: str) -> str:

@@ -423,7 +423,7 @@ def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configu
         if one.is_named or one.path.resolve() not in judges:
             found[str(one.path)] = FarLog(str(one.path), one.is_named, one.path.stat().st_size)
     if not found:
-        hint = "what groundstation made is no input" if any(path.is_dir() and is_ours(path) for path in near) else ""
+        hint = "output of groundstation is no input" if any(path.is_dir() and is_ours(path) for path in near) else ""
         raise UsageError(", ".join(map(str, paths)), "no log in it", "", hint)
     return tuple(log for _, log in sorted(found.items()))
 

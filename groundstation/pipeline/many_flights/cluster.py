@@ -68,7 +68,7 @@ def on_cluster(
         for future in ended:
             number, job = running.pop(future.key)
             if future.cancelled():
-                hint = "start it, and run again: what was finished is kept"
+                hint = "start it and run again: finished work is kept"
                 raise GroundstationError(scheduler, "the scheduler is gone", "", hint)
             error = future.exception()
             result = future.result() if error is None else _failed(job, error)

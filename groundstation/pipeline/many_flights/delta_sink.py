@@ -12,7 +12,7 @@ from groundstation.pipeline.one_flight.outcome import Outcome
 KIND = "delta:"
 DIGEST = "row_sha256"
 TRIES = 20  # of a commit that another writer comes before: each time one of them has written
-MEANING = "of the row: a row that is there with the same one is not written again"
+MEANING = "of the row: a row already there with the same digest is not written again"
 
 
 def delta_place(store: str) -> str:

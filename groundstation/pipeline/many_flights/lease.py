@@ -42,7 +42,7 @@ class Lease:
         """Raise GroundstationError when another run has taken over, as it may once the lock has ended."""
         held = _held(self._folder)
         if held is None or held.token != self._token:
-            owner = "somebody who removed its lock" if held is None else held.owner
+            owner = "the lock was removed" if held is None else held.owner
             raise GroundstationError(self._folder.url, f"another run took over ({owner})", "", "run again")
 
     def release(self) -> None:
@@ -94,7 +94,7 @@ def _taken(folder: RemoteFolder, held: _Held | None) -> UsageError:
     if held is None:
         return UsageError(folder.url, "another run began at the same moment", "", "run again")
     until = utc_ns_to_iso(int(held.until_s) * NS_PER_S)
-    hint = f"wait for it; should it be dead, its lock ends at {until} (or remove {LOCKS}/{held.name} there)"
+    hint = f"wait for it; if it is dead, its lock ends at {until} (or remove {LOCKS}/{held.name} there)"
     return UsageError(folder.url, f"another run is writing into it ({held.owner})", "", hint)
 
 

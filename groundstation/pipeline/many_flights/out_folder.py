@@ -19,7 +19,9 @@ def refuse_foreign(out: Path, force: bool) -> None:
     if out.exists() and not out.is_dir():
         raise UsageError(str(out), "a file", "a folder for the results")
     if out.is_dir() and not is_ours(out) and not force and any(one.name != LOCK for one in out.iterdir()):
-        raise UsageError(str(out), "a folder that groundstation did not make", "a new or own folder", "-f uses it")
+        raise UsageError(
+            str(out), "a folder that groundstation did not make", "a new folder or one it made", "-f uses it"
+        )
     if (out / FLIGHT_FOLDER_MARK).exists():
         raise UsageError(str(out), "a flight folder", "a folder that holds flight folders", "name another -o")
 

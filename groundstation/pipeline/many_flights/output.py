@@ -101,7 +101,7 @@ class RemoteOutput:
             raise UsageError(self._out.url, "a flight folder", "a folder that holds flight folders", "name another -o")
         if names and OUT_FOLDER_MARK not in names and BY_LOG not in names and not force:
             raise UsageError(
-                self._out.url, "a folder that groundstation did not make", "a new or own folder", "-f uses it"
+                self._out.url, "a folder that groundstation did not make", "a new folder or one it made", "-f uses it"
             )
 
     def copy_all(self) -> None:

@@ -278,7 +278,7 @@ def _reason(one: Member, named: Mapping[str, Sequence[Member]], grouped: set[Pat
     others = [other for name in one.hears - {one.aircraft} for other in named.get(name, ())]
     names = ", ".join(sorted({other.aircraft for other in others}))
     if any(overlap_ns(one.span_ns, other.span_ns) > 0 and other.folder in grouped for other in others):
-        return f"ranges to {names}, in no session: the flights that overlap are in one with another of {one.aircraft}"
+        return f"ranges to {names}, in no session: flights that overlap are in one with another {one.aircraft} flight"
     away_ns = [-overlap_ns(one.span_ns, other.span_ns) for other in others if one.span_ns and other.span_ns]
-    nearest = f", {min(away_ns) / NS_PER_S:.0f} s away at the least" if away_ns else ""
-    return f"ranges to {names}, in no session: no flight of these overlaps{nearest}"
+    nearest = f", {min(away_ns) / NS_PER_S:.0f} s away at least" if away_ns else ""
+    return f"ranges to {names}, in no session: none of their flights overlaps{nearest}"

@@ -101,7 +101,7 @@ def watch(
         When the folder does not exist, or is ``out``; when ``out`` is a folder of others and ``force`` is not given.
     """
     if not folder.is_dir():
-        raise UsageError(str(folder), "no such folder", "a folder that logs arrive in")
+        raise UsageError(str(folder), "no such folder", "a folder where logs arrive")
     if folder.resolve() == out.resolve():
         raise UsageError(str(out), "the folder that is watched", "another one for the results")
     refuse_foreign(out, force)

@@ -110,11 +110,11 @@ def _told(corrected: "CorrectedHeading", deviation: Deviation, whose: str) -> Fi
     parts = [f"{whose} ({deviation.method}, {deviation.verdict}) applied to {corrected.topic} by {how}"]
     parts.append(f"{len(corrected)} headings")
     if kind_of(corrected.topic) == "ins" and deviation.magnetometer_topic:
-        parts.append(f"it was found for {deviation.magnetometer_topic}: right only where that is the same sensor")
+        parts.append(f"it was found for {deviation.magnetometer_topic}: correct only if that is the same sensor")
     if corrected.lacks_current:
-        parts.append("it depends on a current that this log lacks, taken for that of its figures")
+        parts.append("it depends on a current that this log lacks: that of its figures is assumed")
     if not corrected.model:
-        parts.append("no true heading: no declination for want of date or position")
+        parts.append("no true heading: the declination needs a date and a position")
     return Finding("info", APPLIED, "; ".join(parts), corrected.topic)
 
 
@@ -147,7 +147,7 @@ def _judged(
         return []
     residual, count = found
     text = (
-        f"magnetic heading minus INS true heading less declination in level flight: {residual.before:.2f} deg RMS "
+        f"magnetic heading plus declination minus INS true heading in level flight: {residual.before:.2f} deg RMS "
         f"before, {residual.after:.2f} after the deviation was applied ({count} headings of {corrected.topic})"
     )
     if residual.after <= residual.before:

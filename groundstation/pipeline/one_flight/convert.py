@@ -77,7 +77,7 @@ def _convert_recorded(log: Log, target: Path, limits: Thresholds, references: Re
     items = log.replay()
     found = survey(items, thresholds=limits)
     if not found.ledger.topics:
-        raise UnreadableLogError(log.path.name, "no record that could be read", "", "`info` tells what the file is")
+        raise UnreadableLogError(log.path.name, "no readable record", "", "`info` shows what the file is")
     topics = found.ledger.topics
     if references.paths and any(kind_of(one.topic) == TRUTH for one in topics):
         raise GroundstationError(log.path.name, *OWN_TRUTH)

@@ -357,7 +357,7 @@ def _told(part: _Part, rows: int, reordered: int, start_ns: int) -> JoinedLog:
     source, relation = part.log.source, part.relation
     own = JoinedLog(part.label, source.name, source.sha256, source.reader, rows, "own_clock", reordered=reordered)
     if relation is None:
-        return replace(own, reason="the flight has its clock")
+        return replace(own, reason="the flight uses its clock")
     gap_sigma = relation.gnss_less_motion_sigma_s
     return replace(
         own,

@@ -83,9 +83,9 @@ def laid_beside(log_name: str, span_ns: tuple[int, int], has_utc: bool, referenc
     from groundstation.tables.table import Flight
 
     if not has_utc and references.is_expected:
-        raise GroundstationError(log_name, "a log without UTC", "UTC, by which a reference is put on its clock")
+        raise GroundstationError(log_name, "a log without UTC", "UTC, which a reference needs")
     if not has_utc:
-        text = "no reference: the log has no UTC, by which one is put on its clock"
+        text = "no reference used: the log has no UTC, which a reference needs"
         return Laid(findings=(Finding("info", "reference.none", text),))
     found, unread = [], []
     for path in references.paths:
@@ -100,9 +100,7 @@ def laid_beside(log_name: str, span_ns: tuple[int, int], has_utc: bool, referenc
             found.append((load_reference(path), table))
     if len(found) > 1:
         names = ", ".join(reference.name for reference, _ in found)
-        raise GroundstationError(
-            log_name, f"several references at its time: {names}", "one", "name the one to judge by"
-        )
+        raise GroundstationError(log_name, f"several references cover its time: {names}", "one", "name the one to use")
     if not found:
         nothing = _nothing(log_name, span_ns, references)
         return replace(nothing, findings=(*unread, *nothing.findings))
@@ -125,8 +123,8 @@ def _nothing(log_name: str, span_ns: tuple[int, int], references: References) ->
     if references.is_expected:
         names, theirs = (", ".join(map(tell, references.paths)) for tell in (_name_of, _span_text))
         when = " to ".join(utc_ns_to_iso(one, 0) for one in span_ns)
-        raise GroundstationError(names, f"a reference of {theirs}", f"one of the time of {log_name}, {when}")
-    text = f"none of {len(references.paths)} references is of the time of this log"
+        raise GroundstationError(names, f"a reference that covers {theirs}", f"one that covers {log_name}, {when}")
+    text = f"none of {len(references.paths)} references covers the time of this log"
     return Laid(findings=(Finding("info", "reference.none", text),))
 
 
@@ -147,7 +145,7 @@ def _findings(reference: Reference, table: "Table") -> list[Finding]:
     text = f"{name} ({reference.reader}, {reference.table.topic}) judges this flight: {len(table)} samples as truth"
     found = [Finding("info", "reference.laid", text, TRUTH)]
     if reference.is_weekly:
-        text = f"{name} tells seconds of a GPS week and no date: the week is that of the log"
+        text = f"{name} has seconds of a GPS week but no date: the week of the log is used"
         found.append(Finding("info", "reference.week", text, TRUTH))
     lost = [damage for damage in reference.damages if damage.loses_data]
     if lost:

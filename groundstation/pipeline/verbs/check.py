@@ -238,7 +238,7 @@ def _checked(
     fail_on: str,
 ) -> Checked:
     if not ledger.topics:
-        reason = f"{log.path.name}: no record that could be read: `info` tells what the file is"
+        reason = f"{log.path.name}: no readable record: `info` shows what the file is"
         outcome = Outcome(str(log.path), "failed", reason, sha256=log.source.sha256)
         return Checked(outcome, facts, ledger, clock, findings)
     gravest = worst(findings)

@@ -72,7 +72,7 @@ def compare(a: Path, b: Path, event: Event | None = None) -> tuple[Comparison, S
     """
     if is_session(a) != is_session(b):
         session = a if is_session(a) else b
-        raise UsageError(str(session), "a session of several aircraft", "a flight, as the other is")
+        raise UsageError(str(session), "a session of several aircraft", "a flight, like the other")
     saved_a, saved_b = _load(a), _load(b)
     one, other = _side(saved_a), _side(saved_b)
     origins = {_origin(saved) for saved in (saved_a, saved_b)}

@@ -147,7 +147,7 @@ def _written_alone(write: Callable[[Path, Track], int], target: Path, tracks: tu
     for track in tracks:
         try:
             left_out = write(target, track)
-            lacking = f", {left_out} left out that lack what the format needs" if left_out else ""
+            lacking = f", {left_out} left out: they lack what the format needs" if left_out else ""
             return f"{track.name} ({len(track) - left_out}{lacking})"
         except NotAssessableError as error:
             reasons.append(error)

@@ -34,7 +34,7 @@ def export_figures(folder: Path, target: Path, names: Sequence[str] = (), *, for
         When there is no such folder or figure, or a file is there already and ``force`` is not given.
     """
     if not folder.is_dir():
-        raise UsageError(str(folder), "no folder", "a flight folder that `run` made: figures are of its answers")
+        raise UsageError(str(folder), "no folder", "a flight folder that `run` made: only it has figures")
     saved = saved_flight(folder)
     for name in names:
         if name not in saved.figures:
@@ -61,7 +61,7 @@ def _refuse_saved(place: Path) -> None:
     """Refuse the tables of a run: summary.json and later runs count on them as they were written."""
     place = place.resolve()
     if place.name in (TABLES, ARRAYS) and (place.parent / FLIGHT_FOLDER_MARK).is_file():
-        raise UsageError(str(place), "a folder of the run's own", "another one: -f does not overwrite results")
+        raise UsageError(str(place), "a folder of the run's own results", "another one: -f does not overwrite results")
 
 
 def _with_utc(figure: FigureData, start_utc_ns: int | None) -> FigureData:

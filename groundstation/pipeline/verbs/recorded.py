@@ -165,7 +165,7 @@ def _flights(files: Sequence[Path], findings: list[Finding]) -> list[Flight]:
                 findings.append(Finding("warn", "session.unreadable", str(error), place=path.name))
                 continue
             if converted.has_lost_data:
-                text = f"{path.name} lost data; `groundstation check` tells what"
+                text = f"{path.name} lost data; `groundstation check` shows what"
                 findings.append(Finding("warn", "session.lost_data", text, place=path.name))
             info = converted.info
             batches = (item for item in read(target) if isinstance(item, RecordBatch))

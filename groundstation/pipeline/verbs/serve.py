@@ -45,8 +45,8 @@ def serve(
     if web and not _is_loopback(host):
         raise UsageError(
             f"--web --host {host}",
-            "Rerun's catalog server answers pages of its own machine alone",
-            next_step="leave --web out; others open the catalog in their own viewer",
+            "Rerun's catalog server serves only pages of its own machine",
+            next_step="omit --web; others open the catalog in their own viewer",
         )
     flights, sessions, fleet = recordings_in(out, say)
     stop = threading.Event()
@@ -128,4 +128,4 @@ def _serve_page(url: str, host: str) -> None:
     command = viewer_command(url, web=True, host=host, headless=True)
     code = subprocess.run(command, check=False, env=viewer_environment(os.environ)).returncode
     if code:
-        raise GroundstationError("the Rerun web viewer", f"ended with code {code}; its own lines stand above")
+        raise GroundstationError("the Rerun web viewer", f"ended with code {code}; see its output above")

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from groundstation.studies.page import StudyResult
 
 STUDIES = {
-    "heading": "heading correction before take-off: errors, coverage of the interval, the figures of the paper again",
+    "heading": "heading correction before take-off: errors, coverage of the interval, figures of the paper repeated",
     "forecast": "forecast of INS errors: every method under true and false models, and how honest its sigma is",
     "magnetic": "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
     "cooperative": "navigation between aircraft: published figures with ours beside them, divergence, consistency",

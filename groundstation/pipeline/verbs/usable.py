@@ -93,7 +93,7 @@ def usability_of_session(
     absent = sorted(heard - {*assembled.session.names, *(point.name for point in assembled.session.points)})
     if absent:
         shown = ", ".join(absent)
-        told = (Shortfall(f"ranges to {shown}, of whom no log is named: name theirs beside it"), *told)
+        told = (Shortfall(f"ranges to {shown}, but no log of them is named: add theirs"), *told)
     if len(assembled.session.vehicles) == 1 and absent:
         return Usability(purpose, "in part", told)
     found = _examined(analysis, assembled.session, known)

@@ -66,7 +66,7 @@ def look_at(
                 raise GroundstationError(where, found)
             code = open_viewer(_recording(Path(outcome.folder)), web=web, host=host, port=port, say=say)
     if code:
-        raise GroundstationError("the Rerun viewer", f"ended with code {code}; its own lines stand above")
+        raise GroundstationError("the Rerun viewer", f"ended with code {code}; see its output above")
 
 
 def _sound(recording: Path) -> Path:
