@@ -103,3 +103,13 @@ with with_pandas():
 assert pa.table(dict(x=[3.0])).to_pandas()["x"].sum() == 3.0
 """
     assert loaded(program, names=("pandas",)) == ["pandas"]
+
+
+def test_a_reader_of_others_finds_pandas(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "other-1.0.dist-info"
+    folder.mkdir()
+    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: other\nVersion: 1.0\n")
+    (folder / "entry_points.txt").write_text("[groundstation.readers]\nother = other\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    program = "import sys\nfrom groundstation.base.without_pandas import spare_pandas\nspare_pandas()\nimport pandas\n"
+    assert loaded(program, names=("pandas",)) == ["pandas"]

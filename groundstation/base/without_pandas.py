@@ -7,7 +7,16 @@ process, none of which has a Series. For processes of the command line alone: in
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from types import ModuleType
+
+
+@cache
+def _has_readers_of_others() -> bool:
+    """Whether somebody added a format: such a reader may import pandas whenever it likes."""
+    from importlib.metadata import entry_points
+
+    return any(not one.value.startswith("groundstation.") for one in entry_points(group="groundstation.readers"))
 
 
 class _NoPandas:
@@ -15,7 +24,7 @@ class _NoPandas:
 
     @staticmethod
     def find_spec(name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> None:
-        if name == "pandas":
+        if name == "pandas" and not _has_readers_of_others():
             raise ModuleNotFoundError("this process does without pandas", name=name)
 
 
