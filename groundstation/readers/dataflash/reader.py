@@ -41,6 +41,7 @@ def items(source: Source) -> Iterator[Item]:
         yield from mapper.batches()
     yield from remarks
     yield from choices.remarks(found, mapper.fields)
+    yield from mapper.remarks()
     yield from found.damages
     yield from mapper.damages()
     yield from doubts(scanner.payloads, scanner.definitions, by_type)
@@ -57,7 +58,7 @@ def _rows(block: Block, found: Overview) -> Iterator[Rows]:
             continue
         rows = rows_of(definition, block.records(definition, which), block.first_index + which)
         name = found.units.instance_field(definition)
-        if name is None or definition.type_id not in found.split:
+        if name is None or (definition.type_id, definition.name) not in found.split:
             yield rows
         else:
             yield from by_instance(rows, name)
