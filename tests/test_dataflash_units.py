@@ -136,7 +136,7 @@ def log_of(chosen: dict[str, tuple[str, str, str, bool]], with_tables: bool = Tr
     return log
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(derandomize=True, max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(chosen=ways())
 def test_values_are_raw_times_the_documented_factor(
     chosen: dict[str, tuple[str, str, str, bool]], tmp_path: Path

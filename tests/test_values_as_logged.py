@@ -156,7 +156,7 @@ def written(form: str, folder: Path) -> tuple[bytes, int]:
 
 
 @pytest.mark.parametrize("form", MUTATED)
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(derandomize=True, max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(changes=st.lists(st.tuples(st.floats(0.0, 1.0), st.integers(1, 255)), min_size=1, max_size=12))
 def test_values_of_a_log_with_changed_bytes(
     tmp_path_factory: pytest.TempPathFactory, form: str, changes: list[tuple[float, int]]
