@@ -87,6 +87,16 @@ def test_a_transfer_between_terminals_is_the_same_message(tmp_path: Path, receiv
     assert rows(items, "ins")["roll_deg"].tolist() == [200 * 180 / 2**15, 300 * 180 / 2**15]
 
 
+def test_zeros_of_a_unit_without_a_position_are_none(tmp_path: Path) -> None:
+    words = [(1, 200_000, made.word_429(label, 4_000 * (at > 2))) for at in range(5) for label in (0o310, 0o311, 0o314)]
+    items = read(tmp_path, made.packet(4, 0x38, made.words_429(words), 0), shipped("arinc429_inertial"))
+    found = rows(items, "ins")
+    assert np.isfinite(found["latitude_deg"]).sum() == 2 and np.isfinite(found["true_heading_deg"]).sum() == 5
+    assert texts(items, "not_used") == [
+        "ins: 3 records with latitude and longitude 0: no position, kept as raw values alone"
+    ]
+
+
 def test_one_terminal_on_two_channels_is_two_units(tmp_path: Path) -> None:
     icd = load(icd_file(tmp_path))
     packets = [made.packet(channel, 0x19, made.messages_1553([message(0, 1, channel)]), 0) for channel in (4, 5)]

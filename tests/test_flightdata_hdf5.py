@@ -52,6 +52,19 @@ def fields(log: Read, topic: str) -> set[str]:
     return {name for batch in log.batches if batch.topic == topic for name in batch.columns}
 
 
+@pytest.mark.parametrize("offset", [0.0, 0.5])
+def test_zeros_are_no_position(tmp_path: Path, offset: float) -> None:
+    """Beside them a longitude of other times is interpolated from one: it is none either."""
+    from_fix = np.where(np.arange(ROWS) < 5, 0.0, 1.0)
+    parameters = {"Latitude": {"data": 60.0 * from_fix}, "Longitude": {"data": 10.0 * from_fix, "offset": offset}}
+    log = Read(write_flightdata(tmp_path / "log.hdf5", parameters))
+    assert set(log.values("ins", "latitude_deg")) == {60.0} and set(log.values("ins", "longitude_deg")) == {10.0}
+    assert len(log.values("raw.Latitude", "value")) == ROWS
+    (damage,) = log.damages
+    assert (damage.topic, damage.loses_data) == ("ins", False) and "no position" in damage.what
+    assert damage.count == (5 if offset == 0.0 else 4)
+
+
 def test_units_signs_and_times(tmp_path: Path) -> None:
     log = Read(plain(tmp_path / "log.hdf5"))
     assert log.header.reader == "flightdata-hdf5" and log.header.utc_of_zero_ns == START_UTC_S * NS_PER_S
