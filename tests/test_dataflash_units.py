@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from groundstation.base.records import Damage
 from groundstation.readers.dataflash.definitions import Units, parse
 from tests.dataflash_writer import DataFlash
+from tests.real_logs import real_log
 from tests.test_dataflash import Log
 
 ROUNDING = 1e-6  # single precision, relative
@@ -342,3 +343,21 @@ def test_instances_that_no_autopilot_has_leave_no_inertial_sensor(tmp_path: Path
     log.write("IMU", 1, 200, 0.1, 0.2, 0.3)
     read = Log(tmp_path / "log.BIN", log.content)
     assert "ins" not in read.flight.topics() and isinstance(read.damages[0], Damage)
+
+
+@pytest.mark.real_log
+@pytest.mark.parametrize(
+    ("name", "satellites", "hdop"),
+    [
+        ("dataflash/copter_3.6.7_log0041.BIN", {11, 12, 13}, (0.5, 1.5)),
+        ("dataflash/plane_4.2.3_pilot0004.BIN", {0, 5, 6}, (1.0, 100.0)),
+        ("cases/d12_hdop_9_9.bin", {4}, (9.9, 9.9)),
+        ("cases/d12_hdop_9_9_units_of_4.2.bin", {4}, (9.9, 9.9)),
+    ],
+)
+def test_satellites_and_dilution_of_recorded_logs(
+    tmp_path: Path, name: str, satellites: set[int], hdop: tuple[float, float]
+) -> None:
+    read = Log(tmp_path / "log.BIN", real_log(name).read_bytes())
+    assert set(read.present("gnss", "satellites_used")) == satellites
+    assert min(read.present("gnss", "hdop")) >= hdop[0] and max(read.present("gnss", "hdop")) <= hdop[1]
