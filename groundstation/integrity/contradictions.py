@@ -32,6 +32,7 @@ OFF_DEG = 60.0  # nose against track
 FAST_MPS = 25.0  # no multirotor flies sideways so fast for a minute
 ALIGNED = 0.8  # length of the mean direction of what lasts: an offset, not a spin
 HEIGHT_M, HEIGHT_SHARE = 200.0, 0.2  # weather moves pressure altitude by less, cold air by less of the climb
+ANY = 1e7  # metres, metres per second or degrees
 HEADINGS = ("true_heading_deg", "magnetic_heading_deg")
 ALTITUDES = ("altitude_msl_m", "altitude_ellipsoid_m")
 WHEELS = "odometry"  # kind of topic that only a vehicle on wheels has
@@ -122,9 +123,14 @@ def _series_of(motion: Motion, clock: ClockModel) -> tuple[int, list[_Series]]:
     for topic, index, device_ns, columns in motion.samples():
         time_ns = clock.time_ns(index, Column(device_ns))
         order = np.argsort(time_ns, kind="stable")
-        placed.append((topic, time_ns[order], {name: values[order] for name, values in columns.items()}))
+        placed.append((topic, time_ns[order], {name: _possible(name, one[order]) for name, one in columns.items()}))
     zero_ns = min((int(time_ns[0]) for _, time_ns, _ in placed if len(time_ns)), default=0)
     return zero_ns, [_Series(topic, (time_ns - zero_ns) / NS_PER_S, columns) for topic, time_ns, columns in placed]
+
+
+def _possible(name: str, values: FloatArray) -> FloatArray:
+    """The values with NaN for what no motion has: the ledger tells of it as out of range."""
+    return np.where(np.abs(values) <= (90.0 if name == "latitude_deg" else ANY), values, np.nan)
 
 
 def _windows_of(one: _Series) -> _Windows | None:
