@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from groundstation.chapters.assessed import SUBJECTS
+from groundstation.chapters.inertial_claim import is_start_unknown
 from groundstation.chapters.parts import Facts, Section
 from groundstation.chapters.wording import number, significant
 from groundstation.results.flight import FlightResults
@@ -92,6 +93,8 @@ def _advice(results: FlightResults) -> Iterator[tuple[str, str, str]]:
         yield "Record", FREE_INERTIAL, "INS errors"
     if inertial is not None and inertial.kind == "unknown":
         yield "Check", "whether GNSS corrects this INS (ins_kind of the aircraft file)", "INS errors"
+    if inertial is not None and is_start_unknown(inertial):
+        yield "Check", "when the INS began to navigate (nav_start_utc of the aircraft file)", "INS errors"
     if results.status != "ok":
         yield "Check", LOST, ""
 

@@ -129,7 +129,8 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
     topics = tuple(ledger for ledger, _lateness in results)
     clock = replace(clock, lateness_ns={ledger.topic: lateness for ledger, lateness in results})
     dropouts, timeline = (contents.dropouts(clock), contents.timeline(clock)) if clock.has_times else ((), None)
-    ledger = LedgerCounts(topics, clock, tuple(damages), tuple(remarks), limits, dropouts, timeline)
+    against = contents.contradictions(clock, header.metadata) if clock.has_times else ()
+    ledger = LedgerCounts(topics, clock, tuple(damages), tuple(remarks), limits, dropouts, timeline, against)
     return Survey(header, clock, replace(ledger, damages=(*damages, *broken_off(ledger))))
 
 
