@@ -138,6 +138,8 @@ _LEAP_SECONDS = (
 _GPS_EPOCH_S = 315_964_800  # 1980-01-06, seconds since 1970
 GPS_EPOCH_NS = _GPS_EPOCH_S * NS_PER_S
 _S_PER_WEEK = 604_800
+ROLLOVER_WEEKS = 1_024  # the GPS week of the satellites' message has ten bits
+ROLLOVER_NS = ROLLOVER_WEEKS * _S_PER_WEEK * NS_PER_S
 
 
 def leap_seconds_at(utc_ns: int) -> int:
@@ -149,6 +151,35 @@ def leap_seconds_at(utc_ns: int) -> int:
     (17, 18)
     """
     return max((leap for day, leap in _LEAP_SECONDS if iso_to_utc_ns(f"{day}T00:00Z")[0] <= utc_ns), default=0)
+
+
+MOST_LEAP_S = 20  # GPS time less UTC, for some years to come
+_NEAR_WEEK_S, _NEAR_SECOND_S = 30, 0.15  # of whole weeks (leap seconds may be wrong too), of whole seconds
+
+
+def whole_weeks(difference_ns: int) -> int:
+    """Weeks by which two times differ, 0 where they do not differ by whole weeks.
+
+    Examples
+    --------
+    >>> whole_weeks(-604_800 * NS_PER_S), whole_weeks(3 * 604_800 * NS_PER_S + 5), whole_weeks(86_400 * NS_PER_S)
+    (-1, 3, 0)
+    """
+    weeks = round(difference_ns / (_S_PER_WEEK * NS_PER_S))
+    return weeks if abs(difference_ns - weeks * _S_PER_WEEK * NS_PER_S) < _NEAR_WEEK_S * NS_PER_S else 0
+
+
+def leap_seconds_late(difference_ns: int) -> int:
+    """Whole seconds by which a time is late for want of leap seconds, 0 where it is not.
+
+    Examples
+    --------
+    >>> leap_seconds_late(2_010_000_000), leap_seconds_late(2_500_000_000), leap_seconds_late(-2 * NS_PER_S)
+    (2, 0, 0)
+    """
+    whole_s = round(difference_ns / NS_PER_S)
+    is_near = abs(difference_ns - whole_s * NS_PER_S) < _NEAR_SECOND_S * NS_PER_S
+    return whole_s if is_near and 0 < whole_s <= MOST_LEAP_S else 0
 
 
 def gps_week_to_utc_ns(week: NDArray[np.int64] | int, week_ms: NDArray[np.int64] | int) -> NDArray[np.int64]:

@@ -12,9 +12,11 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.atmosphere import pressure_altitude_m
+from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Column, Remark
 
 Columns: TypeAlias = dict[str, Column]
+_PLACE = ("latitude_deg", "longitude_deg", "altitude_msl_m", "altitude_ellipsoid_m")
 
 
 class Numbers(Protocol):
@@ -120,6 +122,27 @@ def scaled(fields: Mapping[str, tuple[str, float]]) -> Callable[[Numbers], Colum
 def holds(numbers: Numbers, name: str) -> BoolArray | None:
     """Where a flag is set, shape (n,); None in messages that have no such flag."""
     return numbers[name] != 0.0 if name in numbers else None
+
+
+def without_zero_position(columns: Columns) -> tuple[Columns, int]:
+    """Columns without the positions 0, 0 and their heights, and how many there were.
+
+    Examples
+    --------
+    >>> place = {"latitude_deg": Column(np.zeros(2)), "longitude_deg": Column(np.array([0.0, 38.0]))}
+    >>> found, count = without_zero_position(place)
+    >>> found["latitude_deg"].mask.tolist(), count
+    ([False, True], 1)
+    """
+    if "latitude_deg" not in columns or "longitude_deg" not in columns:
+        return columns, 0
+    latitude, longitude = columns["latitude_deg"], columns["longitude_deg"]
+    is_told = latitude.mask & longitude.mask & np.isfinite(latitude.values) & np.isfinite(longitude.values)
+    is_zero = is_told & ~has_position(latitude.values, longitude.values)
+    if not is_zero.any():
+        return columns, 0
+    placed = {name: Column(columns[name].values, columns[name].mask & ~is_zero) for name in _PLACE if name in columns}
+    return columns | placed, int(is_zero.sum())
 
 
 def pressure_altitude(pressure_pa: FloatArray) -> Columns:
