@@ -139,7 +139,8 @@ _GPS_EPOCH_S = 315_964_800  # 1980-01-06, seconds since 1970
 GPS_EPOCH_NS = _GPS_EPOCH_S * NS_PER_S
 _S_PER_WEEK = 604_800
 ROLLOVER_WEEKS = 1_024  # the GPS week of the satellites' message has ten bits
-ROLLOVER_NS = ROLLOVER_WEEKS * _S_PER_WEEK * NS_PER_S
+WEEK_NS = _S_PER_WEEK * NS_PER_S
+ROLLOVER_NS = ROLLOVER_WEEKS * WEEK_NS
 
 
 def leap_seconds_at(utc_ns: int) -> int:
@@ -165,8 +166,8 @@ def whole_weeks(difference_ns: int) -> int:
     >>> whole_weeks(-604_800 * NS_PER_S), whole_weeks(3 * 604_800 * NS_PER_S + 5), whole_weeks(86_400 * NS_PER_S)
     (-1, 3, 0)
     """
-    weeks = round(difference_ns / (_S_PER_WEEK * NS_PER_S))
-    return weeks if abs(difference_ns - weeks * _S_PER_WEEK * NS_PER_S) < _NEAR_WEEK_S * NS_PER_S else 0
+    weeks = round(difference_ns / WEEK_NS)
+    return weeks if abs(difference_ns - weeks * WEEK_NS) < _NEAR_WEEK_S * NS_PER_S else 0
 
 
 def leap_seconds_late(difference_ns: int) -> int:

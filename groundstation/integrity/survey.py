@@ -16,6 +16,7 @@ from groundstation.base.records import BoolArray, Column, Damage, Int64Array, It
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.breaks_off import broken_off
 from groundstation.integrity.clock import ClockModel, estimate_clock
+from groundstation.integrity.clock_dates import doubtful_date
 from groundstation.integrity.clock_references import ClockReferences
 from groundstation.integrity.contents import Contents
 from groundstation.integrity.counting import CountingSettings, estimate_counting_clock
@@ -130,6 +131,8 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
     clock = replace(clock, lateness_ns={ledger.topic: lateness for ledger, lateness in results})
     dropouts, timeline = (contents.dropouts(clock), contents.timeline(clock)) if clock.has_times else ((), None)
     ledger = LedgerCounts(topics, clock, tuple(damages), tuple(remarks), limits, dropouts, timeline)
+    doubt = doubtful_date(header.reader, ledger.start_ns, remarks) if clock.is_absolute and topics else None
+    ledger = replace(ledger, remarks=(*remarks, doubt)) if doubt else ledger
     return Survey(header, clock, replace(ledger, damages=(*damages, *broken_off(ledger))))
 
 
