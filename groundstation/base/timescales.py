@@ -204,6 +204,34 @@ def gps_week_to_utc_ns(week: NDArray[np.int64] | int, week_ms: NDArray[np.int64]
     return np.asarray(whole_ns + np.asarray(week_ms, dtype=np.int64) % 1000 * 1_000_000, dtype=np.int64)
 
 
+def utc_to_gps_ns(utc_ns: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Moments of UTC as a date and time of GPS time, the leap seconds of their day more; what turns GPS time into UTC,
+    the other way round.
+
+    Examples
+    --------
+    >>> told = np.array([iso_to_utc_ns("2025-08-28T17:30:21.749Z")[0]])
+    >>> utc_ns_to_iso(int(utc_to_gps_ns(told)[0])), bool((gps_to_utc_ns(utc_to_gps_ns(told)) == told).all())
+    ('2025-08-28T17:30:39.749Z', True)
+    """
+    days_s = np.array([day for day, _leap in _LEAP_SECONDS], dtype="datetime64[s]").astype(np.int64)
+    leaps = np.array([0, *(leap for _day, leap in _LEAP_SECONDS)], dtype=np.int64)
+    utc_ns = np.asarray(utc_ns, dtype=np.int64)
+    return np.asarray(utc_ns + leaps[np.searchsorted(days_s, utc_ns // NS_PER_S, side="right")] * NS_PER_S)
+
+
+def weeks_later_ns(utc_ns: NDArray[np.int64], weeks: NDArray[np.int64] | int) -> NDArray[np.int64]:
+    """UTC of the same second of the GPS week in another week: leap seconds may have come between.
+
+    Examples
+    --------
+    >>> told = np.array([iso_to_utc_ns("2004-09-20T10:00:05Z")[0]])
+    >>> utc_ns_to_iso(int(weeks_later_ns(told, ROLLOVER_WEEKS)[0]))
+    '2024-05-06T10:00:00.000Z'
+    """
+    return gps_to_utc_ns(utc_to_gps_ns(utc_ns) + np.asarray(weeks, dtype=np.int64) * WEEK_NS)
+
+
 def gps_to_utc_ns(gps_ns: NDArray[np.int64]) -> NDArray[np.int64]:
     """UTC nanoseconds since 1970 of moments that are written as a date and time of GPS time, less its leap seconds.
 

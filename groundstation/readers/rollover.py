@@ -10,8 +10,17 @@ Source: u-blox, GPS week number rollover workaround (UBX-19016936); gpsd, timeba
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from groundstation.base.records import Remark
-from groundstation.base.timescales import ROLLOVER_NS, ROLLOVER_WEEKS, iso_to_utc_ns, leap_seconds_at, utc_ns_to_iso
+from groundstation.base.timescales import (
+    ROLLOVER_NS,
+    ROLLOVER_WEEKS,
+    iso_to_utc_ns,
+    leap_seconds_at,
+    utc_ns_to_iso,
+    weeks_later_ns,
+)
 from groundstation.base.units import NS_PER_S
 
 CODE = "week_rollover"
@@ -57,9 +66,9 @@ class Rollovers:
         >>> utc_ns_to_iso(told_ns + Rollovers(1).shift_ns(told_ns, is_gps_time=True))
         '2024-05-06T10:00:00.000Z'
         """
-        moved_ns = self.count * ROLLOVER_NS
-        more_s = leap_seconds_at(told_ns + moved_ns) - leap_seconds_at(told_ns) if is_gps_time else 0
-        return moved_ns - more_s * NS_PER_S
+        if is_gps_time:
+            return int(weeks_later_ns(np.array([told_ns]), self.count * ROLLOVER_WEEKS)[0]) - told_ns
+        return self.count * ROLLOVER_NS
 
 
 def rollovers(
