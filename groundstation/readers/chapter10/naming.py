@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.records import BoolArray, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.signals import kind_of, topics_of_kind
 from groundstation.readers.chapter10.bus_words import ANY_ERROR, TOPIC_429, TOPIC_1553, bounded, words_of
@@ -24,6 +25,7 @@ from groundstation.readers.icd import (
     usable_1553,
 )
 from groundstation.readers.icd.model import REVERSED_BYTE
+from groundstation.readers.mapping import without_zero_position
 
 # Codes of the remarks that naming makes.
 NAMING_CODES = ("icd", "icd_of_another", "mapped", "several_units", "derived", "bus_errors", "not_used")
@@ -166,6 +168,7 @@ class Namer:
         self._tags: dict[str, int] = {}
         self._derived: dict[str, None] = {}
         self._flagged: dict[str, tuple[int, int]] = {}
+        self._zeros: dict[str, int] = {}
         every: list[Element] = [one for word in found.words for one in word.elements if one.signal]
         every += [one for message in found.messages for one in message.elements if one.signal]
         signals = [str(one.signal).rpartition(".") for one in every]
@@ -193,7 +196,16 @@ class Namer:
                 self._derived[topic] = None
             made = merged(topic, ready, SAMPLE_NS if is_429 else 0) if ready else None
             if made is not None:
-                yield from bounded(made)
+                yield from bounded(self._placed(made))
+
+    def _placed(self, batch: RecordBatch) -> RecordBatch:
+        """A batch without the positions 0, 0 of a unit that has none yet; they are counted."""
+        columns, zeros = without_zero_position(dict(batch.columns))
+        if not zeros:
+            return batch
+        self._zeros[batch.topic] = self._zeros.get(batch.topic, 0) + zeros
+        rows = np.logical_or.reduce([column.mask for column in columns.values()])
+        return replace(batch, columns=columns).take(rows)
 
     def _of_429(self, batch: RecordBatch, table: _Table) -> Iterator[tuple[str, Piece]]:
         words = batch.columns["word"].values.astype(np.uint32, copy=False)
@@ -301,6 +313,8 @@ class Namer:
                 yield Remark(
                     "bus_errors", f"{topic}: {errors} of {total} messages have an error: kept, not used", topic
                 )
+        for topic, count in sorted(self._zeros.items()):
+            yield Remark("not_used", f"{topic}: {count} {NO_POSITION}", topic)
         for title, tally in self._tallies.items():
             why = [
                 f"{count} {text}"

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.records import MAX_BATCH_ROWS, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.signals import RAW_PREFIX
 from groundstation.base.source_units import PREFIX, units_entry
@@ -14,6 +15,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.readers.flightdata_hdf5.canonical import TRACK, Feed, feeds_of, track_feed, values_at
 from groundstation.readers.flightdata_hdf5.container import FAILURES, HIGHEST_RATE_HZ, Container, Parameter, opened
 from groundstation.readers.layout import velocity_from_track
+from groundstation.readers.mapping import without_zero_position
 from groundstation.readers.source import Source
 
 SLICE_S = MAX_BATCH_ROWS / HIGHEST_RATE_HZ
@@ -24,10 +26,11 @@ _ODD = re.compile(r"[^A-Za-z0-9_\-]+")
 
 @dataclass
 class _Losses:
-    """Parameters whose data turned out to be damaged, and by what."""
+    """Parameters whose data turned out to be damaged, and by what; positions that are none."""
 
     broken: dict[str, str] = field(default_factory=dict)
     lost: dict[str, int] = field(default_factory=dict)
+    zeros: dict[str, int] = field(default_factory=dict)
 
     def add(self, name: str, error: BaseException, samples: int) -> None:
         self.broken.setdefault(name, " ".join(str(error).split())[:100])
@@ -36,6 +39,8 @@ class _Losses:
     def damages(self) -> Iterator[Damage]:
         for name, reason in self.broken.items():
             yield Damage("corrupt", f"parameter {name}", self.lost[name], f"samples that cannot be read ({reason})")
+        for topic, count in self.zeros.items():
+            yield Damage("unreadable_cells", "the whole log", count, NO_POSITION, topic, loses_data=False)
 
 
 def items(source: Source, reader_name: str) -> Iterator[Item]:
@@ -124,6 +129,9 @@ def _canonical_batches(
                 continue
             is_flag = feed.field.kind == "bool"
             columns[feed.field.name] = Column(values != 0.0 if is_flag else values, present)
+        columns, zeros = without_zero_position(columns)
+        if zeros:
+            losses.zeros[topic] = losses.zeros.get(topic, 0) + zeros
         _with_velocities(columns)
         batch = _batch(topic, times_ns, columns)
         if batch is not None:
