@@ -91,6 +91,10 @@ def utc_of_power_up(times: GpsTimes, firmware: str = "") -> tuple[int | None, li
         f"{utc_ns_to_iso(utc_ns)}; late by the receiver's delay, some 0.1 to 0.2 s"
     )
     remarks = [Remark("utc_from_gps", text), *told.remarks("GPS time"), *found.remarks]
+    unknown = int((times.week == 0).sum())
+    if unknown:
+        text = f"GPS time: {unknown} fixes told week 0: the week was not known yet"
+        remarks.append(Remark("week_number", text))
     return utc_ns, remarks if told.passed_over else [*remarks, *_disagreement(zeros, device_ns)]
 
 

@@ -81,9 +81,13 @@ class Anchors:
         day_ns = self._in_time(places, day_ns)
         if not len(self):
             return Column(unrolled(day_ns, DAY_NS))
-        near_ns = self.utc_ns[self._before(places)]
+        at = self._before(places)
+        near_ns = self.utc_ns[at]
         midnight = near_ns // DAY_NS * DAY_NS
         utc_ns = _nearest([midnight + step * DAY_NS + day_ns for step in (-1, 0, 1)], near_ns)
+        next_ns = self.utc_ns[np.minimum(at + 1, len(self) - 1)]  # the date of an epoch may stand in its last sentence
+        is_same = next_ns % DAY_NS // NS_PER_S == day_ns // NS_PER_S
+        utc_ns = np.where(is_same, next_ns // DAY_NS * DAY_NS + day_ns, utc_ns)
         return self._credible(places, utc_ns, np.ones(len(places), dtype=bool))
 
     def in_their_week(self, places: Int64Array, time: Column) -> Column:

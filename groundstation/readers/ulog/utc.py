@@ -7,7 +7,7 @@ import numpy as np
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Int64Array, Remark
-from groundstation.base.timescales import iso_to_utc_ns, utc_ns_to_iso
+from groundstation.base.timescales import GPS_EPOCH_NS, iso_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.rollover import Earliest, OtherDate, rollovers
 from groundstation.readers.start import ToldZero, told_at_zero
@@ -17,6 +17,7 @@ from groundstation.readers.ulog.messages import Keyed, logged_text
 UTC_SOURCES = ("vehicle_gps_position", "sensor_gps", "vehicle_global_position")
 FIX_3D = 3
 _NS_PER_US = 1_000
+_EPOCH_US = GPS_EPOCH_NS // _NS_PER_US
 _EARLIEST_US = iso_to_utc_ns("1980-01-08T00:00:00Z")[0] // _NS_PER_US  # before it a clock was not set
 _LATEST_US = iso_to_utc_ns("2100-01-01T00:00:00Z")[0] // _NS_PER_US
 _BOOT_TIME, _OFFSET = "boot_time_utc_us", "time_ref_utc"
@@ -67,7 +68,7 @@ class Clocks:
             return
         rows = block.rows(layout, np.flatnonzero(block.topic == topic.number))
         utc, device = rows["time_utc_usec"].astype(np.uint64), rows["timestamp"]
-        good = (utc >= _EARLIEST_US) & (utc < _LATEST_US) & (device > 0) & (device < _LATEST_US)
+        good = (utc >= _EPOCH_US) & (utc < _LATEST_US) & (device > 0) & (device < _LATEST_US)
         if "fix_type" in layout.names:
             good &= rows["fix_type"] >= FIX_3D
         at_us = device[good].astype(np.int64)
@@ -96,7 +97,7 @@ class Clocks:
         """UTC of power-up by the surest of the clocks; ``release`` is the version of the firmware, as text."""
         own = self._own()
         told = {name: np.concatenate(self._told[name], axis=1) for name in sorted(self._told, key=_rank)}
-        told = {name: one for name, one in told.items() if one.shape[1] >= _FEWEST or one[0, -1] >= _FORMAT_NS}
+        told = {name: one for name, one in told.items() if _is_dated(one[0])}
         if not told:
             return PowerUp() if own is None else _dated(own.zero_ns, own.moment_ns, (own.remark,), release, ())
         receivers = {name: told_at_zero(*one) for name, one in told.items()}
@@ -161,6 +162,11 @@ def _utc_of_name(text: str, offset_s: int) -> int | None:
     except GroundstationError:
         return None
     return utc_ns if _EARLIEST_US <= utc_ns // _NS_PER_US < _LATEST_US else None
+
+
+def _is_dated(utc_ns: Int64Array) -> bool:
+    """Whether a receiver that told these times knew a date, be it one that cannot be true."""
+    return bool(utc_ns[-1] >= _FORMAT_NS or (utc_ns >= _EARLIEST_US * _NS_PER_US).sum() >= _FEWEST)
 
 
 def _chosen(receivers: dict[str, ToldZero]) -> tuple[str, ToldZero]:
