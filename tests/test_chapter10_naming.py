@@ -152,6 +152,32 @@ def test_samples_of_429_words(tmp_path: Path) -> None:
     np.testing.assert_allclose(batch.device_time_ns.values / 1e9, [0.0, 8e-4, 0.0212, 0.0412], atol=1e-12)
 
 
+def test_a_position_0_0_is_none(tmp_path: Path) -> None:
+    """An inertial unit that is not aligned: its words say that they hold computed data."""
+    words: list[tuple[int, int, int]] = []
+    for latitude, longitude in [(0.0, 0.0), (34.5, 0.0), (0.0, 0.0), (34.5, -117.5)]:
+        words += [(0, 200_000, made.word_429(0o310, bnr(latitude, 180)))]
+        words += [(0, 4_000, made.word_429(0o311, bnr(longitude, 180)))]
+        words += [(0, 4_000, made.word_429(0o314, bnr(-90, 180)))]
+    items = read(tmp_path, made.packet(7, 0x38, made.words_429(words), COUNTS_PER_S), shipped("arinc429_inertial"))
+    (batch,) = [item for item in items if isinstance(item, RecordBatch) and item.topic == "ins"]
+    assert batch.columns["latitude_deg"].mask.tolist() == [False, True, False, True]
+    assert batch.columns["true_heading_deg"].values.tolist() == [270.0] * 4
+    assert any("ins: 2 records with latitude and longitude 0: no position" in one for one in texts(items, "not_used"))
+
+
+def test_a_count_is_no_angle(tmp_path: Path) -> None:
+    """A most significant bit of no value: the unit says nothing of the counts, which stay raw."""
+    path = icd_file(tmp_path)
+    counts = path.read_text().replace("msbval: 90.0", "msbval: 0.0")
+    path.write_text(counts)
+    packet = made.packet(4, 0x19, made.messages_1553([message(0, 1, 100)]), 0)
+    assert not [item for item in read(tmp_path, packet, load(path)) if getattr(item, "topic", "") == "ins"]
+    path.write_text(counts.replace("uom: deg,", "uom: deg, signal: ins.roll_deg,"))
+    with pytest.raises(UsageError, match="0, a count"):
+        load(path)
+
+
 def canonical(path: Path) -> dict[str, tuple[list[float], list[int]]]:
     """Values and times of every signal of a store file."""
     found: dict[str, tuple[list[float], list[int]]] = {}

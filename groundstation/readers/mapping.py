@@ -125,7 +125,7 @@ def holds(numbers: Numbers, name: str) -> BoolArray | None:
 
 
 def without_zero_position(columns: Columns) -> tuple[Columns, int]:
-    """Columns without the positions 0, 0 and their heights, and how many there were.
+    """Columns without the positions 0, 0 and their heights, and how many there were; so is one of which half is told.
 
     Examples
     --------
@@ -136,9 +136,10 @@ def without_zero_position(columns: Columns) -> tuple[Columns, int]:
     """
     if "latitude_deg" not in columns or "longitude_deg" not in columns:
         return columns, 0
-    latitude, longitude = columns["latitude_deg"], columns["longitude_deg"]
-    is_told = latitude.mask & longitude.mask & np.isfinite(latitude.values) & np.isfinite(longitude.values)
-    is_zero = is_told & ~has_position(latitude.values, longitude.values)
+    has_either = columns["latitude_deg"].mask | columns["longitude_deg"].mask
+    latitude, longitude = (np.where(columns[name].mask, columns[name].values, 0.0) for name in _PLACE[:2])
+    is_told = has_either & np.isfinite(latitude) & np.isfinite(longitude)
+    is_zero = is_told & ~has_position(latitude, longitude)
     if not is_zero.any():
         return columns, 0
     placed = {name: Column(columns[name].values, columns[name].mask & ~is_zero) for name in _PLACE if name in columns}
