@@ -205,8 +205,7 @@ def gps_week_to_utc_ns(week: NDArray[np.int64] | int, week_ms: NDArray[np.int64]
 
 
 def utc_to_gps_ns(utc_ns: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Moments of UTC as a date and time of GPS time, the leap seconds of their day more; what turns GPS time into UTC,
-    the other way round.
+    """Date and time of GPS time of moments in UTC: the inverse of :func:`gps_to_utc_ns`.
 
     Examples
     --------
@@ -221,7 +220,7 @@ def utc_to_gps_ns(utc_ns: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def weeks_later_ns(utc_ns: NDArray[np.int64], weeks: NDArray[np.int64] | int) -> NDArray[np.int64]:
-    """UTC of the same second of the GPS week in another week: leap seconds may have come between.
+    """UTC of the same second of another GPS week: leap seconds may have come between.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Dates that a log cannot have, or hardly: those of a receiver that does not know its GPS week, or miscounts it."""
+"""Dates that a log cannot have, or hardly: a receiver miscounted its GPS week."""
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
@@ -23,7 +23,7 @@ _OF_ANY_YEAR = ("flightdata-hdf5", "utias", "miluv", "sbet")  # recorders withou
 
 
 def doubtful_date(reader: str, utc_ns: int, remarks: Iterable[Remark]) -> Remark | None:
-    """What is to be said of the date on which a log begins; None where it can be, or the reader has spoken of it.
+    """Remark on the date on which a log begins; None where it can be, or the reader told.
 
     Parameters
     ----------

@@ -251,7 +251,7 @@ def _unfolded(told_ns: Int64Array, own_ns: Int64Array) -> Int64Array:
 
 
 def _other_weeks(own_ns: Int64Array, told_ns: Int64Array, is_utc: bool) -> tuple[BoolArray, list[Mistake]]:
-    """Readings that tell the number of another week for a short while, shape (n,), and each such while by its name.
+    """Readings of another GPS week for a short while, shape (n,), and each while by name.
 
     A receiver may know the time of the week before the week; at the turn of a week the new number may come late. The
     week that counts is that of the recorder, where it runs by UTC and some readings agree, else that of most readings.

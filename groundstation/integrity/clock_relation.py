@@ -249,7 +249,7 @@ def mistake_of_step(size_s: float, utc_ns: int) -> str:
 
 
 def mistake_of_told_step(size_s: float, utc_ns: int) -> str:
-    """Name of a step of a UTC that a receiver told, empty where it has none: UTC falls as leap seconds are learnt.
+    """Name of a step of a receiver's UTC, which falls as leap seconds are learnt, or empty.
 
     Examples
     --------

@@ -125,7 +125,9 @@ def holds(numbers: Numbers, name: str) -> BoolArray | None:
 
 
 def without_zero_position(columns: Columns) -> tuple[Columns, int]:
-    """Columns without the positions 0, 0 and their heights, and how many there were; so is one of which half is told.
+    """Columns without the positions 0, 0 and their heights, and how many there were.
+
+    A latitude of 0 without a longitude is none either, and the other way round.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Dates that lie 1024 weeks in the past: a receiver that missed a rollover of the GPS week tells them.
+"""Dates 1024 weeks in the past: a receiver that missed a rollover of the GPS week.
 
 The week counts to 1023 in the satellites' message. A receiver whose firmware is old takes it for a week of the 1024
 before; the time of the day stays right. Such a date is never ahead of the true one, so what else a log knows of its
@@ -31,7 +31,7 @@ _DAY_NS = 86_400 * NS_PER_S
 
 @dataclass(frozen=True)
 class Earliest:
-    """The year before which a log cannot have been recorded, and what did not exist before it: ``PX4 v1.11``.
+    """Year before which something in the log did not exist: ``PX4 v1.11``.
 
     ``moves`` is False of what stays in use for decades, as a format: it shows that a date is wrong, not by how much.
     """
@@ -43,7 +43,7 @@ class Earliest:
 
 @dataclass(frozen=True)
 class OtherDate:
-    """What another clock of the log tells for the same moment, UTC; ``within_days`` of it."""
+    """UTC of the same moment by another clock of the log, good to ``within_days``."""
 
     name: str
     utc_ns: int
@@ -52,13 +52,13 @@ class OtherDate:
 
 @dataclass(frozen=True)
 class Rollovers:
-    """By how many rollovers a date is behind, and what is to be said of it."""
+    """Number of rollovers that a date is behind, and remarks on it."""
 
     count: int = 0
     remarks: tuple[Remark, ...] = ()
 
     def shift_ns(self, told_ns: int, *, is_gps_time: bool) -> int:
-        """What to add to a UTC that was told, or that was made of GPS time by the leap seconds of the day told.
+        """Nanoseconds to add to a UTC that was told, or made of GPS time on the day told.
 
         Examples
         --------
@@ -78,7 +78,7 @@ def rollovers(
     earliest: Earliest | None = None,
     others: tuple[OtherDate, ...] = (),
 ) -> Rollovers:
-    """By how many rollovers a date is behind the true one, as far as the log shows it.
+    """Count the rollovers that a date is behind the true one, as far as the log shows.
 
     Parameters
     ----------

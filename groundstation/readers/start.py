@@ -114,14 +114,14 @@ class ToldZero:
 
 @dataclass
 class _Level:
-    """Readings that agree; ``pieces`` are their stretches (first, stop) in the order of the log."""
+    """Readings that agree; ``pieces`` are their stretches (first, stop)."""
 
     pieces: list[tuple[int, int]] = field(default_factory=list)
     middle_ns: int = 0
 
 
 def told_at_zero(told_ns: Int64Array, device_ns: Int64Array) -> ToldZero:
-    """What another clock told when the recorder's was at zero.
+    """Time by another clock when the recorder's was at zero.
 
     Of readings that repeat a time only the first counts, for the others are older than they say: a clock may tell whole
     seconds. When the log's first time was told first is not known where times repeat.
@@ -144,7 +144,7 @@ def told_at_zero(told_ns: Int64Array, device_ns: Int64Array) -> ToldZero:
 
 
 def zero_of_readings(zeros_ns: Int64Array) -> ToldZero:
-    """The zero by readings of another clock that may have been set in the log: the last level counts.
+    """Zero by readings of another clock; where that was set, the last level counts.
 
     A receiver tells UTC some seconds late until it has heard of the leap seconds, and a date of the past until it knows
     the week. So the latest date counts, and of levels on that date the last; of a receiver that started again in the
@@ -182,7 +182,7 @@ def _middle(values: Int64Array) -> int:
 
 
 def _levels(zeros_ns: Int64Array) -> list[_Level]:
-    """Levels of readings in the order of the log; none where readings agree, or where hardly any two do."""
+    """Levels of readings in their order; none where all agree, or hardly any two do."""
     jumps = np.flatnonzero(np.abs(np.diff(zeros_ns)) > _JUMP_NS) + 1
     if not 0 < len(jumps) < _MOST_PIECES:
         return []
@@ -202,7 +202,7 @@ def _levels(zeros_ns: Int64Array) -> list[_Level]:
 
 
 def _goes_on(zeros_ns: Int64Array, level: _Level, first: int, middle_ns: int) -> bool:
-    """Whether a piece is of the level before it: an outlier stood between them, or the clocks drift apart."""
+    """Check for a piece of the level before it: after an outlier, or as clocks drift."""
     _first, stop = level.pieces[-1]
     return (
         abs(middle_ns - level.middle_ns) < _SAME_NS

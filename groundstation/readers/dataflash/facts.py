@@ -99,7 +99,7 @@ def utc_of_power_up(times: GpsTimes, firmware: str = "") -> tuple[int | None, li
 
 
 def _dated(times: GpsTimes) -> BoolArray:
-    """Fixes whose week can be that of a log, shape (n,); else those in any week, of which there must be a few."""
+    """Fixes whose week can be that of a log, shape (n,); else a few that agree on any."""
     in_week = (times.week_ms >= 0) & (times.week_ms < _MS_PER_WEEK)
     good = in_week & (times.week >= _FIRST_WEEK) & (times.week < _LAST_WEEK)
     early = in_week & (times.week > 0) & (times.week < _FIRST_WEEK)
@@ -107,7 +107,7 @@ def _dated(times: GpsTimes) -> BoolArray:
 
 
 def _earliest(firmware: str) -> Earliest:
-    """The year before which a firmware did not exist; of the format where its version is not known.
+    """Year before which a firmware did not exist; without a version that of the format.
 
     Examples
     --------

@@ -134,7 +134,7 @@ def by_name(element: AnyElement, holders: Iterable[str]) -> AnyElement:
 
 
 def is_count(element: Element) -> bool:
-    """Whether an element is a plain count, of which its unit says nothing: it has bits, and none of them has a value.
+    """Check for a plain count: bits without a value, of which the unit says nothing.
 
     Examples
     --------

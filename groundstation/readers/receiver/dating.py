@@ -1,4 +1,4 @@
-"""The full times of a stream, on the date that it is known to be of, and what is to be said of them."""
+"""Full times of a stream on the date that is known, and remarks on them."""
 
 import re
 from collections import Counter
@@ -20,7 +20,7 @@ _IN_TEXT = re.compile(rb"HW UBX[^\r\n*]{0,24}?(000[0-9A]0000|00190000)")
 
 @dataclass
 class Told:
-    """What a stream tells of its date.
+    """Times and facts of a stream that bear on its date.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Dated:
 
 
 def dated(told: Told) -> Dated:
-    """Full times of binary messages where there are any, of sentences elsewhere, on the date that is known."""
+    """Put the full times of a stream on one date: of its messages, else of its sentences."""
     of_week, weeks = on_one_date(_set(told.of_week), is_gps_time=True)
     of_day, days = on_one_date(_set(told.of_day), is_gps_time=False)
     late = late_stretches(of_day)
@@ -84,7 +84,7 @@ def _set(anchors: Anchors) -> Anchors:
 
 
 def _leap_seconds(told: Told, last_ns: int) -> int | None:
-    """Leap seconds that the stream states, or by which its UTC and its time of the week differ most often."""
+    """Leap seconds that a stream states most often, or its UTC and time of week differ by."""
     leaps = Counter(told.leaps)
     leaps.update(int(text) for text in _LEAP_SECONDS.findall(told.head))
     for late_s, count in told.wrong_leaps.items():
@@ -122,7 +122,7 @@ def _wrong_leaps(wrong_leaps: Mapping[int, int]) -> Iterator[Remark]:
 
 
 def _apart(of_week: Anchors, of_day: Anchors) -> Iterator[Remark]:
-    """What is to be said where binary messages and sentences tell different days."""
+    """Remark that binary messages and sentences tell different days."""
     if not len(of_week) or not len(of_day):
         return
     by_week_ns, by_day_ns = int(of_week.utc_ns[-1]), int(of_day.utc_ns[-1])

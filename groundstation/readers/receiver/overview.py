@@ -113,7 +113,7 @@ def _formatter(name: str) -> str:
 def _set_times(
     found: Overview, full_times: ubx.FullTimes, places: Int64Array, utc_ns: Int64Array, source: Source
 ) -> None:
-    """Full times of binary messages where there are any, of sentences elsewhere; and what is odd about them."""
+    """Note the full times of a stream, and what is odd about them."""
     order = np.argsort(places, kind="stable")
     told = Told(
         of_week=full_times.anchors(),

@@ -37,10 +37,10 @@ _DAYS_A_WEEK = 7
 
 @dataclass(frozen=True)
 class LateStretch:
-    """Sentences whose UTC is late by ``late_s``, for want of leap seconds: those up to a place in the file.
+    """Sentences up to a place in the file whose UTC is late, for want of leap seconds.
 
     ``last_place`` is that of the last one with a date, ``first_place`` that of the first one which is right, and
-    ``day_ns`` its time of the day: other sentences of its epoch may stand before it.
+    ``day_ns`` its time of the day: other sentences of its epoch may stand before it. ``late_s`` is by how much.
     """
 
     last_place: int
@@ -91,7 +91,7 @@ class Anchors:
         return self._credible(places, utc_ns, np.ones(len(places), dtype=bool))
 
     def in_their_week(self, places: Int64Array, time: Column) -> Column:
-        """UTC that messages made of their own week, in the week that brings it nearest to the anchor before it."""
+        """UTC of messages with a week of their own, in the week that is nearest to the anchor."""
         if not len(self):
             return time
         weeks = np.rint((self.utc_ns[self._before(places)] - time.values) / WEEK_NS).astype(np.int64)
@@ -160,9 +160,10 @@ def moved_on(anchors: Anchors, rollovers: int, *, is_gps_time: bool) -> Anchors:
 
 
 def late_stretches(anchors: Anchors) -> tuple[LateStretch, ...]:
-    """Stretches of sentences whose UTC is late: it falls back by whole seconds as the leap seconds are learnt.
+    """Stretches of sentences before the leap seconds were learnt: then UTC falls back.
 
-    Before and after such a step times go on steadily. What is late by no more than the time between two is not seen.
+    It falls by whole seconds, and times go on steadily before and after. What is late by no more than the time between
+    two is not seen.
     """
     is_new = np.append(True, np.diff(anchors.utc_ns) != 0) if len(anchors) else np.zeros(0, dtype=bool)
     places, utc_ns = anchors.places[is_new], anchors.utc_ns[is_new]

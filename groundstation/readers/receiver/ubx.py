@@ -127,7 +127,7 @@ class FullTimes:
         self.leaps.update(dict(zip(told.tolist(), counts.tolist(), strict=True)))
 
     def note_utc_offset(self, messages: Messages) -> None:
-        """Count the leap seconds that TIME of NovAtel states: UTC less GPS time, where UTC is known."""
+        """Count the leap seconds that TIME of NovAtel states, where it knows UTC."""
         if messages.name == "TIME" and messages.layout is not None and messages.size >= messages.layout.size:
             head = messages.head()
             known = (head["utc_status"] > 0) & (np.abs(head["utc_offset"]) <= MOST_LEAP_S)

@@ -33,7 +33,7 @@ def sniff(source: Source) -> Claim | None:
 
 
 def _refuse_encrypted(source: Source) -> None:
-    """Say how to decrypt what PX4 encrypted; the data of PX4 before 1.16 are told by their name alone."""
+    """Say how to decrypt what PX4 encrypted; before 1.16 data are told by their name."""
     if source.head.startswith(_KEY):
         found, next_step = "the key of an encrypted PX4 ULog, no log", "decrypt the .ulgc beside it"
         raise UnclaimedLogError(source.name, found, "", f"{next_step} with PX4's Tools/decrypt_ulog.py")

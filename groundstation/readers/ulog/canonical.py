@@ -130,7 +130,7 @@ def gnss(rows: Numbers) -> Columns:
 
 
 def _filled(ellipsoid: Column, msl: Column) -> Column:
-    """Height above the ellipsoid where it was filled in: a driver that does not know it leaves 0."""
+    """Height above the ellipsoid where a driver filled it in: else it leaves 0."""
     return Column(ellipsoid.values, ellipsoid.mask & ((ellipsoid.values != 0.0) | (msl.values == 0.0)))
 
 

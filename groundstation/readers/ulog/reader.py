@@ -38,7 +38,7 @@ _ALTITUDES = ("sensor_combined",)  # topics that tell the altitude itself, not t
 
 @dataclass
 class _Losses:
-    """Data messages without a usable definition, times that no clock shows, pressures and places that are none."""
+    """Data without a usable definition, times that no clock shows, refused values."""
 
     unreadable: dict[str, int] = field(default_factory=dict)
     beyond: dict[str, int] = field(default_factory=dict)

@@ -75,7 +75,7 @@ def _note_odd_flags(block: Block, topic: Topic, odd: set[tuple[int, str]]) -> No
 
 
 def _has_fix(block: Block, topic: Topic) -> bool:
-    """Whether a receiver has a fix in a block."""
+    """Check for a receiver with a fix in a block."""
     if topic.name not in _RECEIVERS or topic.layout is None or "fix_type" not in topic.layout.names:
         return False
     rows = block.rows(topic.layout, np.flatnonzero(block.topic == topic.number))
@@ -83,7 +83,7 @@ def _has_fix(block: Block, topic: Topic) -> bool:
 
 
 def _assign(found: Overview, topics: list[Topic]) -> None:
-    """Choose the rule of each role among the topics that have data; of receivers those with a fix, where any has."""
+    """Choose the rule of each role among topics with data; of receivers those with a fix."""
     silent = _RECEIVERS - found.fixed if found.fixed else frozenset()
     offers = [
         Offer(topic.name, topic.instance, topic.layout.names)

@@ -1,4 +1,4 @@
-"""UTC of power-up: by the receivers of a log, else by the autopilot's own clock as it was set before logging began."""
+"""UTC of power-up: by the receivers of a log, else by the autopilot's own clock."""
 
 import re
 from dataclasses import dataclass, field
@@ -34,7 +34,7 @@ _FORMAT_NS = iso_to_utc_ns("2016-01-01T00:00:00Z")[0]
 
 @dataclass(frozen=True)
 class _OwnClock:
-    """UTC of power-up by the autopilot's clock, a moment that it told, what tells it, and what is to be said."""
+    """UTC of power-up by the autopilot's clock, a moment told by it, its name, a remark."""
 
     zero_ns: int
     moment_ns: int
@@ -44,7 +44,7 @@ class _OwnClock:
 
 @dataclass(frozen=True)
 class PowerUp:
-    """UTC of power-up in nanoseconds, None where nothing tells it, and what is to be said of it."""
+    """UTC of power-up in nanoseconds, None where nothing tells it, and remarks."""
 
     utc_ns: int | None = None
     remarks: tuple[Remark, ...] = ()
@@ -94,7 +94,7 @@ class Clocks:
             self._line = (line.text, line.timestamp_us) if _LOG_NAME.search(line.text) else None
 
     def power_up(self, release: str) -> PowerUp:
-        """UTC of power-up by the surest of the clocks; ``release`` is the version of the firmware, as text."""
+        """UTC of power-up by the surest clock; ``release`` is the firmware's version, as text."""
         own = self._own()
         told = {name: np.concatenate(self._told[name], axis=1) for name in sorted(self._told, key=_rank)}
         told = {name: one for name, one in told.items() if _is_dated(one[0])}
@@ -165,7 +165,7 @@ def _utc_of_name(text: str, offset_s: int) -> int | None:
 
 
 def _is_dated(utc_ns: Int64Array) -> bool:
-    """Whether a receiver that told these times knew a date, be it one that cannot be true."""
+    """Check that a receiver knew a date, be it one that cannot be true."""
     return bool(utc_ns[-1] >= _FORMAT_NS or (utc_ns >= _EARLIEST_US * _NS_PER_US).sum() >= _FEWEST)
 
 
@@ -184,7 +184,7 @@ def _dated(
 
 
 def _earliest(release: str) -> Earliest:
-    """The year before which no firmware of a version flew; of the format where the version is none of PX4's.
+    """Year before which a version of PX4 did not fly; of others that of the format.
 
     Examples
     --------
@@ -198,7 +198,7 @@ def _earliest(release: str) -> Earliest:
 
 
 def _apart(own: _OwnClock | None, receiver: str, utc_ns: int | None) -> list[Remark]:
-    """What is to be said where the autopilot's clock and a receiver disagree."""
+    """Remark that the autopilot's clock and a receiver disagree."""
     if own is None or utc_ns is None or abs(own.zero_ns - utc_ns) <= _APART_NS:
         return []
     away_s = (own.zero_ns - utc_ns) / NS_PER_S
