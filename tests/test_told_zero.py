@@ -86,6 +86,12 @@ def test_a_clock_set_by_another_amount_is_told_with_its_size() -> None:
     assert remark.code == "clock_disagrees" and "50 readings told a time -37." in remark.text
 
 
+def test_messages_that_come_late_together_are_no_level() -> None:
+    for away_s in (-2.16, -2.0, 2.0):
+        found = zero_of_readings(readings([(200, 0.0), (4, away_s), (200, 0.0)]))
+        assert len(found.zeros_ns) == 404 and not found.passed_over
+
+
 def test_whole_seconds_that_beat_with_the_readings_are_one_level() -> None:
     """A clock of whole seconds read every 1.03 s: what it tells falls behind, and catches up by a second."""
     device = np.rint(np.arange(300) * 1.03e9).astype(np.int64)

@@ -68,6 +68,7 @@ def utc_of_zero(metadata: Mapping[str, str]) -> tuple[int | None, list[Remark]]:
 _JUMP_NS = NS_PER_S // 2  # between readings of one level: messages of a receiver come late by less
 _SAME_NS = 7 * NS_PER_S // 10  # middles of one level
 _FEWEST, _MOST_PIECES = 3, 1_000  # readings of a level; pieces between jumps, of which more are no levels but noise
+_FEW_READINGS, _FEW = 10, 0.1  # of a level that nothing explains, and as a share of all: fewer are late messages
 _HALF_DAY_NS = 43_200 * NS_PER_S
 
 
@@ -119,6 +120,11 @@ class _Level:
     pieces: list[tuple[int, int]] = field(default_factory=list)
     middle_ns: int = 0
 
+    @property
+    def readings(self) -> int:
+        """Number of readings."""
+        return sum(stop - first for first, stop in self.pieces)
+
 
 def told_at_zero(told_ns: Int64Array, device_ns: Int64Array) -> ToldZero:
     """Time by another clock when the recorder's was at zero.
@@ -163,7 +169,7 @@ def zero_of_readings(zeros_ns: Int64Array) -> ToldZero:
     >>> found.ns, [remark.text for remark in found.remarks("GNSS time")]
     (0, ['GNSS time: 4 readings told UTC 2 s late, by leap seconds that were not learnt yet'])
     """
-    levels = _levels(zeros_ns)
+    levels = _without_excursions(_levels(zeros_ns))
     if len(levels) < 2:
         return ToldZero(_middle(zeros_ns), zeros_ns)
     counting = _counting(levels)
@@ -171,9 +177,7 @@ def zero_of_readings(zeros_ns: Int64Array) -> ToldZero:
     rows = [np.arange(*piece) for level in alike for piece in level.pieces]
     used = zeros_ns[np.sort(np.concatenate(rows))]
     ns = _middle(used)
-    passed = [
-        (sum(stop - first for first, stop in one.pieces), one.middle_ns - ns) for one in levels if one not in alike
-    ]
+    passed = [(one.readings, one.middle_ns - ns) for one in levels if one not in alike]
     return ToldZero(ns, used, tuple(passed))
 
 
@@ -199,6 +203,21 @@ def _levels(zeros_ns: Int64Array) -> list[_Level]:
         else:
             levels.append(_Level([(first, stop)], middle_ns))
     return levels
+
+
+def _without_excursions(levels: list[_Level]) -> list[_Level]:
+    """Levels but for late messages: unexplained ones that are short, or after which all is as before."""
+    kept: list[_Level] = []
+    for at, one in enumerate(levels):
+        neighbours = levels[max(at - 1, 0) : at] + levels[at + 1 : at + 2]
+        away_ns = [one.middle_ns - other.middle_ns for other in neighbours]
+        returns = len(away_ns) > 1 and abs(away_ns[1] - away_ns[0]) < _SAME_NS
+        few = one.readings < min(_FEW_READINGS, _FEW * sum(other.readings for other in levels))
+        is_leap = any(leap_seconds_late(abs(away)) for away in away_ns) and not (returns and few)
+        if is_leap or any(whole_weeks(away) for away in away_ns) or not (returns or few):
+            kept.append(one)
+    is_one = all(abs(one.middle_ns - kept[0].middle_ns) < _SAME_NS for one in kept)
+    return [] if is_one else kept
 
 
 def _goes_on(zeros_ns: Int64Array, level: _Level, first: int, middle_ns: int) -> bool:
