@@ -15,6 +15,7 @@ _UNSET_NS = iso_to_utc_ns("1980-01-08T00:00:00Z")[0]  # a time before it is of a
 _LEAP_SECONDS = re.compile(rb"\$(?:PUBX,04(?:,[^,*\r\n]*){4}|PGRMF(?:,[^,*\r\n]*){4}),(\d\d)D?,")
 # Hardware of u-blox by its number -> the year in which it came. Source: u-blox, product announcements.
 _HARDWARE: Mapping[str, int] = {"00070000": 2012, "00080000": 2013, "00190000": 2018, "000A0000": 2020}
+_NEWEST_NS = iso_to_utc_ns(f"{max(_HARDWARE.values()) + 1}-01-01T00:00:00Z")[0]
 _IN_TEXT = re.compile(rb"HW UBX[^\r\n*]{0,24}?(000[0-9A]0000|00190000)")
 
 
@@ -67,7 +68,9 @@ def dated(told: Told) -> Dated:
     if not len(anchors):
         return Dated(anchors, tuple(remarks))
     last_ns = int(anchors.utc_ns[-1])
-    found = rollovers(last_ns, leap_s=_leap_seconds(told, last_ns), earliest=_earliest(told), others=_others(other))
+    is_old = last_ns < _NEWEST_NS  # else nothing that a stream tells of itself can contradict its date
+    leap_s, earliest = (_leap_seconds(told, last_ns), _earliest(told)) if is_old else (None, None)
+    found = rollovers(last_ns, leap_s=leap_s, earliest=earliest, others=_others(other))
     remarks += found.remarks
     if not found.count:
         remarks += [*_wrong_leaps(told.wrong_leaps), *_apart(of_week, of_day)]
