@@ -87,6 +87,16 @@ def test_a_transfer_between_terminals_is_the_same_message(tmp_path: Path, receiv
     assert rows(items, "ins")["roll_deg"].tolist() == [200 * 180 / 2**15, 300 * 180 / 2**15]
 
 
+def test_zeros_of_a_unit_without_a_position_are_none(tmp_path: Path) -> None:
+    words = [(1, 200_000, made.word_429(label, 4_000 * (at > 2))) for at in range(5) for label in (0o310, 0o311, 0o314)]
+    items = read(tmp_path, made.packet(4, 0x38, made.words_429(words), 0), shipped("arinc429_inertial"))
+    found = rows(items, "ins")
+    assert np.isfinite(found["latitude_deg"]).sum() == 2 and np.isfinite(found["true_heading_deg"]).sum() == 5
+    assert texts(items, "not_used") == [
+        "ins: 3 records with latitude and longitude 0: no position, kept as raw values alone"
+    ]
+
+
 def test_one_terminal_on_two_channels_is_two_units(tmp_path: Path) -> None:
     icd = load(icd_file(tmp_path))
     packets = [made.packet(channel, 0x19, made.messages_1553([message(0, 1, channel)]), 0) for channel in (4, 5)]
@@ -150,32 +160,6 @@ def test_samples_of_429_words(tmp_path: Path) -> None:
     assert batch.columns["pitch_deg"].mask.tolist() == [True, True, False, True]
     assert batch.columns["roll_deg"].mask.tolist() == [True, True, True, False]
     np.testing.assert_allclose(batch.device_time_ns.values / 1e9, [0.0, 8e-4, 0.0212, 0.0412], atol=1e-12)
-
-
-def test_a_position_0_0_is_none(tmp_path: Path) -> None:
-    """An inertial unit that is not aligned: its words say that they hold computed data."""
-    words: list[tuple[int, int, int]] = []
-    for latitude, longitude in [(0.0, 0.0), (34.5, 0.0), (0.0, 0.0), (34.5, -117.5)]:
-        words += [(0, 200_000, made.word_429(0o310, bnr(latitude, 180)))]
-        words += [(0, 4_000, made.word_429(0o311, bnr(longitude, 180)))]
-        words += [(0, 4_000, made.word_429(0o314, bnr(-90, 180)))]
-    items = read(tmp_path, made.packet(7, 0x38, made.words_429(words), COUNTS_PER_S), shipped("arinc429_inertial"))
-    (batch,) = [item for item in items if isinstance(item, RecordBatch) and item.topic == "ins"]
-    assert batch.columns["latitude_deg"].mask.tolist() == [False, True, False, True]
-    assert batch.columns["true_heading_deg"].values.tolist() == [270.0] * 4
-    assert any("ins: 2 records with latitude and longitude 0: no position" in one for one in texts(items, "not_used"))
-
-
-def test_a_count_is_no_angle(tmp_path: Path) -> None:
-    """A most significant bit of no value: the unit says nothing of the counts, which stay raw."""
-    path = icd_file(tmp_path)
-    counts = path.read_text().replace("msbval: 90.0", "msbval: 0.0")
-    path.write_text(counts)
-    packet = made.packet(4, 0x19, made.messages_1553([message(0, 1, 100)]), 0)
-    assert not [item for item in read(tmp_path, packet, load(path)) if getattr(item, "topic", "") == "ins"]
-    path.write_text(counts.replace("uom: deg,", "uom: deg, signal: ins.roll_deg,"))
-    with pytest.raises(UsageError, match="0, a count"):
-        load(path)
 
 
 def canonical(path: Path) -> dict[str, tuple[list[float], list[int]]]:

@@ -52,6 +52,19 @@ def fields(log: Read, topic: str) -> set[str]:
     return {name for batch in log.batches if batch.topic == topic for name in batch.columns}
 
 
+@pytest.mark.parametrize("offset", [0.0, 0.5])
+def test_zeros_are_no_position(tmp_path: Path, offset: float) -> None:
+    """Beside them a longitude of other times is interpolated from one: it is none either."""
+    from_fix = np.where(np.arange(ROWS) < 5, 0.0, 1.0)
+    parameters = {"Latitude": {"data": 60.0 * from_fix}, "Longitude": {"data": 10.0 * from_fix, "offset": offset}}
+    log = Read(write_flightdata(tmp_path / "log.hdf5", parameters))
+    assert set(log.values("ins", "latitude_deg")) == {60.0} and set(log.values("ins", "longitude_deg")) == {10.0}
+    assert len(log.values("raw.Latitude", "value")) == ROWS
+    (damage,) = log.damages
+    assert (damage.topic, damage.loses_data) == ("ins", False) and "no position" in damage.what
+    assert damage.count == (5 if offset == 0.0 else 4)
+
+
 def test_units_signs_and_times(tmp_path: Path) -> None:
     log = Read(plain(tmp_path / "log.hdf5"))
     assert log.header.reader == "flightdata-hdf5" and log.header.utc_of_zero_ns == START_UTC_S * NS_PER_S
@@ -105,22 +118,6 @@ def test_between_a_valid_and_a_masked_sample_there_is_nothing(tmp_path: Path) ->
     log = Read(write_flightdata(tmp_path / "l.h5", parameters))
     pitch = log.values("ins", "pitch_deg")
     assert [at for at, value in enumerate(pitch) if value is None] == [0, 5, 6]  # none before the first
-
-
-def test_a_position_0_0_is_none_and_nothing_lies_between_it_and_a_place(tmp_path: Path) -> None:
-    """Longitude is sampled half a second later: at the border it would come out half way to Greenwich."""
-    place = np.where(np.arange(ROWS) < 5, 0.0, 1.0)
-    parameters = {
-        "Latitude": {"data": 60.0 * place},
-        "Longitude": {"data": 10.0 * place, "offset": 0.5},
-        "Pitch": ramp(1.0, 0.0),
-    }
-    log = Read(write_flightdata(tmp_path / "l.h5", parameters))
-    assert log.values("ins", "latitude_deg")[:8] == [None] * 5 + [60.0, 60.0, 60.0]
-    assert log.values("ins", "longitude_deg")[:8] == [None] * 6 + [10.0, 10.0]
-    assert log.values("ins", "pitch_deg") == [1.0] * ROWS and len(log.rows("raw.Latitude")) == ROWS
-    (damage,) = [item for item in log.damages if "no position" in item.what]
-    assert (damage.count, damage.topic, damage.loses_data) == (5, "ins", False)
 
 
 def break_mask(group: Any) -> None:

@@ -127,8 +127,6 @@ def holds(numbers: Numbers, name: str) -> BoolArray | None:
 def without_zero_position(columns: Columns) -> tuple[Columns, int]:
     """Columns without the positions 0, 0 and their heights, and how many there were.
 
-    A latitude of 0 without a longitude is none either, and the other way round.
-
     Examples
     --------
     >>> place = {"latitude_deg": Column(np.zeros(2)), "longitude_deg": Column(np.array([0.0, 38.0]))}
@@ -138,10 +136,9 @@ def without_zero_position(columns: Columns) -> tuple[Columns, int]:
     """
     if "latitude_deg" not in columns or "longitude_deg" not in columns:
         return columns, 0
-    has_either = columns["latitude_deg"].mask | columns["longitude_deg"].mask
-    latitude, longitude = (np.where(columns[name].mask, columns[name].values, 0.0) for name in _PLACE[:2])
-    is_told = has_either & np.isfinite(latitude) & np.isfinite(longitude)
-    is_zero = is_told & ~has_position(latitude, longitude)
+    latitude, longitude = columns["latitude_deg"], columns["longitude_deg"]
+    is_told = latitude.mask & longitude.mask & np.isfinite(latitude.values) & np.isfinite(longitude.values)
+    is_zero = is_told & ~has_position(latitude.values, longitude.values)
     if not is_zero.any():
         return columns, 0
     placed = {name: Column(columns[name].values, columns[name].mask & ~is_zero) for name in _PLACE if name in columns}

@@ -1,5 +1,6 @@
 """Words of the buses become signals by ICDs: a mapping over the raw topics, of a recording or of its MCAP alike."""
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -168,7 +169,7 @@ class Namer:
         self._tags: dict[str, int] = {}
         self._derived: dict[str, None] = {}
         self._flagged: dict[str, tuple[int, int]] = {}
-        self._zeros: dict[str, int] = {}
+        self._nowhere: Counter[str] = Counter()
         every: list[Element] = [one for word in found.words for one in word.elements if one.signal]
         every += [one for message in found.messages for one in message.elements if one.signal]
         signals = [str(one.signal).rpartition(".") for one in every]
@@ -199,13 +200,13 @@ class Namer:
                 yield from bounded(self._placed(made))
 
     def _placed(self, batch: RecordBatch) -> RecordBatch:
-        """A batch without the positions 0, 0 of a unit that has none yet; they are counted."""
+        """The batch without positions of zeros, which a unit sends before it has one."""
         columns, zeros = without_zero_position(dict(batch.columns))
         if not zeros:
             return batch
-        self._zeros[batch.topic] = self._zeros.get(batch.topic, 0) + zeros
+        self._nowhere[batch.topic] += zeros
         rows = np.logical_or.reduce([column.mask for column in columns.values()])
-        return replace(batch, columns=columns).take(rows)
+        return RecordBatch(batch.topic, batch.record_index, batch.device_time_ns, columns).take(rows)
 
     def _of_429(self, batch: RecordBatch, table: _Table) -> Iterator[tuple[str, Piece]]:
         words = batch.columns["word"].values.astype(np.uint32, copy=False)
@@ -313,7 +314,7 @@ class Namer:
                 yield Remark(
                     "bus_errors", f"{topic}: {errors} of {total} messages have an error: kept, not used", topic
                 )
-        for topic, count in sorted(self._zeros.items()):
+        for topic, count in sorted(self._nowhere.items()):
             yield Remark("not_used", f"{topic}: {count} {NO_POSITION}", topic)
         for title, tally in self._tallies.items():
             why = [

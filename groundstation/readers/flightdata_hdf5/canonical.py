@@ -11,7 +11,6 @@ from typing import Literal
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
-from groundstation.base.geodesy import NO_POSITION_DEG
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.signals import Field, field_of
 from groundstation.base.units import CONVERSIONS
@@ -69,8 +68,6 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
     ),
     "discrete": (Rule("Gear On Ground", "weight_on_wheels", "", way="step"),),
 }
-_PLACE = ("latitude_deg", "longitude_deg")
-_LARGEST_STEP_DEG = 0.1  # of a position between two samples
 TRACK = "Track True"  # with Groundspeed: the velocities of ins
 _SAID: Mapping[str, str] = {
     "Heading True Continuous": "counts on past north: brought into [0, 360)",
@@ -152,9 +149,6 @@ def values_at(feed: Feed, times_ns: Int64Array) -> tuple[FloatArray, BoolArray]:
     behind = np.clip(np.searchsorted(known_ns, times_ns, side="left"), 0, len(known_ns) - 1)
     present = is_valid[before] & is_valid[behind] & (since_ns >= 0) & (known_ns[behind] >= times_ns)
     difference = values[behind] - values[before]
-    if feed.field.name in _PLACE:
-        is_zero = np.abs(values) < NO_POSITION_DEG  # a filter without a position: nothing lies between it and a place
-        present &= (is_zero[before] == is_zero[behind]) | (np.abs(difference) < _LARGEST_STEP_DEG)
     if feed.way == "circle":
         difference = wrap_180(difference)
     out = feed.factor * (values[before] + since_ns / np.maximum(known_ns[behind] - known_ns[before], 1) * difference)

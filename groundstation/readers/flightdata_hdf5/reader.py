@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -26,11 +27,11 @@ _ODD = re.compile(r"[^A-Za-z0-9_\-]+")
 
 @dataclass
 class _Losses:
-    """Parameters whose data turned out to be damaged, and by what; positions that are none."""
+    """Parameters whose data turned out to be damaged, and by what; positions that are none, by topic."""
 
     broken: dict[str, str] = field(default_factory=dict)
     lost: dict[str, int] = field(default_factory=dict)
-    zeros: dict[str, int] = field(default_factory=dict)
+    nowhere: Counter[str] = field(default_factory=Counter)
 
     def add(self, name: str, error: BaseException, samples: int) -> None:
         self.broken.setdefault(name, " ".join(str(error).split())[:100])
@@ -39,8 +40,8 @@ class _Losses:
     def damages(self) -> Iterator[Damage]:
         for name, reason in self.broken.items():
             yield Damage("corrupt", f"parameter {name}", self.lost[name], f"samples that cannot be read ({reason})")
-        for topic, count in self.zeros.items():
-            yield Damage("unreadable_cells", "the whole log", count, NO_POSITION, topic, loses_data=False)
+        for topic, count in self.nowhere.items():
+            yield Damage("unreadable_cells", topic, count, NO_POSITION, topic, loses_data=False)
 
 
 def items(source: Source, reader_name: str) -> Iterator[Item]:
@@ -129,13 +130,23 @@ def _canonical_batches(
                 continue
             is_flag = feed.field.kind == "bool"
             columns[feed.field.name] = Column(values != 0.0 if is_flag else values, present)
-        columns, zeros = without_zero_position(columns)
-        if zeros:
-            losses.zeros[topic] = losses.zeros.get(topic, 0) + zeros
         _with_velocities(columns)
+        placed, zeros = without_zero_position(columns)
+        if zeros:
+            losses.nowhere[topic] += zeros
+            clocks = {(one.parameter.offset_s, one.parameter.frequency_hz) for one in several}
+            columns = placed | (_apart(columns, placed) if len(clocks) > 1 else {})
         batch = _batch(topic, times_ns, columns)
         if batch is not None:
             yield batch
+
+
+def _apart(columns: dict[str, Column], placed: dict[str, Column]) -> dict[str, Column]:
+    """Positions but for those beside a row of zeros, which were interpolated from it."""
+    is_zero = columns["latitude_deg"].mask & ~placed["latitude_deg"].mask
+    beside = np.append(False, is_zero[:-1]) | np.append(is_zero[1:], False)
+    names = ("latitude_deg", "longitude_deg")
+    return {name: Column(placed[name].values, placed[name].mask & ~beside) for name in names}
 
 
 def _with_velocities(columns: dict[str, Column]) -> None:
