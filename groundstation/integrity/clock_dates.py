@@ -1,6 +1,6 @@
 """Dates that a log cannot have, or hardly: a receiver miscounted its GPS week."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
 from groundstation.base.records import Remark
@@ -12,6 +12,8 @@ from groundstation.base.timescales import (
     iso_to_utc_ns,
     utc_ns_to_iso,
 )
+from groundstation.integrity.clock import ClockModel
+from groundstation.integrity.ledger import TopicCounts
 
 ROLLED_OVER, FIRST_WEEK = "week_rollover", "date_of_rollover"  # codes of remarks
 # Reader -> the year its format came. Others hold what was recorded with a receiver of this century.
@@ -20,6 +22,16 @@ _YEARS: Mapping[str, int] = MappingProxyType(
 )
 _USUAL_YEAR = 2000
 _OF_ANY_YEAR = ("flightdata-hdf5", "utias", "miluv", "sbet")  # recorders without a receiver, and dates of a file's name
+
+
+def doubtful_dates(
+    reader: str, clock: ClockModel, topics: Sequence[TopicCounts], remarks: Sequence[Remark]
+) -> Iterator[Remark]:
+    """Remark on the date of a log by its clock, where there is one."""
+    if clock.is_absolute and topics:
+        doubt = doubtful_date(reader, min(topic.first_ns for topic in topics), remarks)
+        if doubt is not None:
+            yield doubt
 
 
 def doubtful_date(reader: str, utc_ns: int, remarks: Iterable[Remark]) -> Remark | None:
