@@ -196,3 +196,20 @@ def test_a_time_source_behind_by_a_rollover(tmp_path: Path) -> None:
         path.write_bytes(recording([(2004, 9, 20)] * 20, tmats))
         found = survey(registry.read(path))
         assert utc_ns_to_iso(found.ledger.start_ns) == f"{start}T10:00:00.000Z", tmats
+
+
+@pytest.mark.parametrize("late", [1, 4, 9])
+def test_the_turn_of_a_week_with_a_number_that_comes_late(late: int, tmp_path: Path) -> None:
+    """The time of the week is zero again, and for some epochs the week is still the old one."""
+    log = DataFlash()
+    log.define(8, "GPS", "QBIHBcLLefff", "TimeUS,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ")
+    week_ms = 604_800_000
+    for epoch in range(200):
+        since_ms = (epoch - 100) * 200
+        told = (week_ms + since_ms, 2312) if since_ms < 0 else (since_ms, 2312 if epoch < 100 + late else 2313)
+        log.write("GPS", 20_000_000 + epoch * 200_000, 3, *told, 12, 100, 500_000_000, 10, 0, 0.0, 0.0, 0.0)
+    (tmp_path / "log.BIN").write_bytes(log.content)
+    found = survey(registry.read(tmp_path / "log.BIN"))
+    assert utc_ns_to_iso(found.ledger["gnss"].first_ns) == "2024-05-04T23:59:22.000Z"
+    (relation,) = found.clock.relations
+    assert not relation.breaks and f"{late} reading" in findings(found)["clock.week_number"].text

@@ -97,7 +97,7 @@ def test_the_clock_of_the_ground_station(tmp_path: Path) -> None:
     assert found.header.utc_of_zero_ns == ZERO_US * 1000
     assert "as the ground station" in told(found, "utc_from_boot_time")
     assert "not GNSS time" in told(found, "utc_from_boot_time") and not told(found, "utc_from_gnss")
-    for unset in (0, 1, 200_000_000_000_000):
+    for unset in (0, 1, 200_000_000_000_000, 946_684_800_000_000):
         log = started().keyed("I", "uint64_t boot_time_utc_us", unset.to_bytes(8, "little"))
         assert read(tmp_path, log.text(2_000_000, "a line")).header.utc_of_zero_ns is None
 
@@ -118,7 +118,7 @@ def test_the_name_of_the_log_has_the_date(tmp_path: Path, offset_s: int) -> None
     found = read(tmp_path, log.text(12_000_000, "[logger] Start file log").tagged(12_000_000, f"[logger] {path}", 3))
     assert found.header.utc_of_zero_ns == ZERO_US * 1000
     assert path.partition("log/")[2] in told(found, "utc_from_log_name")
-    for bad in ("/log/2024-13-45/99_99_99.ulg", "/log/sess001/log100.ulg", "/log/1970-01-01/00_00_12.ulg"):
+    for bad in ("/log/2024-13-45/99_99_99.ulg", "/log/sess001/log100.ulg", "/log/2000-01-01/00_00_12.ulg"):
         assert read(tmp_path, started().text(12_000_000, bad)).header.utc_of_zero_ns is None
 
 

@@ -19,6 +19,7 @@ FIX_3D = 3
 _NS_PER_US = 1_000
 _EPOCH_US = GPS_EPOCH_NS // _NS_PER_US
 _EARLIEST_US = iso_to_utc_ns("1980-01-08T00:00:00Z")[0] // _NS_PER_US  # before it a clock was not set
+_OWN_EARLIEST_US = 1_234_567_890_000_000  # 2009: PX4 takes its own clock for one that was not set before it
 _LATEST_US = iso_to_utc_ns("2100-01-01T00:00:00Z")[0] // _NS_PER_US
 _BOOT_TIME, _OFFSET = "boot_time_utc_us", "time_ref_utc"
 _LOG_NAME = re.compile(r"/(\d{4})-(\d\d)-(\d\d)/(\d\d)_(\d\d)_(\d\d)\w*\.ulg")
@@ -82,7 +83,7 @@ class Clocks:
         """Take in a piece of information, or a parameter."""
         if not isinstance(fact.value, int):
             return
-        if fact.key == _BOOT_TIME and _EARLIEST_US <= fact.value < _LATEST_US:
+        if fact.key == _BOOT_TIME and _OWN_EARLIEST_US <= fact.value < _LATEST_US:
             self._boot_us = fact.value
         elif fact.key == _OFFSET and abs(fact.value) <= _MOST_OFFSET_S:
             self._offset_s = fact.value
@@ -161,7 +162,7 @@ def _utc_of_name(text: str, offset_s: int) -> int | None:
         utc_ns = iso_to_utc_ns(f"{year}-{month}-{day}T{hour}:{minute}:{second}Z")[0] - offset_s * NS_PER_S
     except GroundstationError:
         return None
-    return utc_ns if _EARLIEST_US <= utc_ns // _NS_PER_US < _LATEST_US else None
+    return utc_ns if _OWN_EARLIEST_US <= utc_ns // _NS_PER_US < _LATEST_US else None
 
 
 def _is_dated(utc_ns: Int64Array) -> bool:
