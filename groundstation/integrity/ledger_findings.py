@@ -18,7 +18,7 @@ TOPIC_CODES = (
 )
 _REMARKS_THAT_WARN = (
     *("assumed_utc", "assumed_year", "year_unknown", "clock_disagrees", "unreadable_metadata"),
-    *("plug_in", "duplicate_column", "icd_of_another", "tmats_contradicted"),
+    *("plug_in", "duplicate_column", "icd_of_another", "tmats_contradicted", "week_rollover", "week_number"),
 )
 
 

@@ -16,6 +16,7 @@ from groundstation.base.records import BoolArray, Column, Damage, Int64Array, It
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.breaks_off import broken_off
 from groundstation.integrity.clock import ClockModel, estimate_clock
+from groundstation.integrity.clock_dates import doubtful_dates
 from groundstation.integrity.clock_references import ClockReferences
 from groundstation.integrity.contents import Contents
 from groundstation.integrity.counting import CountingSettings, estimate_counting_clock
@@ -127,6 +128,7 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
     clock = replace(clock, relations=references.relations(clock))
     results = _ledgers(places, pieces, contents, clock, limits) if clock.has_times else []
     topics = tuple(ledger for ledger, _lateness in results)
+    remarks += doubtful_dates(header.reader, clock, topics, remarks)
     clock = replace(clock, lateness_ns={ledger.topic: lateness for ledger, lateness in results})
     dropouts, timeline = (contents.dropouts(clock), contents.timeline(clock)) if clock.has_times else ((), None)
     against = contents.contradictions(clock, header.metadata) if clock.has_times else ()

@@ -178,10 +178,11 @@ def _utc_from_rows(source: Source, dialect: Dialect, layout: Layout, column: int
     both = (device.mask & utc.mask & fits).nonzero()[0]
     if not len(both):
         return None, []
-    zero_ns, zeros = told_at_zero(utc.values[both], device.values[both])
-    remarks = [Remark("derived", f"UTC of the recorder's zero from time_utc: median over its first {len(zeros)} times")]
+    zero = told_at_zero(utc.values[both], device.values[both])
+    text = f"UTC of the recorder's zero from time_utc: median over its first {len(zero.zeros_ns)} times"
+    remarks = [Remark("derived", text), *zero.remarks("time_utc")]
     remarks += [Remark("assumed_utc", "time_utc names no zone: read as UTC")] if zoneless else []
-    return zero_ns, remarks
+    return zero.ns, remarks
 
 
 def _layout(top: _Top) -> tuple[Layout, list[Remark]]:

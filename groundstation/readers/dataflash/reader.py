@@ -23,7 +23,7 @@ def items(source: Source) -> Iterator[Item]:
     scanner = Scanner(source)
     found = overview(scanner)
     facts = metadata(found)
-    utc_ns, remarks = utc_of_power_up(found.gps_times)
+    utc_ns, remarks = utc_of_power_up(found.gps_times, facts.get("firmware", ""))
     yield LogHeader(READER, facts, utc_ns, has_counting_clock=True)
     choices = choose(found, facts.get("vehicle", ""))
     mapper, topics = Mapper(found, choices), _Topics()

@@ -48,6 +48,8 @@ LAYOUTS: Mapping[str, str] = MappingProxyType(
         "INSSTDEV": f"{_SPREADS} -:u2 enabled_updates:u4 -:u4",
         "CORRIMUDATA": _IMU,
         "CORRIMUDATAS": _IMU,
+        "TIME": "clock_status:u4 offset:r8 offset_std_dev:r8 utc_offset:r8 utc_year:u4 utc_month:u1 utc_day:u1 "
+        "utc_hour:u1 utc_min:u1 utc_ms:u4 utc_status:u4",
         "HEADING": f"{_HEADING}base_id:c4 {_COUNTS}{_SIGNALS}",
         "HEADING2": f"{_HEADING}rover_id:c4 base_id:c4 {_COUNTS}{_SIGNALS}",
         "DUALANTENNAHEADING": f"{_HEADING}base_id:c4 {_COUNTS}{_SIGNALS}",

@@ -10,10 +10,11 @@ from groundstation.base.records import Damage, Int64Array, Remark
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.receiver import nmea, novatel, novatel_messages, scan, ubx
+from groundstation.readers.receiver.dating import Told, dated
 from groundstation.readers.receiver.messages import Block, Messages
 from groundstation.readers.receiver.sentences import FORMATTERS, Sentences, by_address
 from groundstation.readers.receiver.stream import Frames, Stream
-from groundstation.readers.receiver.times import DAY_NS, Anchors
+from groundstation.readers.receiver.times import Anchors
 from groundstation.readers.receiver.ubx_canonical import ATTITUDE_SOURCES, POSITION_SOURCES, has_attitude
 from groundstation.readers.source import Source
 
@@ -67,6 +68,7 @@ def overview(source: Source, bare: bool) -> Overview:
         for timed in novatel.messages_of(frames):
             found.counts[timed.name] += len(timed)
             full_times.take_time(timed.places, timed.time())
+            full_times.note_utc_offset(timed)
         attitudes.update(name for name in ATTITUDE_SOURCES if has_attitude(block, name))
         if _VERSION in block and not found.metadata:
             found.metadata = _versions(block[_VERSION])
@@ -84,7 +86,7 @@ def overview(source: Source, bare: bool) -> Overview:
     else:
         found.damages = tuple(stream.damages())
     _choose(found, attitudes)
-    _set_times(found, full_times, np.concatenate([*places, _NOTHING]), np.concatenate([*utc_ns, _NOTHING]))
+    _set_times(found, full_times, np.concatenate([*places, _NOTHING]), np.concatenate([*utc_ns, _NOTHING]), source)
     return found
 
 
@@ -108,26 +110,22 @@ def _formatter(name: str) -> str:
     return name if name in FORMATTERS else name[2:]
 
 
-def _set_times(found: Overview, full_times: ubx.FullTimes, places: Int64Array, utc_ns: Int64Array) -> None:
-    """Anchors of UBX where there are any, of sentences elsewhere; and what is odd about them."""
-    by_ubx = full_times.anchors()
+def _set_times(
+    found: Overview, full_times: ubx.FullTimes, places: Int64Array, utc_ns: Int64Array, source: Source
+) -> None:
+    """Note the full times of a stream, and what is odd about them."""
     order = np.argsort(places, kind="stable")
-    by_nmea = Anchors(places[order], utc_ns[order], np.full(len(places), -1, dtype=np.int64))
-    found.anchors = by_ubx if len(by_ubx) else by_nmea
-    for wrong_s, count in sorted(full_times.wrong_leaps.items()):
-        text = (
-            f"{count} fixes told UTC {abs(wrong_s)} s {'late' if wrong_s > 0 else 'early'}, as a receiver does before "
-            "its first almanac: their times are GPS time less the leap seconds of the day"
-        )
-        found.remarks.append(Remark("leap_seconds", text))
-    if len(by_ubx) and len(by_nmea):
-        apart_ns = int(by_nmea.utc_ns[-1] - by_ubx.utc_ns[-1])
-        if abs(apart_ns) > DAY_NS:
-            text = (
-                f"sentences tell {utc_ns_to_iso(int(by_nmea.utc_ns[-1]), 0)}, binary messages "
-                f"{utc_ns_to_iso(int(by_ubx.utc_ns[-1]), 0)}: the binary ones are believed"
-            )
-            found.remarks.append(Remark("date_disagrees", text))
+    told = Told(
+        of_week=full_times.anchors(),
+        of_day=Anchors(places[order], utc_ns[order], np.full(len(places), -1, dtype=np.int64)),
+        leaps=full_times.leaps,
+        wrong_leaps=full_times.wrong_leaps,
+        head=source.head,
+        hardware=found.metadata.get("receiver.hwVersion", ""),
+    )
+    times = dated(told)
+    found.anchors = times.anchors
+    found.remarks += times.remarks
 
 
 def _versions(messages: Messages) -> dict[str, str]:

@@ -3,6 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import HEADING_IS_TRACK, Column, Damage, Item, LogHeader, RecordBatch, Remark
@@ -90,7 +91,7 @@ def _of_block(frames: Frames, sentences: dict[str, Sentences], found: Overview, 
         yield from batches(messages, time)
         block.add(messages)
     for timed in novatel.messages_of(frames):
-        yield from raw_batches(timed, timed.time())
+        yield from raw_batches(timed, found.anchors.in_their_week(timed.places, timed.time()))
         block.add(timed)
     epochs = nmea.epochs_of(sentences)
     time = nmea.day_times(epochs, found.anchors)
@@ -99,7 +100,7 @@ def _of_block(frames: Frames, sentences: dict[str, Sentences], found: Overview, 
     if found.leader in ubx_canonical.POSITION_SOURCES:
         gnss = ubx_canonical.gnss_batch(block, found.leader, found.anchors)
     elif found.leader:
-        gnss = novatel.gnss_batch(block, found.leader)
+        gnss = _in_their_week(novatel.gnss_batch(block, found.leader), found)
     else:
         gnss, astray = nmea.gnss_batch(epochs, time)
         told.astray += astray
@@ -120,8 +121,16 @@ def _ins(block: Block, epochs: nmea.Epochs, time: Column, found: Overview) -> Re
     if found.attitude in nmea.HEADING_FORMATTERS:
         return nmea.ins_batch(epochs, found.attitude, time, ubx_canonical.INS_MODE)
     if found.attitude in INS_SOURCES:
-        return novatel.ins_batch(block, found.attitude)
+        return _in_their_week(novatel.ins_batch(block, found.attitude), found)
     return ubx_canonical.ins_batch(block, found.attitude, found.anchors)
+
+
+def _in_their_week(batch: RecordBatch | None, found: Overview) -> RecordBatch | None:
+    """A batch whose times were made of the week that each of its messages tells."""
+    if batch is None:
+        return None
+    time = found.anchors.in_their_week(batch.record_index, batch.device_time_ns)
+    return replace(batch, device_time_ns=time)
 
 
 def _raw_sentences(sentences: Sentences, time: Column, told: _Told) -> Iterator[RecordBatch]:

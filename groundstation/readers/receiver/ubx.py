@@ -1,5 +1,6 @@
 """UBX messages of a block: their names, times, and the full times that they tell."""
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -8,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Column, Int64Array
+from groundstation.base.timescales import MOST_LEAP_S
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.receiver import scan
 from groundstation.readers.receiver.layouts import layout
 from groundstation.readers.receiver.messages import Messages
 from groundstation.readers.receiver.stream import Frames
 from groundstation.readers.receiver.times import (
+    NO_ANCHORS,
     Anchors,
     calendar_ns,
     fine_utc_ns,
@@ -25,6 +28,12 @@ HEADER_BYTES = 6
 FIRST_WEEK, LAST_WEEK = 1_000, 4_000  # 1999 to 2056: other numbers are no date of a log
 S_PER_WEEK = 604_800.0
 _SECONDS = {"NAV-PVT": "second", "NAV-PVAT": "sec", "NAV-TIMEUTC": "sec"}
+# Message -> the fields with the leap seconds and with its flags, and the bit that calls them valid.
+_LEAPS = {
+    "NAV-TIMEGPS": ("leapS", "valid", 4),
+    "NAV-TIMELS": ("currLs", "valid", 1),
+    "RXM-RAWX": ("leapS", "recStat", 1),
+}
 _NAV_CLASS = 0x01
 _ITOW_AT_4 = (0x14, 0x13, 0x3C, 0x3B)  # HPPOSLLH, HPPOSECEF, RELPOSNED, SVIN have a version in front
 
@@ -55,7 +64,8 @@ def time_of(messages: Messages, anchors: Anchors) -> Column:
         head = messages.head()
         sound = _is_gps_time(head["week"], head["rcvTow"])
         utc_ns = gps_to_utc_ns(np.where(sound, head["week"], 0), np.where(sound, head["rcvTow"], 0.0))
-        return Column(np.where(sound, utc_ns, 0), None if sound.all() else sound)
+        own_week = Column(np.where(sound, utc_ns, 0), None if sound.all() else sound)
+        return anchors.in_their_week(messages.places, own_week)
     return Column(np.zeros(len(messages), dtype=np.int64), np.zeros(len(messages), dtype=bool))
 
 
@@ -86,13 +96,15 @@ def _is_gps_time(week: NDArray[Any], week_s: NDArray[Any]) -> BoolArray:
 class FullTimes:
     """Gathers the full times that the messages of a stream tell.
 
-    ``wrong_leaps`` counts the fixes whose UTC had another number of leap seconds than the day has, by the difference.
+    ``wrong_leaps`` counts the fixes whose UTC had another number of leap seconds than the day has, by the difference;
+    ``leaps`` the messages that state their number.
     """
 
     _places: list[Int64Array] = field(default_factory=list)
     _utc_ns: list[Int64Array] = field(default_factory=list)
     _week_ms: list[Int64Array] = field(default_factory=list)
     wrong_leaps: dict[int, int] = field(default_factory=dict)
+    leaps: Counter[int] = field(default_factory=Counter)
 
     def take(self, messages: Messages) -> None:
         """Take in messages that may tell the full time."""
@@ -102,7 +114,24 @@ class FullTimes:
         elif messages.name == "NAV-TIMEGPS" and head is not None:
             self._of_week(messages, head)
         elif messages.name == "RXM-RAWX" and messages.has("rcvTow"):
-            self.take_time(messages.places, time_of(messages, self.anchors()))
+            self.take_time(messages.places, time_of(messages, NO_ANCHORS))
+        self._note_leaps(messages)
+
+    def _note_leaps(self, messages: Messages) -> None:
+        """Count the leap seconds that messages state, where they call them valid."""
+        if messages.name not in _LEAPS or not messages.has(_LEAPS[messages.name][0]):
+            return
+        number, flags, bit = _LEAPS[messages.name]
+        head = messages.head()
+        told, counts = np.unique(head[number][(head[flags] & bit) != 0], return_counts=True)
+        self.leaps.update(dict(zip(told.tolist(), counts.tolist(), strict=True)))
+
+    def note_utc_offset(self, messages: Messages) -> None:
+        """Count the leap seconds that TIME of NovAtel states, where it knows UTC."""
+        if messages.name == "TIME" and messages.layout is not None and messages.size >= messages.layout.size:
+            head = messages.head()
+            known = (head["utc_status"] > 0) & (np.abs(head["utc_offset"]) <= MOST_LEAP_S)
+            self.leaps.update((-np.rint(head["utc_offset"][known])).astype(np.int64).tolist())
 
     def take_time(self, places: Int64Array, time: Column) -> None:
         """Take in messages of which each tells its full time."""
@@ -111,8 +140,7 @@ class FullTimes:
     def anchors(self) -> Anchors:
         """What was gathered, in the order of the file."""
         if not self._places:
-            nothing = np.zeros(0, dtype=np.int64)
-            return Anchors(nothing, nothing, nothing)
+            return NO_ANCHORS
         places, utc_ns, week_ms = (np.concatenate(parts) for parts in (self._places, self._utc_ns, self._week_ms))
         order = np.argsort(places, kind="stable")
         return Anchors(places[order], utc_ns[order], week_ms[order])
