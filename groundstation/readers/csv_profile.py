@@ -4,7 +4,7 @@
 profile's raw topic.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -12,17 +12,18 @@ from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Item, LogHeader, Remark
 from groundstation.base.slips import slips
 from groundstation.base.source_units import PREFIX, units_entry
-from groundstation.readers.dialect import detect_encoding, head_lines
+from groundstation.readers.dialect import Line, detect_encoding, head_lines
 from groundstation.readers.misnamed import misnamed
 from groundstation.readers.profile import Profile, load, shipped
 from groundstation.readers.profile_fit import Fit, delimiter_of, fit_at, fit_below
 from groundstation.readers.profile_layout import layout_of
-from groundstation.readers.sections import MOST, Section, header_places, told
+from groundstation.readers.sections import MOST, Section, header_places, left_out, mark_of, told
 from groundstation.readers.source import Claim, Source
 from groundstation.readers.start import unusable_references, utc_of_zero
 
 NAME = "csv-profile"
 DISTINCTIVE_COLUMNS = 4
+_HEAD_LINES = 1000
 DAMAGED_HEAD_LINES = 20  # in which a header row is looked for when the first line is not the profile's
 
 
@@ -35,20 +36,28 @@ def sniff(source: Source) -> Claim | None:
     """Claim a file whose first line and header row are those of a shipped profile.
 
     Where the first line is damaged a header row with enough of the profile's columns will do. Of the profiles of a
-    family the one that names most of the columns has the file.
+    family the one has the file whose header row stands first: long names stand above short ones.
     """
+    found = _best(source)
+    return None if found is None else Claim(NAME, found[1].profile.name, found[0])
+
+
+def _best(source: Source) -> tuple[float, Fit] | None:
+    """The shipped profile that fits a file, and how sure that is."""
     first = source.head[:4096].removeprefix(b"\xef\xbb\xbf").decode("utf-8", errors="replace").lstrip()
-    claims: list[tuple[float, int, str]] = []
-    for profile in _shipped():
+    profiles = [profile for profile in _shipped() if profile.first_lines]
+    is_one = any(first.startswith(profile.first_lines) for profile in profiles)
+    encoding = detect_encoding(source.head, source.name)
+    lines = head_lines(source, encoding, _HEAD_LINES if is_one else DAMAGED_HEAD_LINES)
+    found: list[tuple[float, Fit]] = []
+    for profile in profiles:
         is_its_own = first.startswith(profile.first_lines)
-        fit = _fit(source, profile, 1000 if is_its_own else DAMAGED_HEAD_LINES) if profile.first_lines else None
-        known = 0 if fit is None else sum(rule.name in fit.position for rule in profile.columns)
-        if fit is not None and (is_its_own or known >= DISTINCTIVE_COLUMNS):
-            claims.append((1.0 if is_its_own else 0.9, known, profile.name))
-    if not claims:
-        return None
-    confidence, _known, name = max(claims, key=lambda claim: claim[:2])
-    return Claim(NAME, name, confidence)
+        fit = _fit(profile, encoding, lines if is_its_own else lines[:DAMAGED_HEAD_LINES])
+        count = 0 if fit is None else sum(rule.name in fit.position for rule in profile.columns)
+        if fit is not None and (is_its_own or count >= DISTINCTIVE_COLUMNS):
+            found.append((1.0 if is_its_own else 0.9, fit))
+            lines = lines[: fit.header.number + DAMAGED_HEAD_LINES]  # a relative has its header near by
+    return max(found, key=lambda one: (one[0], -one[1].header.number), default=None)
 
 
 def claim_by(source: Source, profile: Path) -> Claim:
@@ -73,10 +82,10 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
     if profile is not None:
         fit = _fitted(source, load(profile))
     else:
-        claim = sniff(source)
-        if claim is None:
+        found = _best(source)
+        if found is None:
             raise UnreadableLogError(source.name, "no table of a known layout", "", "describe it by a profile")
-        fit = _fitted(source, next(known for known in _shipped() if known.name == claim.detail))
+        fit = found[1]
     metadata = _metadata(fit)
     utc_of_zero_ns, remarks = _utc_of_zero(fit, metadata)
     header = LogHeader(f"{NAME} {fit.profile.name}", metadata, utc_of_zero_ns)
@@ -87,15 +96,13 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
     sections, section_remarks = _sections(source, fit, utc_of_zero_ns)
     items = TableReader(source, sections).items(header)
     yield next(items)
-    yield from dict.fromkeys(remarks + section_remarks + unusable_references(metadata))
+    yield from dict.fromkeys([*remarks, *section_remarks, *unusable_references(metadata)])
     yield from _above(fit)
     yield from misnamed(items, _slips(fit), fit.header.number)
 
 
-def _fit(source: Source, profile: Profile, limit: int = 1000) -> Fit | None:
+def _fit(profile: Profile, encoding: str, lines: Sequence[Line]) -> Fit | None:
     """Find the header row: the first one that has every column the profile asks for."""
-    encoding = detect_encoding(source.head, source.name)
-    lines = head_lines(source, encoding, limit)
     for at, line in enumerate(lines):
         delimiter = delimiter_of(line.text, profile)
         if delimiter:
@@ -104,7 +111,8 @@ def _fit(source: Source, profile: Profile, limit: int = 1000) -> Fit | None:
 
 
 def _fitted(source: Source, profile: Profile) -> Fit:
-    fit = _fit(source, profile)
+    encoding = detect_encoding(source.head, source.name)
+    fit = _fit(profile, encoding, head_lines(source, encoding, _HEAD_LINES))
     if fit is None:
         wanted = ", ".join(dict.fromkeys((*profile.required, *profile.time.columns[:2])))
         raise UnreadableLogError(
@@ -124,15 +132,19 @@ def _above(fit: Fit) -> Iterator[Damage]:
         yield Damage("dropped_rows", place, len(fit.rows_above), "rows above the header that names their columns")
 
 
-def _sections(source: Source, first: Fit, utc_of_zero_ns: int | None) -> tuple[list[Section], list[Remark]]:
+def _sections(source: Source, first: Fit, utc_of_zero_ns: int | None) -> tuple[list[Section], list[Remark | Damage]]:
     """Rows below the first header, and below each further one that names other columns or another zero of time."""
     fits, ends, shifts = [first], list[int](), [0]
-    remarks: list[Remark] = []
+    remarks: list[Remark | Damage] = []
     profile = first.profile
-    mark = max((*profile.required, *profile.time.columns[:2]), key=len)
+    mark = mark_of(max((*profile.required, *profile.time.columns[:2]), key=len))
+    stands_again, last_byte = False, None
     for place in header_places(
-        source, first.last, first.encoding, (mark,), lambda line: bool(delimiter_of(line, profile))
+        source, first.last, first.encoding, mark, lambda line: bool(delimiter_of(line, profile))
     ):
+        stands_again = True
+        if fits[-1].is_repeated(place):
+            continue
         found, end_byte = fit_below(source, fits[-1], place)
         utc_ns, _remarks = _utc_of_zero(found, _metadata(found))
         shift_ns = shifts[-1] if utc_ns is None or utc_of_zero_ns is None else utc_ns - utc_of_zero_ns
@@ -140,15 +152,15 @@ def _sections(source: Source, first: Fit, utc_of_zero_ns: int | None) -> tuple[l
         if is_same and shift_ns == shifts[-1]:
             continue
         if len(fits) == MOST:
-            text = f"more than {MOST} headers: none is looked at from row {place.line.number} on"
-            remarks.append(Remark("second_header", text))
+            remarks.append(left_out(source, place.line.number, place.first_byte))
+            last_byte = place.first_byte
             break
         remarks.append(told(place, is_same))
         fits, ends, shifts = [*fits, found], [*ends, end_byte], [*shifts, shift_ns]
     sections = []
-    for fit, end, shift_ns in zip(fits, (*ends, None), shifts, strict=True):
+    for fit, end, shift_ns in zip(fits, (*ends, last_byte), shifts, strict=True):
         layout, more = layout_of(fit, source, utc_of_zero_ns, end)
-        sections.append(Section(fit.dialect_to(end), layout, shift_ns))
+        sections.append(Section(fit.dialect_to(end, stands_again), layout, shift_ns))
         remarks += more
     return sections, remarks
 

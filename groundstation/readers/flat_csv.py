@@ -5,8 +5,10 @@ without a canonical field go to ``raw.<topic>`` (``raw.csv`` when their name has
 the file is one, else as text.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -27,13 +29,23 @@ from groundstation.readers.dialect import (
 )
 from groundstation.readers.layout import Derivation, Layout, Rule, TimeRule, rule_for
 from groundstation.readers.misnamed import misnamed
-from groundstation.readers.sections import MOST, Section, ended, header_places, lines_below, told
+from groundstation.readers.sections import (
+    MOST,
+    Section,
+    ended,
+    header_places,
+    left_out,
+    lines_below,
+    told,
+    without_headers,
+)
 from groundstation.readers.source import Claim, Source
 from groundstation.readers.start import told_at_zero, unusable_references, utc_of_zero
 
 NAME = "flat-csv"
 PAGE = "docs/flat-csv.md has ten lines to copy"
 TIME_COLUMNS = {"time_ns": "nanoseconds", "time_s": "seconds", "time_utc": "iso"}  # the recorder's own clock first
+_MARK = re.compile(rb"time_(?:s|ns|utc)")
 _MOST_NS = 9e18  # 64 bits hold such differences
 FEWEST_ROWS = 3  # below a header row that does not stand on top
 
@@ -65,7 +77,7 @@ class _Top:
         """How the time of a row is written."""
         return next(kind for name, kind in TIME_COLUMNS.items() if name in self.names)
 
-    @property
+    @cached_property
     def dialect(self) -> Dialect:
         """How the rows below are written."""
         return Dialect(
@@ -158,7 +170,7 @@ def read(source: Source) -> Iterator[Item]:
     sections, section_remarks = _sections(source, top, layout, utc_of_zero_ns)
     items = TableReader(source, sections).items(LogHeader(NAME, top.metadata, utc_of_zero_ns))
     yield next(items)
-    yield from dict.fromkeys(remarks + clock_remarks + section_remarks)
+    yield from dict.fromkeys([*remarks, *clock_remarks, *section_remarks])
     if top.strange_lines:
         what = "lines above the header row that are no metadata"
         yield Damage("corrupt", f"rows 1 to {top.header.number - 1}", top.strange_lines, what)
@@ -167,11 +179,12 @@ def read(source: Source) -> Iterator[Item]:
 
 def _sections(
     source: Source, top: _Top, layout: Layout, utc_of_zero_ns: int | None
-) -> tuple[list[Section], list[Remark]]:
+) -> tuple[list[Section], list[Remark | Damage]]:
     """Rows below the first header, and below each further one that names other columns or another zero of time."""
-    sections, remarks = [Section(top.dialect, layout)], list[Remark]()
-    last, last_utc_ns = top, utc_of_zero_ns
-    for place in header_places(source, top.header, top.encoding, tuple(TIME_COLUMNS), _is_header):
+    sections, remarks = [Section(top.dialect, layout)], list[Remark | Damage]()
+    last, last_utc_ns, stands_again = top, utc_of_zero_ns, False
+    for place in header_places(source, top.header, top.encoding, _MARK, _is_header):
+        stands_again = True
         metadata = dict(_entries(place.above))
         delimiter = detect_delimiter(place.line.text)
         names = tuple(split_cells(place.line.text, delimiter))
@@ -179,10 +192,8 @@ def _sections(
         if is_same and utc_of_zero(metadata)[0] in (None, last_utc_ns):
             continue
         if len(sections) == MOST:
-            remarks.append(
-                Remark("second_header", f"more than {MOST} headers: none is looked at from row {place.line.number} on")
-            )
-            break
+            sections[-1] = ended(sections[-1], place.first_byte)
+            return sections, [*remarks, left_out(source, place.line.number, place.first_byte)]
         below = tuple(line.text for line in lines_below(source, place.line, top.encoding))
         found = _Top(top.encoding, metadata, place.line, names, delimiter, below, 0)
         found_layout, more = _layout(found)
@@ -192,7 +203,7 @@ def _sections(
         sections.append(Section(found.dialect, found_layout, shift_ns))
         remarks += [told(place, is_same, shift_ns), *more, *_mistakes(found), *clock_remarks]
         last, last_utc_ns = found, last_utc_ns if utc_ns is None else utc_ns
-    return sections, remarks
+    return sections if stands_again else [without_headers(sections[0])], remarks
 
 
 def _shift_ns(zero_ns: int | None, utc_ns: int | None, found: _Top, last: _Top, shift_ns: int | None) -> int | None:

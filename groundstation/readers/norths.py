@@ -36,7 +36,7 @@ _FIELD_MISFIT_DEG, _FIELD_MARGIN_DEG = 2.5, 1.0  # tables of recorders are years
 
 @dataclass(frozen=True)
 class Samples:
-    """Some rows of a log, shape (n,) each; NaN where a row has no value. ``time_ns`` is that of one of them."""
+    """Some rows of a log, shape (n,) each; NaN where a row has no value."""
 
     track_deg: FloatArray
     variation_deg: FloatArray
@@ -44,7 +44,6 @@ class Samples:
     velocity_north_mps: FloatArray
     latitude_deg: FloatArray
     longitude_deg: FloatArray
-    time_ns: int | None = None
 
     @property
     def has_variation(self) -> bool:
@@ -83,18 +82,14 @@ def samples_of(source: Source, dialect: Dialect, layout: Layout) -> Samples:
     from groundstation.readers.table_reader import TableReader
 
     parts: list[dict[str, FloatArray]] = []
-    time_ns = None
     for window in _windows(source, dialect):
-        for time, columns in TableReader(source, [Section(window, layout)]).columns():
-            known = time.values[time.mask]
-            time_ns = int(known[0]) if time_ns is None and len(known) else time_ns
+        for columns in TableReader(source, [Section(window, layout)]).columns():
             parts.append({name: np.where(one.mask, one.values, np.nan) for (_topic, name), one in columns.items()})
         if _is_enough(parts):
             break
-    count = sum(len(part["variation_deg"]) for part in parts)
+    none = np.full(sum(len(part["variation_deg"]) for part in parts), np.nan)
     names = {name for part in parts for name in part}
     joined = {name: np.concatenate([part[name] for part in parts]) for name in names}
-    none = np.full(count, np.nan)
     return Samples(
         joined.get("track_deg", none),
         joined.get("variation_deg", none),
@@ -102,8 +97,18 @@ def samples_of(source: Source, dialect: Dialect, layout: Layout) -> Samples:
         joined.get("velocity_north_mps", none),
         joined.get("latitude_deg", none),
         joined.get("longitude_deg", none),
-        time_ns,
     )
+
+
+def day_of(source: Source, dialect: Dialect, layout: Layout) -> int | None:
+    """Time of one row, device nanoseconds; None where no row looked at has one."""
+    from groundstation.readers.table_reader import first_times
+
+    for window in _windows(source, dialect):
+        times, _zoneless = first_times(source, window, layout)
+        if times.mask.any():
+            return int(times.values[times.mask][0])
+    return None
 
 
 def _windows(source: Source, dialect: Dialect) -> Iterator[Dialect]:
@@ -172,13 +177,13 @@ def _moved_m(samples: Samples) -> FloatArray:
     return np.asarray(np.deg2rad(moved) * SEMI_MAJOR_M)
 
 
-def by_the_field(samples: Samples, utc_of_zero_ns: int) -> Norths:
+def by_the_field(samples: Samples, utc_ns: int) -> Norths:
     """Sign of the variation by the declination of the Earth's field at some of the positions."""
     with np.errstate(invalid="ignore"):
         usable = has_position(samples.latitude_deg, samples.longitude_deg)
         usable &= np.abs(samples.variation_deg) >= LEAST_VARIATION_DEG
     places = np.flatnonzero(usable)
-    if not len(places) or samples.time_ns is None:
+    if not len(places):
         return Norths()
     places = places[np.unique(np.linspace(0, len(places) - 1, _PLACES).astype(int))]
     try:
@@ -186,7 +191,7 @@ def by_the_field(samples: Samples, utc_of_zero_ns: int) -> Norths:
             samples.latitude_deg[places],
             samples.longitude_deg[places],
             np.full(len(places), np.nan),
-            samples.time_ns + utc_of_zero_ns,
+            utc_ns,
         )
     except NotAssessableError:
         return Norths()

@@ -55,18 +55,22 @@ class Fit:
         """The last line above the rows."""
         return self.behind[-1] if self.behind else self.header
 
-    def dialect_to(self, end_byte: int | None) -> Dialect:
-        """How the rows are written, where they begin and end."""
-        lines = (*self.above, self.header, *self.behind)
+    def dialect_to(self, end_byte: int | None, stands_again: bool = True) -> Dialect:
+        """How the rows are written, where they begin and end; ``stands_again``: the header may stand among them."""
+        lines = (*self.above, *((self.header,) if stands_again else ()), *self.behind)
         return Dialect(
             self.encoding,
             self.delimiter,
-            len(self.names) + trailing_cells(self.first_rows, self.delimiter, len(self.names)),
+            self._cell_count,
             self.last.next_byte,
             self.last.number + 1,
             frozenset(normal_form(line.text, self.delimiter) for line in lines) - {""},
             end_byte,
         )
+
+    @cached_property
+    def _cell_count(self) -> int:
+        return len(self.names) + trailing_cells(self.first_rows, self.delimiter, len(self.names))
 
     @cached_property
     def position(self) -> Mapping[str, int]:
@@ -77,15 +81,20 @@ class Fit:
         return found
 
     @cached_property
-    def told(self) -> tuple[Told, ...]:
-        """What the names, and the rows of units or of other names around the header, say of each column."""
+    def _around(self) -> tuple[list[list[str]], list[list[str]]]:
+        """Cells of the rows of names, and of those of units, around the header and with it."""
         if not self.profile.header_tells:
-            return (Told(),) * len(self.names)
-        around = [line.text for line in (*self.above, *self.behind)]
-        units = [cells for text in around if text.startswith("#") and (cells := self._cells(text))]
-        names = [self.names, *(cells for text in around if not text.startswith("#") and (cells := self._cells(text)))]
-        columns = range(len(self.names))
-        return tuple(told([cells[at] for cells in names], [cells[at] for cells in units]) for at in columns)
+            return [], []
+        lines = [line.text for line in (*self.above, *self.behind)]
+        names = [cells for text in lines if not text.startswith("#") and (cells := self._cells(text))]
+        return [list(self.names), *names], [
+            cells for text in lines if text.startswith("#") and (cells := self._cells(text))
+        ]
+
+    def told(self, at: int) -> Told:
+        """What the names, and the rows of units or of other names around the header, say of a column."""
+        names, units = self._around
+        return told([cells[at] for cells in names], [cells[at] for cells in units])
 
     @property
     def units(self) -> dict[str, str]:
@@ -104,7 +113,12 @@ class Fit:
 
     def names_as(self, other: "Fit") -> bool:
         """Whether another header names and tells the same."""
-        return (self.names, self.delimiter, self.told) == (other.names, other.delimiter, other.told)
+        return (self.names, self.delimiter, self._around) == (other.names, other.delimiter, other._around)
+
+    def is_repeated(self, place: Place) -> bool:
+        """Whether the very lines stand again."""
+        above = place.above[len(place.above) - len(self.above) :] if self.above else ()
+        return place.line.text == self.header.text and [one.text for one in above] == [one.text for one in self.above]
 
     def is_row(self, line: str) -> bool:
         """Whether a line is a row: it has a cell for each column, and a time, or no time and some number."""
@@ -135,6 +149,8 @@ class Fit:
 def delimiter_of(line: str, profile: Profile) -> str:
     """How the cells of a line are parted where it is a header row of a profile, else nothing."""
     wanted = {*profile.required, *profile.time.columns[:2]}
+    if not all(name in line for name in wanted):
+        return ""
     for delimiter in DELIMITERS:
         names = _names(line, delimiter, profile)
         if wanted.issubset(names) or (profile.header_tells and wanted.issubset(map(bare, names))):

@@ -9,7 +9,7 @@ from groundstation.base.records import Remark
 from groundstation.base.signals import field_of
 from groundstation.readers.dialect import uses_decimal_comma
 from groundstation.readers.layout import METHODS, Derivation, Key, Layout, Rule, TimeRule, rule_for
-from groundstation.readers.norths import LOOKED_AT, OF_MOTION, Norths, by_motion, by_the_field, samples_of
+from groundstation.readers.norths import LOOKED_AT, OF_MOTION, Norths, by_motion, by_the_field, day_of, samples_of
 from groundstation.readers.profile import ColumnRule, DerivedRule
 from groundstation.readers.profile_fit import Fit
 from groundstation.readers.source import Source
@@ -42,7 +42,7 @@ def layout_of(
     norths = _norths(fit, source, time, utc_of_zero_ns, end_byte)
     for rule in found:
         at = fit.position[rule.name]
-        adapted = _adapted(rule, fit.told[at], fed.remarks)
+        adapted = _adapted(rule, fit.told(at), fed.remarks)
         if adapted is not None:
             _feed(fit, adapted, at, norths, fed)
     missing = [rule.name for rule in profile.columns if rule.name not in fit.position and not rule.is_optional]
@@ -91,8 +91,8 @@ def _feed(fit: Fit, rule: ColumnRule, at: int, norths: Norths, fed: _Fed) -> Non
     """Add the rule of a column; of a direction from magnetic north its values as they are, and a derivation."""
     raw = (fit.profile.raw_topic, fit.label(at))
     north, by = rule.north, ""
-    if rule.north and fit.told[at].north:
-        north, by = fit.told[at].north, "its name"
+    if rule.north and (said := fit.told(at).north):
+        north, by = said, "its name"
     if rule.north and rule.field.name == "track_deg" and norths.track:
         north, by = norths.track, norths.track_by
     if north != rule.north:
@@ -146,7 +146,7 @@ def _factors(fit: Fit, rule: DerivedRule) -> tuple[float, ...]:
     """Factors of the inputs of a derivation, by the unit that the file tells where it tells one of the dimension."""
     factors = []
     for given, unit in zip(rule.inputs, METHODS[rule.method].units, strict=True):
-        said = fit.told[fit.position[given.column]].unit if given.column else None
+        said = fit.told(fit.position[given.column]).unit if given.column else None
         factors.append(said[1] if said is not None and said[0] == unit else given.factor)
     return tuple(factors)
 
@@ -174,9 +174,12 @@ def _norths(fit: Fit, source: Source, time: TimeRule, utc_of_zero_ns: int | None
         if one.topic == "gnss" and one.field.name in OF_MOTION and one.name in fit.position
     ]
     layout = Layout(time, tuple(rules), decimal_comma=uses_decimal_comma(fit.first_rows, fit.delimiter))
-    samples = samples_of(source, fit.dialect_to(end_byte), layout)
+    dialect = fit.dialect_to(end_byte)
+    samples = samples_of(source, dialect, layout)
     found = by_motion(samples) if "track_deg" in directions else Norths()
-    if not found.sign and "true_heading_deg" in directions and utc_of_zero_ns is not None:
-        field = by_the_field(samples, utc_of_zero_ns)
+    is_asked = not found.sign and samples.has_variation and "true_heading_deg" in directions
+    day_ns = day_of(source, dialect, layout) if is_asked and utc_of_zero_ns is not None else None
+    if day_ns is not None and utc_of_zero_ns is not None:
+        field = by_the_field(samples, day_ns + utc_of_zero_ns)
         found = replace(found, sign=field.sign, sign_by=field.sign_by)
     return replace(found, has_variation=samples.has_variation)

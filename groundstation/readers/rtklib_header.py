@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.ecef import geodetic_deg_m
+from groundstation.base.records import Damage
 from groundstation.readers.dialect import Line, head_lines
-from groundstation.readers.sections import MOST, lines_with
+from groundstation.readers.sections import MOST, left_out, lines_with
 from groundstation.readers.source import Source
 
 Place = tuple[float, float, float]
@@ -22,6 +23,7 @@ _HEIGHTS = re.compile(r"\(.*\bheight\b.*\b(ellipsoidal|geodetic)\b")
 _REFERENCE = re.compile(r"(?:ref|slave) pos\s*:(.*)")
 # RTKLIB before 2.4.3 b34 writes %13.9f%14.9f%10.4f with nothing between them.
 _NUMBER = re.compile(r"[-+]?\d+\.\d{9}(?=\d*\.)|[-+]?\d+(?:\.\d*)?|[-+]?\.\d+")
+_PERCENT = re.compile(b"%")
 _TURN_DEG = 360.0
 _HEAD_LINES = 1000
 
@@ -78,27 +80,26 @@ def form_of(source: Source) -> Governed | None:
     return None if form is None else Governed(form, top[-1].number + 1, top[-1].next_byte)
 
 
-def forms_of(source: Source, first: Governed) -> tuple[list[Governed], int]:
-    """The headers of a file that change how rows are read, and how many lines of names were not looked at."""
-    governed, left = [first], 0
+def forms_of(source: Source, first: Governed) -> tuple[list[Governed], Damage | None]:
+    """The headers of a file that change how rows are read, and what is left out where they are too many."""
+    governed = [first]
     last = Line(first.first_line - 1, first.first_byte, "", True)
     for block, start in _blocks(source, last):
         form = _form(source, block, governed[-1].form)
         if form is None or form.reads_as(governed[-1].form):
             continue
-        if len(governed) == MOST:
-            left += 1
-            continue
         governed[-1] = replace(governed[-1], end_byte=start)
+        if len(governed) == MOST:
+            return governed, left_out(source, block[0].number, start)
         governed.append(Governed(form, block[-1].number + 1, block[-1].next_byte))
-    return governed, left
+    return governed, None
 
 
 def _blocks(source: Source, last: Line) -> Iterator[tuple[list[Line], int]]:
     """Lines behind the header on top that begin with a percent sign, those that follow each other together."""
     block: list[Line] = []
     begin = 0
-    for line, start in lines_with(source, last, "utf-8", ("%",)):
+    for line, start in lines_with(source, last, "utf-8", _PERCENT):
         if not line.text.lstrip().startswith("%"):
             continue
         if block and line.number != block[-1].number + 1:

@@ -28,7 +28,7 @@ from groundstation.readers.layout import Layout, Rule, TimeRule
 from groundstation.readers.losses import Losses
 from groundstation.readers.places import without_place, zeroed
 from groundstation.readers.rtklib_header import Form, Governed, form_of, forms_of
-from groundstation.readers.sections import MOST, Section
+from groundstation.readers.sections import Section
 from groundstation.readers.source import Claim, Source
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ RAW = "raw.pos"
 _PARTING = re.compile(rb"[ \t]+(?:[,;][ \t]*)?|[,;][ \t]*")
 _TOUCHING = re.compile(rb"(?<=[0-9.])(?=[-+][0-9.])")
 _OF_NO_ROW = re.compile(rb"(?m)^\t?%[^\n]*|^\t|\t?\r?$")  # of lines whose cells are parted by tabs
-_SIGNS, _DIGITS_FROM, _DIGITS_TO, _POINT = (43, 45), 48, 57, 46
+_PLUS, _MINUS, _POINT, _DIGITS_FROM, _DIGITS_TO = b"+-.09"
 _FIXES = np.array(["none", "rtk_fixed", "rtk_float", "dgnss", "dgnss", "3d", "ppp", "dead_reckoning"])
 _JST_NS = 9 * 3_600 * NS_PER_S
 _PIECE_BYTES, _LONGEST_LINE = 1 << 20, 1 << 16
@@ -58,11 +58,13 @@ def read(source: Source) -> Iterator[Item]:
         raise UnreadableLogError(source.name, "no line of names", "%  GPST latitude(deg) ... of RTKLIB")
     governed, left = forms_of(source, first)
     yield LogHeader(NAME, first.form.metadata, 0)
-    yield from dict.fromkeys(_remarks(governed, left))
+    yield from dict.fromkeys(_remarks(governed))
     losses = Losses()
     for _names, group in groupby(governed, key=lambda one: (one.form.names, one.form.has_week)):
         yield from _rows(source, list(group), losses)
     yield from losses.damages()
+    if left is not None:
+        yield left
 
 
 def _rows(source: Source, governed: Sequence[Governed], losses: Losses) -> Iterator[Item]:
@@ -140,7 +142,7 @@ def _parted(rows: bytes) -> bytes:
     b'40.086179918\\t-105.206044414 1.0e-5 -0.1'
     """
     content = np.frombuffer(rows, dtype=np.uint8)
-    signs = np.flatnonzero(np.isin(content, _SIGNS))
+    signs = np.flatnonzero((content == _MINUS) | (content == _PLUS))
     before = content[signs[signs > 0] - 1]
     if not (((before >= _DIGITS_FROM) & (before <= _DIGITS_TO)) | (before == _POINT)).any():
         return rows
@@ -299,13 +301,11 @@ def _velocities(velocity: tuple[FloatArray, Any] | None) -> dict[str, Column]:
     }
 
 
-def _remarks(governed: Sequence[Governed], left: int) -> Iterator[Remark]:
+def _remarks(governed: Sequence[Governed]) -> Iterator[Remark]:
     for one in governed[1:]:
         form = one.form
         text = f"a header above row {one.first_line} governs the rows below it: times in {form.scale}"
         yield Remark("second_header", f"{text}, {', '.join(form.names[2:5])}")
-    if left:
-        yield Remark("second_header", f"more than {MOST} headers: {left} are not looked at")
     for form in (one.form for one in governed):
         if form.scale == "GPST":
             yield Remark("converted", "times are GPS time: UTC is less the leap seconds of the day", "gnss")

@@ -5,20 +5,21 @@ columns, other units, another time zero.
 """
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import BinaryIO
 
-from groundstation.base.records import Remark
+from groundstation.base.records import Damage, Remark
 from groundstation.readers.dialect import Dialect, Line
 from groundstation.readers.layout import Layout
 from groundstation.readers.source import Source
 
-MOST = 500  # more headers that change something are no log: what follows is read by the last of them
+MOST = 500  # more headers that change something are no log: what follows is left out
 _PIECE_BYTES, _LONGEST_LINE = 1 << 20, 8 << 20
 _ABOVE_BYTES, _BELOW_BYTES = 1 << 16, 1 << 14  # how far from a header line its preamble and its rows are looked at
-_SHORT = 3  # characters: names that stand in many a cell are looked for as whole cells
-_CELL = rb"(?m)(?:^|[,;\t])[ \"#]*%s[ \"]*(?=[,;\t\r]|$)"
+_MARK_OF_UTF8 = "\ufeff"  # a file that was appended to another brings its own
+_SHORT = 2  # characters: such a name stands in many a row
+_WORD = re.compile(rb"[\n\r][ \"#]*[A-Za-z_]")
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class Place:
 
 
 def header_places(
-    source: Source, first: Line, encoding: str, names: Sequence[str], is_header: Callable[[str], bool]
+    source: Source, first: Line, encoding: str, mark: re.Pattern[bytes], is_header: Callable[[str], bool]
 ) -> Iterator[Place]:
     """Lines below the first header that are headers too.
 
@@ -57,42 +58,57 @@ def header_places(
     ----------
     source : Source
     first : Line
-        The first header line; looked for is behind it.
+        The last line of the first header; looked for is behind it.
     encoding : str
-    names : sequence of str
-        Names of which every header has at least one.
+    mark : pattern
+        Stands in every header line, and in hardly any row.
     is_header : callable
-        Tells of a line with one of the names whether it is a header.
+        Tells of a line with the mark whether it is a header.
     """
-    separator, after = _separator(source), first
+    after = first
     with source.open() as again:
-        for line, start in lines_with(source, first, encoding, names):
+        for line, start in lines_with(source, first, encoding, mark):
             if is_header(line.text):
-                yield Place(line, start, _above(again, after, line.number, start, encoding, separator))
+                yield Place(line, start, _above(again, after, line.number, start, encoding, _separator(source)))
                 after = line
 
 
-def lines_with(source: Source, first: Line, encoding: str, marks: Sequence[str]) -> Iterator[tuple[Line, int]]:
-    """Whole lines behind a line that have one of the marks, and their first bytes; a short name is a cell."""
+def mark_of(name: str) -> re.Pattern[bytes]:
+    """A mark of the header lines that have a name; of a short one, that they begin with a letter."""
+    return _WORD if len(name) <= _SHORT else re.compile(re.escape(name.encode()))
+
+
+def lines_with(source: Source, first: Line, encoding: str, mark: re.Pattern[bytes]) -> Iterator[tuple[Line, int]]:
+    """Whole lines behind a line that have a mark, and their first bytes."""
     separator = _separator(source)
-    base, number, rest = first.next_byte, first.number + 1, b""
-    with source.open() as stream:
+    base, rest = first.next_byte - len(separator), b""  # every piece begins with the end of the line before
+    number, counted = first.number + 1, first.next_byte
+    with source.open() as stream, source.open() as again:
         stream.seek(base)
         while data := stream.read(_PIECE_BYTES):
-            piece = rest + data
-            end = piece.rfind(separator) + 1
-            if not end and len(piece) > _LONGEST_LINE:
-                base, rest = base + len(piece), b""
+            piece = rest + data if rest else data
+            end = piece.rfind(separator)
+            if end <= 0 and len(piece) > _LONGEST_LINE:
+                base, rest = base + len(piece) - 1, piece[-1:]
                 continue
-            rest, piece, counted = piece[end:], piece[:end], 0
-            for start in sorted({start for mark in marks for start in _starts(piece, mark.encode(), separator)}):
-                number += piece.count(separator, counted, start)
-                counted = start
-                behind = piece.find(separator, start) + 1
-                text = piece[start:behind].decode(encoding, errors="replace").rstrip("\r\n")
-                yield Line(number, base + behind, text, True), base + start
-            number += piece.count(separator, counted)
-            base += end
+            at = 0
+            while end > 0 and (hit := mark.search(piece, at, end)) is not None:
+                start, at = piece.rfind(separator, 0, hit.end()) + 1, piece.find(separator, hit.end())
+                if counted < base:
+                    number, counted = number + _count(again, counted, base, separator), base
+                number, counted = number + piece.count(separator, counted - base, start), base + start
+                text = piece[start:at].decode(encoding, errors="replace").rstrip("\r").removeprefix(_MARK_OF_UTF8)
+                yield Line(number, base + at + 1, text, True), counted
+            base, rest = base + max(end, 0), piece[max(end, 0) :]
+
+
+def _count(stream: BinaryIO, start: int, end: int, separator: bytes) -> int:
+    """Line ends between two bytes of a file."""
+    stream.seek(start)
+    count = 0
+    while start < end and (data := stream.read(min(_PIECE_BYTES, end - start))):
+        count, start = count + data.count(separator), start + len(data)
+    return count
 
 
 def lines_below(source: Source, line: Line, encoding: str) -> tuple[Line, ...]:
@@ -117,6 +133,19 @@ def ended(section: Section, end_byte: int) -> Section:
     return replace(section, dialect=replace(section.dialect, end_byte=end_byte))
 
 
+def left_out(source: Source, line: int, first_byte: int) -> Damage:
+    """Damage that tells of the lines from a header on that is one too many."""
+    with source.open() as stream:
+        count = _count(stream, first_byte, source.size, _separator(source))
+    what = f"lines behind the first {MOST} headers, each unlike the one before: left out"
+    return Damage("dropped_rows", f"rows {line} to {line + max(count, 1) - 1}", max(count, 1), what)
+
+
+def without_headers(section: Section) -> Section:
+    """A section in which no header line stands again: nothing to look for."""
+    return replace(section, dialect=replace(section.dialect, header_lines=frozenset()))
+
+
 def told(place: Place, is_same: bool, shift_ns: int | None = 0) -> Remark:
     """A remark that the rows below a place have a header of their own: other columns, or the same with another time."""
     what = "is that of a log with another zero of time" if is_same else "names other columns"
@@ -124,19 +153,6 @@ def told(place: Place, is_same: bool, shift_ns: int | None = 0) -> Remark:
     if shift_ns is None:
         text += ", whose times nothing ties to those above: they are left out"
     return Remark("second_header", text)
-
-
-def _starts(piece: bytes, name: bytes, separator: bytes) -> Iterator[int]:
-    """Where the lines begin that have a mark; a short name must be a whole cell."""
-    if len(name) <= _SHORT and name.isalnum():
-        yield from {
-            piece.rfind(separator, 0, hit.start() + 1) + 1 for hit in re.finditer(_CELL % re.escape(name), piece)
-        }
-        return
-    at = piece.find(name)
-    while at >= 0:
-        yield piece.rfind(separator, 0, at) + 1
-        at = piece.find(name, piece.find(separator, at))
 
 
 def _above(stream: BinaryIO, after: Line, number: int, start: int, encoding: str, separator: bytes) -> tuple[Line, ...]:

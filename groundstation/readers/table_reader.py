@@ -75,10 +75,16 @@ class TableReader:
         yield from self._remarks(scanner)
         yield from self._losses.damages()
 
-    def columns(self) -> Iterator[tuple[Column, dict[Key, Column]]]:
-        """Times and columns of the rows of the first section, block by block."""
+    def columns(self) -> Iterator[dict[Key, Column]]:
+        """Columns of the rows of the first section without their times, block by block."""
         for block in RowScanner(self._source, self._dialect, Losses()):
-            yield self._typed(block)
+            yield self._fields(self._arrays(block, with_time=False), block.line_numbers)
+
+    def first_times(self) -> Column:
+        """Times of the first block of rows; none when there are no rows."""
+        for block in RowScanner(self._source, self._dialect, Losses()):
+            return self._time(self._arrays(block), block.line_numbers)
+        return Column(np.zeros(0, dtype=np.int64))
 
     def _settled(self, sections: Sequence[Section]) -> tuple[Section, ...]:
         """Sections with ``raw`` settled: float64 where every cell of the file is a number, else text.
@@ -134,21 +140,28 @@ class TableReader:
         return {column: table.column(str(column)).combine_chunks() for column in types}
 
     def _typed(self, block: Block) -> tuple[Column, dict[Key, Column]]:
+        arrays = self._arrays(block)
+        return self._time(arrays, block.line_numbers), self._fields(arrays, block.line_numbers)
+
+    def _arrays(self, block: Block, with_time: bool = True) -> dict[int, Any]:
+        """Cells of the columns that have rules, and of the time, as numbers where they can be, else as text."""
         layout = self._layout
         types = {rule.column: pa.float64() if rule.kind == "double" else pa.string() for rule in layout.rules}
-        types |= dict.fromkeys(layout.time.columns, pa.string())
+        types |= dict.fromkeys(layout.time.columns if with_time else (), pa.string())
         try:
             arrays = self._parse(block, types, "," if layout.decimal_comma else ".")
         except pa.ArrowInvalid:  # some cell is no number: take all as text and find out which
             arrays = self._parse(block, dict.fromkeys(types, pa.string()))
-        arrays = {at: cells.trimmed(array) if pa.types.is_string(array.type) else array for at, array in arrays.items()}
-        time = self._time(arrays, block.line_numbers)
-        columns = {rule.key: self._column(rule, arrays[rule.column], block.line_numbers) for rule in layout.rules}
+        return {at: cells.trimmed(array) if pa.types.is_string(array.type) else array for at, array in arrays.items()}
+
+    def _fields(self, arrays: Mapping[int, Any], lines: Int64Array) -> dict[Key, Column]:
+        """Columns of the rules, and those that are derived from them."""
+        columns = {rule.key: self._column(rule, arrays[rule.column], lines) for rule in self._layout.rules}
         for topic, by_field in self._places():
-            columns |= self._placed(topic, by_field, columns, block.line_numbers)
-        for derivation in layout.derivations:
+            columns |= self._placed(topic, by_field, columns, lines)
+        for derivation in self._layout.derivations:
             columns |= apply(derivation, columns)
-        return time, columns
+        return columns
 
     def _places(self) -> Iterator[tuple[str, dict[str, Rule]]]:
         """Topics whose rows tell a place, and their rules by field; what a simulator tells as truth is left alone."""
@@ -284,8 +297,7 @@ def _occupied(fields: Mapping[str, Column]) -> BoolArray | None:
 def first_times(source: Source, dialect: Dialect, layout: Layout) -> tuple[Column, int]:
     """Times of the first block of rows (none when there are no rows), and how many name no zone."""
     reader = TableReader(source, [Section(dialect, replace(layout, rules=(), derivations=()))])
-    time = next((time for time, _none in reader.columns()), Column(np.zeros(0, dtype=np.int64)))
-    return time, reader.zoneless
+    return reader.first_times(), reader.zoneless
 
 
 def truncated_header(line: int) -> Damage:
