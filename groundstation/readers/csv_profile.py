@@ -138,14 +138,18 @@ def _sections(source: Source, first: Fit, utc_of_zero_ns: int | None) -> tuple[l
     remarks: list[Remark | Damage] = []
     profile = first.profile
     mark = mark_of(max((*profile.required, *profile.time.columns[:2]), key=len))
-    stands_again, last_byte = False, None
+    stands_again, last_byte, own_until = False, None, first.last.number
     for place in header_places(
         source, first.last, first.encoding, mark, lambda line: bool(delimiter_of(line, profile))
     ):
+        if place.line.number <= own_until:
+            continue  # a header's own row of other names
         stands_again = True
         if fits[-1].is_repeated(place):
+            own_until = place.line.number + len(fits[-1].behind)
             continue
         found, end_byte = fit_below(source, fits[-1], place)
+        own_until = found.last.number
         utc_ns, _remarks = _utc_of_zero(found, _metadata(found))
         shift_ns = shifts[-1] if utc_ns is None or utc_of_zero_ns is None else utc_ns - utc_of_zero_ns
         is_same = found.names_as(fits[-1])

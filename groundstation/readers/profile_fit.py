@@ -172,14 +172,11 @@ def fit_below(source: Source, before: Fit, place: Place) -> tuple[Fit, int]:
     """A profile over a header in the middle of a file, and the byte where the rows of the one before end."""
     lines = [place.line, *lines_below(source, place.line, before.encoding)]
     fit = _with_names(before.profile, before.encoding, delimiter_of(place.line.text, before.profile), lines, 0)
-    above: list[Line] = []
-    end_byte = place.first_byte
-    for line, one_above in zip(reversed(place.above), (*reversed(place.above[:-1]), before.last), strict=True):
-        if before.is_row(line.text) or len(above) == _MOST_ABOVE:
-            break
-        above.insert(0, line)
-        end_byte = one_above.next_byte
-    return replace(fit, above=tuple(above)), end_byte
+    count = 0
+    while count < min(len(place.above), _MOST_ABOVE) and not before.is_row(place.above[-count - 1].text):
+        count += 1
+    end_byte = place.above_from[-count] if count else place.first_byte
+    return replace(fit, above=place.above[len(place.above) - count :]), end_byte
 
 
 def _with_names(profile: Profile, encoding: str, delimiter: str, lines: Sequence[Line], at: int) -> Fit:

@@ -42,11 +42,12 @@ class Section:
 
 @dataclass(frozen=True)
 class Place:
-    """A line that may be a header, and the lines above it down to the header before."""
+    """A header line, and the lines above it up to the header before, each with its first byte."""
 
     line: Line
     first_byte: int
     above: tuple[Line, ...]
+    above_from: tuple[int, ...]
 
 
 def header_places(
@@ -69,7 +70,7 @@ def header_places(
     with source.open() as again:
         for line, start in lines_with(source, first, encoding, mark):
             if is_header(line.text):
-                yield Place(line, start, _above(again, after, line.number, start, encoding, _separator(source)))
+                yield Place(line, start, *_above(again, after, line.number, start, encoding, _separator(source)))
                 after = line
 
 
@@ -155,16 +156,19 @@ def told(place: Place, is_same: bool, shift_ns: int | None = 0) -> Remark:
     return Remark("second_header", text)
 
 
-def _above(stream: BinaryIO, after: Line, number: int, start: int, encoding: str, separator: bytes) -> tuple[Line, ...]:
-    """Lines between the header before and a line."""
+def _above(
+    stream: BinaryIO, after: Line, number: int, start: int, encoding: str, separator: bytes
+) -> tuple[tuple[Line, ...], tuple[int, ...]]:
+    """Lines between the header before and a line, and their first bytes."""
     begin = max(after.next_byte, start - _ABOVE_BYTES)
     stream.seek(begin)
     lines = stream.read(start - begin).split(separator)[:-1]
     if begin > after.next_byte:
         lines = lines[1:]  # the first may be half of one
-    found, next_byte = [], start
+    found, starts, next_byte = [], [], start
     for offset, content in enumerate(reversed(lines), start=1):
         text = content.decode(encoding, errors="replace").rstrip("\r")
         found.append(Line(number - offset, next_byte, text, True))
         next_byte -= len(content) + len(separator)
-    return tuple(reversed(found))
+        starts.append(next_byte)
+    return tuple(reversed(found)), tuple(reversed(starts))
