@@ -19,6 +19,7 @@ from pypdf import PdfReader
 from typer.testing import CliRunner
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.declination import declination_along
 from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.base.records import Column
 from groundstation.base.timescales import utc_ns_to_iso
@@ -55,7 +56,6 @@ from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
 from groundstation.store.reader import read, read_info
 from groundstation.tables.assemble import flight_from_batches
-from groundstation.tables.declination import declination_along
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer.recording import write_recording
 from tests import magnetic_example

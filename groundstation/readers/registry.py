@@ -167,6 +167,9 @@ def _guarded(reader: Reader, claim: Claim, source: Source) -> Iterator[Item]:
 def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]]:
     if source.is_empty:
         raise UnclaimedLogError(source.name, "an empty file", "a recorded log", "check how it was copied")
+    companion = magic.companion(source)
+    if companion is not None:
+        raise UnclaimedLogError(source.name, companion, "", "give the log itself")
     if profile is not None:
         by_profile = bags if bags.sniff(source) else csv_profile
         return by_profile.claim_by(source, profile), plug_in_failures()

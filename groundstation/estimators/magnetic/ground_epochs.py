@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180, wrap_360
+from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
 from groundstation.estimators.heading.delay import known_delay
@@ -27,7 +28,6 @@ from groundstation.estimators.magnetic.readings import NO_DATE, PLACE_WANTED
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import DeclinationUsed
 from groundstation.results.magnetic_ground import LeftOut
-from groundstation.tables.declination import declination_along
 from groundstation.tables.headings import FARTHEST_POSITION_S
 from groundstation.tables.phases import ground_mask
 from groundstation.tables.resample import join
