@@ -20,7 +20,7 @@ NOVATEL_SHORT_HEADER = 12
 TEXT_CRC_BYTES = 9  # of a NovAtel log as text: an asterisk and eight digits
 SHORTEST_TEXT = 28  # bytes of such a log, which are those of the binary header
 LONGEST = 66_000  # bytes of the longest frame that any protocol can write
-LONGEST_SENTENCE = 1_024
+LONGEST_SENTENCE, LONGEST_ADDRESS = 1_024, 31
 DOLLAR, BANG, STAR, COMMA, CR, LF, HASH, PERCENT, SEMICOLON = 36, 33, 42, 44, 13, 10, 35, 37, 59
 NO_FRAME, PENDING = 0, -1
 
@@ -103,7 +103,7 @@ def _bare_sentence(data: Any, at: int) -> int:
 @in_place
 def _is_address(data: Any, at: int) -> bool:
     """Whether two capital letters or more and a comma stand behind the first character of a sentence."""
-    for k in range(at + 1, min(at + 10, len(data))):
+    for k in range(at + 1, min(at + LONGEST_ADDRESS, len(data))):
         byte = data[k]
         if byte == COMMA:
             return k >= at + 3
