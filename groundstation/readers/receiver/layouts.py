@@ -44,6 +44,11 @@ class Part:
     fields: tuple[Field, ...]
     ends: dict[str, int]
 
+    def values(self, records: NDArray[Any], name: str) -> NDArray[Any]:
+        """Values of one field, which has no finer part."""
+        field = next(field for field in self.fields if field.name == name)
+        return _values(records, field, {})
+
     def columns(self, records: NDArray[Any], size: int | None = None) -> dict[str, Column]:
         """Values by name; members that end behind byte ``size`` of the payload are left out."""
         fine = {field.fine for field in self.fields if field.fine}

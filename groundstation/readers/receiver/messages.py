@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -65,10 +66,14 @@ class Messages:
         is_usual = self.layout is None or self.size >= self.layout.size
         return f"raw.{self.name}" if is_usual else f"raw.{self.name}.{self.size}"
 
-    def head(self) -> NDArray[Any]:
-        """Heads as structures, shape (n,)."""
+    @cached_property
+    def _head(self) -> NDArray[Any]:
         assert self.layout is not None
         return self.frames.records(self.payload_at, self.layout.head.dtype)
+
+    def head(self) -> NDArray[Any]:
+        """Heads as structures, shape (n,)."""
+        return self._head
 
     def has(self, member: str) -> bool:
         """Whether the heads have a member."""
@@ -96,7 +101,7 @@ class Messages:
     def _told(self) -> Int64Array:
         """Groups that each message says it has."""
         assert self.layout is not None
-        return _column(self.layout, self.head(), self.layout.count).astype(np.int64)
+        return self.layout.head.values(self.head(), self.layout.count).astype(np.int64)
 
     def group(self) -> tuple[NDArray[Any], Int64Array, Int64Array]:
         """Members of the repeated groups: structures, which message each is of, and its place in the file."""
@@ -112,10 +117,6 @@ class Messages:
             self.payload_at[owner] + self.layout.size + number * width, self.layout.group.dtype
         )
         return records, owner, self.places[owner] + 1 + number
-
-
-def _column(layout: Layout, head: NDArray[Any], name: str) -> NDArray[Any]:
-    return layout.head.columns(head)[name].values
 
 
 def _repeated(counts: Int64Array) -> tuple[Int64Array, Int64Array]:

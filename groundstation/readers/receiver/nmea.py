@@ -59,6 +59,8 @@ class Epochs:
     places : ndarray of int64, shape (n,)
         Byte of the file at which each begins.
     choice : Choice
+    arrivals : Anchors, optional
+        Times of arrival of the sentences, for a stream that tells no time.
     """
 
     sentences: Mapping[str, Sentences]
@@ -66,6 +68,7 @@ class Epochs:
     day_ns: Int64Array
     places: Int64Array
     choice: Choice = ALL
+    arrivals: Anchors | None = None
 
     def __len__(self) -> int:
         return len(self.day_ns)
@@ -73,6 +76,8 @@ class Epochs:
     def time_of(self, address: str, time: Column) -> Column:
         """Time of each sentence, given that of the epochs."""
         epoch = self.epoch[address]
+        if not len(self) and self.arrivals is not None:
+            return _arrival(self.arrivals, self.sentences[address].places)
         if not len(self):
             return Column(np.zeros(len(epoch), dtype=np.int64), np.zeros(len(epoch), dtype=bool))
         at = np.maximum(epoch, 0)
@@ -107,7 +112,13 @@ class Epochs:
         return columns
 
 
-def epochs_of(sentences: Mapping[str, Sentences], choice: Choice = ALL) -> Epochs:
+def _arrival(arrivals: Anchors, places: Int64Array) -> Column:
+    """Times of arrival of the sentences at given places; absent for one that has none."""
+    at = np.minimum(np.searchsorted(arrivals.places, places), len(arrivals) - 1)
+    return Column(arrivals.utc_ns[at], arrivals.places[at] == places)
+
+
+def epochs_of(sentences: Mapping[str, Sentences], choice: Choice = ALL, arrivals: Anchors | None = None) -> Epochs:
     """Put the sentences of a block into epochs."""
     which, day_ns, is_whole = [], [], []
     for one in sentences.values():
@@ -132,7 +143,7 @@ def epochs_of(sentences: Mapping[str, Sentences], choice: Choice = ALL) -> Epoch
     }
     frames = next(iter(sentences.values())).frames if sentences else None
     places = nothing if frames is None else frames.places[starts]
-    return Epochs(sentences, epoch, told_ns[is_new], places, choice)
+    return Epochs(sentences, epoch, told_ns[is_new], places, choice, arrivals)
 
 
 def _with_fractions(told_ns: Int64Array, is_whole: BoolArray) -> Int64Array:

@@ -10,6 +10,9 @@ from groundstation.base.records import Damage, Int64Array, Remark
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.receiver import nmea, novatel, novatel_messages, scan, ubx
+from groundstation.readers.receiver.host_text import HostText
+from groundstation.readers.receiver.host_times import HostTimes
+from groundstation.readers.receiver.host_times import remarks as host_remarks
 from groundstation.readers.receiver.messages import Block, Messages
 from groundstation.readers.receiver.nmea_canonical import HEADING_FORMATTERS, has_heading
 from groundstation.readers.receiver.sentence_layouts import FORMATTERS, MAKERS_POSITIONS, RECEIVERS, STANDARD_POSITIONS
@@ -47,6 +50,10 @@ class Overview:
         Message or formatter that gives ``ins``; empty where none does.
     heading_address : str
         Address of the sentences that do; empty where a binary message does.
+    arrivals : Anchors, optional
+        Times of arrival by the clock of the computer that recorded, where the stream tells no time.
+    is_absolute : bool
+        Whether times are UTC.
     blocks : list of Frames and their sentences
         Those of a stream that is one block: they need not be looked for again. Empty for a longer one.
     damages : tuple of Damage
@@ -59,6 +66,8 @@ class Overview:
     choice: nmea.Choice = nmea.ALL
     attitude: str = ""
     heading_address: str = ""
+    arrivals: Anchors | None = None
+    is_absolute: bool = False
     metadata: dict[str, str] = field(default_factory=dict)
     remarks: list[Remark] = field(default_factory=list)
     rtcm: Counter[int] = field(default_factory=Counter)
@@ -66,11 +75,12 @@ class Overview:
     damages: tuple[Damage, ...] = ()
 
 
-def overview(source: Source, bare: bool) -> Overview:
-    """Walk through a stream once."""
+def overview(source: Source, bare: bool, host: HostText | None = None) -> Overview:
+    """Walk through a stream once; ``host`` is how a computer wrote around the sentences."""
     found, full_times, attitudes, sound = Overview(), ubx.FullTimes(), Counter[str](), set[str]()
     places, utc_ns = [], []
-    stream = Stream(source, bare)
+    stream = Stream(source, bare, is_hosts=host.accepts if host else None)
+    host_clock = HostTimes(host) if host else None
     for frames in stream:
         block = Block()
         for messages in ubx.messages_of(frames):
@@ -90,6 +100,8 @@ def overview(source: Source, bare: bool) -> Overview:
         for one in sentences.values():
             found.counts[one.address] += len(one)
             attitudes[one.address] += len(one) * has_heading(one)
+        if host_clock is not None:
+            host_clock.take(frames, nmea.epochs_of(sentences))
         found.blocks.append((frames, sentences))
         del found.blocks[1 + MOST_BLOCKS_KEPT :]
         told = nmea.full_times(sentences)
@@ -102,6 +114,8 @@ def overview(source: Source, bare: bool) -> Overview:
         found.damages = tuple(stream.damages())
     _choose(found, attitudes, sound)
     _set_times(found, full_times, np.concatenate([*places, _NOTHING]), np.concatenate([*utc_ns, _NOTHING]))
+    if host_clock is not None:
+        _take_hosts(found, host_clock)
     return found
 
 
@@ -143,6 +157,7 @@ def _set_times(found: Overview, full_times: ubx.FullTimes, places: Int64Array, u
     order = np.argsort(places, kind="stable")
     by_nmea = Anchors(places[order], utc_ns[order], np.full(len(places), -1, dtype=np.int64))
     found.anchors = by_ubx if len(by_ubx) else by_nmea
+    found.is_absolute = bool(len(found.anchors))
     for wrong_s, count in sorted(full_times.wrong_leaps.items()):
         text = (
             f"{count} fixes told UTC {abs(wrong_s)} s {'late' if wrong_s > 0 else 'early'}, as a receiver does before "
@@ -157,6 +172,16 @@ def _set_times(found: Overview, full_times: ubx.FullTimes, places: Int64Array, u
                 f"{utc_ns_to_iso(int(by_ubx.utc_ns[-1]), 0)}: the binary ones are believed"
             )
             found.remarks.append(Remark("date_disagrees", text))
+
+
+def _take_hosts(found: Overview, host_clock: HostTimes) -> None:
+    """Take the date, or times of arrival, from the computer's clock where the stream tells none."""
+    served = None if len(found.anchors) else host_clock.serve()
+    if served is not None:
+        found.arrivals, found.is_absolute = served.arrivals, served.is_absolute
+        if served.dates is not None:
+            found.anchors, found.is_absolute = served.dates, True
+    found.remarks += host_remarks(host_clock.host, host_clock.lines, served)
 
 
 def _versions(messages: Messages) -> dict[str, str]:

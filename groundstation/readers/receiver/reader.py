@@ -5,7 +5,16 @@ from collections.abc import Callable, Iterator, Mapping
 
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Column, Item, LogHeader, RecordBatch
-from groundstation.readers.receiver import nmea, nmea_canonical, novatel, scan, ubx, ubx_canonical
+from groundstation.readers.receiver import (
+    host_text,
+    host_times,
+    nmea,
+    nmea_canonical,
+    novatel,
+    scan,
+    ubx,
+    ubx_canonical,
+)
 from groundstation.readers.receiver.messages import Block, bounded, raw_batches, text_batches
 from groundstation.readers.receiver.novatel_messages import INS_SOURCES
 from groundstation.readers.receiver.overview import NAME, Overview, overview, remarks
@@ -25,13 +34,13 @@ def items(source: Source) -> Iterator[Item]:
     UnreadableLogError
         When the stream has no frame but RTCM.
     """
-    is_bare = not _WITH_CHECKSUM.search(source.head)
-    found = overview(source, is_bare)
+    is_bare, host = not _WITH_CHECKSUM.search(source.head), host_text.find(source.head)
+    found = overview(source, is_bare, host)
     if not found.counts:
         raise UnreadableLogError(source.name, "no message or sentence of a receiver", "", "was it cut or damaged?")
     # Messages of one epoch come late and in any order, with times some microseconds apart: no step of the clock.
-    yield LogHeader(NAME, found.metadata, 0 if len(found.anchors) else None, has_counting_clock=True)
-    stream, tally = Stream(source, is_bare, _epoch_start_of(found)), Tally()
+    yield LogHeader(NAME, found.metadata, 0 if found.is_absolute else None, has_counting_clock=True)
+    stream, tally = Stream(source, is_bare, _epoch_start_of(found), host.accepts if host else None), Tally()
     for frames, sentences in found.blocks or ((frames, by_address(frames)) for frames in stream):
         yield from _of_block(frames, sentences, found, tally)
     yield from remarks(found)
@@ -58,11 +67,14 @@ def _of_block(frames: Frames, sentences: dict[str, Sentences], found: Overview, 
         yield from raw_batches(timed, timed.time())
         block.add(timed)
         tally.add_lengths(timed, is_poll=False)
-    epochs = nmea.epochs_of(sentences, found.choice)
+    epochs = nmea.epochs_of(sentences, found.choice, found.arrivals)
     time = nmea.day_times(epochs, found.anchors)
     for address, one in sentences.items():
         yield from _raw_sentences(one, epochs.time_of(address, time))
         tally.add_cells(one)
+    host = host_times.raw_batch(frames, epochs, time)
+    if host is not None:
+        yield from bounded(host)
     tally.bare += len(frames.of(scan.BARE_NMEA))
     if found.leader in ubx_canonical.POSITION_SOURCES:
         gnss = ubx_canonical.gnss_batch(block, found.leader, found.anchors, tally)
