@@ -98,7 +98,8 @@ class Tally:
         ``counts`` are those of all messages and sentences by name.
         """
         if not self._positions:
-            why = f"GNSS never had a fix: {self._fixes} rows, at most {self._most_satellites:g} satellites; "
+            most = f"{'at most ' if self._most_satellites else ''}{self._most_satellites:g} satellites"
+            why = f"GNSS never had a fix: {self._fixes} rows, {most}; "
             yield Remark("no_position", f"no position in this file: {why if self._fixes else ''}{_named(counts)}")
         if self.bare:
             yield Remark("no_checksum", "sentences without a checksum: a damaged number is not seen")
