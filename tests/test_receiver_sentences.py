@@ -83,11 +83,13 @@ def test_heights_in_another_unit_are_left_out(tmp_path: Path) -> None:
 
 
 def test_dilution_is_that_of_the_systems_in_the_solution(tmp_path: Path) -> None:
-    """A system without a satellite writes 99.99, or what it likes."""
+    """A system without a satellite writes 99.99, or what it likes; 99.99 is no dilution."""
     used = nmea("GNGSA,A,3,01,02,03,04,,,,,,,,,1.5,0.9,1.2,1")
     unused = nmea("GNGSA,A,3,,,,,,,,,,,,,99.99,99.99,99.99,2")
     assert Read(tmp_path, gga("120000.00") + used + unused).values("gnss", "pdop") == [1.5]
-    assert Read(tmp_path, gga("120000.00") + unused).values("gnss", "pdop") == [99.99]
+    assert Read(tmp_path, gga("120000.00") + unused).values("gnss", "pdop") == [None]
+    low = gga("120000.00").replace(b"0.80", b"99.9")
+    assert Read(tmp_path, nmea(low[1:-5].decode())).values("gnss", "hdop") == [99.9]
 
 
 @pytest.mark.parametrize(("unit", "heading"), [("T", 12.5), ("", 12.5), ("M", None)])

@@ -69,6 +69,15 @@ def test_the_first_solution_leads_the_high_rate_one(tmp_path: Path) -> None:
     assert read.values("gnss", "latitude_deg") == [51.5] and "HNR-PVT (3) stays raw" in read.remark("skipped")
 
 
+def test_a_dilution_of_9999_is_none(tmp_path: Path) -> None:
+    itow = week_ms(NOON)
+    read = Read(tmp_path, pvt(NOON, pDOP=9999) + ubx("NAV-DOP", iTOW=itow, gDOP=9999, hDOP=9998))
+    assert read.values("gnss", "pdop") == [None] and read.values("gnss", "gdop") == [None]
+    oem = novatel("BESTPOS", 129_618_000, latitude=51.5) + novatel("PSRDOP", 129_618_000, gdop=9999.0, hdop=1.5)
+    read = Read(tmp_path, oem)
+    assert read.values("gnss", "gdop") == [None] and read.values("gnss", "hdop") == [1.5]
+
+
 def test_an_integrated_navigation_beside_a_receiver_stays_raw(tmp_path: Path) -> None:
     other = gga("120000.00", "5230.00000,N").replace(b"GNGGA", b"INGGA")
     other = nmea(other[1:-5].decode())

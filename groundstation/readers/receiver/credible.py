@@ -15,6 +15,7 @@ from groundstation.readers.receiver.tally import (
     Tally,
 )
 
+DILUTIONS, MOST_DILUTION = ("gdop", "pdop", "hdop"), 99.985
 HEADINGS = ("true_heading_deg", "magnetic_heading_deg")
 _MOST_DEG = {"roll_deg": MOST_ROLL_DEG, "pitch_deg": MOST_PITCH_DEG} | dict.fromkeys(HEADINGS, MOST_HEADING_DEG)
 
@@ -37,6 +38,12 @@ def credible_position(columns: Columns, topic: str, places: Int64Array, tally: T
     tally.add(ZERO_POSITION, topic, places[refused & is_zero & latitude.mask & longitude.mask])
     place = {"latitude_deg": _without(latitude, refused), "longitude_deg": _without(longitude, refused)}
     return columns | place
+
+
+def credible_dilution(columns: Columns) -> Columns:
+    """Columns without the dilutions of 99.99 and more, by which a receiver says that it has none."""
+    told = {name: columns[name] for name in DILUTIONS if name in columns}
+    return columns | {name: _without(one, one.values > MOST_DILUTION) for name, one in told.items()}
 
 
 def credible_attitude(columns: Columns, places: Int64Array, tally: Tally) -> Columns:

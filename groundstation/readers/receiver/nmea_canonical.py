@@ -6,7 +6,7 @@ from groundstation.base.angles import wrap_360
 from groundstation.base.records import BoolArray, Column, RecordBatch
 from groundstation.base.units import MPS_PER_KMH, MPS_PER_KNOT
 from groundstation.readers.layout import velocity_from_track
-from groundstation.readers.receiver.credible import HEADINGS, credible_attitude, credible_position
+from groundstation.readers.receiver.credible import HEADINGS, credible_attitude, credible_dilution, credible_position
 from groundstation.readers.receiver.messages import Columns, occupied
 from groundstation.readers.receiver.nmea import Epochs
 from groundstation.readers.receiver.nmea_makers import makers_solution
@@ -38,7 +38,7 @@ def gnss_batch(epochs: Epochs, time: Column, tally: Tally) -> RecordBatch | None
     columns = credible_position(columns, "gnss", epochs.places, tally)
     _add_heights(epochs, columns, tally)
     columns |= _velocity(epochs, columns)
-    columns |= _quality(epochs)
+    columns |= credible_dilution(_quality(epochs))
     _add_solution(epochs, columns, tally)
     columns = {name: column for name, column in columns.items() if column.mask.any()}
     if not len(epochs) or not columns:

@@ -16,7 +16,7 @@ from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatc
 from groundstation.base.timescales import gps_week_to_utc_ns
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.receiver import novatel_text, scan
-from groundstation.readers.receiver.credible import credible_attitude, credible_position
+from groundstation.readers.receiver.credible import credible_attitude, credible_dilution, credible_position
 from groundstation.readers.receiver.layouts import layout
 from groundstation.readers.receiver.messages import Block, Columns, Messages, occupied
 from groundstation.readers.receiver.novatel_messages import LAYOUTS, VELOCITY_OF, name_of
@@ -167,7 +167,7 @@ def gnss_batch(block: Block, leader: str, tally: Tally) -> RecordBatch | None:
     }
     columns |= _joined(block, messages, VELOCITY_OF[leader], _velocity)
     columns |= _joined(block, messages, "PSRDOP", _dilution)
-    columns = credible_position(columns, "gnss", messages.places, tally)
+    columns = credible_position(credible_dilution(columns), "gnss", messages.places, tally)
     return occupied("gnss", messages.places, messages.time(), columns)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
 from groundstation.readers.layout import velocity_from_track
-from groundstation.readers.receiver.credible import credible_attitude, credible_position
+from groundstation.readers.receiver.credible import credible_attitude, credible_dilution, credible_position
 from groundstation.readers.receiver.messages import Block, Columns, occupied
 from groundstation.readers.receiver.tally import MOVING_MPS, Tally
 from groundstation.readers.receiver.times import Anchors
@@ -47,7 +47,7 @@ def gnss_batch(block: Block, leader: str, anchors: Anchors, tally: Tally) -> Rec
     if family == "NAV":
         columns |= _precise(block, fields, columns)
     columns = _added(block, f"{family}-DOP", fields, _dilution) | columns
-    columns = credible_position(columns, "gnss", messages.places, tally)
+    columns = credible_position(credible_dilution(columns), "gnss", messages.places, tally)
     return occupied("gnss", messages.places, time_of(messages, anchors), columns)
 
 
