@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from groundstation.cli.application import EXAMPLES, VERBS, examples
 from groundstation.cli.main import app
 from tests.dataflash_writer import flight_log
+from tests.receiver_writer import nmea
 
 HEAVY = (
     "cattrs",
@@ -102,6 +103,14 @@ def test_a_log_in_which_nothing_survives_has_one_answer(tmp_path: Path) -> None:
         code, out, err = groundstation(*verb, str(log))
         assert code == 1 and err.startswith("error: flight.BIN: no readable record"), (verb, code, err)
         assert err.count("\n") == 1 and ("format:" in out) == (verb == ["info"])
+
+
+def test_records_without_a_time_are_said_to_be_there_by_every_verb(tmp_path: Path) -> None:
+    log = tmp_path / "compass.nmea"
+    log.write_bytes(b"".join(nmea(f"HEHDT,{at}.0,T") for at in range(60)))
+    for verb in (["info"], ["check"], ["run", "-o", str(tmp_path / "out")]):
+        code, _out, err = groundstation(*verb, str(log))
+        assert code == 1 and err.startswith("error: compass.nmea: no readable record has a time, of 60"), (verb, err)
 
 
 def test_a_foreign_file_in_a_folder_is_skipped_and_listed(tmp_path: Path) -> None:

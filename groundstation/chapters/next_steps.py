@@ -42,6 +42,7 @@ BY_REASON = (
     ("ground contact proven", ("Record", "weight on wheels")),
     ("no turn of steady bank", ("Fly", "a full circle to either side at equal bank")),
     ("expected at least 300 s", ("Fly", "5 min or more with INS and GNSS")),
+    ("GNSS never had a fix", ("Check", "the GNSS antenna, its cable and its sky")),
     ("no GNSS velocity", ("Record", "GNSS velocity")),
     ("no INS position", ("Record", "INS position")),
     ("no GNSS position", ("Record", "GNSS position")),

@@ -86,6 +86,7 @@ def info(
 ) -> int | None:
     """Show what a log is: format, clock, span, topics with rows, rates, fields; its buses (word by word with -v)."""
     from groundstation.cli import printing
+    from groundstation.pipeline.one_flight.convert import why_nothing_is_placed
     from groundstation.pipeline.verbs import describe
 
     if suggest_icd:
@@ -95,7 +96,7 @@ def info(
     shown = printing.as_json(description.to_dict()) if json else printing.description(description, everything=verbose)
     typer.echo(shown)
     if not description.has_records:
-        say(f"error: {log.name}: no readable record")
+        say(f"error: {log.name}: {why_nothing_is_placed(description.findings)}")
         return FAILED
     return DATA_LOST if description.has_lost_data else DONE
 

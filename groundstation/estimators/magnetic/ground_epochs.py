@@ -31,7 +31,7 @@ from groundstation.results.magnetic_ground import LeftOut
 from groundstation.tables.headings import FARTHEST_POSITION_S
 from groundstation.tables.phases import ground_mask
 from groundstation.tables.resample import join
-from groundstation.tables.sources import sources_of_kind
+from groundstation.tables.sources import sources_of_kind, why_without_gnss
 from groundstation.tables.table import Flight
 
 ANALYSIS = "magnetic_ground"
@@ -79,7 +79,8 @@ def choose_topics(flight: Flight, ins_topic: str = "", gnss_topic: str = "") -> 
     ):
         having = [topic for topic in sources_of_kind(flight, kind) if flight[topic].has(*names)]
         if not having or (wanted and wanted not in having):
-            raise NotAssessableError(ANALYSIS, f"no {what} in {wanted}" if wanted else f"no {what} in the log")
+            why = why_without_gnss(flight, "velocity") if kind == "gnss" else f"no {what} in the log"
+            raise NotAssessableError(ANALYSIS, f"no {what} in {wanted}" if wanted else why)
         found.append(wanted or having[0])
     return found[0], found[1]
 

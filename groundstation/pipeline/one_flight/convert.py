@@ -77,7 +77,8 @@ def _convert_recorded(log: Log, target: Path, limits: Thresholds, references: Re
     items = log.replay()
     found = survey(items, thresholds=limits)
     if not found.ledger.topics:
-        raise UnreadableLogError(log.path.name, "no readable record", "", "`info` shows what the file is")
+        why = why_nothing_is_placed(ledger_findings(found.ledger))
+        raise UnreadableLogError(log.path.name, why, "", "`info` shows what the file is")
     topics = found.ledger.topics
     if references.paths and any(kind_of(one.topic) == TRUTH for one in topics):
         raise GroundstationError(log.path.name, *OWN_TRUTH)
@@ -102,6 +103,12 @@ def _convert_recorded(log: Log, target: Path, limits: Thresholds, references: Re
         for batch in chain(corrected(items, found.clock), laid.batches):
             writer.write(batch)
     return Converted(info, findings, any(damage.loses_data for damage in found.damages))
+
+
+def why_nothing_is_placed(findings: Iterable[Finding]) -> str:
+    """Reason why a log has no topic: its records have no time, or it has no record that can be read."""
+    timeless = next((one.count for one in findings if one.code == "clock.no_times"), 0)
+    return f"no readable record has a time, of {timeless}" if timeless else "no readable record"
 
 
 def _with_truth(ledger: Ledger, laid: Laid, limits: Thresholds) -> Ledger:

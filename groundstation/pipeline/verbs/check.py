@@ -14,7 +14,13 @@ from groundstation.base.serial import to_json_exactly
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.convert import census_of, has_other_limits, recounted, told_of_fields
+from groundstation.pipeline.one_flight.convert import (
+    census_of,
+    has_other_limits,
+    recounted,
+    told_of_fields,
+    why_nothing_is_placed,
+)
 from groundstation.pipeline.one_flight.log import Log, as_log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
@@ -238,7 +244,7 @@ def _checked(
     fail_on: str,
 ) -> Checked:
     if not ledger.topics:
-        reason = f"{log.path.name}: no readable record: `info` shows what the file is"
+        reason = f"{log.path.name}: {why_nothing_is_placed(findings)}: `info` shows what the file is"
         outcome = Outcome(str(log.path), "failed", reason, sha256=log.source.sha256)
         return Checked(outcome, facts, ledger, clock, findings)
     gravest = worst(findings)

@@ -163,8 +163,10 @@ def _body(name: str, text: str) -> bytes | None:
         if len(cells) < len(head):
             return None
         found = b"".join(_packed(*field, cell) for field, cell in zip(head, cells, strict=False))
-        rest = cells[len(head) :] if group else []
-        for start in range(0, len(rest), max(len(group), 1)):
+        rest = cells[len(head) :]
+        if not group:
+            return found + bytes(len(rest))  # cells behind the layout make the body longer than it
+        for start in range(0, len(rest), len(group)):
             part = rest[start : start + len(group)]
             found += b"".join(_packed(*field, cell) for field, cell in zip(group, part, strict=True))
     except (ValueError, OverflowError, struct.error):

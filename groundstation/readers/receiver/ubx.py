@@ -22,20 +22,24 @@ from groundstation.readers.receiver.times import (
     fine_utc_ns,
     gps_to_utc_ns,
 )
-from groundstation.readers.receiver.ubx_messages import LAYOUTS, name_of
+from groundstation.readers.receiver.ubx_messages import is_version, layout_of, name_of
 
 HEADER_BYTES = 6
 FIRST_WEEK, LAST_WEEK = 1_000, 4_000  # 1999 to 2056: other numbers are no date of a log
 S_PER_WEEK = 604_800.0
-_SECONDS = {"NAV-PVT": "second", "NAV-PVAT": "sec", "NAV-TIMEUTC": "sec"}
+_SECONDS = {"NAV-PVT": "second", "NAV-PVAT": "sec", "NAV-TIMEUTC": "sec", "HNR-PVT": "second"}
+_SECONDS |= {f"NAV2-{name[4:]}": second for name, second in _SECONDS.items() if name.startswith("NAV-")}
+_WEEKS = ("NAV-TIMEGPS", "NAV2-TIMEGPS")
 # Message -> the fields with the leap seconds and with its flags, and the bit that calls them valid.
 _LEAPS = {
     "NAV-TIMEGPS": ("leapS", "valid", 4),
     "NAV-TIMELS": ("currLs", "valid", 1),
     "RXM-RAWX": ("leapS", "recStat", 1),
 }
-_NAV_CLASS = 0x01
+_LEAPS |= {f"NAV2-{name[4:]}": told for name, told in _LEAPS.items() if name.startswith("NAV-")}
+_CLASSES = {"NAV": 0x01, "NAV2": 0x29, "HNR": 0x28}
 _ITOW_AT_4 = (0x14, 0x13, 0x3C, 0x3B)  # HPPOSLLH, HPPOSECEF, RELPOSNED, SVIN have a version in front
+_HNR_INS = 0x02  # of the class HNR; its time stands elsewhere
 
 
 def messages_of(frames: Frames) -> Iterator[Messages]:
@@ -48,10 +52,13 @@ def messages_of(frames: Frames) -> Iterator[Messages]:
         of_code = np.flatnonzero(code == number)
         for size in np.unique(sizes[of_code]).tolist():
             name = name_of(number, size)
-            known = layout(LAYOUTS[name]) if name in LAYOUTS else None
+            text = layout_of(name)
+            known = layout(text) if text else None
             is_open = known is None or size >= known.size
             rows = of_code[sizes[of_code] >= size] if is_open else of_code[sizes[of_code] == size]
-            yield Messages(name, frames, frames.places[which[rows]], at[rows] + HEADER_BYTES, sizes[rows], known)
+            places, payload_at = frames.places[which[rows]], at[rows] + HEADER_BYTES
+            is_sound = known is None or size >= known.needed or is_version(name, size)
+            yield Messages(name, frames, places, payload_at, sizes[rows], known, is_sound)
             if is_open:
                 break
 
@@ -60,7 +67,7 @@ def time_of(messages: Messages, anchors: Anchors) -> Column:
     """UTC of each message; absent for those that tell no time."""
     if messages.has("iTOW"):
         return anchors.of_week(messages.places, messages.head()["iTOW"].astype(np.int64))
-    if messages.has("rcvTow"):
+    if messages.has("rcvTow") and messages.has("week"):
         head = messages.head()
         sound = _is_gps_time(head["week"], head["rcvTow"])
         utc_ns = gps_to_utc_ns(np.where(sound, head["week"], 0), np.where(sound, head["rcvTow"], 0.0))
@@ -111,7 +118,7 @@ class FullTimes:
         head = messages.head() if messages.layout is not None and len(messages) and messages.has("iTOW") else None
         if messages.name in _SECONDS and head is not None:
             self._of_calendar(messages, head)
-        elif messages.name == "NAV-TIMEGPS" and head is not None:
+        elif messages.name in _WEEKS and head is not None:
             self._of_week(messages, head)
         elif messages.name == "RXM-RAWX" and messages.has("rcvTow"):
             self.take_time(messages.places, time_of(messages, NO_ANCHORS))
@@ -161,7 +168,7 @@ class FullTimes:
         """Dates and times of fixes that are called valid. Nanoseconds may be negative: they are added."""
         year, month, day = (head[name].astype(np.int64) for name in ("year", "month", "day"))
         midnight_ns, sound = calendar_ns(year, month, day)
-        needed = 7 if messages.name == "NAV-TIMEUTC" else 3
+        needed = 7 if messages.name.endswith("TIMEUTC") else 3
         sound = sound & (head["valid"] & needed == needed) & (np.abs(head["nano"]) <= NS_PER_S)
         second_s = (head["hour"].astype(np.int64) * 60 + head["min"]) * 60 + head[_SECONDS[messages.name]]
         week_ms = head["iTOW"].astype(np.int64)
@@ -175,12 +182,18 @@ class FullTimes:
         self._add(messages.places, utc_ns, week_ms, sound)
 
 
-def epoch_start(frames: Frames) -> int:
-    """Number of the first navigation message of the last epoch in a block, ``len(frames)`` where there is none."""
+def epoch_start(frames: Frames, leader: str) -> int:
+    """Number of the first message of the last epoch in a block, ``len(frames)`` where there is none.
+
+    Messages of the class of the leading one count: the others of its epoch stand beside it.
+    """
     which = frames.of(scan.UBX)
     at = frames.offsets[which]
-    is_navigation = (frames.data[at + 2] == _NAV_CLASS) & (frames.lengths[which] >= scan.UBX_EXTRA + 8)
-    which, at = which[is_navigation], at[is_navigation]
+    family = leader.partition("-")[0]
+    counts = (frames.data[at + 2] == _CLASSES[family]) & (frames.lengths[which] >= scan.UBX_EXTRA + 8)
+    if family == "HNR":
+        counts &= frames.data[at + 3] != _HNR_INS
+    which, at = which[counts], at[counts]
     if not len(which):
         return len(frames)
     shift = np.where(np.isin(frames.data[at + 3], _ITOW_AT_4), 4, 0)
