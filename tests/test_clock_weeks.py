@@ -141,7 +141,7 @@ def test_leap_seconds_that_a_receiver_learns_are_named(tmp_path: Path) -> None:
         ("rtklib-pos", "1987-03-02", "week_rollover"),
         ("px4-ulog", "2015-12-31", "week_rollover"),
         ("px4-ulog", "2016-01-01", None),
-        ("csv profile garmin-g1000", "2003-06-01", "week_rollover"),
+        ("csv profile garmin-g1000", "2004-09-20", "week_rollover"),
         ("receiver", "2004-09-20", None),
         ("receiver", "2019-04-09", "date_of_rollover"),
         ("receiver", "2019-04-15", None),

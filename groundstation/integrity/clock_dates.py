@@ -18,7 +18,7 @@ from groundstation.integrity.ledger import TopicCounts
 ROLLED_OVER, FIRST_WEEK = "week_rollover", "date_of_rollover"  # codes of remarks
 # Reader -> the year its format came. Others hold what was recorded with a receiver of this century.
 _YEARS: Mapping[str, int] = MappingProxyType(
-    {"px4-ulog": 2016, "dataflash": 2010, "tlog": 2009, "chapter10": 2004, "csv profile garmin-g1000": 2004}
+    {"px4-ulog": 2016, "dataflash": 2010, "tlog": 2009, "chapter10": 2004, "csv profile garmin-g1000": 2006}
 )
 _USUAL_YEAR = 2000
 _OF_ANY_YEAR = ("flightdata-hdf5", "utias", "miluv", "sbet")  # recorders without a receiver, and dates of a file's name
@@ -57,7 +57,7 @@ def doubtful_date(reader: str, utc_ns: int, remarks: Iterable[Remark]) -> Remark
         return None
     day, year = utc_ns_to_iso(utc_ns, 0)[:10], _YEARS.get(reader, _USUAL_YEAR)
     if utc_ns < iso_to_utc_ns(f"{year}-01-01T00:00:00Z")[0]:
-        before = f"before {year}" if year == _USUAL_YEAR else f"and its format came in {year}"
+        before = f"before {year}" if year == _USUAL_YEAR else f"and its format came in {year} or later"
         text = (
             f"the log begins on {day}, {before}: if the GPS week rolled over, it is of "
             f"{utc_ns_to_iso(utc_ns + ROLLOVER_NS, 0)[:10]}; the time is kept"
