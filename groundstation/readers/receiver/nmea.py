@@ -14,7 +14,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.readers.receiver.sentence_layouts import TIME_FIELD, TIMED
 from groundstation.readers.receiver.sentences import Sentences, time_of_day_ns
 from groundstation.readers.receiver.stream import Frames
-from groundstation.readers.receiver.times import Anchors, calendar_ns
+from groundstation.readers.receiver.times import DAY_NS, Anchors, calendar_ns
 
 Columns = dict[str, Column]
 _NOT_TIMED = -1
@@ -199,6 +199,19 @@ def full_times(sentences: Mapping[str, Sentences]) -> tuple[Int64Array, Int64Arr
     return np.concatenate(places), np.concatenate(utc_ns)
 
 
-def day_times(epochs: Epochs, anchors: Anchors) -> Column:
-    """UTC of the epochs; the time of the day where the date is nowhere told."""
-    return anchors.of_day(epochs.places, epochs.day_ns)
+class DayTimes:
+    """Tells UTC of the epochs of one block after the other; the time of the day, counted on, where no date is told."""
+
+    def __init__(self, anchors: Anchors) -> None:
+        self._anchors = anchors
+        self._last_ns: int | None = None
+
+    def of(self, epochs: Epochs) -> Column:
+        """Times of the epochs of the next block."""
+        time = self._anchors.of_day(epochs.places, epochs.day_ns)
+        if len(self._anchors) or not len(time):
+            return time
+        days = 0 if self._last_ns is None else round((self._last_ns - int(time.values[0])) / DAY_NS)
+        time = Column(time.values + days * DAY_NS, time.present)
+        self._last_ns = int(time.values[-1])
+        return time
