@@ -156,6 +156,7 @@ def test_a_log_of_a_makers_own_fixes_has_positions(tmp_path: Path) -> None:
     text = "PUBX,00,120000.00,5130.0,N,00042.0,W,104.4,{},2.9,3.1,36.0,90.0,-0.1,,1.0,1.1,1.2,9,0,0"
     clock = nmea("PUBX,04,120000.00,040526,129600.00,2417,18,-384839,-53.623,16")
     read = Read(tmp_path, clock + nmea(text.format("G3")) + nmea(text.format("NF").replace("00.00", "01.00")))
+    assert read.times("gnss")[0] == "2026-05-04T12:00:00.000000000Z", "by the date of PUBX 04"
     assert read.values("gnss", "latitude_deg") == [51.5, None] and read.values("gnss", "fix") == ["3d", "none"]
     assert read.values("gnss", "velocity_east_mps")[0] == pytest.approx(10.0)
     assert read.values("gnss", "velocity_down_mps") == [-0.1, None] and read.values("gnss", "integrity_ok") == [
@@ -166,6 +167,20 @@ def test_a_log_of_a_makers_own_fixes_has_positions(tmp_path: Path) -> None:
     assert flat.values("gnss", "integrity_ok") == [None] and flat.values("gnss", "altitude_ellipsoid_m") == [None]
     both = Read(tmp_path, DATED + nmea(text.format("G3").replace("5130", "5140")))
     assert both.values("gnss", "latitude_deg") == [51.5], "the standard sentences come first"
+
+
+def test_the_fixes_of_trimble_and_ashtech(tmp_path: Path) -> None:
+    """The date of GGK has the month in front; its height is above the ellipsoid where it says so."""
+    text = "PTNL,GGK,120000.00,050426,5130.0,N,00042.0,W,{},09,1.9,{},M"
+    read = Read(tmp_path, nmea(text.format(3, "EHT150.790")) + nmea(text.format(0, "EHT1").replace("00.00", "01.00")))
+    assert read.times("gnss") == ["2026-05-04T12:00:00.000000000Z", "2026-05-04T12:00:01.000000000Z"]
+    assert read.values("gnss", "fix") == ["rtk_fixed", "none"] and read.values("gnss", "latitude_deg") == [51.5, None]
+    assert read.values("gnss", "altitude_ellipsoid_m") == [150.79, None] and read.values("gnss", "pdop") == [1.9, 1.9]
+    grid = Read(tmp_path, nmea(text.format(1, "GHT150.790")))
+    assert grid.values("gnss", "altitude_ellipsoid_m") == [None] and grid.values("gnss", "fix") == ["3d"]
+    ashtech = Read(tmp_path, nmea(OTHERS[0]))
+    assert ashtech.values("gnss", "latitude_deg") == [51.5] and ashtech.values("gnss", "fix") == ["rtk_fixed"]
+    assert "as no standard sentence tells a position" in ashtech.remark("mapped")
 
 
 # --- messages: the length of the payload

@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from groundstation.base.units import MPS_PER_KNOT
+from groundstation.readers.receiver import stream
 from tests.receiver_writer import gga, nmea, rmc
 from tests.test_receiver import Read
 
@@ -74,6 +76,19 @@ def test_hemispheres(tmp_path: Path, latitude: str, longitude: str, expected: tu
     found = read.values("gnss", "latitude_deg")[0], read.values("gnss", "longitude_deg")[0]
     assert found == (expected or (None, None))
     assert bool(read.damages) == (expected is None)
+
+
+def test_without_a_date_times_count_on_past_midnight_from_block_to_block(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def at(second: int) -> str:
+        return f"{second // 3600 % 24:02d}{second // 60 % 60:02d}{second % 60:02d}.00"
+
+    monkeypatch.setattr(stream, "BLOCK_BYTES", 30_011)
+    read = Read(tmp_path, b"".join(gga(at(85_400 + k)) for k in range(4_000)))
+    batches = read.batches("gnss")
+    times = np.concatenate([batch.device_time_ns.values for batch in batches])
+    assert len(batches) > 4 and set(np.diff(times).tolist()) == {10**9}
 
 
 def test_heights_in_another_unit_are_left_out(tmp_path: Path) -> None:

@@ -64,6 +64,21 @@ def test_attitude_of_the_high_rate_solution(tmp_path: Path) -> None:
     assert fused.values("ins", "true_heading_deg") == [45.0]
 
 
+def test_a_stream_that_tells_no_week_has_times_of_the_week(tmp_path: Path) -> None:
+    """As sentences without a date have times of the day: no absolute time, and nothing is lost."""
+    last, first = 604_799_000, 0
+    content = b"".join(
+        ubx("NAV-POSLLH", iTOW=itow, lat=515_000_000, lon=1)
+        + ubx_frame(0x2801, ubx("NAV-ATT", iTOW=itow, heading=9_000_000, accHeading=1)[6:-2])
+        for itow in (last, first)
+    )
+    read = Read(tmp_path, content)
+    assert read.header.utc_of_zero_ns is None and read.values("gnss", "latitude_deg") == [51.5, 51.5]
+    for topic in ("gnss", "ins"):
+        (batch,) = read.batches(topic)
+        assert batch.device_time_ns.values.tolist() == [604_799 * 10**9, 604_800 * 10**9]
+
+
 def test_the_first_solution_leads_the_high_rate_one(tmp_path: Path) -> None:
     read = Read(tmp_path, b"".join(high_rate(NOON, lat=520_000_000 + k) for k in range(3)) + pvt(NOON))
     assert read.values("gnss", "latitude_deg") == [51.5] and "HNR-PVT (3) stays raw" in read.remark("skipped")

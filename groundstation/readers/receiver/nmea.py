@@ -14,10 +14,11 @@ from groundstation.base.units import NS_PER_S
 from groundstation.readers.receiver.sentence_layouts import TIME_FIELD, TIMED
 from groundstation.readers.receiver.sentences import Sentences, time_of_day_ns
 from groundstation.readers.receiver.stream import Frames
-from groundstation.readers.receiver.times import Anchors, calendar_ns
+from groundstation.readers.receiver.times import DAY_NS, Anchors, calendar_ns
 
 Columns = dict[str, Column]
 _NOT_TIMED = -1
+_MAKERS_DATES = {"PUBX.04": False, "PTNL.GGK": True}  # with time and date in front; whether the month comes first
 _CENTURY = 80  # two digits of a year from here on are of the last century
 
 
@@ -170,20 +171,23 @@ def epoch_start(frames: Frames, sentences: Mapping[str, Sentences], choice: Choi
 def full_times(sentences: Mapping[str, Sentences]) -> tuple[Int64Array, Int64Array]:
     """Places and UTC nanoseconds of the sentences that tell date and time: RMC (two digits of the year) and ZDA.
 
-    Where an RMC calls its fix valid those that do not are left out: before it a receiver guesses.
+    Makers' sentences tell it where there is none of these. Where an RMC calls its fix valid those that do not are left
+    out: before it a receiver guesses.
     """
     places, utc_ns = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    has_standard = any(one.formatter in ("RMC", "ZDA") for one in sentences.values())
     for one in sentences.values():
-        if one.formatter not in ("RMC", "ZDA"):
+        if one.formatter not in (("RMC", "ZDA") if has_standard else _MAKERS_DATES):
             continue
         value, behind, state = one.numbers(0)
         day_ns, sound = time_of_day_ns(value, behind)
         sound = sound & (state == 1)
-        if one.formatter == "RMC":
-            date, _behind, state = one.numbers(8)
-            day, month, year = date // 10_000, date // 100 % 100, date % 100
+        if one.formatter != "ZDA":
+            date, _behind, state = one.numbers(8 if one.formatter == "RMC" else 1)
+            first, second, year = date // 10_000, date // 100 % 100, date % 100
+            day, month = (second, first) if _MAKERS_DATES.get(one.formatter) else (first, second)
             year = year + np.where(year < _CENTURY, 2000, 1900)
-            is_valid = one.texts(1).values == "A"
+            is_valid = one.texts(1).values == "A" if one.formatter == "RMC" else np.zeros(len(one), dtype=bool)
             sound &= (state == 1) & (is_valid | ~is_valid.any())
         else:
             (day, _d, has_day), (month, _m, has_month), (year, _y, has_year) = (one.numbers(at) for at in (1, 2, 3))
@@ -195,6 +199,19 @@ def full_times(sentences: Mapping[str, Sentences]) -> tuple[Int64Array, Int64Arr
     return np.concatenate(places), np.concatenate(utc_ns)
 
 
-def day_times(epochs: Epochs, anchors: Anchors) -> Column:
-    """UTC of the epochs; the time of the day where the date is nowhere told."""
-    return anchors.of_day(epochs.places, epochs.day_ns)
+class DayTimes:
+    """Tells UTC of the epochs of one block after the other; the time of the day, counted on, where no date is told."""
+
+    def __init__(self, anchors: Anchors) -> None:
+        self._anchors = anchors
+        self._last_ns: int | None = None
+
+    def of(self, epochs: Epochs) -> Column:
+        """Times of the epochs of the next block."""
+        time = self._anchors.of_day(epochs.places, epochs.day_ns)
+        if len(self._anchors) or not len(time):
+            return time
+        days = 0 if self._last_ns is None else round((self._last_ns - int(time.values[0])) / DAY_NS)
+        time = Column(time.values + days * DAY_NS, time.present)
+        self._last_ns = int(time.values[-1])
+        return time

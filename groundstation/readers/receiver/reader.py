@@ -42,8 +42,9 @@ def items(source: Source) -> Iterator[Item]:
     # Messages of one epoch come late and in any order, with times some microseconds apart: no step of the clock.
     yield LogHeader(NAME, found.metadata, 0 if found.is_absolute else None, has_counting_clock=True)
     stream, tally = Stream(source, is_bare, _epoch_start_of(found), host.accepts if host else None), Tally()
+    days = nmea.DayTimes(found.anchors)
     for frames, sentences in found.blocks or ((frames, by_address(frames)) for frames in stream):
-        yield from _of_block(frames, sentences, found, tally)
+        yield from _of_block(frames, sentences, found, days, tally)
     yield from remarks(found)
     yield from tally.items(found.counts)
     yield from found.damages if found.blocks else stream.damages()
@@ -57,7 +58,9 @@ def _epoch_start_of(found: Overview) -> Callable[[Frames], int]:
     return lambda frames: nmea.epoch_start(frames, by_address(frames), found.choice)
 
 
-def _of_block(frames: Frames, sentences: dict[str, Sentences], found: Overview, tally: Tally) -> Iterator[RecordBatch]:
+def _of_block(
+    frames: Frames, sentences: dict[str, Sentences], found: Overview, days: nmea.DayTimes, tally: Tally
+) -> Iterator[RecordBatch]:
     block = Block()
     for messages, time in ubx.timed(frames, found.anchors):
         batches = text_batches if messages.name.startswith("INF-") else raw_batches
@@ -69,7 +72,7 @@ def _of_block(frames: Frames, sentences: dict[str, Sentences], found: Overview, 
         block.add(timed)
         tally.add_lengths(timed, is_poll=False)
     epochs = nmea.epochs_of(sentences, found.choice, found.arrivals)
-    time = nmea.day_times(epochs, found.anchors)
+    time = days.of(epochs)
     for address, one in sentences.items():
         yield from _raw_sentences(one, epochs.time_of(address, time))
         tally.add_cells(one)

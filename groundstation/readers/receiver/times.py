@@ -63,9 +63,12 @@ class Anchors:
         return len(self.places)
 
     def of_week(self, places: Int64Array, week_ms: Int64Array) -> Column:
-        """UTC of times of the week in milliseconds; that of the anchor itself where both are of one epoch."""
+        """UTC of times of the week in milliseconds; that of the anchor itself where both are of one epoch.
+
+        Without an anchor the times of the week, counted on.
+        """
         if not len(self):
-            return Column(np.zeros(len(places), dtype=np.int64), np.zeros(len(places), dtype=bool))
+            return Column(unrolled(week_ms, WEEK_MS) * NS_PER_MS, week_ms < WEEK_MS)
         at = self._before(places)
         near_ns = self.utc_ns[at]
         week = (near_ns - GPS_EPOCH_NS) // NS_PER_MS // WEEK_MS
