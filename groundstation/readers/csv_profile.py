@@ -133,7 +133,7 @@ def _above(fit: Fit) -> Iterator[Damage]:
 
 
 def _sections(source: Source, first: Fit, utc_of_zero_ns: int | None) -> tuple[list[Section], list[Remark | Damage]]:
-    """Rows below the first header, and below each further one that names other columns or another zero of time."""
+    """Rows below each header that names other columns or another zero of time."""
     fits, ends, shifts = [first], list[int](), [0]
     remarks: list[Remark | Damage] = []
     profile = first.profile

@@ -69,17 +69,17 @@ class _Top:
 
     @property
     def is_flat(self) -> bool:
-        """Whether there is a time column, and one of ``<topic>.<field>``."""
+        """Tell whether there is a time column, and one of ``<topic>.<field>``."""
         return _are_flat(self.names)
 
     @property
     def time_kind(self) -> str:
-        """How the time of a row is written."""
+        """Time of a row, as it is written."""
         return next(kind for name, kind in TIME_COLUMNS.items() if name in self.names)
 
     @cached_property
     def dialect(self) -> Dialect:
-        """How the rows below are written."""
+        """Form of the rows below."""
         return Dialect(
             self.encoding,
             self.delimiter,
@@ -91,7 +91,7 @@ class _Top:
 
     @property
     def has_rows(self) -> bool:
-        """Whether most of the lines below have as many cells as the header row."""
+        """Tell whether most of the lines below have as many cells as the header row."""
         sizes = [len(split_cells(row, self.delimiter)) for row in self.first_rows if row.strip()]
         sound = sizes.count(len(self.names))
         return sound >= FEWEST_ROWS and 2 * sound > len(sizes)
@@ -180,7 +180,7 @@ def read(source: Source) -> Iterator[Item]:
 def _sections(
     source: Source, top: _Top, layout: Layout, utc_of_zero_ns: int | None
 ) -> tuple[list[Section], list[Remark | Damage]]:
-    """Rows below the first header, and below each further one that names other columns or another zero of time."""
+    """Rows below each header that names other columns or another zero of time."""
     sections, remarks = [Section(top.dialect, layout)], list[Remark | Damage]()
     last, last_utc_ns, stands_again = top, utc_of_zero_ns, False
     for place in header_places(source, top.header, top.encoding, _MARK, _is_header):
@@ -215,7 +215,7 @@ def _shift_ns(zero_ns: int | None, utc_ns: int | None, found: _Top, last: _Top, 
 
 
 def _is_header(line: str) -> bool:
-    """Whether a line in the middle of the file names a time column, and one of ``<topic>.<field>``."""
+    """Tell whether a line in the middle of the file names a time column, and one of ``<topic>.<field>``."""
     return _are_flat(split_cells(line, detect_delimiter(line)))
 
 

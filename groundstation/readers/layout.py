@@ -60,7 +60,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class TimeRule:
-    """How the time of a row is written.
+    """Time of a row, as it is written.
 
     Parameters
     ----------
@@ -210,7 +210,13 @@ def rule_for(
 
 
 def apply(derivation: Derivation, known: Mapping[Key, Column]) -> dict[Key, Column]:
-    """Columns that a derivation gives: present where all its inputs are."""
+    """Columns that a derivation gives: a value where all inputs have one and the file has none of its own.
+
+    Nothing where the file's own columns are complete.
+    """
+    outputs = [(derivation.topic, name) for name in derivation.outputs]
+    if all(key in known and known[key].present is None for key in outputs):
+        return {}
     inputs = [known[key] for key in derivation.inputs]
     masks = [column.mask for column in inputs]
     masks += [known[key].values != 0.0 for key in derivation.not_zero]
@@ -219,7 +225,9 @@ def apply(derivation: Derivation, known: Mapping[Key, Column]) -> dict[Key, Colu
     with np.errstate(over="ignore", invalid="ignore"):  # of absurd numbers: becomes infinite or NaN
         values = [np.where(present, one.values * factor, np.nan) for one, factor in zip(inputs, factors, strict=True)]
         results = METHODS[derivation.method].function(*values)
-    return {
-        (derivation.topic, name): Column(np.asarray(result), present)
-        for name, result in zip(derivation.outputs, results, strict=True)
-    }
+    found = {key: Column(np.asarray(result), present) for key, result in zip(outputs, results, strict=True)}
+    return {key: _filled(known[key], column) if key in known else column for key, column in found.items()}
+
+
+def _filled(own: Column, derived: Column) -> Column:
+    return Column(np.where(own.mask, own.values, derived.values), own.mask | derived.mask)

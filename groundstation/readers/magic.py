@@ -31,7 +31,7 @@ def recognise(source: Source) -> str | None:
 
 
 def companion(source: Source) -> str | None:
-    """What a file is that belongs to a log and is none itself, None for any other.
+    """Name a file that belongs to a log and is none itself; None for any other.
 
     RTKLIB writes beside a log it records when which of its bytes came: ``TIMETAG RTKLIB`` and its version, 60 bytes.
     """

@@ -1,4 +1,4 @@
-"""Which north a logged track counts from, and which way the logged variation does: the data tell.
+"""North of a logged track and sign of a logged variation, told by the data.
 
 Recorders of one family differ: a Garmin G1000 logs a magnetic track and a variation that is positive east, a G3X a true
 track and a variation that is positive west, a G5 the one or the other by its software. Where velocities, or positions,
@@ -47,14 +47,14 @@ class Samples:
 
     @property
     def has_variation(self) -> bool:
-        """Whether the variation is more than next to nothing in most rows."""
+        """Tell whether the variation is more than next to nothing in most rows."""
         known = np.abs(self.variation_deg[np.isfinite(self.variation_deg)])
         return bool(len(known) and np.median(known) >= LEAST_VARIATION_DEG)
 
 
 @dataclass(frozen=True)
 class Norths:
-    """What the data of a log show of its track and its variation.
+    """Findings from the data of a log, on its track and its variation.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Norths:
 
 
 def samples_of(source: Source, dialect: Dialect, layout: Layout) -> Samples:
-    """Rows from the middle of a file where the vehicle moves, from elsewhere where it does not; all of a small file.
+    """Rows from the middle of a file, from elsewhere where nothing moves; all of a small file.
 
     ``layout`` has fields of :data:`OF_MOTION` and ``variation_deg`` under the topic :data:`LOOKED_AT`.
     """
@@ -126,7 +126,7 @@ def _windows(source: Source, dialect: Dialect) -> Iterator[Dialect]:
 
 
 def _is_enough(parts: Sequence[Mapping[str, FloatArray]]) -> bool:
-    """Whether enough rows move, or the variation is next to nothing."""
+    """Tell whether enough rows move, or the variation is next to nothing."""
     variation = np.concatenate([part["variation_deg"] for part in parts] or [np.zeros(0)])
     speed = np.concatenate([part.get("ground_speed_mps", np.zeros(0)) for part in parts] or [np.zeros(0)])
     known = np.abs(variation[np.isfinite(variation)])
@@ -135,7 +135,7 @@ def _is_enough(parts: Sequence[Mapping[str, FloatArray]]) -> bool:
 
 
 def by_motion(samples: Samples) -> Norths:
-    """North of the track, and of a magnetic one the sign of the variation, by the direction of motion.
+    """North of the track, and the sign of the variation of a magnetic one, by the motion.
 
     Examples
     --------
@@ -165,7 +165,7 @@ def by_motion(samples: Samples) -> Norths:
 
 
 def _moved_m(samples: Samples) -> FloatArray:
-    """How far north and east positions move around each row, shape (2, n)."""
+    """Way north and east of the positions around each row, metres, shape (2, n)."""
     moved = np.full((2, len(samples.track_deg)), np.nan)
     known = np.flatnonzero(has_position(samples.latitude_deg, samples.longitude_deg))
     if len(known) > 2 * _APART:

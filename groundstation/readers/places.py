@@ -1,4 +1,4 @@
-"""Rows whose latitude and longitude are zero: a receiver or a filter without a position writes so."""
+"""Rows with latitude and longitude zero: a receiver without a position writes them."""
 
 from collections.abc import Mapping
 
@@ -27,7 +27,7 @@ def without_place(latitude: Column, longitude: Column) -> BoolArray:
 
 
 def zeroed(kind: str, fields: Mapping[str, Column], is_zero: BoolArray) -> dict[str, BoolArray]:
-    """Where the fields of a topic have no value, since its rows have no place, shape (n,) each.
+    """Masks of the values that fall away where rows have no place, by field, shape (n,) each.
 
     The height goes with the place. A receiver that has no place has no velocity either: what it tells of motion goes
     where all of it is zero.

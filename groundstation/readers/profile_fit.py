@@ -1,4 +1,4 @@
-"""A profile laid over a header of a table: where its columns are, and which lines around it belong to it."""
+"""A profile laid over a header of a table: its columns, and the lines that belong to it."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -56,7 +56,7 @@ class Fit:
         return self.behind[-1] if self.behind else self.header
 
     def dialect_to(self, end_byte: int | None, stands_again: bool = True) -> Dialect:
-        """How the rows are written, where they begin and end; ``stands_again``: the header may stand among them."""
+        """Form, beginning and end of the rows; ``stands_again``: the header may stand among them."""
         lines = (*self.above, *((self.header,) if stands_again else ()), *self.behind)
         return Dialect(
             self.encoding,
@@ -74,7 +74,7 @@ class Fit:
 
     @cached_property
     def position(self) -> Mapping[str, int]:
-        """Columns by name; also by the name without its unit where headers of this profile tell units."""
+        """Columns by name; also by the name without a unit if the header tells units."""
         found = {name: at for at, name in reversed(list(enumerate(self.names))) if name}
         if self.profile.header_tells:
             found = {bare(name): at for at, name in reversed(list(enumerate(self.names))) if bare(name)} | found
@@ -92,7 +92,7 @@ class Fit:
         ]
 
     def told(self, at: int) -> Told:
-        """What the names, and the rows of units or of other names around the header, say of a column."""
+        """Read the names of a column, and its cells in the rows around the header."""
         names, units = self._around
         return told([cells[at] for cells in names], [cells[at] for cells in units])
 
@@ -112,28 +112,28 @@ class Fit:
         return name if self.names.index(name) == at else f"{name}_{at + 1}"
 
     def names_as(self, other: "Fit") -> bool:
-        """Whether another header names and tells the same."""
+        """Tell whether another header names and tells the same."""
         return (self.names, self.delimiter, self._around) == (other.names, other.delimiter, other._around)
 
     def is_repeated(self, place: Place) -> bool:
-        """Whether the very lines stand again."""
+        """Tell whether the very lines stand again."""
         above = place.above[len(place.above) - len(self.above) :] if self.above else ()
         return place.line.text == self.header.text and [one.text for one in above] == [one.text for one in self.above]
 
     def is_row(self, line: str) -> bool:
-        """Whether a line is a row: it has a cell for each column, and a time, or no time and some number."""
+        """Tell a row: it has a cell for each column, and a time, or no time and some number."""
         times, others = self._times(line)
         if any(times):
             return bool(_TIMES[self.profile.time.kind].fullmatch(times[-1]))
         return any(_TIMES["seconds"].fullmatch(cell) for cell in others)
 
     def is_of_names(self, line: str) -> bool:
-        """Whether a line has a name for each column of time."""
+        """Tell whether a line has a name for each column of time."""
         times, _others = self._times(line)
         return bool(times) and all(times) and not _TIMES[self.profile.time.kind].fullmatch(times[-1])
 
     def _times(self, line: str) -> tuple[list[str], list[str]]:
-        """Cells of a line that tell the time, and the others; none where their number is not that of the columns."""
+        """Cells of a line that tell the time, and the others; none if there are too few or many."""
         cells = split_cells(line, self.delimiter)
         if len(cells) not in (len(self.names), len(self.names) + 1) or line.startswith("#"):
             return [], []
@@ -147,7 +147,7 @@ class Fit:
 
 
 def delimiter_of(line: str, profile: Profile) -> str:
-    """How the cells of a line are parted where it is a header row of a profile, else nothing."""
+    """Delimiter of a line that is a header row of a profile, else nothing."""
     wanted = {*profile.required, *profile.time.columns[:2]}
     if not all(name in line for name in wanted):
         return ""
@@ -169,7 +169,7 @@ def fit_at(profile: Profile, encoding: str, delimiter: str, lines: Sequence[Line
 
 
 def fit_below(source: Source, before: Fit, place: Place) -> tuple[Fit, int]:
-    """A profile over a header in the middle of a file, and the byte where the rows of the one before end."""
+    """A profile over a header in the middle of a file, and the byte that ends the one before."""
     lines = [place.line, *lines_below(source, place.line, before.encoding)]
     fit = _with_names(before.profile, before.encoding, delimiter_of(place.line.text, before.profile), lines, 0)
     count = 0

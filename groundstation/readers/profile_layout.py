@@ -1,4 +1,4 @@
-"""A profile laid over the header of a table: which column feeds which field, after what the header itself tells."""
+"""A profile over the header of a table: the column of each field, as the header tells."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ class _Fed:
     remarks: list[Remark]
 
     def add(self, rule: Rule) -> bool:
-        """Whether the field of a rule was free."""
+        """Tell whether the field of a rule was free."""
         return self.rules.setdefault(rule.key, rule) is rule
 
 
@@ -68,7 +68,7 @@ def _time(fit: Fit) -> TimeRule:
 
 
 def _adapted(rule: ColumnRule, said: Told, remarks: list[Remark]) -> ColumnRule | None:
-    """A rule with the unit and the height that the file tells; None where it is of another dimension."""
+    """A rule with the unit and height that the file tells; None if its dimension is another."""
     known = rule.field
     if said.unit is not None and known.unit and said.unit[0] != known.unit:
         if known.unit == "deg" and said.unit[0] == "m":  # (M): magnetic
@@ -88,7 +88,7 @@ def _adapted(rule: ColumnRule, said: Told, remarks: list[Remark]) -> ColumnRule 
 
 
 def _feed(fit: Fit, rule: ColumnRule, at: int, norths: Norths, fed: _Fed) -> None:
-    """Add the rule of a column; of a direction from magnetic north its values as they are, and a derivation."""
+    """Add the rule of a column; of a magnetic direction its values and a derivation."""
     raw = (fit.profile.raw_topic, fit.label(at))
     north, by = rule.north, ""
     if rule.north and (said := fit.told(at).north):
@@ -124,26 +124,23 @@ def _feed(fit: Fit, rule: ColumnRule, at: int, norths: Norths, fed: _Fed) -> Non
 
 
 def _raw_key(fit: Fit, name: str) -> Key:
-    """Where a column is kept that no rule names."""
+    """Place of a column that no rule names."""
     return fit.profile.raw_topic, fit.label(fit.position[name])
 
 
 def _derivations(fit: Fit, fed: _Fed) -> Iterator[Derivation]:
-    """Those of the profile's derivations whose inputs the file has, and whose outputs it does not tell itself."""
+    """Derivations of the profile whose inputs the file has."""
     known = fed.rules.keys() | {(one.topic, name) for one in fed.derivations for name in one.outputs}
     for rule in fit.profile.derived:
-        outputs = {(rule.topic, name) for name in rule.outputs}
-        if outputs <= known or not all(
-            given.column in fit.position if given.column else given.key in known for given in rule.inputs
-        ):
+        if not all(given.column in fit.position if given.column else given.key in known for given in rule.inputs):
             continue
         keys = tuple(_raw_key(fit, given.column) if given.column else given.key for given in rule.inputs)
         yield Derivation(rule.method, rule.topic, rule.outputs, keys, _factors(fit, rule))
-        known |= outputs
+        known |= {(rule.topic, name) for name in rule.outputs}
 
 
 def _factors(fit: Fit, rule: DerivedRule) -> tuple[float, ...]:
-    """Factors of the inputs of a derivation, by the unit that the file tells where it tells one of the dimension."""
+    """Factors of the inputs of a derivation, by the unit that the file tells if it fits."""
     factors = []
     for given, unit in zip(rule.inputs, METHODS[rule.method].units, strict=True):
         said = fit.told(fit.position[given.column]).unit if given.column else None
@@ -152,7 +149,7 @@ def _factors(fit: Fit, rule: DerivedRule) -> tuple[float, ...]:
 
 
 def _raw(fit: Fit, rules: Iterable[Rule], derivations: Sequence[Derivation], time: TimeRule) -> Iterator[Rule]:
-    """Rules of the columns that no other rule takes; those that a derivation needs are numbers."""
+    """Rules of columns that no other rule takes; derivations get numbers."""
     taken = {rule.column for rule in rules} | set(time.columns)
     inputs = {key for derivation in derivations for key in derivation.inputs}
     for at, name in enumerate(fit.names):
@@ -162,7 +159,7 @@ def _raw(fit: Fit, rules: Iterable[Rule], derivations: Sequence[Derivation], tim
 
 
 def _norths(fit: Fit, source: Source, time: TimeRule, utc_of_zero_ns: int | None, end_byte: int | None) -> Norths:
-    """What the data show of the norths that directions count from."""
+    """Ask the data which norths directions count from."""
     profile, variation = fit.profile, fit.profile.variation
     directions = {rule.field.name for rule in profile.columns if rule.north and rule.name in fit.position}
     if variation is None or variation.column not in fit.position or not directions:

@@ -1,4 +1,4 @@
-"""Headers of RTKLIB solutions: a line of names, and the facts in the lines around it, govern the rows below them.
+"""Headers of RTKLIB solutions: names and facts that govern the rows below them.
 
 A file has one on top, and more where solutions were appended to each other.
 
@@ -30,7 +30,7 @@ _HEAD_LINES = 1000
 
 @dataclass(frozen=True)
 class Form:
-    """What a header says of the rows below it.
+    """Form of the rows below a header.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ class Form:
     metadata: Mapping[str, str]
 
     def reads_as(self, other: "Form") -> bool:
-        """Whether rows mean the same by another header."""
+        """Tell whether rows mean the same by another header."""
         return self == replace(other, metadata=self.metadata)
 
 
 @dataclass(frozen=True)
 class Governed:
-    """A form and where its rows begin: line and byte; ``end_byte`` is where the next header begins."""
+    """A form, and line and byte of its first row; ``end_byte`` begins the next header."""
 
     form: Form
     first_line: int
@@ -81,7 +81,7 @@ def form_of(source: Source) -> Governed | None:
 
 
 def forms_of(source: Source, first: Governed) -> tuple[list[Governed], Damage | None]:
-    """The headers of a file that change how rows are read, and what is left out where they are too many."""
+    """Headers of a file that change how rows are read, and what is left out behind too many."""
     governed = [first]
     last = Line(first.first_line - 1, first.first_byte, "", True)
     for block, start in _blocks(source, last):
@@ -96,7 +96,7 @@ def forms_of(source: Source, first: Governed) -> tuple[list[Governed], Damage | 
 
 
 def _blocks(source: Source, last: Line) -> Iterator[tuple[list[Line], int]]:
-    """Lines behind the header on top that begin with a percent sign, those that follow each other together."""
+    """Lines behind the first header that begin with a percent sign, neighbours together."""
     block: list[Line] = []
     begin = 0
     for line, start in lines_with(source, last, "utf-8", _PERCENT):
@@ -112,7 +112,7 @@ def _blocks(source: Source, last: Line) -> Iterator[tuple[list[Line], int]]:
 
 
 def _form(source: Source, block: Sequence[Line], before: Form | None) -> Form | None:
-    """What a block of lines says; None where it changes nothing.
+    """Form told by a block of lines; None where it changes nothing.
 
     A line of names begins anew: what the lines around it do not say is not known. Without one, or where the same line
     of names stands alone, what they say is added to what was known.
@@ -153,7 +153,7 @@ def _first_row(source: Source, start: int) -> bytes:
 
 
 def _reference(text: str) -> Place | None:
-    """Place of the base station: degrees, degrees minutes and seconds, or ECEF; its numbers may touch.
+    """Place of the base station: degrees, d m s, or ECEF; its numbers may touch.
 
     Examples
     --------

@@ -151,7 +151,7 @@ def _parted(rows: bytes) -> bytes:
 
 @dataclass(frozen=True)
 class _Tabbed(Source):
-    """Another source whose rows are parted by tabs, from ``first_byte`` to ``end_byte`` (None: its end)."""
+    """Another source, rows parted by tabs, from ``first_byte`` to ``end_byte`` (None: end)."""
 
     whole: Source
     first_byte: int

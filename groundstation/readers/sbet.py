@@ -58,7 +58,7 @@ class _Sense:
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim a file whose records are places on Earth, moments in order and no farther apart than the speeds allow.
+    """Claim a file whose records are places on Earth in order, as near as the speeds say.
 
     Some hundred records are looked at on top, and of a longer file in its middle or at its end.
     """

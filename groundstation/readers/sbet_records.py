@@ -31,7 +31,7 @@ _LONGEST_STEP_S, _FASTEST_MPS = 10.0, 1_000.0
 
 
 def are_plausible(records: NDArray[Any], has_no_place: bool = False) -> bool:
-    """Whether records are a stretch of a trajectory: numbers that are ones, in order, with a way between.
+    """Tell whether records are a stretch of a trajectory, by their order and the way between.
 
     ``has_no_place``: they may also have none, as before a first fix.
     """
@@ -51,7 +51,7 @@ def are_plausible(records: NDArray[Any], has_no_place: bool = False) -> bool:
 
 
 def _fits_the_way(records: NDArray[Any]) -> bool:
-    """Whether the places of records are no farther apart than their speeds allow, over a second or all there is."""
+    """Tell whether places are as near as the speeds say, over a second or all there is."""
     latitude, longitude, time = records["latitude"], records["longitude"], unrolled_s(records["time"])
     if len(records) < 2 or ((latitude == longitude) & (latitude == records["altitude"])).all():
         return False
@@ -67,12 +67,12 @@ def _fits_the_way(records: NDArray[Any]) -> bool:
 
 
 def has_place(records: NDArray[Any]) -> NDArray[np.bool_]:
-    """Whether records have a place, shape (n,)."""
+    """Tell which records have a place, shape (n,)."""
     return has_position(records["latitude"] * DEG_PER_RAD, records["longitude"] * DEG_PER_RAD)
 
 
 def next_start(data: bytes, at: int) -> int | None:
-    """The next byte at which several sound records in a row begin, one step of time apart from each other."""
+    """Next byte at which several sound records in a row begin, one step of time apart."""
     span = IN_A_ROW * RECORD.itemsize
     aligned = at - 1 + RECORD.itemsize  # most often one record alone is damaged
     width = _SEARCHED
@@ -100,7 +100,7 @@ def unrolled_s(week_s: FloatArray) -> FloatArray:
 
 
 def are_sound(records: NDArray[Any]) -> NDArray[np.bool_]:
-    """Whether records are places on Earth with angles and speeds that exist, shape (n,)."""
+    """Tell which records are places on Earth with angles and speeds that exist, shape (n,)."""
     with np.errstate(invalid="ignore", over="ignore"):
         time, latitude, longitude = records["time"], records["latitude"], records["longitude"]
         sound = (time >= 0.0) & (time < 2 * S_PER_WEEK) & (np.abs(latitude) <= np.pi / 2) & (np.abs(longitude) <= np.pi)
@@ -117,7 +117,7 @@ def are_sound(records: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 def _follow(records: NDArray[Any]) -> NDArray[np.bool_]:
-    """Whether records are sound and each a small step of time behind the one before, shape (n,)."""
+    """Tell which records are sound, a small step of time behind the one before, shape (n,)."""
     sound = are_sound(records)
     with np.errstate(invalid="ignore", over="ignore"):
         steps = np.diff(unrolled_s(records["time"]))

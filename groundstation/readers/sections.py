@@ -75,7 +75,7 @@ def header_places(
 
 
 def mark_of(name: str) -> re.Pattern[bytes]:
-    """A mark of the header lines that have a name; of a short one, that they begin with a letter."""
+    """A mark of header lines: a name in them, or a letter at their beginning if it is short."""
     return _WORD if len(name) <= _SHORT else re.compile(re.escape(name.encode()))
 
 
@@ -148,7 +148,7 @@ def without_headers(section: Section) -> Section:
 
 
 def told(place: Place, is_same: bool, shift_ns: int | None = 0) -> Remark:
-    """A remark that the rows below a place have a header of their own: other columns, or the same with another time."""
+    """A remark on a header of other columns, or of another time, that governs the rows below."""
     what = "is that of a log with another zero of time" if is_same else "names other columns"
     text = f"the header in row {place.line.number} {what}: it governs the rows below it"
     if shift_ns is None:

@@ -29,7 +29,7 @@ from groundstation.readers import cells
 from groundstation.readers.cells import Cells
 from groundstation.readers.dates import local_ns
 from groundstation.readers.dialect import Dialect
-from groundstation.readers.layout import METHODS, Key, Layout, Rule, apply
+from groundstation.readers.layout import METHODS, Derivation, Key, Layout, Rule, apply
 from groundstation.readers.losses import Losses
 from groundstation.readers.places import PLACED, without_place, zeroed
 from groundstation.readers.rows import Block, RowScanner, restore_delimiters
@@ -60,6 +60,7 @@ class TableReader:
         self._wrapped: dict[str, int] = {}
         self.zoneless = 0
         self._placeless: set[str] = set()  # topics that had a row without a place
+        self._derived: set[Derivation] = set()  # those that gave a value
         self._dialect, self._layout = sections[0].dialect, sections[0].layout
         self._sections = self._settled(sections)
 
@@ -160,11 +161,14 @@ class TableReader:
         for topic, by_field in self._places():
             columns |= self._placed(topic, by_field, columns, lines)
         for derivation in self._layout.derivations:
-            columns |= apply(derivation, columns)
+            found = apply(derivation, columns)
+            if any(key not in columns or (one.mask & ~columns[key].mask).any() for key, one in found.items()):
+                self._derived.add(derivation)
+            columns |= found
         return columns
 
     def _places(self) -> Iterator[tuple[str, dict[str, Rule]]]:
-        """Topics whose rows tell a place, and their rules by field; what a simulator tells as truth is left alone."""
+        """Topics whose rows tell a place, and their rules by field; truth is left alone."""
         topics: dict[str, dict[str, Rule]] = {}
         for rule in self._layout.rules:
             topics.setdefault(rule.topic, {})[rule.field] = rule
@@ -175,7 +179,7 @@ class TableReader:
     def _placed(
         self, topic: str, by_field: Mapping[str, Rule], columns: Mapping[Key, Column], lines: Int64Array
     ) -> dict[Key, Column]:
-        """Columns of a topic without rows that have no place; from the first of those on, raw numbers beside them."""
+        """Columns of a topic without values that have no place, and the raw numbers beside them."""
         latitude, longitude = (columns[topic, f"{name}_deg"] for name in ("latitude", "longitude"))
         is_zero = without_place(latitude, longitude)
         self._losses.add("no_position", NO_POSITION, lines[is_zero], topic=topic, loses_data=False)
@@ -260,7 +264,8 @@ class TableReader:
 
     def _remarks(self, scanner: RowScanner) -> Iterator[Remark]:
         layouts = [section.layout for section in self._sections]
-        for derivation in dict.fromkeys(derivation for layout in layouts for derivation in layout.derivations):
+        derivations = dict.fromkeys(derivation for layout in layouts for derivation in layout.derivations)
+        for derivation in filter(self._derived.__contains__, derivations):
             outputs = ", ".join(derivation.outputs)
             text = f"{derivation.topic}: {outputs} derived from {METHODS[derivation.method].text}"
             yield Remark("derived", text, derivation.topic, derivation.outputs)

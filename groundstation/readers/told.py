@@ -1,4 +1,4 @@
-"""What a header says about a column beside its name: its unit, which north, which height.
+"""Unit, north and height of a column, as far as its header tells them.
 
 ``GPS Ground Track (deg true)``, ``GPS Altitude (WGS84 ft)``; or in a row of its own, ``degrees``, ``ft msl``.
 """
@@ -47,7 +47,7 @@ _SEA = re.compile(r"\ba?msl\b|\bgeoid\b|\begm(?:96|08|2008)?\b", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Told:
-    """What is told of one column; empty where nothing is.
+    """Facts told of one column; empty where nothing is.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def bare(name: str) -> str:
 
 
 def told(names: Iterable[str], units: Iterable[str] = ()) -> Told:
-    """What the names of a column, and cells of rows of units, say of it; the first that says something.
+    """Read the names of a column and its cells in rows of units; the first one counts.
 
     Examples
     --------
