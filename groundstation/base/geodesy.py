@@ -7,11 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.records import BoolArray
 
 SEMI_MAJOR_M = 6_378_137.0
 FLATTENING = 1.0 / 298.257223563
 ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
 EARTH_RATE_RADPS = 7.292115e-5
+NO_POSITION_DEG = 1e-7  # a centimetre: a receiver or a filter without a position writes zeros
+NO_POSITION = "records with latitude and longitude 0: no position, kept as raw values alone"
 
 
 def curvature_radii_m(latitude_deg: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -41,6 +44,29 @@ def on_earth(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> tuple[FloatAr
     latitude, longitude = np.asarray(latitude_deg, dtype=np.float64), np.asarray(longitude_deg, dtype=np.float64)
     is_place = (np.abs(latitude) <= 90.0) & (np.abs(longitude) <= 360.0)
     return np.where(is_place, latitude, np.nan), np.where(is_place, longitude, np.nan)
+
+
+def has_position(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> BoolArray:
+    """Rows with a position: both angles are finite, and not both are below ``NO_POSITION_DEG``.
+
+    Parameters
+    ----------
+    latitude_deg, longitude_deg : array_like, same shape
+        As the device wrote them, degrees.
+
+    Returns
+    -------
+    ndarray of bool, same shape
+        False where the device had no position yet. A place on the equator or on the meridian of Greenwich is one.
+
+    Examples
+    --------
+    >>> has_position([56.0, 0.0, 0.0, 3e-8, np.nan], [38.0, 0.0, 38.0, -3e-8, 38.0]).tolist()
+    [True, False, True, False, False]
+    """
+    latitude, longitude = np.asarray(latitude_deg, dtype=np.float64), np.asarray(longitude_deg, dtype=np.float64)
+    is_zero = (np.abs(latitude) < NO_POSITION_DEG) & (np.abs(longitude) < NO_POSITION_DEG)
+    return np.asarray(np.isfinite(latitude) & np.isfinite(longitude) & ~is_zero)
 
 
 def north_east_m(
