@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from groundstation.base.records import Damage
 from groundstation.readers.bags.definitions import plain_name
-from groundstation.readers.bags.messages import Block, Connection, Part
+from groundstation.readers.bags.messages import Block, Connection, Missing, Part
 from groundstation.readers.skipped import bytes_place
 from groundstation.readers.source import Source
 
@@ -29,7 +29,8 @@ class Mcap:
         self._connections: dict[tuple[str, str, str, bytes], Connection] = {}
 
     def __iter__(self) -> Iterator[Part]:
-        from groundstation.store.foreign import ForeignLost, ForeignMcap, ForeignMessages, Missing
+        from groundstation.store.foreign import ForeignLost, ForeignMcap, ForeignMessages
+        from groundstation.store.foreign import Missing as ForeignMissing
 
         with self._source.open() as stream:
             for found in ForeignMcap(stream, self._source.size):
@@ -46,8 +47,8 @@ class Mcap:
                     )
                 elif isinstance(found, ForeignLost):
                     yield _damage(found)
-                elif isinstance(found, Missing):
-                    yield Damage("dropped_rows", "the whole log", found.count, f"{found.what} (topic {found.topic})")
+                elif isinstance(found, ForeignMissing):
+                    yield Missing(found.topic, found.count, found.what)
                 else:
                     what = "messages of a channel that no record of the file defines"
                     yield Damage("dropped_channel", "the whole log", found.messages, what)
