@@ -125,12 +125,16 @@ class LogHeader:
     has_counting_clock : bool
         Device times count up from power-up and nothing sets them: a record that comes after a later one of another
         topic was written late, and is no step of the clock.
+    clock_offsets : tuple of (int, int)
+        What another clock of the log says of the device's: from the record of this index on, so many nanoseconds are to
+        be added to device times (and to times of validity). The records before the first are moved by its offset too.
     """
 
     reader: str
     metadata: Mapping[str, str] = field(default_factory=dict)
     utc_of_zero_ns: int | None = None
     has_counting_clock: bool = False
+    clock_offsets: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True)
