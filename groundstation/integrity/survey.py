@@ -1,8 +1,8 @@
 """One pass over a log: its header, clock model and ledger.
 
 Kept are places and times, 16 bytes a record, for each set of topics that are sampled together; when there are more than
-16 MiB of them, all go to a temporary file, 12 bytes a record. Both are 8 more where values have times of validity. Rates
-and gaps are those of the times at which values were valid.
+16 MiB of them, all go to a temporary file, 12 bytes a record; times of validity take 8 bytes more. Rates and gaps are
+those of the times at which values were valid.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -16,6 +16,7 @@ from groundstation.readers.bags.ros1 import Ros1Bag
 from groundstation.readers.bags.ros1_records import MAGIC as ROS1_MAGIC
 from groundstation.readers.bags.ros1_records import has_chunk
 from groundstation.readers.bags.rosbag2_metadata import BagMetadata
+from groundstation.readers.bags.sources import Key, key_of
 from groundstation.readers.bags.sqlite import MAGIC as SQLITE_MAGIC
 from groundstation.readers.bags.sqlite import Ros2Sqlite
 from groundstation.readers.source import Source
@@ -147,7 +148,7 @@ class Bag:
                 yield Missing(topic, count - told[topic], counted_by(f"{METADATA} of the bag")).damage()
 
     def _of_files(self) -> Iterator[Part]:
-        known: dict[tuple[str, str, str, bytes], Connection] = {}
+        known: dict[tuple[Key, str, int], Connection] = {}
         files = self.files()
         first = 0
         for file in files:
@@ -161,7 +162,7 @@ class Bag:
                         yield part if len(files) == 1 else replace(part, place=f"{file.name}, {part.place}")
                         continue
                     one = part.connection
-                    key = one.topic, one.type, one.encoding, one.schema
+                    key = key_of(one), one.publisher, one.number  # a part of a split bag goes on with its connections
                     connection = known.setdefault(key, replace(one, number=len(known)))
                     yield replace(part, connection=connection, record_index=part.record_index + first)
                     behind = max(behind, first + int(part.record_index[-1]) + 1)
