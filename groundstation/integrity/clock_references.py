@@ -33,6 +33,8 @@ from groundstation.integrity.stretches import Sampler
 MOST_SAMPLES = 4_096
 MOST_REFERENCES = 8
 _DAY_NS = 86_400 * NS_PER_S
+STAMPS = "header stamp"  # a clock that is read when a message is made, and written when it reaches the recorder
+_AROUND, _PROMPT_NS, _WAITED_NS = 64, NS_PER_S // 100, NS_PER_S // 2
 _FLOAT_NS = 1_000  # of seconds since 1970 in a float64
 _FEW, _FEW_READINGS = 0.1, 5  # with the number of another week: so many are set aside, more are a step
 _FEWEST = 3
@@ -178,6 +180,9 @@ def _relation(readings: _Readings, clock: ClockModel, settings: RelationSettings
     told_ns = told_ns[good]
     order = np.argsort(own_ns, kind="stable")
     own_ns, told_ns = own_ns[order], told_ns[order]
+    if reference.clock == STAMPS:
+        prompt = _prompt(own_ns - told_ns)
+        own_ns, told_ns = own_ns[prompt], told_ns[prompt]
     if len(own_ns) < settings.fewest_samples:
         return ClockRelation(reference.clock, source, samples=len(own_ns), reason=f"{len(own_ns)} readings are too few")
     if reference.scale == "day":
@@ -204,6 +209,17 @@ def _relation(readings: _Readings, clock: ClockModel, settings: RelationSettings
         is_absolute=reference.scale in ("utc", "gps"),
         mistakes=(*aside, *_mistakes(reference, fitted, clock, told_ns)),
     )
+
+
+def _prompt(late_ns: Int64Array) -> BoolArray:
+    """Messages that were written soon after their stamp, shape (n,): all where none waited longer than those around."""
+    window = min(_AROUND, len(late_ns))
+    if not window:
+        return np.ones(len(late_ns), dtype=bool)
+    least = np.lib.stride_tricks.sliding_window_view(late_ns, window).min(axis=1)
+    around = np.clip(np.arange(len(late_ns)) - window // 2, 0, len(least) - 1)
+    waited_ns = late_ns - least[around]
+    return waited_ns < _PROMPT_NS if (waited_ns > _WAITED_NS).any() else np.ones(len(late_ns), dtype=bool)
 
 
 def _told(reference: ReferenceField, columns: dict[str, NDArray[Any]]) -> tuple[Int64Array, BoolArray]:

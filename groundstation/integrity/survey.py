@@ -1,7 +1,8 @@
 """One pass over a log: its header, clock model and ledger.
 
 Kept are places and times, 16 bytes a record, for each set of topics that are sampled together; when there are more than
-16 MiB of them, all go to a temporary file, 12 bytes a record.
+16 MiB of them, all go to a temporary file, 12 bytes a record; times of validity take 8 bytes more. Rates and gaps are
+those of the times at which values were valid.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,7 +16,7 @@ from groundstation.base.gaps import Gaps
 from groundstation.base.records import BoolArray, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.breaks_off import broken_off
-from groundstation.integrity.clock import ClockModel, estimate_clock
+from groundstation.integrity.clock import ClockModel, ClockOffsets, estimate_clock
 from groundstation.integrity.clock_dates import doubtful_dates
 from groundstation.integrity.clock_references import ClockReferences
 from groundstation.integrity.contents import Contents
@@ -60,9 +61,9 @@ class Survey:
 
 
 class _Order(NamedTuple):
-    """Corrected times of a topic in order, and how far it was from it: lateness in nanoseconds, counts."""
+    """Times of validity of a topic in order, and how far from it its records were: lateness in nanoseconds, counts."""
 
-    time_ns: Int64Array
+    valid_ns: Int64Array
     lateness_ns: int
     backward_steps: int
     stray_rows: int
@@ -71,11 +72,16 @@ class _Order(NamedTuple):
 def _order_of(places: Places, pieces: Sequence[Kept], clock: ClockModel) -> _Order:
     """The order of the records of some pieces, taken piece by piece."""
     time_ns = np.empty(sum(kept.count for kept in pieces), dtype=np.int64)
+    valid_ns = np.empty_like(time_ns) if any(kept.has_validity for kept in pieces) else time_ns
     at = backward = stray = 0
     before = np.zeros(0, dtype=np.int64)
     for kept in pieces:
         piece = places.piece(kept)
-        time_ns[at : at + kept.count] = clock.time_ns(piece.index, piece.time)
+        rows = slice(at, at + kept.count)
+        time_ns[rows] = clock.time_ns(piece.index, piece.time)
+        if valid_ns is not time_ns:
+            own_ns = piece.time.values if piece.validity_ns is None else piece.validity_ns
+            valid_ns[rows] = clock.valid_ns(piece.index, piece.time, own_ns, time_ns[rows])
         timed = np.concatenate((before, piece.timed))
         backward += int(np.count_nonzero(timed[1:] < timed[:-1]))
         stray += int(np.isin(piece.index, clock.stray_index).sum()) if len(clock.stray_index) else 0
@@ -83,8 +89,9 @@ def _order_of(places: Places, pieces: Sequence[Kept], clock: ClockModel) -> _Ord
     lateness = 0
     if (time_ns[1:] < time_ns[:-1]).any():
         lateness = int((np.maximum.accumulate(time_ns) - time_ns).max())
-        time_ns.sort(kind="stable")
-    return _Order(time_ns, lateness, backward, stray)
+    if (valid_ns[1:] < valid_ns[:-1]).any():
+        valid_ns.sort(kind="stable")
+    return _Order(valid_ns, lateness, backward, stray)
 
 
 def survey(items: Iterable[Item], *, thresholds: Thresholds | None = None) -> Survey:
@@ -149,7 +156,7 @@ def _ledgers(
         for topic in topics:
             ledger = topic_ledger(
                 topic,
-                order.time_ns,
+                order.valid_ns,
                 backward_steps=order.backward_steps,
                 stray_rows=order.stray_rows,
                 fields=contents.fields(topic, clock),
@@ -162,19 +169,30 @@ def _ledgers(
 
 def _clock_of(header: LogHeader, places: Places, topics: Sequence[Sequence[Kept]], limits: Thresholds) -> ClockModel:
     """The model of the log's clock, of the kind that its reader names."""
+    offsets = ClockOffsets.of(header.clock_offsets)
     if header.has_counting_clock:
-        return _counting_clock(header, places, topics, limits.counting_clock)
-    index, time = places.in_one(topics)
-    return estimate_clock(index, time, header.utc_of_zero_ns, settings=limits.clock)
+        clock = _counting_clock(header, places, topics, limits.counting_clock, offsets)
+    else:
+        index, time = places.in_one(topics)
+        moved = time if offsets is None else offsets.moved(index, time)
+        clock = estimate_clock(index, moved, header.utc_of_zero_ns, settings=limits.clock)
+    if offsets is None or not clock.has_times:
+        return clock
+    return clock.on(offsets, clock.first_device_ns - int(offsets.offsets_ns[0]))
 
 
 def _counting_clock(
-    header: LogHeader, places: Places, topics: Sequence[Sequence[Kept]], settings: CountingSettings
+    header: LogHeader,
+    places: Places,
+    topics: Sequence[Sequence[Kept]],
+    settings: CountingSettings,
+    offsets: ClockOffsets | None,
 ) -> ClockModel:
     """The model of a counting clock; of a long log only the records that have a say are laid together."""
     thinner = Thinner(round(settings.tolerance_s * NS_PER_S), settings.run_records)
     windows: list[tuple[Int64Array, Column, BoolArray]] = []
-    for index, time, frozen in places.in_order(topics):
+    for index, own, frozen in places.in_order(topics):
+        time = own if offsets is None else offsets.moved(index, own)
         if not places.is_long:
             return estimate_counting_clock(index, time, frozen, header.utc_of_zero_ns, settings=settings)
         kept = thinner.kept(time.values, time.mask & ~frozen)
@@ -206,7 +224,8 @@ class Census:
         self.rows += len(batch)
         if not len(batch) or batch.time_ns is None:
             return
-        self._times.setdefault(batch.topic, []).append(np.array(batch.time_ns))
+        valid_ns = batch.time_ns if batch.validity_time_ns is None else batch.validity_time_ns
+        self._times.setdefault(batch.topic, []).append(np.array(valid_ns))
         self._contents.add(batch, batch.time_ns)
 
     def ledger(self, damages: Sequence[Damage] = ()) -> LedgerCounts:

@@ -26,7 +26,7 @@ from groundstation.readers.icd import (
     usable_1553,
 )
 from groundstation.readers.icd.model import REVERSED_BYTE
-from groundstation.readers.mapping import without_zero_position
+from groundstation.readers.mapping import placed
 
 # Codes of the remarks that naming makes.
 NAMING_CODES = ("icd", "icd_of_another", "mapped", "several_units", "derived", "bus_errors", "not_used")
@@ -201,11 +201,11 @@ class Namer:
 
     def _placed(self, batch: RecordBatch) -> RecordBatch:
         """The batch without positions of zeros, which a unit sends before it has one."""
-        columns, zeros = without_zero_position(dict(batch.columns))
+        columns, zeros = placed(dict(batch.columns))
         if not zeros:
             return batch
         self._nowhere[batch.topic] += zeros
-        rows = np.logical_or.reduce([column.mask for column in columns.values()])
+        rows = np.logical_or.reduce([column.mask for column in columns.values()] or [np.zeros(len(batch), dtype=bool)])
         return RecordBatch(batch.topic, batch.record_index, batch.device_time_ns, columns).take(rows)
 
     def _of_429(self, batch: RecordBatch, table: _Table) -> Iterator[tuple[str, Piece]]:

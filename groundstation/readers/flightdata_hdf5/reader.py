@@ -16,7 +16,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.readers.flightdata_hdf5.canonical import TRACK, Feed, feeds_of, track_feed, values_at
 from groundstation.readers.flightdata_hdf5.container import FAILURES, HIGHEST_RATE_HZ, Container, Parameter, opened
 from groundstation.readers.layout import velocity_from_track
-from groundstation.readers.mapping import without_zero_position
+from groundstation.readers.mapping import placed
 from groundstation.readers.source import Source
 
 SLICE_S = MAX_BATCH_ROWS / HIGHEST_RATE_HZ
@@ -131,11 +131,11 @@ def _canonical_batches(
             is_flag = feed.field.kind == "bool"
             columns[feed.field.name] = Column(values != 0.0 if is_flag else values, present)
         _with_velocities(columns)
-        placed, zeros = without_zero_position(columns)
+        known, zeros = placed(columns)
         if zeros:
             losses.nowhere[topic] += zeros
             clocks = {(one.parameter.offset_s, one.parameter.frequency_hz) for one in several}
-            columns = placed | (_apart(columns, placed) if len(clocks) > 1 else {})
+            columns = known | (_apart(columns, known) if len(clocks) > 1 else {})
         batch = _batch(topic, times_ns, columns)
         if batch is not None:
             yield batch

@@ -21,7 +21,7 @@ from groundstation.base.records import (
     Remark,
 )
 from groundstation.base.signals import EVENT_SEPARATOR
-from groundstation.readers.mapping import mapped, without_zero_position
+from groundstation.readers.mapping import mapped, placed
 from groundstation.readers.parts import Part, bounded, merged, occupied
 from groundstation.readers.source import Source
 from groundstation.readers.ulog.blocks import NOT_SUBSCRIBED, Block, Topic, Walk
@@ -176,7 +176,7 @@ class _CanonicalTopics:
                 columns["mode"] = Column(np.full(len(rows), self._mode), columns[_WITH_MODE].present)
             if _OF_PRESSURE in columns and topic.name not in _ALTITUDES:
                 self._note_refused(name, columns[_OF_PRESSURE])
-            columns, zeros = without_zero_position(columns)
+            columns, zeros = placed(columns)
             self._losses.refuse(name, NO_POSITION, zeros)
             part = occupied(Part(index, time, columns))
             if part is not None:
