@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from groundstation.base.geodesy import north_east_m
+from groundstation.base.geodesy import north_east_m, on_earth, plan_north_east_m
 from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.comparison import answers, findings, opening, settings
 from groundstation.chapters.parts import Section
@@ -114,15 +114,17 @@ def _tracks(sides: Sequence[_Side]) -> Drawing | None:
     for side in sides:
         data = side.figure("overview", "latitude_deg", "longitude_deg")
         if data is not None:
-            latitude, longitude = numbers(data, "latitude_deg"), numbers(data, "longitude_deg")
-            first = int(np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))[0])
-            drawn.append((side, latitude, longitude, (latitude[first], longitude[first])))
+            latitude, longitude = on_earth(numbers(data, "latitude_deg"), numbers(data, "longitude_deg"))
+            known = np.flatnonzero(np.isfinite(latitude))
+            if known.size:
+                first = float(latitude[known[0]]), float(longitude[known[0]])
+                drawn.append((side, latitude, longitude, first))
     if not drawn:
         return None
     shared = drawn[0][-1]
     is_shared = bool(np.hypot(*north_east_m(*drawn[-1][-1], *shared)) <= NEAR_M)
     tracks = [
-        (side, *north_east_m(latitude, longitude, *(shared if is_shared else own)))
+        (side, *plan_north_east_m(latitude, longitude, *(shared if is_shared else own)))
         for side, latitude, longitude, own in drawn
     ]
 

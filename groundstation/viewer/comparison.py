@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from groundstation.base.geodesy import north_east_m, on_earth
+from groundstation.base.geodesy import north_east_m, on_earth, plan_north_east_m
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.results.comparison import Comparison
@@ -186,7 +186,7 @@ def _plan(recorder: Recorder, halves: Sequence[Half]) -> rrb.View | None:
     is_shared = bool(apart_m <= NEAR_M)
     places = []
     for (half, time_s, positions, known), origin in zip(tracks, origins, strict=True):
-        north, east = north_east_m(positions[:, 0], positions[:, 1], *(origins[0] if is_shared else origin))
+        north, east = plan_north_east_m(positions[:, 0], positions[:, 1], *(origins[0] if is_shared else origin))
         points = np.column_stack([east, -north])  # the axes of a Rerun picture run right and down
         places.append(points[known])
         _track(recorder, half, time_s, points, known)
