@@ -12,6 +12,7 @@ SEMI_MAJOR_M = 6_378_137.0
 FLATTENING = 1.0 / 298.257223563
 ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
 EARTH_RATE_RADPS = 7.292115e-5
+MOST_ON_EARTH_DEG = {"latitude_deg": 90.0, "longitude_deg": 360.0}  # some count longitudes from 0 to 360
 POLAR_LATITUDE_DEG = 85.0  # from here on a plan is drawn as seen from above its origin
 
 
@@ -40,7 +41,8 @@ def on_earth(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> tuple[FloatAr
     ([56.0, nan, nan], [38.0, nan, nan])
     """
     latitude, longitude = np.asarray(latitude_deg, dtype=np.float64), np.asarray(longitude_deg, dtype=np.float64)
-    is_place = (np.abs(latitude) <= 90.0) & (np.abs(longitude) <= 360.0)
+    most_latitude_deg, most_longitude_deg = MOST_ON_EARTH_DEG.values()
+    is_place = (np.abs(latitude) <= most_latitude_deg) & (np.abs(longitude) <= most_longitude_deg)
     return np.where(is_place, latitude, np.nan), np.where(is_place, longitude, np.nan)
 
 
