@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
+from groundstation.base.printable import in_a_line
+
 MOST_SHOWN = 2000  # characters of each part of an error: a file may have put much into it
 
 
@@ -43,8 +45,7 @@ class GroundstationError(Exception):
 
 def _shown(part: str) -> str:
     """As much of a part as a person reads, in characters that a terminal shows."""
-    text = " ".join(part.split()) if len(part) <= MOST_SHOWN else f"{part[:MOST_SHOWN]} ... ({len(part)} characters)"
-    return "".join(one if one.isprintable() else "?" for one in text)
+    return in_a_line(part if len(part) <= MOST_SHOWN else f"{part[:MOST_SHOWN]} ... ({len(part)} characters)")
 
 
 class UnreadableLogError(GroundstationError):

@@ -11,6 +11,7 @@ import typer
 import typer.core
 
 from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.base.failures import Failure
 from groundstation.cli.text import as_json, printable
 
 DONE, FAILED, USAGE, DATA_LOST, LIMIT_REACHED = 0, 1, 2, 3, 4
@@ -201,6 +202,17 @@ def time_limit_s(given: float | None) -> float:
 def say(text: str) -> None:
     """Print a line on stderr."""
     typer.echo(printable(text), err=True)
+
+
+def tell_failures(found: Iterable[Failure], *, with_traces: bool = False) -> int:
+    """Print on stderr the parts that failed; the exit code for that."""
+    code = DONE
+    for failure in found:
+        code = FAILED
+        say(f"error: {failure.text}")
+        for line in failure.trace.splitlines() if with_traces else ():
+            say(line)
+    return code
 
 
 def tell_written(paths: Iterable[object], *, as_json_text: bool, quiet: bool) -> None:

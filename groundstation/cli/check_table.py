@@ -11,7 +11,7 @@ from groundstation.base.signals import is_canonical
 from groundstation.base.text_columns import columns
 from groundstation.chapters.parts import Grid, Head
 from groundstation.chapters.terminal import grid_text
-from groundstation.cli.printing import totals
+from groundstation.cli.printing import tell_errors, totals
 from groundstation.cli.text import as_json, printable
 from groundstation.pipeline.verbs.check import Checked
 
@@ -31,9 +31,7 @@ def show(
     told = 0
     for one in checked:
         if one.outcome.state == "failed":
-            typer.echo(f"error: {printable(one.outcome.text)}", err=True)
-            if everything and one.outcome.trace:
-                typer.echo(one.outcome.trace, err=True)
+            tell_errors(one.outcome, with_traces=everything)
         elif not quiet:
             typer.echo(("\n" if told else "") + text_of(one, everything))
             told += 1

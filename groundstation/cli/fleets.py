@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from groundstation.base.failures import failures, gathered_failures
 from groundstation.cli.application import (
     DONE,
     FAILED,
@@ -15,6 +16,7 @@ from groundstation.cli.application import (
     app,
     examples,
     say,
+    tell_failures,
 )
 
 
@@ -46,7 +48,9 @@ def acceptance(
     from groundstation.cli.text import as_json, printable
     from groundstation.pipeline.many_flights.acceptance import accept_to
 
-    found, paths, problem = accept_to(out, standard, output, with_pdf=with_pdf)
+    with gathered_failures():
+        found, paths, problem = accept_to(out, standard, output, with_pdf=with_pdf)
+        lacking = failures()
     if json:
         typer.echo(as_json(found.to_dict() | {"written": [str(path) for path in paths]}))
     elif not quiet:
@@ -58,7 +62,7 @@ def acceptance(
     unread = [flight for flight in found.flights if not flight.is_read]
     for flight in unread:
         say(f"error: {flight.flight_id}: {flight.reason}")
-    if unread:
+    if tell_failures(lacking) or unread:
         return FAILED
     reached_at = {"fail": ("warn", "fail"), "not enough flights": ("warn",), "not flown": ("warn",)}
     return LIMIT_REACHED if fail_on in reached_at.get(found.decision, ()) else DONE

@@ -95,12 +95,22 @@ def outcomes(
         for line in skipped_lines(done, most=len(done) if with_times else MOST_SKIPPED):
             typer.echo(line, err=True)
     for outcome in done:
-        if outcome.state == "failed":
-            typer.echo(f"error: {printable(outcome.text)}", err=True)
-            if with_times and outcome.trace:
-                typer.echo(outcome.trace, err=True)
-    if len(done) > 1 and not quiet and not is_plan:
+        tell_errors(outcome, with_traces=with_times)
+    if sum(not one.is_beside for one in done) > 1 and not quiet and not is_plan:
         typer.echo(totals(done), err=True)
+
+
+def tell_errors(outcome: Outcome, *, with_traces: bool = False) -> None:
+    """Print on stderr why a log failed, and which parts of a flight did."""
+    traces = [outcome.trace] if outcome.state == "failed" else []
+    if outcome.state == "failed":
+        typer.echo(f"error: {printable(outcome.text)}", err=True)
+    name = outcome.source if outcome.is_session else log_name(Path(outcome.source))
+    for failure in outcome.failures:
+        typer.echo(f"error: {printable(f'{name}: {failure.text}')}", err=True)
+        traces.append(failure.trace)
+    for trace in filter(None, traces if with_traces else ()):
+        typer.echo("\n".join(map(printable, trace.splitlines())), err=True)
 
 
 def _names(done: Sequence[Outcome]) -> list[str]:
@@ -134,7 +144,7 @@ def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:
 
 
 def totals(done: Sequence[Outcome]) -> str:
-    """Totals line: how many logs, and sessions of several, ended in which state.
+    """Totals line: how many logs, and sessions of several, ended in which state; what stands beside them is none.
 
     Examples
     --------
@@ -142,9 +152,12 @@ def totals(done: Sequence[Outcome]) -> str:
     '2 logs: 1 done, 0 with data lost, 0 at the limit, 1 failed, 0 skipped'
     >>> totals([Outcome("a", "done", ""), Outcome("a, b", "done", "", is_session=True)]).partition("; ")[2]
     '1 session: 1 done, 0 with data lost, 0 at the limit, 0 failed'
+    >>> totals([Outcome("a", "incomplete", "")])
+    '1 log: 0 done, 0 with data lost, 0 at the limit, 0 failed, 0 skipped, 1 incomplete'
     >>> totals([Outcome("a", "done", "", was_finished=True)])
     '1 log: 1 done, 0 with data lost, 0 at the limit, 0 failed, 0 skipped; 1 was finished before'
     """
+    done = [one for one in done if not one.is_beside]
     logs = _counted("log", [one for one in done if not one.is_session], list(_STATE_WORDS))
     sessions = [one for one in done if one.is_session and one.state != "skipped"]
     parts = [logs, *([_counted("session", sessions, list(_STATE_WORDS)[:-1])] if sessions else [])]
@@ -156,11 +169,18 @@ def totals(done: Sequence[Outcome]) -> str:
 
 def _counted(noun: str, done: Sequence[Outcome], states: Sequence[State]) -> str:
     counts = ", ".join(f"{sum(one.state == state for one in done)} {_STATE_WORDS[state]}" for state in states)
-    return f"{len(done)} {noun}{'' if len(done) == 1 else 's'}: {counts}"
+    incomplete = sum(one.state == "incomplete" for one in done)
+    more = f", {incomplete} incomplete" if incomplete else ""
+    return f"{len(done)} {noun}{'' if len(done) == 1 else 's'}: {counts}{more}"
 
 
 MOST_SKIPPED = 5  # named in a line
-_LINE_WORDS: Mapping[State, str] = {"done": "done", "data_lost": "data lost", "limit_reached": "at the limit"}
+_LINE_WORDS: Mapping[State, str] = {
+    "done": "done",
+    "data_lost": "data lost",
+    "limit_reached": "at the limit",
+    "incomplete": "incomplete",
+}
 _STATE_WORDS: Mapping[State, str] = {
     "done": "done",
     "data_lost": "with data lost",
@@ -172,7 +192,7 @@ _STATE_WORDS: Mapping[State, str] = {
 
 def _plain(outcome: Outcome) -> dict[str, Any]:
     return {
-        **({"kind": "session"} if outcome.is_session else {}),
+        **({"kind": "session"} if outcome.is_session else {"kind": "output"} if outcome.is_beside else {}),
         "source": outcome.source,
         "state": outcome.state,
         "exit_code": outcome.code,
@@ -180,6 +200,7 @@ def _plain(outcome: Outcome) -> dict[str, Any]:
         "folder": outcome.folder,
         "was_finished": outcome.was_finished,
         "text": outcome.text,
+        **({"left_out": [failure.text for failure in outcome.failures]} if outcome.failures else {}),
     }
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.geodesy import curvature_radii_m
+from groundstation.base.geodesy import continuous_longitude_deg, curvature_radii_m
 from groundstation.base.records import frozen
 from groundstation.base.units import M_PER_NAUTICAL_MILE
 
@@ -101,9 +101,8 @@ def _direction(
     """Unit vector along the track, north and east; NaN where the aircraft hardly moves or its place is not known."""
     meridian, prime_vertical = curvature_radii_m(latitude_deg)
     north = np.gradient(np.deg2rad(latitude_deg), time_s) * meridian
-    turned = np.rad2deg(np.unwrap(np.deg2rad(np.where(np.isfinite(longitude_deg), longitude_deg, 0.0))))
-    turned = np.where(np.isfinite(longitude_deg), turned, np.nan)
-    east = np.gradient(np.deg2rad(turned), time_s) * prime_vertical * np.cos(np.deg2rad(latitude_deg))
+    turned_rad = np.deg2rad(continuous_longitude_deg(longitude_deg))
+    east = np.gradient(turned_rad, time_s) * prime_vertical * np.cos(np.deg2rad(latitude_deg))
     speed = np.hypot(north, east)
     speed = np.where(speed > MOVING_MPS, speed, np.nan)
     return north / speed, east / speed

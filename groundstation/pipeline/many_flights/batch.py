@@ -38,7 +38,7 @@ from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
 PLANS: Mapping[str, str] = {
     "everything": "to run",
-    "analysis": "to analyse again: a setting changed, or a file is missing; the MCAP stays",
+    "analysis": "to analyse again: a setting changed, a file is missing or a part failed; the MCAP stays",
     "reports": "to report again",
     "nothing": "finished, nothing to do",
 }

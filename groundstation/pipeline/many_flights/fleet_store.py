@@ -290,8 +290,8 @@ def write_month(job: MonthJob, listen: Listener = silent) -> Outcome:
         _write(job)
     except OSError as error:
         reason = f"{job.out}: {FLIGHTS} and the samples of {job.month} cannot be written ({error.strerror or error})"
-        return Outcome(job.log, "failed", reason)
-    return Outcome(job.log, "done", "")
+        return Outcome(job.log, "failed", reason, is_beside=True)
+    return Outcome(job.log, "done", "", is_beside=True)
 
 
 def _write(job: MonthJob) -> None:

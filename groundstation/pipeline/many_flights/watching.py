@@ -123,7 +123,7 @@ def watch(
                 yield found
         if once:
             if trouble.told:
-                yield (Outcome(str(out), "failed", trouble.told),)
+                yield (Outcome(str(out), "failed", trouble.told, is_beside=True),)
             return
 
 

@@ -7,11 +7,13 @@ import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial as bound
 from pathlib import Path, PurePosixPath
 from typing import TypeVar
 
-from groundstation.base.errors import UnclaimedLogError, UnreadableLogError
-from groundstation.base.findings import SEVERITIES, Severity, worst
+from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
+from groundstation.base.failures import attempt, failures, gathered_failures, is_incomplete, with_failures
+from groundstation.base.findings import SEVERITIES, Finding, worst
 from groundstation.base.records import RecordBatch
 from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES
 from groundstation.pipeline.one_flight.analyse import Given, analyse
@@ -33,6 +35,7 @@ from groundstation.results.manifest import Resume
 from groundstation.tables.table import Flight
 
 PARTIAL_PREFIX = ".partial-"
+OF_THE_WORLD = OSError, GroundstationError  # a full disk, a setting: no defect of the part that meets it
 Inside = TypeVar("Inside")
 
 
@@ -113,9 +116,14 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
     """Run one log into a partial folder in ``out``; the caller moves it into place (see :func:`place`).
 
     A log that cannot be read or computed gives an outcome with the reason, never an exception: one bad log never
-    stops the others.
+    stops the others. Nor does one part of a flight that fails by a defect (an analysis, a figure, a tab) stop the rest
+    of it: the flight is then incomplete, and a finding says what it lacks.
     """
-    watch = Stopwatch(listen, job.path.name)
+    with gathered_failures():
+        return _run_gathering(job, Stopwatch(listen, job.path.name))
+
+
+def _run_gathering(job: Job, watch: Stopwatch) -> Outcome:
     sha256 = ""
     partial: Path | None = None
     try:
@@ -150,7 +158,7 @@ def _require_unchanged(log: Log, version: tuple[int, int]) -> None:
 
 
 def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Stopwatch) -> Outcome:
-    from groundstation.results.files import save
+    from groundstation.results.files import put_failures, save
 
     mcap = partial / "flight.mcap"
     if job.step == "analysis" and job.finished is not None:
@@ -167,11 +175,16 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         identity += f"_{log.source.sha256[:8]}"
     with watch.stage("estimating"):
         results = analyse(flight, given_of(log, converted, identity), job.configuration)
-        applied = apply_deviation(flight, results, job.configuration.apply, job.configuration.settings)
-        results = applied.results
+        asked = job.configuration.apply, job.configuration.settings
+        applied = attempt("applied deviation", "all", apply_deviation, flight, results, *asked, unless=OF_THE_WORLD)
+        results = results if applied is None else applied.results
+        for one in FLIGHT_ANALYSES:
+            attempt("columns", one.name, one.values, results.answers)  # of the tables of flights
     with watch.stage("saving"):
-        corrected = partial / corrected_name(identity)
-        write_corrected(corrected, converted.info, flight, applied, job.configuration.thresholds)
+        if applied is not None:
+            corrected = partial / corrected_name(identity)
+            write_corrected(corrected, converted.info, flight, applied, job.configuration.thresholds)
+        results = replace(results, findings=with_failures(results.findings, failures()))
         mcap.rename(partial / f"{identity}.mcap")
         text = sentence(results)
         keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf)
@@ -179,14 +192,17 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         path = job.url or str(log.path.absolute())
         save(partial, results, manifest_of(results, job.configuration.to_dict(), path=path, resume=resume))
     problem = _show(partial, flight, results, job, watch)
+    put_failures(partial, failures())
+    findings = with_failures(results.findings, failures())
     return Outcome(
         job.log,
-        state_of(worst(results.findings), converted.has_lost_data, job.fail_on),
+        state_of(findings, converted.has_lost_data, job.fail_on),
         "; ".join(filter(None, (text, problem))),
         flight_id=identity,
         folder=str(partial),
         sha256=log.source.sha256,
         times_s=watch.times_s,
+        failures=failures(),
     )
 
 
@@ -199,7 +215,8 @@ def _show(partial: Path, flight: Flight, results: FlightResults, job: Job, watch
         with watch.stage("recording"):  # while the other painters are at the report's figures
             from groundstation.viewer.recording import write_recording  # Rerun is loaded after they were forked
 
-            write_recording(partial / f"{results.flight_id}.rrd", flight, results)
+            path = partial / f"{results.flight_id}.rrd"
+            attempt("recording", "flight", write_recording, path, flight, results, unless=OF_THE_WORLD)
         with watch.stage("reporting"):
             return finish().problem
 
@@ -208,11 +225,15 @@ def _export(folder: Path) -> str:
     """Write the tables that reports write beside them; returns what went wrong."""
     from groundstation.results.files import load
 
-    return write_exports(load(folder, ANSWER_TYPES), with_pdf=False)[1]
+    saved = load(folder, ANSWER_TYPES)
+    written = attempt("report", "exports", bound(write_exports, saved, with_pdf=False), unless=OF_THE_WORLD)
+    return "" if written is None else written[1]
 
 
 def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
     """The outcome of a flight that is finished, its reports made again where that is asked for."""
+    from groundstation.results.files import put_failures
+
     problem = ""
     if job.step == "reports" and job.only_results:
         problem = _export(finished.folder)
@@ -221,15 +242,17 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
             written = write_flight_report(finished.folder, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters)
             problem = written.problem
             remember_reports(finished, with_pdf=job.with_pdf)
+    put_failures(finished.folder, failures())
     return Outcome(
         job.log,
-        state_of(finished.gravest, finished.has_lost_data, job.fail_on),
+        state_of(with_failures(finished.findings, failures()), finished.has_lost_data, job.fail_on),
         "; ".join(filter(None, (finished.text, problem))),
         flight_id=finished.flight_id,
         folder=str(finished.folder),
         sha256=finished.sha256,
         times_s=watch.times_s,
         was_finished=job.step == "nothing",
+        failures=failures(),
     )
 
 
@@ -261,8 +284,11 @@ def read_flight(mcap: Path, converted: Converted) -> Flight:
     return flight_from_batches(batches, metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name)
 
 
-def state_of(gravest: Severity | None, has_lost_data: bool, fail_on: str) -> State:
-    """State of a run from its worst finding and whether data was lost."""
+def state_of(findings: tuple[Finding, ...], has_lost_data: bool, fail_on: str) -> State:
+    """State of a run from its findings and whether data was lost."""
+    if is_incomplete(findings):
+        return "incomplete"
+    gravest = worst(findings)
     if fail_on in SEVERITIES and gravest and SEVERITIES.index(gravest) >= SEVERITIES.index(fail_on):
         return "limit_reached"
     return "data_lost" if has_lost_data else "done"
@@ -270,7 +296,8 @@ def state_of(gravest: Severity | None, has_lost_data: bool, fail_on: str) -> Sta
 
 def sentence(results: FlightResults) -> str:
     """What was found, in one line."""
-    found = [text for analysis in FLIGHT_ANALYSES if (text := analysis.sentence(results.answers))]
+    told = (attempt("line", one.name, one.sentence, results.answers) for one in FLIGHT_ANALYSES)
+    found = [text for text in told if text]
     if found:
         return "; ".join(found)
     if not results.not_assessable:

@@ -17,7 +17,8 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from groundstation.base.errors import GroundstationError
-from groundstation.base.findings import Severity, worst
+from groundstation.base.failures import is_incomplete
+from groundstation.base.findings import Finding
 from groundstation.base.version import __version__
 from groundstation.pipeline.one_flight.apply_deviation import APPLIED, corrected_name
 from groundstation.pipeline.one_flight.configuration import Configuration
@@ -53,8 +54,7 @@ class Finished:
     text : str
         What was found, in one line.
     has_lost_data : bool
-    gravest : {'info', 'warn', 'fail'} or None
-        Severity of its gravest finding.
+    findings : tuple of Finding
     has_deviation, has_applied : bool
         Whether a magnetic deviation was found, and whether one was added to the log: there are files of both.
     """
@@ -66,7 +66,7 @@ class Finished:
     keys: Keys
     text: str
     has_lost_data: bool
-    gravest: Severity | None
+    findings: tuple[Finding, ...]
     has_deviation: bool = False
     has_applied: bool = False
 
@@ -83,14 +83,15 @@ class Finished:
     def step(self, keys: Keys, *, with_pdf: bool, only_results: bool = False) -> Step:
         """What has to be done for the results to be those of ``keys``; a file that somebody took away is made again.
 
-        With ``only_results`` neither recording nor reports are asked for; what there is of them stays.
+        With ``only_results`` neither recording nor reports are asked for; what there is of them stays. A part that
+        failed is tried again.
         """
         if keys.conversion != self.keys.conversion or self.mcap.name not in self.files:
             return "everything"
         analysed = {corrected_name(self.flight_id)} if self.has_applied else set()
         if not only_results:
             analysed.add(f"{self.flight_id}.rrd")
-        if keys.analysis != self.keys.analysis or not analysed <= self.files:
+        if keys.analysis != self.keys.analysis or not analysed <= self.files or is_incomplete(self.findings):
             return "analysis"
         wanted = {DEVIATION_CSV} if self.has_deviation else set()
         if only_results:
@@ -191,7 +192,7 @@ def _finished(folder: Path, files: frozenset[str], manifest: Manifest, summary: 
         resume.keys,
         resume.text,
         resume.has_lost_data,
-        worst(summary.findings),
+        summary.findings,
         bool(summary.results.get("magnetic")),
         any(finding.code == APPLIED for finding in summary.findings),
     )

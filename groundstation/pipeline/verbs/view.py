@@ -64,6 +64,8 @@ def look_at(
             if outcome.state == "failed":
                 where, _, found = outcome.text.partition(": ")
                 raise GroundstationError(where, found)
+            for failure in outcome.failures:
+                say(f"error: {path.name}: {failure.text}")
             code = open_viewer(_recording(Path(outcome.folder)), web=web, host=host, port=port, say=say)
     if code:
         raise GroundstationError("the Rerun viewer", f"ended with code {code}; see its output above")

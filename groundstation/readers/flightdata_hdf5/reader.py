@@ -135,7 +135,7 @@ def _canonical_batches(
         if zeros:
             losses.nowhere[topic] += zeros
             clocks = {(one.parameter.offset_s, one.parameter.frequency_hz) for one in several}
-            columns = known | (_apart(columns, known) if len(clocks) > 1 else {})
+            columns = known | (_apart(columns, known) if len(clocks) > 1 and "latitude_deg" in known else {})
         batch = _batch(topic, times_ns, columns)
         if batch is not None:
             yield batch
