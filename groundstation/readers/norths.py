@@ -139,8 +139,8 @@ def by_motion(samples: Samples) -> Norths:
 
     Examples
     --------
-    >>> n = np.full(30, np.nan)
-    >>> found = by_motion(Samples(n * 0 + 77.0, n * 0 + 13.0, n * 0 + 12.0, n * 0, n, n))  # magnetic: it flies east
+    >>> one, none = np.ones(30), np.full(30, np.nan)
+    >>> found = by_motion(Samples(77.0 * one, 13.0 * one, 12.0 * one, 0.0 * one, none, none))  # it flies east
     >>> found.track, found.sign, found.track_by
     ('magnetic', 1, 'velocities')
     """
