@@ -82,7 +82,8 @@ class RecordBatch:
         Corrected recorder time, set once the clock is known: UTC nanoseconds since 1970 when the clock is absolute,
         else nanoseconds since the log's zero. Readers leave it out; the store yields it.
     validity_time_ns : ndarray of int64, shape (n,), optional
-        Time at which the values were true, where it is not ``time_ns``. Readers give it by the device's clock.
+        Time at which the values were true, where it is not ``time_ns``. Readers give it by the device's clock; where it
+        is the device time itself, values are valid at the corrected time of their record.
     """
 
     topic: str

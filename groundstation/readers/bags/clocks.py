@@ -4,10 +4,8 @@ Log time is the recorder's computer's. Where it steps while stamps go on smoothl
 Stamps are believed where they go with the log time, or where they go on smoothly while messages were logged in bursts.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +14,7 @@ from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.bags.messages import Connection
 from groundstation.readers.bags.sources import Line
+from groundstation.readers.clock_offsets import Jump, Offsets, offsets_by
 from groundstation.readers.two_clocks import FEWEST_READINGS, Readings, Stretch, Track, stretches_of
 
 LARGEST_LAG_S = 2.0  # between header stamp and log time: what is further apart is another clock
@@ -30,20 +29,7 @@ _SLIP_NS = 60 * NS_PER_S  # from the last message before a slip to the first beh
 _LARGEST_LAG_NS = int(LARGEST_LAG_S * NS_PER_S)
 
 
-class Jump(NamedTuple):
-    """Two messages in turn between which the log time of a connection falls, or leaps.
-
-    ``number`` is the place of the second among the messages of the connection; then records and log times of both.
-    """
-
-    number: int
-    before: int
-    record: int
-    before_ns: int
-    time_ns: int
-
-
-def was_set(jumps: Sequence[Jump], offsets: "Offsets") -> bool:
+def was_set(jumps: Sequence[Jump], offsets: Offsets) -> bool:
     """Whether a corrected log time falls by a second or more, or leaps from before 1980, for more than a few messages.
 
     Parameters
@@ -133,122 +119,33 @@ class Stamped:
         return Line(connection, np.sort(self.log.all()[0]), self.log.stride)
 
 
-@dataclass(frozen=True, eq=False)
-class Offsets:
-    """What is added to log times: ``added_ns[k]`` from the record ``starts[k]`` on. Without any, nothing."""
-
-    starts: Int64Array = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
-    added_ns: Int64Array = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
-    by: str = ""
-
-    def at(self, record_index: Int64Array) -> Int64Array:
-        """What is added to the log times of records."""
-        place = np.searchsorted(self.starts, record_index, side="right") - 1
-        return np.asarray(self.added_ns[np.maximum(place, 0)])
-
-    def text(self) -> str:
-        """What was set when, for people."""
-        parts = [
-            f"by {_seconds_text(int(after - before))} before record {record}"
-            for record, before, after in zip(self.starts[1:].tolist(), self.added_ns, self.added_ns[1:], strict=False)
-            if after != before
-        ]
-        if not parts:
-            added = _seconds_text(-int(self.added_ns[0]))
-            return f"the clock of log time was never set: {added} are added, by the stamps of messages"
-        return (
-            f"the clock of log time was set {', '.join(parts)}, as the stamps of {self.by} show: it is moved to go on"
-        )
-
-    @property
-    def stated(self) -> tuple[tuple[int, int], ...]:
-        """As the header of a log states them."""
-        if not self.added_ns.any():
-            return ()
-        return tuple(zip(self.starts.tolist(), self.added_ns.tolist(), strict=True))
-
-    def moved(self, track: Track) -> Track:
-        """Readings by the corrected log time."""
-        return Track(track.record_index, track.receipt_ns + self.at(track.record_index), track.clock_ns, track.number)
+def told(offsets: Offsets, names: Mapping[int, str]) -> str:
+    """What was set when, for people; ``names`` are topics by their numbers."""
+    parts = [f"by {size_ns / NS_PER_S:+.3f} s before record {record}" for record, size_ns in offsets.steps()]
+    if not parts:
+        added_s = int(offsets.added_ns[0]) / NS_PER_S
+        return f"the clock of log time was never set: {added_s:+.3f} s are added, by the stamps of messages"
+    by = ", ".join(names[number] for number in offsets.by)
+    return f"the clock of log time was set {', '.join(parts)}, as the stamps of {by} show: it is moved to go on"
 
 
-def _seconds_text(time_ns: int) -> str:
-    return f"{-time_ns / NS_PER_S:+.3f} s"
-
-
-class _Step(NamedTuple):
-    """The recorder's clock was set between two records, by so much, as ``readings`` of a stamp tell."""
-
-    after: int
-    first: int
-    size_ns: int
-    readings: int
-    by: int
-
-
-def offsets_of(stamped: dict[int, Stamped], names: dict[int, str]) -> Offsets:
+def offsets_of(stamped: Mapping[int, Stamped]) -> Offsets:
     """How log times are to be moved so that they go on smoothly with the stamps; zero where they were set right.
 
     Parameters
     ----------
-    stamped : dict of connection number to Stamped
-    names : dict of connection number to str
-        Topics, to say by which of them.
+    stamped : mapping of connection number to Stamped
     """
     tracks = {number: one.readings.all() for number, one in stamped.items()}
     tracks = {number: track for number, track in tracks.items() if track.readings >= FEWEST_READINGS}
-    steps = _united(_steps(tracks), [jump for one in stamped.values() for jump in one.jumps])
-    starts, added = [0], [0]
-    for step in steps:
-        starts.append(step.first)
-        added.append(added[-1] - step.size_ns)
-    offsets = Offsets(np.array(starts, dtype=np.int64), np.array(added, dtype=np.int64))
+    offsets = offsets_by(tracks, [jump for one in stamped.values() for jump in one.jumps])
     right = [_added_where_right(track, offsets) for track in tracks.values()]
     known = [one for one in right if one is not None]
     if known:
-        _start, zero_ns = max(known)  # where the log time was last right, nothing is added
-        zero_ns = -zero_ns
-    elif (unset := _least_unset(tracks.values(), offsets)) is not None:
-        zero_ns = -unset
-    else:
-        zero_ns = -added[-1]
-    by = ", ".join(dict.fromkeys(names[step.by] for step in steps))
-    return Offsets(offsets.starts, offsets.added_ns + zero_ns, by)
-
-
-def _steps(tracks: dict[int, Track]) -> list[_Step]:
-    """Steps of the recorder's clock that the stamps of any connection show."""
-    found = []
-    for number, track in tracks.items():
-        for before, stretch in pairwise(stretches_of(track)):
-            if stretch.stepped == "receipt":
-                first = int(stretch.track.record_index[0])
-                size_ns = stretch.level_ns - before.level_ns
-                found.append(_Step(stretch.after, first, size_ns, track.readings, number))
-    return found
-
-
-def _united(steps: list[_Step], jumps: Sequence[Jump]) -> list[_Step]:
-    """Steps that several connections show as one, at the first record that any of them has behind it."""
-    united: list[_Step] = []
-    for step in sorted(steps, key=lambda step: (step.first, step.after)):
-        if united and step.after < united[-1].first:
-            last = united[-1]
-            best = max(last, step, key=lambda one: one.readings)
-            united[-1] = best._replace(after=max(last.after, step.after), first=min(last.first, step.first))
-        else:
-            united.append(step)
-    found = []
-    for step in united:
-        size_ns = abs(step.size_ns)
-        same = [
-            jump.record
-            for jump in jumps
-            if jump.before < step.first and jump.record > step.after
-            if abs(jump.time_ns - jump.before_ns) > size_ns // 2
-        ]
-        found.append(step._replace(first=min([step.first, *(record for record in same if record > step.after)])))
-    return found
+        _start, added_ns = max(known)  # where the log time was last right, nothing is added
+        return offsets.plus(-added_ns)
+    unset_ns = _least_unset(tracks.values(), offsets)
+    return offsets.plus(-int(offsets.added_ns[-1]) if unset_ns is None else -unset_ns)
 
 
 def _added_where_right(track: Track, offsets: Offsets) -> tuple[int, int] | None:

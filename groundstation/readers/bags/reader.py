@@ -27,7 +27,7 @@ from groundstation.readers.bags.profile import MessageProfile
 from groundstation.readers.bags.sources import Key, key_of
 from groundstation.readers.bags.survey import Survey, survey
 from groundstation.readers.mapping import placed
-from groundstation.readers.parts import Part, bounded, merged, occupied
+from groundstation.readers.parts import Part, bounded, merged, occupied, one_row_each
 from groundstation.readers.source import Source
 
 GATHERED_BYTES = 8 << 20  # of messages that are decoded together
@@ -102,24 +102,6 @@ def _publishers(found: Survey, names: dict[int, str]) -> dict[int, str]:
     }
 
 
-def _one_row_each(batch: RecordBatch) -> RecordBatch:
-    """Records of one header stamp as one row: what a unit says of one instant. Not where two have the same field."""
-    stamps = batch.validity_time_ns
-    if stamps is None:
-        return batch
-    _stamps, first, place = np.unique(stamps, return_index=True, return_inverse=True)
-    masks = {name: column.mask for name, column in batch.columns.items()}
-    if any(np.bincount(place[mask], minlength=1).max() > 1 for mask in masks.values()):
-        return batch
-    columns = {}
-    for name, column in batch.columns.items():
-        values, present = np.zeros(len(first), dtype=column.values.dtype), np.zeros(len(first), dtype=bool)
-        values[place[masks[name]]], present[place[masks[name]]] = column.values[masks[name]], True
-        columns[name] = Column(values, None if present.all() else present)
-    index, time = batch.record_index[first], batch.device_time_ns.take(first)
-    return RecordBatch(batch.topic, index, time, columns, validity_time_ns=stamps[first]).take(np.argsort(index))
-
-
 def _fits_in(time_ns: Int64Array, record_index: Int64Array, is_far: BoolArray) -> BoolArray:
     """Whether times lie between those of the records before and behind that are not far, shape (n,)."""
     order = np.argsort(record_index)
@@ -162,7 +144,7 @@ class _Topics:
         for topic, parts in raw.items():
             yield from bounded(merged(topic, parts))
         for topic, parts in sorted(canonical.items()):
-            yield from bounded(_one_row_each(merged(topic, parts)) if len(parts) > 1 else merged(topic, parts))
+            yield from bounded(one_row_each(merged(topic, parts)) if len(parts) > 1 else merged(topic, parts))
 
     def _part(self, block: Block, decoded: Decoded) -> Part:
         """Raw columns of decoded messages, with their three times."""
@@ -199,11 +181,13 @@ class _Topics:
             return stamp_ns
         is_in_order = _fits_in(stamp_ns, record_index, is_far)
         is_late = is_in_order & lags.may_be_late(log_ns - stamp_ns)
-        is_far &= ~is_late & ~(is_in_order & ~_fits_in(log_ns, record_index, is_far))
+        has_log_time = _fits_in(log_ns, record_index, is_far)
+        is_far &= ~is_late & ~(is_in_order & ~has_log_time)
         if is_far.any():
             name = self._names[number]
             self._far_stamps[name] = self._far_stamps.get(name, 0) + int(is_far.sum())
-        return np.where(is_far, log_ns - lags.usual_ns, stamp_ns)
+        logged_ns = np.where(has_log_time, log_ns - lags.usual_ns, log_ns)  # of no log time the clock's model has one
+        return np.where(is_far, logged_ns, stamp_ns)
 
     def remarks(self) -> Iterator[Remark]:
         """What was not kept as columns, and stamps that were not believed."""

@@ -11,13 +11,14 @@ from groundstation.base.signals import field_of, kind_of
 from groundstation.readers.bags import px4
 from groundstation.readers.bags.bag import Bag
 from groundstation.readers.bags.canonical import MESSAGES, is_earth_frame, wheel_odometry
-from groundstation.readers.bags.clocks import LARGEST_LAG_S, Lags, Offsets, offsets_of, was_set
+from groundstation.readers.bags.clocks import LARGEST_LAG_S, Lags, offsets_of, told, was_set
 from groundstation.readers.bags.decode import Decoder
 from groundstation.readers.bags.messages import Block
 from groundstation.readers.bags.profile import MessageProfile
 from groundstation.readers.bags.seen import Seen
 from groundstation.readers.bags.sources import in_order, sources_of
 from groundstation.readers.bags.values import Values
+from groundstation.readers.clock_offsets import Offsets
 from groundstation.readers.mapping import Columns, mapped
 
 SHARED_SHARE = 0.8  # of the stamps of the slower of two topics that the faster has too: one unit's solution
@@ -105,7 +106,7 @@ def survey(bag: Bag, profile: MessageProfile | None = None) -> Survey:
 
 def _map(found: Survey) -> None:
     """Lay the messages on canonical topics, those of the profile first."""
-    told = _map_by_rules(found)
+    named = _map_by_rules(found)
     served = [seen for seen in found.sources if seen.rule is None and _serves(seen)]
     units = _units([seen for seen in served if MESSAGES[seen.connection.type].role in _ORDER])
     kinds: dict[str, list[list[Seen]]] = {}
@@ -115,7 +116,7 @@ def _map(found: Survey) -> None:
     kinds.setdefault("magnetometer", []).extend([seen] for seen in alone)
     for seen in (seen for unit in kinds.pop("", []) for seen in unit):
         _leave_raw(found, seen, "whose it is and along which axes is not told; a profile can say it")
-    for kind in sorted(kinds.keys() & told):
+    for kind in sorted(kinds.keys() & named):
         for one in (seen for unit in kinds.pop(kind) for seen in unit):
             _leave_raw(found, one, f"the profile says what {kind} is")
     for kind, several in kinds.items():
@@ -231,10 +232,10 @@ def _feed(found: Survey, topic: str, unit: list[Seen]) -> None:
 
 def _choose_clock(found: Survey) -> None:
     """Header stamps tell when values were true, unless they are of another clock than the log time."""
-    names = {number: seen.connection.topic for number, seen in found.seen.items()}
-    found.offsets = offsets_of({number: seen.stamped[0] for number, seen in found.seen.items()}, names)
+    found.offsets = offsets_of({number: seen.stamped[0] for number, seen in found.seen.items()})
     if found.offsets.stated:
-        found.remarks.append(Remark("clock_used", found.offsets.text()))
+        names = {number: seen.connection.topic for number, seen in found.seen.items()}
+        found.remarks.append(Remark("clock_used", told(found.offsets, names)))
     stamped = [(seen, Lags.of(seen.stamped, found.offsets)) for seen in found.sources if seen.has_header]
     mapped = [(seen, lags) for seen, lags in stamped if seen.connection.number in found.feeds and len(lags.lag_ns)]
     others = [(seen, lags) for seen, lags in mapped if not lags.are_good]
@@ -248,6 +249,6 @@ def _choose_clock(found: Survey) -> None:
         return
     found.lags = {number: lags for seen, lags in stamped if lags.are_good for number in seen.numbers}
     if found.lags:
-        told = "; ".join(f"{seen.connection.topic} {lags.text()}" for seen, lags in mapped)
+        late = "; ".join(f"{seen.connection.topic} {lags.text()}" for seen, lags in mapped)
         text = "values are valid at their header stamps; log time orders the records and is kept as recorder time"
-        found.remarks.append(Remark("clock_used", f"{text}; logged after their stamp: {told}" if told else text))
+        found.remarks.append(Remark("clock_used", f"{text}; logged after their stamp: {late}" if late else text))
