@@ -140,8 +140,9 @@ def velocity_from_track(track_deg: FloatArray, speed_mps: FloatArray) -> tuple[F
     >>> [round(float(part[0]), 9) for part in velocity_from_track(np.array([90.0]), np.array([50.0]))]
     [0.0, 50.0]
     """
-    track_rad = np.deg2rad(track_deg)
-    return speed_mps * np.cos(track_rad), speed_mps * np.sin(track_rad)
+    with np.errstate(invalid="ignore", over="ignore"):  # of an infinite direction or speed: NaN
+        track_rad = np.deg2rad(track_deg)
+        return speed_mps * np.cos(track_rad), speed_mps * np.sin(track_rad)
 
 
 def wind_from_direction(from_deg: FloatArray, speed_mps: FloatArray) -> tuple[FloatArray, ...]:

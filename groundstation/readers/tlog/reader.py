@@ -183,9 +183,10 @@ def _take(
     """Add what a message gives to canonical topics; ``nowhere`` counts positions that are none."""
     if not assignments:
         return
-    numbers = {
-        name: one.values.astype(np.float64) for name, one in part.columns.items() if one.values.dtype.kind != "U"
-    }
+    with np.errstate(invalid="ignore"):  # of a NaN that signals
+        numbers = {
+            name: one.values.astype(np.float64) for name, one in part.columns.items() if one.values.dtype.kind != "U"
+        }
     for one in assignments:
         with np.errstate(over="ignore", invalid="ignore"):
             columns, count = placed(one.rule.columns(numbers))
