@@ -8,6 +8,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar, TypeVarTuple
 
+from groundstation.base.errors import lack_of_memory
 from groundstation.base.printable import in_a_line
 
 if TYPE_CHECKING:
@@ -143,8 +144,8 @@ def reason_of(error: BaseException) -> str:
     >>> reason_of(ValueError("bad <object at 0x7f3a5c001c40>")), reason_of(MemoryError())
     ('internal error (ValueError: bad <object at 0x...>); please report it', 'not enough memory')
     """
-    if isinstance(error, MemoryError):
-        return "not enough memory"
+    if lacking := lack_of_memory(error):
+        return lacking
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
     told = _ADDRESS.sub("0x...", in_a_line(str(error)))

@@ -2,6 +2,7 @@
 
 import math
 import sys
+import traceback
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from pathlib import Path
@@ -10,9 +11,9 @@ from typing import Annotated, Any, Literal, ParamSpec
 import typer
 import typer.core
 
-from groundstation.base.errors import GroundstationError, UsageError
-from groundstation.base.failures import Failure
-from groundstation.cli.text import as_json, printable
+from groundstation.base.errors import GroundstationError, UsageError, lack_of_memory
+from groundstation.base.failures import Failure, reason_of
+from groundstation.cli.text import as_json, printable, printable_lines
 
 DONE, FAILED, USAGE, DATA_LOST, LIMIT_REACHED = 0, 1, 2, 3, 4
 INTERRUPTED = 130
@@ -210,8 +211,8 @@ def tell_failures(found: Iterable[Failure], *, with_traces: bool = False) -> int
     for failure in found:
         code = FAILED
         say(f"error: {failure.text}")
-        for line in failure.trace.splitlines() if with_traces else ():
-            say(line)
+        if with_traces:
+            typer.echo(printable_lines(failure.trace), err=True)
     return code
 
 
@@ -243,14 +244,16 @@ def answers_with_exit_code(verb: Callable[Parameters, int | None]) -> Callable[P
         except BrokenPipeError:  # the reader of our output went away: `groundstation list | head -1`
             sys.stderr.close()
             code = DONE
-        except OSError as error:
-            say(f"error: {error.filename or 'file system'}: {error.strerror or error}")
+        except Exception as error:
             code = FAILED
-        except Exception as error:  # a defect of ours: one line for the user, the rest on request
-            if options.get("verbose"):
-                raise
-            say(f"error: internal error ({type(error).__name__}: {error}); please report it; -v shows where")
-            code = FAILED
+            if lacking := lack_of_memory(error):
+                say(f"error: {lacking}")
+            elif isinstance(error, OSError):
+                say(f"error: {error.filename or 'file system'}: {error.strerror or error}")
+            elif options.get("verbose"):  # a defect of ours: one line for the user, the rest on request
+                typer.echo(printable_lines("".join(traceback.format_exception(error))), err=True)
+            else:
+                say(f"error: {reason_of(error)}; -v shows where")
         raise typer.Exit(code)
 
     return run

@@ -8,7 +8,7 @@ from typing import Any
 import typer
 
 from groundstation.base.text_columns import columns
-from groundstation.cli.text import as_json, printable
+from groundstation.cli.text import as_json, printable, printable_lines
 from groundstation.pipeline.one_flight.log import log_name
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
 from groundstation.pipeline.verbs.describe import BusWord, Description
@@ -110,7 +110,7 @@ def tell_errors(outcome: Outcome, *, with_traces: bool = False) -> None:
         typer.echo(f"error: {printable(f'{name}: {failure.text}')}", err=True)
         traces.append(failure.trace)
     for trace in filter(None, traces if with_traces else ()):
-        typer.echo("\n".join(map(printable, trace.splitlines())), err=True)
+        typer.echo(printable_lines(trace), err=True)
 
 
 def _names(done: Sequence[Outcome]) -> list[str]:

@@ -4,7 +4,6 @@ import hashlib
 import json
 import platform
 import shutil
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -26,7 +25,7 @@ from groundstation.pipeline.many_flights.session_figures import session_figures
 from groundstation.pipeline.one_flight.analyse import run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration, read_toml, session_tables
 from groundstation.pipeline.one_flight.convert import convert_log
-from groundstation.pipeline.one_flight.flight import OF_THE_WORLD, PARTIAL_PREFIX, Stopwatch, place, state_of
+from groundstation.pipeline.one_flight.flight import OF_THE_WORLD, Stopwatch, partial_folder, place, state_of
 from groundstation.pipeline.one_flight.identity import MAX_PART_CHARACTERS, flight_id, safe_part
 from groundstation.pipeline.one_flight.log import Log
 from groundstation.pipeline.one_flight.manifest import manifest_of
@@ -143,8 +142,7 @@ def _run_gathering(job: SessionJob, watch: Stopwatch) -> Outcome:
     try:
         if (finished := _finished(job, watch)) is not None:
             return finished
-        partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=job.out))
-        partial.chmod(0o755)  # mkdtemp's folders are private
+        partial = partial_folder(job.out)
         return _run_into(partial, job, watch)
     except Exception as error:
         reason, trace = reason_of(job.name, error)

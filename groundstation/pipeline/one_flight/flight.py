@@ -1,8 +1,8 @@
 """One log from beginning to end: MCAP, answers, recording and report in a folder of its own."""
 
 import os
+import secrets
 import shutil
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -133,8 +133,7 @@ def _run_gathering(job: Job, watch: Stopwatch) -> Outcome:
         log = open_log(job.path, job.configuration.profile_path, job.configuration.icds)
         sha256 = log.source.sha256
         job.out.mkdir(parents=True, exist_ok=True)
-        partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=job.out))
-        partial.chmod(0o755)  # mkdtemp's folders are private
+        partial = partial_folder(job.out)
         return _run(log, version, job, partial, watch)
     except UnclaimedLogError as error:
         return Outcome(job.log, "failed" if job.is_named else "skipped", str(error))
@@ -143,6 +142,13 @@ def _run_gathering(job: Job, watch: Stopwatch) -> Outcome:
     if partial is not None:
         shutil.rmtree(partial, ignore_errors=True)
     return Outcome(job.log, "failed", reason, sha256=sha256, times_s=watch.times_s, trace=trace)
+
+
+def partial_folder(out: Path) -> Path:
+    """A new folder in ``out`` for what is not finished; as every other it is open to whom the user's mask leaves it."""
+    partial = out / f"{PARTIAL_PREFIX}{secrets.token_hex(8)}"
+    partial.mkdir()
+    return partial
 
 
 def _version(path: Path) -> tuple[int, int]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from groundstation.base.errors import GroundstationError
+from groundstation.base.errors import GroundstationError, lack_of_memory
 from groundstation.base.failures import Failure
 from groundstation.base.failures import reason_of as why
 
@@ -73,12 +73,11 @@ def reason_of(name: str, error: Exception) -> tuple[str, str]:
     """Why a log failed, in one line, and where an error that is ours to mend came from (empty for the others)."""
     if isinstance(error, GroundstationError):
         return str(error), ""
-    if isinstance(error, OSError):
+    if isinstance(error, OSError) and not lack_of_memory(error):
         file = f"{Path(error.filename).name}: " if error.filename and Path(error.filename).name != name else ""
         return f"{name}: {file}{error.strerror or error}", ""
-    if isinstance(error, MemoryError):
-        return f"{name}: not enough memory", ""
-    return f"{name}: {why(error)}", "".join(traceback.format_exception(error))
+    trace = "" if lack_of_memory(error) else "".join(traceback.format_exception(error))
+    return f"{name}: {why(error)}", trace
 
 
 def worst_code(outcomes: "tuple[Outcome, ...]") -> int:

@@ -2,7 +2,6 @@
 
 import hashlib
 import shutil
-import tempfile
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from groundstation.estimators.plan import Plan, Planned
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, PLAN_MARK
 from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
 from groundstation.pipeline.one_flight.cores import cores
-from groundstation.pipeline.one_flight.flight import OF_THE_WORLD, PARTIAL_PREFIX, Stopwatch, place, state_of
+from groundstation.pipeline.one_flight.flight import OF_THE_WORLD, Stopwatch, partial_folder, place, state_of
 from groundstation.pipeline.one_flight.identity import safe_part
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
@@ -88,8 +87,7 @@ def run_plan(
 def _run(
     plan: Plan[Any], loaded: LoadedPlan[Any], target: Path, fail_on: str, with_pdf: bool, watch: Stopwatch
 ) -> Outcome:
-    partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=target.parent))
-    partial.chmod(0o755)  # mkdtemp's folders are private
+    partial = partial_folder(target.parent)
     try:
         with gathered_failures():
             return _run_into(partial, plan, loaded, target, fail_on, with_pdf, watch)
