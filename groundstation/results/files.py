@@ -13,6 +13,7 @@ import numpy as np
 
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.serial import MismatchError, from_json, to_json_exactly
+from groundstation.base.to_disk import sync_file
 from groundstation.results.answer import Answer
 from groundstation.results.chosen import chosen_intervals
 from groundstation.results.document import SummaryDocument
@@ -78,19 +79,24 @@ def mapping(document: Any, *keys: str) -> Mapping[str, Any]:
     return document if isinstance(document, Mapping) else {}
 
 
-def write_text(path: Path, text: str) -> None:
+def write_text(path: Path, text: str, *, is_synced: bool = True) -> None:
     """Write a text file as :func:`write_bytes` does.
 
     A lone surrogate (a file name that is not UTF-8) is written as its escape, which JSON reads back as it was.
     """
-    write_bytes(path, text.encode("utf-8", "backslashreplace"))
+    write_bytes(path, text.encode("utf-8", "backslashreplace"), is_synced=is_synced)
 
 
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file under a temporary name and move it into place: a kill never leaves half a file."""
+def write_bytes(path: Path, content: bytes, *, is_synced: bool = True) -> None:
+    """Write a file under a temporary name and move it into place: a kill never leaves half a file.
+
+    Nor does a loss of power, if ``is_synced``: without, the caller writes it through to the disk.
+    """
     temporary = path.with_name(f".{path.name}.partial")
     try:
         temporary.write_bytes(content)
+        if is_synced:
+            sync_file(temporary)
         temporary.replace(path)
     except OSError as error:  # a full disk does not say which file
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
@@ -105,6 +111,8 @@ def json_text(document: Any) -> str:
 
 def save(folder: Path, results: FlightResults, manifest: Manifest) -> None:
     """Write a flight's answers and arrays into its folder; what an earlier run left of them is replaced.
+
+    They are not yet written through to the disk.
 
     Parameters
     ----------
@@ -123,14 +131,14 @@ def save(folder: Path, results: FlightResults, manifest: Manifest) -> None:
         (folder / name).mkdir()
     for figure in results.figures:
         _write_parquet(folder / ARRAYS / f"{figure.name}.parquet", figure)
-        write_text(folder / TABLES / f"{figure.name}.csv", csv_text(figure))
-    write_text(folder / SUMMARY, json_text(summary_of(results)))
-    save_manifest(folder, manifest)
+        write_text(folder / TABLES / f"{figure.name}.csv", csv_text(figure), is_synced=False)
+    write_text(folder / SUMMARY, json_text(summary_of(results)), is_synced=False)
+    save_manifest(folder, manifest, is_synced=False)
 
 
-def save_manifest(folder: Path, manifest: Manifest) -> None:
+def save_manifest(folder: Path, manifest: Manifest, *, is_synced: bool = True) -> None:
     """Write manifest.json of a flight folder."""
-    write_text(folder / MANIFEST, json_text(to_json_exactly(manifest)))
+    write_text(folder / MANIFEST, json_text(to_json_exactly(manifest)), is_synced=is_synced)
 
 
 def load_manifest(folder: Path) -> Manifest:

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path, PurePath
 
 from groundstation.base.errors import UnclaimedLogError, UsageError
+from groundstation.base.to_disk import sync_folder
 from groundstation.pipeline.many_flights.delta_sink import delta_place, put_flights
 from groundstation.pipeline.many_flights.fleet_store import Scan, refresh, scan
 from groundstation.pipeline.many_flights.found_sessions import (
@@ -209,6 +210,7 @@ def _run_here(
         outcomes = (*placement.outcomes(), *sessions)
         found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
         problems = _write_beside(out, outcomes, asked, found)
+        sync_folder(out)
         stored = put_flights(asked.store, found, outcomes) if asked.store else ()
         return (*outcomes, *unwritten, *problems, *stored)
 
@@ -301,7 +303,7 @@ def _run_remote_sessions(
 ) -> tuple[Outcome, ...]:
     """Run the sessions in the copy of an OUT elsewhere, in this process, where the MCAPs are fetched to."""
     before = session_folders(output.root)
-    here = replace(asked, out=output.root, mcap_in=output.mcap_in)
+    here = replace(asked, out=output.root, mcap_in=output.mcap_in, is_copy=True)
     outcomes = _run_sessions(placement, here, among, partial(in_turn, listen=listen), listen)
     sent = []
     for outcome in outcomes:

@@ -27,7 +27,9 @@ from groundstation.pipeline.many_flights.inputs import (
     session_folders,
 )
 from groundstation.pipeline.one_flight.cores import cores
+from groundstation.pipeline.one_flight.flight import REPORT_FILES
 from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.one_flight.sealing import note
 from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
 from groundstation.reports.fleet_report import fleet_report_begun
 from groundstation.reports.index import IndexRow, Kind
@@ -160,6 +162,7 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
         try:
             with told_in_a_line(str(folder)):
                 written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf, painters=cores())
+                note(folder, written.paths, removed=REPORT_FILES)
         except GroundstationError as error:
             if is_flight:
                 raise

@@ -19,6 +19,7 @@ from groundstation.pipeline.one_flight.identity import safe_part
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.pipeline.one_flight.sealing import seal
 from groundstation.reports.flight_report import write_flight_report
 from groundstation.results.files import save, write_text
 from groundstation.results.flight import FlightResults, Source
@@ -113,12 +114,14 @@ def _run_into(
         planned = plan.run(loaded.scenario)
     results = _results(plan, loaded, planned, target.name)
     with watch.stage("saving"):
-        save(partial, results, manifest_of(results, {"scenario": asdict(loaded.scenario)}))
+        manifest = manifest_of(results, {"scenario": asdict(loaded.scenario)})
+        save(partial, results, manifest)
         write_text(partial / PLAN_MARK, loaded.text)
     with watch.stage("recording"):
         write_plan_recording(partial / f"{results.flight_id}.rrd", results)
     with watch.stage("reporting"):
         problem = write_flight_report(partial, ANSWER_TYPES, with_pdf=with_pdf, painters=cores()).problem
+    seal(partial, manifest)
     place(partial, target)
     warned = (f"warning: {finding.text}" for finding in results.findings if finding.severity != "info")
     told = "; ".join(filter(None, (plan.sentence(results.answers), *warned, problem)))
