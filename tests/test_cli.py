@@ -10,6 +10,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from groundstation.base import compile as compiling
 from groundstation.cli.application import EXAMPLES, VERBS, examples
 from groundstation.cli.main import app
 from tests.dataflash_writer import flight_log
@@ -174,3 +175,16 @@ def test_an_output_that_is_not_ours_needs_force(tmp_path: Path) -> None:
     assert groundstation(*arguments, "-f")[0] == 0
     assert (tmp_path / "out/precious.txt").read_text(encoding="utf-8") == "mine"
     assert groundstation(*arguments)[0] == 0, "an own OUT is continued"
+
+
+def test_verbose_says_why_compiled_code_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    log = tmp_path / "a.csv"
+    log.write_text("time_s,ins.true_heading_deg\n0,1\n1,1\n2,1\n")
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(shared))
+    monkeypatch.setattr(compiling, "hand_of_others", lambda folder: f"others may write into {folder}")
+    monkeypatch.setattr(compiling, "_cache_folder", compiling._cache_folder.__wrapped__)
+    words = f"compiled code is not kept ({shared}: others may write into {shared})"
+    assert groundstation("check", str(log), "--progress", "none", "-v")[2].count(words) == 1
+    assert words not in groundstation("check", str(log), "--progress", "none")[2]

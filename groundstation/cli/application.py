@@ -254,6 +254,15 @@ def answers_with_exit_code(verb: Callable[Parameters, int | None]) -> Callable[P
                 typer.echo(printable_lines("".join(traceback.format_exception(error))), err=True)
             else:
                 say(f"error: {reason_of(error)}; -v shows where")
+        if options.get("verbose"):
+            _tell_of_compiled_code()
         raise typer.Exit(code)
 
     return run
+
+
+def _tell_of_compiled_code() -> None:
+    """Say why compiled code is not kept where the user wants it, if anything was compiled."""
+    compiling = sys.modules.get("groundstation.base.compile")
+    if compiling is not None and (reason := compiling.why_nothing_is_kept()):
+        say(reason)

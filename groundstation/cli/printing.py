@@ -1,5 +1,6 @@
 """How results look on stdout: lines for people, JSON for programs."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path, PurePath
@@ -116,7 +117,8 @@ def tell_errors(outcome: Outcome, *, with_traces: bool = False) -> None:
 def _names(done: Sequence[Outcome]) -> list[str]:
     """Logs by the names of their files; by their paths where two files have one name."""
     files = [outcome.source if outcome.is_session else log_name(Path(outcome.source)) for outcome in done]
-    return [file if files.count(file) == 1 else outcome.source for file, outcome in zip(files, done, strict=True)]
+    count = Counter(files)
+    return [file if count[file] == 1 else outcome.source for file, outcome in zip(files, done, strict=True)]
 
 
 def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:

@@ -15,6 +15,7 @@ from groundstation.base.errors import UnreadableLogError
 from groundstation.base.failures import CODE, Failure, attempt, with_failures
 from groundstation.base.printable import csv_cell, printable_json
 from groundstation.base.serial import MismatchError, from_json, to_json, to_json_exactly
+from groundstation.base.to_disk import sync_file
 from groundstation.results.answer import Answer
 from groundstation.results.chosen import chosen_intervals
 from groundstation.results.document import SummaryDocument
@@ -79,19 +80,24 @@ def mapping(document: Any, *keys: str) -> Mapping[str, Any]:
     return document if isinstance(document, Mapping) else {}
 
 
-def write_text(path: Path, text: str) -> None:
+def write_text(path: Path, text: str, *, is_synced: bool = True) -> None:
     """Write a text file as :func:`write_bytes` does.
 
     A lone surrogate (a file name that is not UTF-8) is written as its escape, which JSON reads back as it was.
     """
-    write_bytes(path, text.encode("utf-8", "backslashreplace"))
+    write_bytes(path, text.encode("utf-8", "backslashreplace"), is_synced=is_synced)
 
 
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file under a temporary name and move it into place: a kill never leaves half a file."""
+def write_bytes(path: Path, content: bytes, *, is_synced: bool = True) -> None:
+    """Write a file under a temporary name and move it into place: a kill never leaves half a file.
+
+    Nor does a loss of power, if ``is_synced``: without, the caller writes it through to the disk.
+    """
     temporary = path.with_name(f".{path.name}.partial")
     try:
         temporary.write_bytes(content)
+        if is_synced:
+            sync_file(temporary)
         temporary.replace(path)
     except OSError as error:  # a full disk does not say which file
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
@@ -106,6 +112,8 @@ def json_text(document: Any) -> str:
 
 def save(folder: Path, results: FlightResults, manifest: Manifest) -> None:
     """Write a flight's answers and arrays into its folder; what an earlier run left of them is replaced.
+
+    They are not yet written through to the disk.
 
     Parameters
     ----------
@@ -124,14 +132,14 @@ def save(folder: Path, results: FlightResults, manifest: Manifest) -> None:
         (folder / name).mkdir()
     for figure in results.figures:
         attempt("arrays", figure.name, _save_figure, folder, figure, unless=(OSError,))
-    write_text(folder / SUMMARY, json_text(summary_of(results)))
-    save_manifest(folder, manifest)
+    write_text(folder / SUMMARY, json_text(summary_of(results)), is_synced=False)
+    save_manifest(folder, manifest, is_synced=False)
 
 
 def _save_figure(folder: Path, figure: FigureData) -> None:
     text = csv_text(figure)
     _write_parquet(folder / ARRAYS / f"{figure.name}.parquet", figure)
-    write_text(folder / TABLES / f"{figure.name}.csv", text)
+    write_text(folder / TABLES / f"{figure.name}.csv", text, is_synced=False)
 
 
 def put_failures(folder: Path, found: Sequence[Failure], made_again: Sequence[str] = ()) -> bool:
@@ -152,9 +160,9 @@ def put_failures(folder: Path, found: Sequence[Failure], made_again: Sequence[st
     return True
 
 
-def save_manifest(folder: Path, manifest: Manifest) -> None:
+def save_manifest(folder: Path, manifest: Manifest, *, is_synced: bool = True) -> None:
     """Write manifest.json of a flight folder."""
-    write_text(folder / MANIFEST, json_text(to_json_exactly(manifest)))
+    write_text(folder / MANIFEST, json_text(to_json_exactly(manifest)), is_synced=is_synced)
 
 
 def load_manifest(folder: Path) -> Manifest:

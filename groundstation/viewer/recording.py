@@ -16,6 +16,7 @@ import rerun_bindings
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.failures import attempt, failures, with_failures
+from groundstation.base.to_disk import sync_file
 from groundstation.results.answer import Answer
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight
@@ -79,6 +80,7 @@ def save_stream(path: Path, identity: str, send: Callable[[rr.RecordingStream], 
     try:
         _save(temporary, identity, send)
         rerun_bindings.flush_and_cleanup_orphaned_recordings()  # else the threads and buffers of each one stay
+        sync_file(temporary)
         temporary.replace(path)
     except (OSError, RuntimeError) as error:  # Rerun's own are RuntimeErrors
         raise GroundstationError(str(path), str(error), next_step="check the folder and the free space") from error

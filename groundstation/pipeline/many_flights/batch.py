@@ -3,13 +3,15 @@
 import math
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePath
+from types import MappingProxyType
 
 from groundstation.base.errors import UnclaimedLogError, UsageError
+from groundstation.base.to_disk import sync_folder
 from groundstation.pipeline.many_flights.delta_sink import delta_place, put_flights
 from groundstation.pipeline.many_flights.fleet_store import Scan, refresh, scan
 from groundstation.pipeline.many_flights.found_sessions import (
@@ -28,6 +30,7 @@ from groundstation.pipeline.many_flights.publishing import FLEET_FILES, write_be
 from groundstation.pipeline.many_flights.remote import FarLog, far_logs, is_remote
 from groundstation.pipeline.many_flights.remote_runs import RemoteJob, digest_remote, run_remote
 from groundstation.pipeline.many_flights.session import load_stations, planned_session
+from groundstation.pipeline.many_flights.strangers import Strangers
 from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJob, Crew, in_turn, side_by_side
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.cores import cores, painters_of
@@ -98,8 +101,13 @@ def run_many(
     if store:
         delta_place(store)
     inputs = _inputs(paths, out, configuration)
-    crew = _crew(scheduler, jobs or cores(), len(inputs), listen, timeout_s)
-    painters = 1 if scheduler else painters_of(jobs or cores(), len(inputs))
+    is_near = not any(is_remote(str(place)) for place in (out, *paths))
+    listen(Event("begin", total=len(inputs)))
+    strangers = Strangers(Path(out) if is_near else None)
+    skipped = _skipped(inputs, strangers, listen) if is_near and configuration.profile is None else {}
+    logs = len(inputs) - len(skipped)
+    crew = _crew(scheduler, jobs or cores(), logs, listen, timeout_s)
+    painters = 1 if scheduler else painters_of(jobs or cores(), logs)
     make = partial(
         Job,
         configuration=configuration,
@@ -108,7 +116,6 @@ def run_many(
         only_results=only_results,
         painters=painters,
     )
-    listen(Event("begin", total=len(inputs)))
     asked = Asked(
         Path(out),
         configuration,
@@ -120,14 +127,16 @@ def run_many(
         store=store,
         painters=jobs or cores(),
     )
-    if any(is_remote(str(place)) for place in (out, *paths)):
+    if not is_near:
         remote = [
             RemoteJob(make(Path(), Path(), is_named=one.is_named), one.url, str(out), redo, one.size) for one in inputs
         ]
         return _run_remote(remote, asked, crew, force, listen)
     near = [make(Path(one.url), Path(out), is_named=one.is_named) for one in inputs]
     refresher = _crew(scheduler, jobs or cores(), TASKS_PER_PROCESS + 1, listen)
-    return _run_here(near, asked, crew, force, listen, refresher)
+    outcomes = _run_here(near, asked, crew, force, listen, refresher, skipped)
+    strangers.keep(outcomes)
+    return outcomes
 
 
 def run_together(
@@ -181,8 +190,24 @@ def run_together(
         return _run_here([job], asked, partial(in_turn, listen=listen), force, listen)
 
 
+def _skipped(inputs: Sequence[FarLog], strangers: Strangers, listen: Listener) -> dict[int, Outcome]:
+    """Outcomes, by their numbers, of files in folders that no reader claims."""
+    found: dict[int, Outcome] = {}
+    for number, one in enumerate(inputs):
+        if not one.is_named and (reason := strangers.reason(Path(one.url))) is not None:
+            found[number] = Outcome(one.url, "skipped", reason)
+            listen(Event("end", PurePath(one.url).name, reason))
+    return found
+
+
 def _run_here(
-    work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen: Listener, refresher: Crew | None = None
+    work: Sequence[Job],
+    asked: Asked,
+    crew: Crew,
+    force: bool,
+    listen: Listener,
+    refresher: Crew | None = None,
+    skipped: Mapping[int, Outcome] = MappingProxyType({}),
 ) -> tuple[Outcome, ...]:
     out = asked.out
     refuse_foreign(out, force)
@@ -190,9 +215,11 @@ def _run_here(
         prepare(out)
         known = KnownFlights(None if asked.redo else out)
         placement = Placement(LocalOutput(out), [job.log for job in work])
+        for number, outcome in skipped.items():
+            placement.put(number, outcome)
 
         def left() -> Iterator[tuple[int, Job]]:
-            for number, job, twin in _with_steps(work, known):
+            for number, job, twin in _with_steps(work, known, skipped):
                 if twin is None:
                     yield number, job
                 else:
@@ -209,6 +236,7 @@ def _run_here(
         outcomes = (*placement.outcomes(), *sessions)
         found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
         problems = _write_beside(out, outcomes, asked, found)
+        sync_folder(out)
         stored = put_flights(asked.store, found, outcomes) if asked.store else ()
         return (*outcomes, *unwritten, *problems, *stored)
 
@@ -301,7 +329,7 @@ def _run_remote_sessions(
 ) -> tuple[Outcome, ...]:
     """Run the sessions in the copy of an OUT elsewhere, in this process, where the MCAPs are fetched to."""
     before = session_folders(output.root)
-    here = replace(asked, out=output.root, mcap_in=output.mcap_in)
+    here = replace(asked, out=output.root, mcap_in=output.mcap_in, is_copy=True)
     outcomes = _run_sessions(placement, here, among, partial(in_turn, listen=listen), listen)
     sent = []
     for outcome in outcomes:
@@ -375,12 +403,13 @@ def plan_many(
     known = KnownFlights(None if redo else out)
     make = partial(Job, out=out, configuration=configuration, with_pdf=with_pdf, only_results=only_results)
     work = [make(Path(one.url), is_named=one.is_named) for one in inputs]
-    outcomes = []
-    for _number, job, twin in _with_steps(work, known):
+    found = {} if configuration.profile is not None else _skipped(inputs, Strangers(out), silent)
+    for number, job, twin in _with_steps(work, known, found):
         if twin is not None:
-            outcomes.append(Outcome(job.log, "done", f"same content as {work[twin].log}, listed once"))
+            found[number] = Outcome(job.log, "done", f"same content as {work[twin].log}, listed once")
         else:
-            outcomes.append(_planned(job))
+            found[number] = _planned(job)
+    outcomes = [outcome for _, outcome in sorted(found.items())]
     ground = None if stations is None else load_stations(stations)
     asked = Asked(out, configuration, ground, "none", with_pdf, redo, only_results=only_results)
     return (*outcomes, *_planned_sessions(asked, before, outcomes))
@@ -420,7 +449,7 @@ def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configu
     found = {log.url: log for path in paths if is_remote(str(path)) for log in far_logs(str(path))}
     judges = {path.resolve() for path in configuration.references.paths}  # in a folder they are no logs to run
     for one in collect(near, None if is_remote(str(out)) else Path(out)):
-        if one.is_named or one.path.resolve() not in judges:
+        if one.is_named or not judges or one.path.resolve() not in judges:
             found[str(one.path)] = FarLog(str(one.path), one.is_named, one.path.stat().st_size)
     if not found:
         hint = "output of groundstation is no input" if any(path.is_dir() and is_ours(path) for path in near) else ""
@@ -428,10 +457,14 @@ def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configu
     return tuple(log for _, log in sorted(found.items()))
 
 
-def _with_steps(jobs: Sequence[Job], known: KnownFlights) -> Iterator[tuple[int, Job, int | None]]:
+def _with_steps(
+    jobs: Sequence[Job], known: KnownFlights, without: Collection[int] = ()
+) -> Iterator[tuple[int, Job, int | None]]:
     """Jobs by number, with what is to be done of each, and the number of an earlier one with the same finished log."""
     first: dict[str, int] = {}
     for number, job in enumerate(jobs):
+        if number in without:
+            continue
         planned = _with_step(job, known) if len(known) else job
         kept = first.setdefault(planned.finished.sha256, number) if planned.finished else number
         yield number, planned, kept if kept != number else None

@@ -233,8 +233,8 @@ def refresh(out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, .
     """
     before, samples = scan(out), SampleStore(out)
     there, known = samples.files(), before.fresh.column("samples")
-    others = there.difference(known)
-    lost = set(known).difference(there, ("",))
+    others = there.keys() - set(known)
+    lost = set(known).difference((name for name, size in there.items() if size), ("",))
     fresh = before.fresh.without(lost, "samples")
     jobs = list(_jobs(before, fresh))
     here: Crew = partial(in_turn, listen=silent)

@@ -28,12 +28,15 @@ from groundstation.pipeline.many_flights.inputs import (
     session_folders,
 )
 from groundstation.pipeline.one_flight.cores import cores
+from groundstation.pipeline.one_flight.flight import REPORT_FILES
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
+from groundstation.pipeline.one_flight.sealing import note
 from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
 from groundstation.reports.fleet_report import fleet_report_begun
 from groundstation.reports.index import IndexRow, Kind
 from groundstation.results.file_names import INDEX_CSV, INDEX_JSON
 
+MOST_SKIPPED = 1000  # files that the index lists
 FLEET_RECORDING, FLEET_PDF = "fleet.rrd", str(Path(FLEET_PAGE).with_suffix(".pdf"))
 FLEET_FILES = (INDEX_JSON, INDEX_CSV, FLEET_PARQUET, FLIGHTS, SAMPLES, FLEET_RECORDING, FLEET_PAGE, FLEET_PDF)
 
@@ -137,12 +140,23 @@ def write_index_of(
             problems.append(_beside(folder, "failed", *reason_of(folder.name, error)))
     logs = [one for one in outcomes if not one.is_beside]
     without_flight = [one for one in logs if not one.flight_id and not (one.is_session and one.state == "skipped")]
-    rows += [failed_row(one.source, one.state, one.text) for one in (*without_flight, *problems)]
+    rows += [failed_row(one.source, one.state, one.text) for one in (*_listed(without_flight), *problems)]
     try:
         write_index(out, rows, INDEXED, elsewhere=f"{len(found)} flights: {FLIGHTS}/" if is_large else "")
     except OSError as error:
         problems.append(_beside(out, "failed", f"{out}: the index cannot be written ({error.strerror or error})"))
     return tuple(problems)
+
+
+def _listed(without_flight: Sequence[Outcome]) -> list[Outcome]:
+    """Logs without a flight as the index lists them: of very many skipped files the rest is one row."""
+    skipped = [one for one in without_flight if one.state == "skipped"]
+    rest = skipped[MOST_SKIPPED:]
+    if not rest:
+        return list(without_flight)
+    others = [one for one in without_flight if one.state != "skipped"]
+    told = Outcome(f"{len(rest)} more files", "skipped", f"skipped as these {MOST_SKIPPED}, and not listed")
+    return [*others, *skipped[:MOST_SKIPPED], told]
 
 
 def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple[Outcome, ...]]:
@@ -169,6 +183,7 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
         try:
             with told_in_a_line(str(folder)):
                 written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf, painters=cores())
+                note(folder, written.paths, removed=REPORT_FILES)
         except GroundstationError as error:
             if is_flight:
                 raise

@@ -4,7 +4,7 @@ import hashlib
 import json
 import platform
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -25,13 +25,21 @@ from groundstation.pipeline.many_flights.session_figures import session_figures
 from groundstation.pipeline.one_flight.analyse import run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration, read_toml, session_tables
 from groundstation.pipeline.one_flight.convert import convert_log
-from groundstation.pipeline.one_flight.flight import OF_THE_WORLD, Stopwatch, partial_folder, place, state_of
+from groundstation.pipeline.one_flight.flight import (
+    OF_THE_WORLD,
+    REPORT_FILES,
+    Stopwatch,
+    partial_folder,
+    place,
+    state_of,
+)
 from groundstation.pipeline.one_flight.identity import MAX_PART_CHARACTERS, flight_id, safe_part
 from groundstation.pipeline.one_flight.log import Log
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.pipeline.one_flight.resume import versions
+from groundstation.pipeline.one_flight.sealing import note, seal, spoiled_files
 from groundstation.reports.flight_report import PDF, REPORT, flight_report_begun, write_flight_report
 from groundstation.results.file_names import MANIFEST
 from groundstation.results.files import load_document, load_manifest, put_failures, save, save_manifest
@@ -72,6 +80,8 @@ class SessionJob:
         Whether there is neither a recording nor a report.
     painters : int
         How many processes paint the figures of its report.
+    is_copy : bool
+        Whether ``out`` is a copy of a folder elsewhere, which has most files by name alone.
     """
 
     logs: tuple[Log, ...]
@@ -85,6 +95,7 @@ class SessionJob:
     notes: tuple[Finding, ...] = ()
     only_results: bool = False
     painters: int = 1
+    is_copy: bool = False
 
     @property
     def log(self) -> str:
@@ -188,13 +199,15 @@ def _kept(job: SessionJob) -> _Kept | None:
         if resume is None or manifest.source.sha256 != job.sha256:
             continue
         is_of_the_verb = job.is_found and not manifest.is_found
+        spoiled = frozenset() if job.is_copy else spoiled_files(folder, manifest)
         is_whole = resume.keys.analysis == keys.analysis and not _is_incomplete(folder)
+        is_whole &= spoiled <= {f"{folder.name}.rrd", *REPORT_FILES}
         if not job.only_results:
-            is_whole &= (folder / f"{folder.name}.rrd").is_file()
+            is_whole &= _is_whole(folder / f"{folder.name}.rrd", spoiled)
         if not is_of_the_verb and (job.redo or not is_whole):
             continue
         is_told = is_of_the_verb or resume.keys.reports == keys.reports
-        has_reports = is_told and all((folder / name).is_file() for name in reports)
+        has_reports = is_told and all(_is_whole(folder / name, spoiled) for name in reports)
         return _Kept(folder, manifest, resume, job.only_results or has_reports)
     return None
 
@@ -207,6 +220,10 @@ def _is_incomplete(folder: Path) -> bool:
         return True
 
 
+def _is_whole(file: Path, spoiled: Collection[str]) -> bool:
+    return file.is_file() and file.name not in spoiled
+
+
 def _finished(job: SessionJob, watch: Stopwatch) -> Outcome | None:
     """The outcome of a session that is finished, its reports made again where they are missing; None without one."""
     kept = _kept(job)
@@ -215,8 +232,10 @@ def _finished(job: SessionJob, watch: Stopwatch) -> Outcome | None:
     folder, resume, problem = kept.folder, kept.resume, ""
     if not kept.is_finished:
         with watch.stage("reporting"):
-            problem = write_flight_report(folder, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters).problem
+            written = write_flight_report(folder, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters)
+        problem = written.problem
         save_manifest(folder, replace(kept.manifest, resume=replace(resume, keys=job.keys())))
+        note(folder, written.paths, removed=REPORT_FILES)
     state = state_of(load_document(folder).findings, resume.has_lost_data, job.fail_on)
     found = _outcome(job, state, "; ".join(filter(None, (resume.text, problem))), folder, watch)
     return replace(found, was_finished=kept.is_finished)
@@ -244,10 +263,12 @@ def _run_into(partial: Path, job: SessionJob, watch: Stopwatch) -> Outcome:
         results = _results(job, assembled, flights, damaged)
     with watch.stage("saving"):
         text = _sentence(results)
-        resume = Resume(job.keys(), text, bool(damaged))
-        save(partial, results, _manifest(job, results, logs, resume))
+        manifest = _manifest(job, results, logs, Resume(job.keys(), text, bool(damaged)))
+        save(partial, results, manifest)
     problem = "" if job.only_results else _show(partial, assembled, results, job, watch)
     put_failures(partial, failures())
+    with watch.stage("saving"):
+        seal(partial, manifest)
     target = job.out / results.flight_id
     shutil.rmtree(target / MCAPS, ignore_errors=True)
     place(partial, target)

@@ -31,12 +31,13 @@ COUNTED_CAUSES = ("dropout", "stuck", "out_of_range", "sequence")  # of spans: c
 class Converted:
     """What an MCAP holds and what was found while it was made.
 
-    ``has_lost_data``: something of the log could not be kept (exit code 3).
+    ``has_lost_data``: something of the log could not be kept (exit code 3). ``sha256`` is the digest of the MCAP.
     """
 
     info: StoreInfo
     findings: tuple[Finding, ...]
     has_lost_data: bool
+    sha256: str = ""
 
 
 def convert_log(
@@ -102,7 +103,7 @@ def _convert_recorded(log: Log, target: Path, limits: Thresholds, references: Re
     with StoreWriter(target, info) as writer:
         for batch in chain(corrected(items, found.clock), laid.batches):
             writer.write(batch)
-    return Converted(info, findings, any(damage.loses_data for damage in found.damages))
+    return Converted(info, findings, any(damage.loses_data for damage in found.damages), writer.sha256)
 
 
 def why_nothing_is_placed(findings: Iterable[Finding]) -> str:
@@ -160,7 +161,7 @@ def _copy_store(log: Log, target: Path, limits: Thresholds, references: Referenc
             raise UnreadableLogError(log.path.name, "no intact record", "", "the file is damaged beyond its index")
         if damages or has_other_limits(info, limits):
             info = writer.info = recounted(info, damages, census)
-    return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages))
+    return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages), writer.sha256)
 
 
 def _laid_beside_store(log: Log, info: StoreInfo, references: References) -> Laid:

@@ -15,17 +15,19 @@ from groundstation.base.errors import GroundstationError, UnclaimedLogError, Unr
 from groundstation.base.failures import attempt, failures, gathered_failures, is_incomplete, with_failures
 from groundstation.base.findings import SEVERITIES, Finding, worst
 from groundstation.base.records import RecordBatch
+from groundstation.base.to_disk import sync_folder
 from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES
 from groundstation.pipeline.one_flight.analyse import Given, analyse
 from groundstation.pipeline.one_flight.apply_deviation import apply_deviation, corrected_name, write_corrected
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
-from groundstation.pipeline.one_flight.identity import flight_id
+from groundstation.pipeline.one_flight.identity import flight_id, sha256_of
 from groundstation.pipeline.one_flight.log import Log, digest_of, open_log
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, Keys, Step, keys_of, remember_reports
+from groundstation.pipeline.one_flight.sealing import note, seal
 from groundstation.reports.flight_report import PDF, REPORT, flight_report_begun, write_flight_report
 from groundstation.reports.steer_card import write_exports
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
@@ -36,6 +38,7 @@ from groundstation.tables.table import Flight
 
 PARTIAL_PREFIX = ".partial-"
 OF_THE_WORLD = OSError, GroundstationError  # a full disk, a setting: no defect of the part that meets it
+REPORT_FILES = (REPORT, PDF, DEVIATION_CSV, STEER_CARD)
 Inside = TypeVar("Inside")
 
 
@@ -168,7 +171,7 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
 
     mcap = partial / "flight.mcap"
     if job.step == "analysis" and job.finished is not None:
-        converted = _taken_over(job.finished.mcap, mcap)
+        converted = _taken_over(job.finished, mcap)
     else:
         with watch.stage("converting"):
             converted = convert_log(log, mcap, job.configuration.thresholds, job.configuration.references)
@@ -196,10 +199,13 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf)
         resume = Resume(keys, text, converted.has_lost_data)
         path = job.url or str(log.path.absolute())
-        save(partial, results, manifest_of(results, job.configuration.to_dict(), path=path, resume=resume))
+        manifest = manifest_of(results, job.configuration.to_dict(), path=path, resume=resume)
+        save(partial, results, manifest)
     problem = _show(partial, flight, results, job, watch)
     put_failures(partial, failures())
     findings = with_failures(results.findings, failures())
+    with watch.stage("saving"):
+        seal(partial, manifest, {f"{identity}.mcap": converted.sha256})
     return Outcome(
         job.log,
         state_of(findings, converted.has_lost_data, job.fail_on),
@@ -243,12 +249,15 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
     problem = ""
     if job.step == "reports" and job.only_results:
         problem = _export(finished.folder)
+        put_failures(finished.folder, failures())
+        note(finished.folder, [finished.folder / DEVIATION_CSV])
     elif job.step == "reports":
         with watch.stage("reporting"):
             written = write_flight_report(finished.folder, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters)
             problem = written.problem
+            put_failures(finished.folder, failures())
+            note(finished.folder, written.paths, removed=REPORT_FILES)
             remember_reports(finished, with_pdf=job.with_pdf)
-    put_failures(finished.folder, failures())
     return Outcome(
         job.log,
         state_of(with_failures(finished.findings, failures()), finished.has_lost_data, job.fail_on),
@@ -262,16 +271,16 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
     )
 
 
-def _taken_over(mcap: Path, target: Path) -> Converted:
+def _taken_over(finished: Finished, target: Path) -> Converted:
     """The MCAP of a finished flight, as if it had just been converted."""
     from groundstation.store.reader import read_info
 
     try:
-        os.link(mcap, target)
+        os.link(finished.mcap, target)
     except OSError:  # no links here, or another file system
-        shutil.copyfile(mcap, target)
-    info = read_info(target)
-    return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages))
+        shutil.copyfile(finished.mcap, target)
+    info, sha256 = read_info(target), finished.mcap_sha256 or sha256_of(target)
+    return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages), sha256)
 
 
 def given_of(log: Log, converted: Converted, identity: str) -> Given:
@@ -348,11 +357,14 @@ def place(partial: Path, target: Path) -> None:
         partial.rename(target)
         return
     (target / MANIFEST).unlink(missing_ok=True)  # the mark of a whole folder goes first and comes back last
+    sync_folder(target)
     for name in optional_files(target.name):
         (target / name).unlink(missing_ok=True)
     shutil.rmtree(target / OLD_ARRAYS, ignore_errors=True)
     for entry in sorted(partial.iterdir(), key=lambda path: path.name == MANIFEST):
         old = target / entry.name
+        if entry.name == MANIFEST:
+            sync_folder(target)
         if old.is_dir() and not old.is_symlink():
             shutil.rmtree(old)
         else:

@@ -7,6 +7,7 @@ reports whether there is a PDF.
 
 import hashlib
 import json
+import os
 import platform
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -24,15 +25,18 @@ from groundstation.pipeline.one_flight.apply_deviation import APPLIED, corrected
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.log import as_log, digest_of
+from groundstation.pipeline.one_flight.sealing import spoiled_files
 from groundstation.reports.flight_report import PDF, REPORT
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.document import SummaryDocument
+from groundstation.results.file_names import ARRAYS, SUMMARY, TABLES
 from groundstation.results.files import load_document, load_manifest, save_manifest
 from groundstation.results.flight import Source
 from groundstation.results.manifest import Keys as Keys
 from groundstation.results.manifest import Manifest
 
 Step = Literal["everything", "analysis", "reports", "nothing"]  # what has to be done for a log
+_OF_RESULTS = (SUMMARY, f"{ARRAYS}/", f"{TABLES}/")
 PACKAGES = (
     *("mcap", "numpy", "pandas", "numba", "scipy", "pyarrow", "rerun-sdk"),
     *("protobuf", "matplotlib", "typst", "pygeomag", "ppigrf"),
@@ -57,6 +61,10 @@ class Finished:
     findings : tuple of Finding
     has_deviation, has_applied : bool
         Whether a magnetic deviation was found, and whether one was added to the log: there are files of both.
+    spoiled : frozenset of str
+        Paths in the folder of files that are missing or not as the run left them; ``files`` has none of them.
+    mcap_sha256 : str
+        Empty where an earlier version made the flight.
     """
 
     folder: Path
@@ -69,6 +77,8 @@ class Finished:
     findings: tuple[Finding, ...]
     has_deviation: bool = False
     has_applied: bool = False
+    spoiled: frozenset[str] = frozenset()
+    mcap_sha256: str = ""
 
     @property
     def mcap(self) -> Path:
@@ -81,7 +91,9 @@ class Finished:
         return plain_id(self.flight_id, self.sha256) != self.flight_id
 
     def step(self, keys: Keys, *, with_pdf: bool, only_results: bool = False) -> Step:
-        """What has to be done for the results to be those of ``keys``; a file that somebody took away is made again.
+        """What has to be done for the results to be those of ``keys``.
+
+        A file that somebody took away, or that is not as the run left it, is made again.
 
         With ``only_results`` neither recording nor reports are asked for; what there is of them stays. A part that
         failed is tried again.
@@ -91,7 +103,8 @@ class Finished:
         analysed = {corrected_name(self.flight_id)} if self.has_applied else set()
         if not only_results:
             analysed.add(f"{self.flight_id}.rrd")
-        if keys.analysis != self.keys.analysis or not analysed <= self.files or is_incomplete(self.findings):
+        is_spoiled = self._has_spoiled_results or is_incomplete(self.findings)
+        if keys.analysis != self.keys.analysis or not analysed <= self.files or is_spoiled:
             return "analysis"
         wanted = {DEVIATION_CSV} if self.has_deviation else set()
         if only_results:
@@ -100,6 +113,10 @@ class Finished:
         if with_pdf:
             wanted |= {PDF, *([STEER_CARD] if self.has_deviation else [])}
         return "nothing" if keys.reports == self.keys.reports and wanted <= self.files else "reports"
+
+    @property
+    def _has_spoiled_results(self) -> bool:
+        return any(name.startswith(_OF_RESULTS) for name in self.spoiled)
 
 
 @cache
@@ -170,18 +187,30 @@ def remember_reports(flight: "Finished", *, with_pdf: bool) -> None:
         save_manifest(flight.folder, replace(manifest, resume=replace(manifest.resume, keys=keys)))
 
 
-def finished(folder: Path) -> Finished | None:
-    """What a flight folder remembers; None when it is not whole, or was not made by such a run."""
+def finished(folder: Path, sizes: Mapping[str, int] | None = None) -> Finished | None:
+    """What a flight folder remembers; None when it is not whole, or was not made by such a run.
+
+    ``sizes`` are those of its files by their path in it, where ``folder`` holds but its documents.
+    """
     try:
         manifest, summary = load_manifest(folder), load_document(folder)
-        files = frozenset(path.name for path in folder.iterdir())
+        files = _not_empty(folder) if sizes is None else {name for name, size in sizes.items() if size}
     except (OSError, GroundstationError):
         return None
-    return _finished(folder, files, manifest, summary)
+    spoiled = spoiled_files(folder, manifest, None if sizes is None else sizes.get)
+    return _finished(folder, frozenset(files) - spoiled, manifest, summary, spoiled)
 
 
-def _finished(folder: Path, files: frozenset[str], manifest: Manifest, summary: SummaryDocument) -> Finished | None:
-    resume = manifest.resume
+def _not_empty(folder: Path) -> set[str]:
+    """Names of the folders and files in a folder, without those that are empty: no file of a run is."""
+    with os.scandir(folder) as entries:
+        return {entry.name for entry in entries if entry.is_dir() or (entry.is_file() and entry.stat().st_size)}
+
+
+def _finished(
+    folder: Path, files: frozenset[str], manifest: Manifest, summary: SummaryDocument, spoiled: frozenset[str]
+) -> Finished | None:
+    resume, mcap = manifest.resume, manifest.files.get(f"{folder.name}.mcap")
     if resume is None:
         return None
     return Finished(
@@ -195,4 +224,6 @@ def _finished(folder: Path, files: frozenset[str], manifest: Manifest, summary: 
         summary.findings,
         bool(summary.results.get("magnetic")),
         any(finding.code == APPLIED for finding in summary.findings),
+        spoiled,
+        "" if mcap is None else mcap.sha256,
     )

@@ -19,6 +19,7 @@ from groundstation.pipeline.one_flight.identity import safe_part
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.pipeline.one_flight.sealing import seal
 from groundstation.reports.flight_report import write_flight_report
 from groundstation.results.files import put_failures, save, write_text
 from groundstation.results.flight import FlightResults, Source
@@ -113,7 +114,8 @@ def _run_into(
         planned = plan.run(loaded.scenario)
     results = _results(plan, loaded, planned, target.name)
     with watch.stage("saving"):
-        save(partial, results, manifest_of(results, {"scenario": asdict(loaded.scenario)}))
+        manifest = manifest_of(results, {"scenario": asdict(loaded.scenario)})
+        save(partial, results, manifest)
         write_text(partial / PLAN_MARK, loaded.text)
     with watch.stage("recording"):
         path = partial / f"{results.flight_id}.rrd"
@@ -124,6 +126,7 @@ def _run_into(
     sentence = attempt("line", plan.name, plan.sentence, results.answers) or ""
     told = "; ".join(filter(None, (sentence, *warned, problem)))
     put_failures(partial, failures())
+    seal(partial, manifest)
     place(partial, target)
     state = state_of(with_failures(results.findings, failures()), False, fail_on)
     done = Outcome(loaded.name, state, told, results.flight_id, str(target), _digest(loaded), watch.times_s)
