@@ -121,6 +121,14 @@ def test_log_times_are_kept_as_they_were_read(tmp_path: Path, case: str) -> None
     assert "never set" in told if case == "never set" else "set by" in told
 
 
+@pytest.mark.parametrize("still_ns", [0, 5 * NS, START_NS])
+def test_a_log_time_that_stands_still_is_no_time(tmp_path: Path, still_ns: int) -> None:
+    flight, found = converted(written(tmp_path / "bag", log=lambda time_ns: np.full(np.shape(time_ns), still_ns)))
+    for topic, made_ns in (("gnss", FIX_NS), ("ins", IMU_NS)):
+        assert np.abs(flight[topic].time_ns - made_ns).max() <= SAME_NS
+    assert any("log time stands still" in one["text"] for one in found.info.remarks)
+
+
 def test_a_clock_that_all_stamps_follow_is_moved_to_go_on(tmp_path: Path) -> None:
     """Nothing tells how long the step took: a nominal period of the log is left between."""
     clock = set_at(40, YEARS)

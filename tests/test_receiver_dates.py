@@ -37,6 +37,12 @@ def of_timegps(second: int, weeks: int) -> bytes:
     return position + ubx("NAV-TIMEGPS", iTOW=itow, week=week - weeks, leapS=LEAP_S, valid=7)
 
 
+def of_old_solution(second: int, weeks: int) -> bytes:
+    week, itow = gps_week(second)
+    position = ubx("NAV-POSLLH", iTOW=itow, lat=515_000_000, lon=-7_000_000, hAcc=1_000)
+    return position + ubx("NAV-SOL", iTOW=itow, week=week - weeks, gpsFix=3, flags=13, numSV=9)
+
+
 def of_rawx(second: int, weeks: int) -> bytes:
     week, itow = gps_week(second)
     record = np.zeros(1, layout_of_rawx())
@@ -76,6 +82,7 @@ def of_nmea(second: float, weeks: int, late_s: int = 0, decimals: int = 2) -> by
 PROTOCOLS: dict[str, tuple[Epoch, str]] = {
     "NAV-PVT": (of_pvt, "gnss"),
     "NAV-TIMEGPS": (of_timegps, "gnss"),
+    "NAV-SOL": (of_old_solution, "gnss"),
     "RXM-RAWX": (of_rawx, "gnss"),
     "NovAtel": (of_novatel, "gnss"),
     "NovAtel text": (of_novatel_text, "ins"),

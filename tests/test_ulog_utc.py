@@ -189,7 +189,7 @@ def test_a_position_0_0_is_none(tmp_path: Path) -> None:
     assert found.values("gnss", "velocity_north_mps") == [3.0] * 4
     assert found.values("raw.vehicle_gps_position", "lat") == [0, 500_000_000, 0, 0]
     (damage,) = found.damages
-    assert (damage.kind, damage.count, damage.topic, damage.loses_data) == ("unreadable_cells", 2, "gnss", False)
+    assert (damage.kind, damage.count, damage.topic, damage.loses_data) == ("no_position", 2, "gnss", False)
     place = "vehicle_global_position:uint64_t timestamp;double lat;double lon;float alt;"
     assert one(tmp_path, place, "2df", 0.0, 3e-8, 12.0).batches.keys() == {"raw.vehicle_global_position"}
 

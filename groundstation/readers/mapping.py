@@ -13,12 +13,8 @@ import numpy as np
 from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.atmosphere import pressure_altitude_m
 from groundstation.base.records import BoolArray, Column, Remark
-from groundstation.readers.places import without_place
 
 Columns: TypeAlias = dict[str, Column]
-_OF_POSITION = frozenset({"latitude_deg", "longitude_deg", "horizontal_sigma_m", "vertical_sigma_m"}) | {
-    f"altitude_{above}_m" for above in ("ellipsoid", "msl")
-}
 
 
 class Numbers(Protocol):
@@ -135,28 +131,3 @@ def pressure_altitude(pressure_pa: FloatArray) -> Columns:
 def direction(values_deg: FloatArray, present: BoolArray | None = None) -> Column:
     """A direction in [0, 360)."""
     return Column(np.asarray(wrap_360(values_deg)), present)
-
-
-def placed(columns: Columns) -> tuple[Columns, int]:
-    """Columns without the positions at latitude and longitude 0, which are none, and how many those are.
-
-    Examples
-    --------
-    >>> latitude, longitude = Column(np.array([0.0, 56.0])), Column(np.array([1e-9, 0.0]))
-    >>> found, count = placed({"latitude_deg": latitude, "longitude_deg": longitude})
-    >>> found["latitude_deg"].mask.tolist(), count
-    ([False, True], 1)
-    """
-    if not {"latitude_deg", "longitude_deg"} <= columns.keys():
-        return columns, 0
-    is_none = without_place(columns["latitude_deg"], columns["longitude_deg"])
-    count = int(np.count_nonzero(is_none))
-    if not count:
-        return columns, 0
-    kept = {
-        name: Column(one.values, one.mask & ~is_none) if name in _OF_POSITION else one for name, one in columns.items()
-    }
-    if "integrity_ok" in kept:
-        fix = kept["integrity_ok"]
-        kept["integrity_ok"] = Column(fix.values & ~is_none, fix.present)
-    return {name: one for name, one in kept.items() if one.mask.any()}, count

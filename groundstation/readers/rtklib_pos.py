@@ -26,7 +26,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.readers.dialect import Dialect
 from groundstation.readers.layout import Layout, Rule, TimeRule
 from groundstation.readers.losses import Losses
-from groundstation.readers.places import without_place, zeroed
+from groundstation.readers.places import placed
 from groundstation.readers.rtklib_header import Form, Governed, form_of, forms_of
 from groundstation.readers.sections import Section
 from groundstation.readers.source import Claim, Source
@@ -203,13 +203,8 @@ def _gnss(batch: RecordBatch, form: Form, losses: Losses) -> RecordBatch | None:
 
 def _placed(found: dict[str, Column], batch: RecordBatch, losses: Losses) -> dict[str, Column]:
     """Columns without the rows that have no place."""
-    if not found.keys() >= {"latitude_deg", "longitude_deg"}:
-        return found
-    is_zero = without_place(found["latitude_deg"], found["longitude_deg"])
-    if is_zero.any():
-        losses.add("no_position", NO_POSITION, batch.record_index[is_zero], topic="gnss", loses_data=False)
-        for name, absent in zeroed("gnss", found, is_zero).items():
-            found[name] = Column(found[name].values, found[name].mask & ~absent)
+    found, zeros = placed("gnss", found)
+    losses.add("no_position", NO_POSITION, batch.record_index[zeros], topic="gnss", loses_data=False)
     return found
 
 

@@ -185,16 +185,22 @@ class Lags:
         Messages waited for the recorder: they were logged in bursts while their stamps go on smoothly.
     offsets : Offsets
         Of the log time that they are compared with: none where the stamps are by the recorder's own clock.
+    is_stopped : bool
+        The log time stands still while the stamps go on: it tells nothing of them.
     """
 
     lag_ns: Int64Array
     share: float
     is_queued: bool
     offsets: Offsets
+    is_stopped: bool = False
 
     @classmethod
     def of(cls, several: Sequence[Stamped], offsets: Offsets) -> "Lags":
         """The lags of a source, by what was seen of its connections."""
+        if several and all(map(_is_stopped, several)):
+            lag_ns = np.concatenate([cls._of([one], offsets).lag_ns for one in several])
+            return cls(lag_ns, 1.0, True, offsets, is_stopped=True)
         moved = cls._of(several, offsets)
         if not offsets.stated or moved.share == 1.0:
             return moved
@@ -235,13 +241,15 @@ class Lags:
     @property
     def are_good(self) -> bool:
         """Whether the stamps are believed."""
-        if self.share < BELIEVED_SHARE:
-            return False
+        if self.is_stopped or self.share < BELIEVED_SHARE:
+            return self.is_stopped
         within = (self.lag_ns >= -_LARGEST_LAG_NS) & (self.lag_ns <= self.most_ns)
         return bool(within.mean() >= USUAL_SHARE)
 
     def believed(self, lag_ns: Int64Array) -> BoolArray:
         """Which stamps are near enough to the log time, shape (n,)."""
+        if self.is_stopped:
+            return np.ones(len(lag_ns), dtype=bool)
         return (lag_ns >= -_LARGEST_LAG_NS) & (lag_ns <= self.most_ns)
 
     def may_be_late(self, lag_ns: Int64Array) -> BoolArray:
@@ -250,9 +258,19 @@ class Lags:
 
     def text(self) -> str:
         """The middle one, and their range."""
+        if self.is_stopped:
+            return "unknown, log time stands still"
         lags_s = np.sort(self.lag_ns) / NS_PER_S
         low, middle, high = lags_s[0], lags_s[len(lags_s) // 2], lags_s[-1]
         return f"{middle:.3f} s ({low:.3f} to {high:.3f})"
+
+
+def _is_stopped(one: Stamped) -> bool:
+    """Whether the log time stands still while stamps that are a date go on."""
+    _record, log_ns, stamp_ns = one.stamps.all()
+    if len(log_ns) < FEWEST_READINGS or np.ptp(one.log.all()[0]) or stamp_ns.min() < FIRST_NS:
+        return False
+    return bool((np.diff(stamp_ns) >= 0).all() and np.ptp(stamp_ns) > _LARGEST_LAG_NS)
 
 
 def _is_near(stretch: Stretch) -> bool:

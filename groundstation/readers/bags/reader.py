@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.records import (
     MAX_TEXT_CHARACTERS,
     BoolArray,
@@ -26,8 +25,8 @@ from groundstation.readers.bags.messages import Block, Connection, joined
 from groundstation.readers.bags.profile import MessageProfile
 from groundstation.readers.bags.sources import Key, key_of
 from groundstation.readers.bags.survey import Survey, survey
-from groundstation.readers.mapping import placed
 from groundstation.readers.parts import Part, bounded, merged, occupied, one_row_each
+from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
 
 GATHERED_BYTES = 8 << 20  # of messages that are decoded together
@@ -136,8 +135,8 @@ class _Topics:
                 part = self._part(block, decoded)
                 raw.setdefault(self._names[number], []).append(part)
                 for feed in self._found.feeds.get(number, ()):
-                    columns, nowhere = placed(feed.of(decoded.columns))
-                    self._nowhere[feed.topic] += nowhere
+                    columns, zeros = placed(feed.topic, feed.of(decoded.columns))
+                    self._nowhere[feed.topic] += len(zeros)
                     of_topic = occupied(Part(part.index, part.time, columns, part.validity_ns))
                     if of_topic is not None:
                         canonical.setdefault(feed.topic, []).append(of_topic)
@@ -207,7 +206,7 @@ class _Topics:
         """Messages that could not be read, of which time and length are kept, and positions that are none."""
         for topic, count in sorted(self._nowhere.items()):
             if count:
-                yield Damage("unreadable_cells", topic, count, NO_POSITION, topic, loses_data=False)
+                yield nowhere(topic, count)
         for number, decoder in sorted(self._decoders.items()):
             if decoder.unreadable:
                 why = f"of {decoder.reason}" if decoder.reason else "that their definition does not describe"

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.records import BoolArray, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.signals import kind_of, topics_of_kind
 from groundstation.readers.chapter10.bus_words import ANY_ERROR, TOPIC_429, TOPIC_1553, bounded, words_of
@@ -26,7 +25,7 @@ from groundstation.readers.icd import (
     usable_1553,
 )
 from groundstation.readers.icd.model import REVERSED_BYTE
-from groundstation.readers.mapping import placed
+from groundstation.readers.places import nowhere, placed
 
 # Codes of the remarks that naming makes.
 NAMING_CODES = ("icd", "icd_of_another", "mapped", "several_units", "derived", "bus_errors", "not_used")
@@ -201,10 +200,10 @@ class Namer:
 
     def _placed(self, batch: RecordBatch) -> RecordBatch:
         """The batch without positions of zeros, which a unit sends before it has one."""
-        columns, zeros = placed(dict(batch.columns))
-        if not zeros:
+        columns, zeros = placed(batch.topic, batch.columns)
+        if not len(zeros):
             return batch
-        self._nowhere[batch.topic] += zeros
+        self._nowhere[batch.topic] += len(zeros)
         rows = np.logical_or.reduce([column.mask for column in columns.values()] or [np.zeros(len(batch), dtype=bool)])
         return RecordBatch(batch.topic, batch.record_index, batch.device_time_ns, columns).take(rows)
 
@@ -297,7 +296,7 @@ class Namer:
     def _tally(self, holder: Any) -> _Tally:
         return self._tallies.setdefault(_title(holder), _Tally())
 
-    def remarks(self) -> Iterator[Remark]:
+    def remarks(self) -> Iterator[Item]:
         """What serves as what, and what was not used."""
         for topic, sources in sorted(self._sources.items()):
             yield Remark("mapped", f"{topic} from {'; '.join(sources)}", topic)
@@ -315,7 +314,7 @@ class Namer:
                     "bus_errors", f"{topic}: {errors} of {total} messages have an error: kept, not used", topic
                 )
         for topic, count in sorted(self._nowhere.items()):
-            yield Remark("not_used", f"{topic}: {count} {NO_POSITION}", topic)
+            yield nowhere(topic, count)
         for title, tally in self._tallies.items():
             why = [
                 f"{count} {text}"

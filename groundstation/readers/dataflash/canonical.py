@@ -1,12 +1,13 @@
 """Canonical topics from the records of a block: ins, gnss, magnetometer, baro, air, electric, discrete."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.atmosphere import REFUSED, pressure_altitude_m
-from groundstation.base.geodesy import NO_POSITION, has_position
+from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Column, Damage, RecordBatch, Remark, frozen
 from groundstation.readers.dataflash import rules
 from groundstation.readers.dataflash.choices import Choices
@@ -16,6 +17,7 @@ from groundstation.readers.dataflash.rules import FIX_2D, FIX_3D, Rule, UnknownU
 from groundstation.readers.dataflash.values import Rows, as_double
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.parts import Part, bounded, merged, occupied
+from groundstation.readers.places import nowhere
 
 RANGE_GOOD, FACING_DOWN = 4, 25
 
@@ -35,6 +37,7 @@ class Mapper:
         self._parts: dict[str, list[Part]] = {}
         self.fields: dict[str, dict[str, None]] = {}  # what was yielded, for the remarks
         self._refused: dict[tuple[str, str], int] = {}
+        self._nowhere: Counter[str] = Counter()
         self._unknown = UnknownUnits()
         self._passed_over: dict[tuple[str, str], tuple[float, str]] = {}
         self._takers = self._all_takers()
@@ -58,6 +61,7 @@ class Mapper:
         """Pressures and positions that are none, values in unknown units; the log's own values are kept."""
         for (topic, what), count in self._refused.items():
             yield Damage("unreadable_cells", topic, count, what, topic, loses_data=False)
+        yield from (nowhere(topic, count) for topic, count in self._nowhere.items() if count)
         yield from self._unknown.damages()
 
     def remarks(self) -> Iterator[Remark]:
@@ -125,7 +129,7 @@ class Mapper:
         """Records with a position among those that claim one; zeros in its place are counted, a NaN stays one."""
         latitude, longitude = values["latitude_deg"], values["longitude_deg"]
         placed = has_position(latitude, longitude) | np.isnan(latitude) | np.isnan(longitude)
-        self._refuse(topic, NO_POSITION, int(np.count_nonzero(claimed & ~placed)))
+        self._nowhere[topic] += int(np.count_nonzero(claimed & ~placed))
         return frozen(claimed & placed)
 
     def _plain(self, wanted: tuple[Rule, ...]) -> Callable[[str, Rows], dict[str, Column]]:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.records import MAX_BATCH_ROWS, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.signals import RAW_PREFIX
 from groundstation.base.source_units import PREFIX, units_entry
@@ -16,7 +15,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.readers.flightdata_hdf5.canonical import TRACK, Feed, feeds_of, track_feed, values_at
 from groundstation.readers.flightdata_hdf5.container import FAILURES, HIGHEST_RATE_HZ, Container, Parameter, opened
 from groundstation.readers.layout import velocity_from_track
-from groundstation.readers.mapping import placed
+from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
 
 SLICE_S = MAX_BATCH_ROWS / HIGHEST_RATE_HZ
@@ -42,7 +41,7 @@ class _Losses:
         for name, reason in self.broken.items():
             yield Damage("corrupt", f"parameter {name}", self.lost[name], f"samples that cannot be read ({reason})")
         for topic, count in self.nowhere.items():
-            yield Damage("unreadable_cells", topic, count, NO_POSITION, topic, loses_data=False)
+            yield nowhere(topic, count)
 
 
 def items(source: Source, reader_name: str) -> Iterator[Item]:
@@ -153,9 +152,9 @@ def _canonical_batches(
             is_flag = feed.field.kind == "bool"
             columns[feed.field.name] = Column(values != 0.0 if is_flag else values, present)
         _with_velocities(columns)
-        known, zeros = placed(columns)
-        if zeros:
-            losses.nowhere[topic] += zeros
+        known, zeros = placed(topic, columns)
+        if len(zeros):
+            losses.nowhere[topic] += len(zeros)
             clocks = {(one.parameter.offset_s, one.parameter.frequency_hz) for one in several}
             columns = known | (_apart(columns, known) if len(clocks) > 1 and "latitude_deg" in known else {})
         batch = _batch(topic, times_ns, columns)

@@ -3,8 +3,8 @@
 import numpy as np
 
 from groundstation.base.angles import wrap_360
-from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Column, Int64Array
+from groundstation.readers.places import placed
 from groundstation.readers.receiver.messages import Columns
 from groundstation.readers.receiver.tally import (
     IMPOSSIBLE_ATTITUDE,
@@ -21,7 +21,7 @@ _MOST_DEG = {"roll_deg": MOST_ROLL_DEG, "pitch_deg": MOST_PITCH_DEG} | dict.from
 
 
 def credible_position(columns: Columns, topic: str, places: Int64Array, tally: Tally) -> Columns:
-    """Columns without the positions 0, 0 and those that are no numbers; ``tally`` counts the zeros.
+    """Columns without what falls away at 0, 0, which ``tally`` counts, and without positions that are no numbers.
 
     Parameters
     ----------
@@ -32,12 +32,11 @@ def credible_position(columns: Columns, topic: str, places: Int64Array, tally: T
     """
     if "latitude_deg" not in columns or "longitude_deg" not in columns:
         return columns
-    latitude, longitude = columns["latitude_deg"], columns["longitude_deg"]
-    refused: BoolArray = ~has_position(latitude.values, longitude.values)
-    is_zero = np.isfinite(latitude.values) & np.isfinite(longitude.values)
-    tally.add(ZERO_POSITION, topic, places[refused & is_zero & latitude.mask & longitude.mask])
-    place = {"latitude_deg": _without(latitude, refused), "longitude_deg": _without(longitude, refused)}
-    return columns | place
+    columns, zeros = placed(topic, columns)
+    tally.add(ZERO_POSITION, topic, places[zeros])
+    place = {name: columns[name] for name in ("latitude_deg", "longitude_deg") if name in columns}
+    finite = np.logical_and.reduce([np.isfinite(one.values) for one in place.values()] or [np.ones(len(places), bool)])
+    return columns | {name: _without(one, ~finite) for name, one in place.items()}
 
 
 def credible_dilution(columns: Columns) -> Columns:

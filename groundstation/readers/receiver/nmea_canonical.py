@@ -35,11 +35,11 @@ def gnss_batch(epochs: Epochs, time: Column, tally: Tally) -> RecordBatch | None
     columns = makers_solution(epochs)
     for formatter in STANDARD_POSITIONS:  # the last that has a position gives it
         columns |= _merged(columns, _position(epochs, formatter))
-    columns = credible_position(columns, "gnss", epochs.places, tally)
     _add_heights(epochs, columns, tally)
     columns |= _velocity(epochs, columns)
     columns |= credible_dilution(_quality(epochs))
     _add_solution(epochs, columns, tally)
+    columns = credible_position(columns, "gnss", epochs.places, tally)
     columns = {name: column for name, column in columns.items() if column.mask.any()}
     if not len(epochs) or not columns:
         return None

@@ -29,7 +29,8 @@ FIRST_WEEK, LAST_WEEK = 1_000, 4_000  # 1999 to 2056: other numbers are no date 
 S_PER_WEEK = 604_800.0
 _SECONDS = {"NAV-PVT": "second", "NAV-PVAT": "sec", "NAV-TIMEUTC": "sec", "HNR-PVT": "second"}
 _SECONDS |= {f"NAV2-{name[4:]}": second for name, second in _SECONDS.items() if name.startswith("NAV-")}
-_WEEKS = ("NAV-TIMEGPS", "NAV2-TIMEGPS")
+# Message -> the field with its flags, and the bits that call the week and its time valid.
+_WEEKS = {"NAV-TIMEGPS": ("valid", 3), "NAV2-TIMEGPS": ("valid", 3), "NAV-SOL": ("flags", 12)}
 # Message -> the fields with the leap seconds and with its flags, and the bit that calls them valid.
 _LEAPS = {
     "NAV-TIMEGPS": ("leapS", "valid", 4),
@@ -160,7 +161,9 @@ class FullTimes:
 
     def _of_week(self, messages: Messages, head: NDArray[Any]) -> None:
         week_ms = head["iTOW"].astype(np.int64)
-        sound = (head["valid"] & 3 == 3) & _is_gps_time(head["week"], week_ms / 1e3) & (np.abs(head["fTOW"]) <= 500_000)
+        flags, bits = _WEEKS[messages.name]
+        sound = (head[flags] & bits == bits) & _is_gps_time(head["week"], week_ms / 1e3)
+        sound &= np.abs(head["fTOW"]) <= 500_000
         utc_ns = gps_to_utc_ns(np.where(sound, head["week"], 0), np.where(sound, week_ms, 0) / 1e3) + head["fTOW"]
         self._add(messages.places, utc_ns, week_ms, np.asarray(sound))
 

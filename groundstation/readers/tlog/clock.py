@@ -202,7 +202,7 @@ class Clocks:
             yield f"the ground station's clock was set by {size_ns / NS_PER_S:+.3f} s before frame {record}"
         if self.ground_ns:
             off_s = -self.ground_ns / NS_PER_S
-            yield f"UTC is that of the vehicle (SYSTEM_TIME): the ground station's clock is {off_s:+.3f} s off"
+            yield f"UTC is that of the vehicle's messages: the ground station's clock is {off_s:+.3f} s off"
         clock = self.senders.get(vehicle)
         if clock is None:
             yield "times are those of receipt on the ground, by the ground station's clock; the link's delay is in them"

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.records import Column, Damage, Int64Array, Item, LogHeader, Remark
 from groundstation.base.signals import EVENT_SEPARATOR, RAW_PREFIX
-from groundstation.readers.mapping import Assignment, Offer, assigned, mapped, placed
+from groundstation.readers.mapping import Assignment, Offer, assigned, mapped
 from groundstation.readers.parts import Part, bounded, merged, occupied, one_row_each
+from groundstation.readers.places import placed
 from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 from groundstation.readers.tlog.canonical import ARMED, INSTANCES, ROLES
@@ -112,7 +113,8 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
             yield from bounded(one_row_each(batch) if len(parts) > 1 else batch)
     yield from _remarks(served, clocks.texts(vehicle))
     for topic, count in sorted(nowhere.items()):
-        yield Remark("no_position", f"{topic}: {count} {NO_POSITION}", topic, ("latitude_deg", "longitude_deg"))
+        if count:
+            yield Remark("no_position", f"{topic}: {count} {NO_POSITION}", topic, ("latitude_deg", "longitude_deg"))
     yield from frames.damages()
 
 
@@ -189,9 +191,8 @@ def _take(
         }
     for one in assignments:
         with np.errstate(over="ignore", invalid="ignore"):
-            columns, count = placed(one.rule.columns(numbers))
-        if count:
-            nowhere[one.topic] += count
+            columns, zeros = placed(one.topic, one.rule.columns(numbers))
+        nowhere[one.topic] += len(zeros)
         kept = occupied(Part(part.index, part.time, columns, part.validity_ns))
         if kept is not None:
             canonical.setdefault(one.topic, []).append(kept)

@@ -22,7 +22,7 @@ class Timer:
         self._before: dict[int, NDArray[np.int64]] = {}  # the last reference of each sender: record, receipt, its clock
         self._last: dict[int, NDArray[np.int64]] = {}  # the last frame whose time is known: record, receipt, UTC
         self._references: dict[int, NDArray[np.int64]] = {}  # of the block that follows
-        self._last_device = np.zeros(0, dtype=np.int64)
+        self._device_ns: Int64Array = np.zeros(0, dtype=np.int64)  # when the last frame before the block was received
 
     def validity_ns(self, block: Block, following: Block | None) -> Int64Array | None:
         """Times of validity of a block's frames by the ground station's clock, shape (n,); None without any clock."""
@@ -53,19 +53,17 @@ class Timer:
                     has_own[wanted] = True
         self._remember(block, own, known, is_known)
         validity_ns, device_ns = utc_ns - self._clocks.offsets.at(index), block.received.values
-        # Frames received at one time may be given others; a time of validity that is the device's would go with it.
+        # Frames received at one time may get others; a time of validity that is the device's would go with it.
         validity_ns += (validity_ns == device_ns) & self._is_repeated(device_ns, following)
         return np.where(has_own | is_known, validity_ns, device_ns)
 
     def _is_repeated(self, device_ns: Int64Array, following: Block | None) -> BoolArray:
-        """Frames that were received at the same time as the one before or behind."""
-        behind = device_ns[:0] if following is None else following.received.values[:1]
-        repeats = np.diff(np.concatenate((self._last_device, device_ns, behind))) == 0
-        first = len(self._last_device)
-        after = np.concatenate((np.zeros(1 - first, dtype=bool), repeats))[: len(device_ns)]
-        before = np.concatenate((repeats[first:], np.zeros(1, dtype=bool)))[: len(device_ns)]
-        self._last_device = device_ns[-1:]
-        return np.asarray(after | before)
+        """Frames of a block that were received together with the one before or behind, shape (n,)."""
+        behind_ns = np.zeros(0, dtype=np.int64) if following is None else following.received.values[:1]
+        around_ns = np.concatenate((self._device_ns, device_ns, behind_ns))
+        is_same = np.concatenate(([False], around_ns[1:] == around_ns[:-1], [False]))
+        first, self._device_ns = len(self._device_ns), device_ns[-1:]
+        return np.asarray((is_same[:-1] | is_same[1:])[first : first + len(device_ns)])
 
     def _received_ns(self, block: Block) -> Int64Array:
         return np.asarray(block.received.values + self._clocks.offsets.at(block.record_index))

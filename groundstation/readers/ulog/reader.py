@@ -1,7 +1,7 @@
 """The second pass over a ULog: batches of every topic, raw and canonical, then remarks and damages."""
 
 import re
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.atmosphere import REFUSED
-from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.records import (
     Column,
     Damage,
@@ -21,8 +20,9 @@ from groundstation.base.records import (
     Remark,
 )
 from groundstation.base.signals import EVENT_SEPARATOR
-from groundstation.readers.mapping import mapped, placed
+from groundstation.readers.mapping import mapped
 from groundstation.readers.parts import Part, bounded, merged, occupied
+from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
 from groundstation.readers.ulog.blocks import NOT_SUBSCRIBED, Block, Topic, Walk
 from groundstation.readers.ulog.canonical import MODE_NAMES, MODES, Rows
@@ -43,6 +43,7 @@ class _Losses:
     unreadable: dict[str, int] = field(default_factory=dict)
     beyond: dict[str, int] = field(default_factory=dict)
     refused: dict[tuple[str, str], int] = field(default_factory=dict)
+    nowhere: Counter[str] = field(default_factory=Counter)
 
     def refuse(self, topic: str, what: str, count: int) -> None:
         """Count values that are not canonical; the log's own are kept."""
@@ -58,6 +59,7 @@ class _Losses:
             yield Damage("unreadable_cells", "the whole log", count, what, topic)
         for (topic, what), count in self.refused.items():
             yield Damage("unreadable_cells", "the whole log", count, what, topic, loses_data=False)
+        yield from (nowhere(topic, count) for topic, count in self.nowhere.items() if count)
 
 
 def items(source: Source, reader_name: str, start_us: int) -> Iterator[Item]:
@@ -176,8 +178,8 @@ class _CanonicalTopics:
                 columns["mode"] = Column(np.full(len(rows), self._mode), columns[_WITH_MODE].present)
             if _OF_PRESSURE in columns and topic.name not in _ALTITUDES:
                 self._note_refused(name, columns[_OF_PRESSURE])
-            columns, zeros = placed(columns)
-            self._losses.refuse(name, NO_POSITION, zeros)
+            columns, zeros = placed(name, columns)
+            self._losses.nowhere[name] += len(zeros)
             part = occupied(Part(index, time, columns))
             if part is not None:
                 self._parts.setdefault(name, []).append(part)
