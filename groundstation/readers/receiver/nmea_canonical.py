@@ -14,7 +14,7 @@ from groundstation.readers.receiver.sentence_layouts import STANDARD_POSITIONS
 from groundstation.readers.receiver.sentences import Sentences
 from groundstation.readers.receiver.tally import ASTRAY, MOST_SEPARATION_M, NOT_MEASURED, Tally
 
-HEADING_FORMATTERS = {"PASHR": 1, "HDT": 0, "THS": 0, "HDM": 0}  # the first that a log has is ``ins``; its field
+HEADING_FORMATTERS = ("PASHR", "HDT", "THS", "HDM")  # the first of which a log tells a heading is ``ins``
 _TWO_DIMENSIONS = 2
 _HEIGHTS = ("altitude_msl_m", "altitude_ellipsoid_m", "vertical_sigma_m")
 _FIXES = np.array(
@@ -235,8 +235,9 @@ def _and(one: Column, other: Column) -> Column:
 
 def has_heading(sentences: Sentences) -> bool:
     """Whether sentences tell a heading at all."""
-    field = HEADING_FORMATTERS.get(sentences.formatter)
-    return field is not None and bool((sentences.numbers(field)[2] == 1).any())
+    if sentences.formatter not in HEADING_FORMATTERS:
+        return False
+    return any(one.mask.any() for name, one in _heading(sentences).items() if name in HEADINGS)
 
 
 def _heading(sentences: Sentences) -> Columns:
