@@ -109,8 +109,10 @@ def test_one_address_gives_the_heading_of_a_whole_stream(tmp_path: Path) -> None
 
 
 def test_an_empty_heading_gives_way_to_one_that_is_there(tmp_path: Path) -> None:
-    content = gga("120000.00") + rmc("120000.00", "040526") + nmea("PASHR,120000.00,,,,,,,,,0,0") + nmea("GNHDT,12.5,T")
-    assert Read(tmp_path, content).values("ins", "true_heading_deg") == [12.5]
+    dated = gga("120000.00") + rmc("120000.00", "040526")
+    for empty in ("PASHR,120000.00,,,,,,,,,0,0", "PASHR,120000.00,77.0,M,1.0,1.0,,.1,.1,.1,2,1"):
+        read = Read(tmp_path, dated + nmea(empty) + nmea("GNHDT,12.5,T"))
+        assert read.values("ins", "true_heading_deg") == [12.5]
 
 
 # --- two dimensions

@@ -14,7 +14,7 @@ from groundstation.readers.receiver.sentence_layouts import STANDARD_POSITIONS
 from groundstation.readers.receiver.sentences import Sentences
 from groundstation.readers.receiver.tally import ASTRAY, MOST_SEPARATION_M, NOT_MEASURED, Tally
 
-HEADING_FORMATTERS = {"PASHR": 1, "HDT": 0, "THS": 0, "HDM": 0}  # the first that a log has is ``ins``; its field
+HEADING_FORMATTERS = ("PASHR", "HDT", "THS", "HDM")  # the first of which a log tells a heading is ``ins``
 _TWO_DIMENSIONS = 2
 _HEIGHTS = ("altitude_msl_m", "altitude_ellipsoid_m", "vertical_sigma_m")
 _FIXES = np.array(
@@ -22,12 +22,17 @@ _FIXES = np.array(
 )
 _NONE, _AUTONOMOUS, _DIFFERENTIAL, _FIXED, _FLOAT, _PPP, _ESTIMATED, _MANUAL, _SIMULATED, _OTHER, _FLAT = range(11)
 _BY_GNSS = np.isin(np.arange(len(_FIXES)), (_AUTONOMOUS, _DIFFERENTIAL, _FIXED, _FLOAT, _PPP, _FLAT))
+_PLAIN = np.isin(np.arange(len(_FIXES)), (_AUTONOMOUS, _DIFFERENTIAL))
+_BY_HAND = np.isin(np.arange(len(_FIXES)), (_MANUAL, _SIMULATED))
 _OF_QUALITY = np.full(12, _OTHER)  # of GGA, 0 to 10; others are not known
 _OF_QUALITY[:6] = _NONE, _AUTONOMOUS, _DIFFERENTIAL, _AUTONOMOUS, _FIXED, _FLOAT
 _OF_QUALITY[6:11] = _ESTIMATED, _MANUAL, _SIMULATED, _DIFFERENTIAL, _PPP
-# Letters of a mode; GNS has one for each system, and the last of these that it has counts.
-_OF_MODE = {"N": _NONE, "S": _SIMULATED, "M": _MANUAL, "E": _ESTIMATED, "A": _AUTONOMOUS, "P": _AUTONOMOUS}
-_OF_MODE |= {"D": _DIFFERENTIAL, "F": _FLOAT, "R": _FIXED}
+# Letters of a mode by rank: GNS has one for each system, and the highest counts; 0 no letter, 2 one that is not known.
+_KIND_OF_RANK = np.array(
+    [_NONE, _NONE, _OTHER, _SIMULATED, _MANUAL, _ESTIMATED, _AUTONOMOUS, _AUTONOMOUS, _DIFFERENTIAL, _FLOAT, _FIXED]
+)
+_RANKS = np.full(128, 2)
+_RANKS[[0, *map(ord, "NSMEAPDFR")]] = 0, 1, 3, 4, 5, 6, 7, 8, 9, 10
 
 
 def gnss_batch(epochs: Epochs, time: Column, tally: Tally) -> RecordBatch | None:
@@ -36,7 +41,7 @@ def gnss_batch(epochs: Epochs, time: Column, tally: Tally) -> RecordBatch | None
     for formatter in STANDARD_POSITIONS:  # the last that has a position gives it
         columns |= _merged(columns, _position(epochs, formatter))
     _add_heights(epochs, columns, tally)
-    columns |= _velocity(epochs, columns)
+    columns |= _velocity(epochs)
     columns |= credible_dilution(_quality(epochs))
     _add_solution(epochs, columns, tally)
     columns = credible_position(columns, "gnss", epochs.places, tally)
@@ -107,24 +112,20 @@ def _add_heights(epochs: Epochs, columns: Columns, tally: Tally) -> None:
         columns |= _merged(columns, heights)
 
 
-def _velocity(epochs: Epochs, columns: Columns) -> Columns:
+def _velocity(epochs: Epochs) -> Columns:
     """Speed and track of RMC, which has a time; of VTG where RMC has none. None where an epoch has no valid fix."""
-    found = epochs.values("VTG", _TRACK_MADE_GOOD)
-    told = _of_track_made_good(found) if found else {}
+    told: Columns = {}
+    invalid: BoolArray = np.zeros(len(epochs), dtype=bool)
     found = epochs.values("RMC", ("spd", "cog", *_VALIDITY["RMC"]))
-    invalid = np.zeros(len(epochs), dtype=bool)
     if found:
-        valid = _has_fix("RMC", found)
-        invalid |= found["status"].mask & ~valid
-        speed, track = found["spd"], found["cog"]
-        newer = {
-            "ground_speed_mps": Column(speed.values * MPS_PER_KNOT, speed.mask & valid),
-            "track_deg": Column(track.values, track.mask & valid),
-        }
-        told |= _merged(told, newer)
-    quality = epochs.values("GGA", ("quality",))
-    if quality and not found:
-        invalid |= quality["quality"].mask & (quality["quality"].values == 0)
+        invalid = found["status"].mask & ~_has_fix("RMC", found)
+        told["ground_speed_mps"] = Column(found["spd"].values * MPS_PER_KNOT, found["spd"].mask & ~invalid)
+        told["track_deg"] = Column(found["cog"].values, found["cog"].mask & ~invalid)
+    elif quality := epochs.values("GGA", ("quality",)):
+        invalid = quality["quality"].mask & (quality["quality"].values == 0)
+    if not all((one.mask | invalid).all() for one in told.values()) or not told:
+        made_good = _of_track_made_good(epochs.values("VTG", _TRACK_MADE_GOOD))
+        told = made_good | _merged(made_good, told)
     if not told:
         return {}
     speed, track = (Column(told[name].values, told[name].mask & ~invalid) for name in ("ground_speed_mps", "track_deg"))
@@ -144,6 +145,8 @@ _SPEED_UNITS = {"N": MPS_PER_KNOT, "K": MPS_PER_KMH}
 
 def _of_track_made_good(found: Columns) -> Columns:
     """Speed and true track of VTG by the units that it tells; one without them has each in its place."""
+    if not found:
+        return {}
     valid = ~(found["posMode"].mask & (found["posMode"].values == "N"))
     in_knots, in_kmh = _speed(found["sogn"], found["sognUnit"], "N"), _speed(found["sogk"], found["sogkUnit"], "K")
     first, second = _true(found["cogt"], found["cogtUnit"], "T"), _true(found["cogm"], found["cogmUnit"], "M")
@@ -189,7 +192,7 @@ def _has_satellites(sentences: Sentences) -> BoolArray:
 def _add_solution(epochs: Epochs, columns: Columns, tally: Tally) -> None:
     """Kind of the fix, and whether GNSS gives it: not told of a fix in two dimensions, which has no height either."""
     kind = _kind(epochs)
-    tally.add(NOT_MEASURED, "gnss", epochs.places[kind.mask & np.isin(kind.values, (_MANUAL, _SIMULATED))])
+    tally.add(NOT_MEASURED, "gnss", epochs.places[kind.mask & _BY_HAND[kind.values]])
     trusted = Column(_BY_GNSS[kind.values], kind.mask & (kind.values != _OTHER))
     status = epochs.values("RMC", ("status",))
     if status:
@@ -197,8 +200,7 @@ def _add_solution(epochs: Epochs, columns: Columns, tally: Tally) -> None:
     dimensions = epochs.values("GSA", ("navMode",))
     if dimensions:
         flat = dimensions["navMode"].mask & (dimensions["navMode"].values == _TWO_DIMENSIONS)
-        plain = np.isin(kind.values, (_AUTONOMOUS, _DIFFERENTIAL))
-        kind = Column(np.where(flat & plain, _FLAT, kind.values), kind.mask)
+        kind = Column(np.where(flat & _PLAIN[kind.values], _FLAT, kind.values), kind.mask)
         for name in {*_HEIGHTS} & columns.keys():
             columns[name] = Column(columns[name].values, columns[name].mask & ~flat)
     else:
@@ -213,10 +215,9 @@ def _kind(epochs: Epochs) -> Column:
     for formatter in ("RMC", "GNS"):
         found = epochs.values(formatter, ("posMode",))
         if found:
-            modes = found["posMode"].values.astype(str)
-            of_mode = np.full(len(epochs), _OTHER)
-            for letter, number in _OF_MODE.items():
-                of_mode[np.char.find(modes, letter) >= 0] = number
+            modes = found["posMode"].values
+            letters = np.ascontiguousarray(modes).view(np.uint32).reshape(len(modes), -1)
+            of_mode = _KIND_OF_RANK[_RANKS[np.minimum(letters, len(_RANKS) - 1)].max(axis=1)]
             kind = _merged({"": kind}, {"": Column(of_mode, found["posMode"].mask)})[""]
     found = epochs.values("GGA", ("quality",))
     if found:
@@ -234,8 +235,9 @@ def _and(one: Column, other: Column) -> Column:
 
 def has_heading(sentences: Sentences) -> bool:
     """Whether sentences tell a heading at all."""
-    field = HEADING_FORMATTERS.get(sentences.formatter)
-    return field is not None and bool((sentences.numbers(field)[2] == 1).any())
+    if sentences.formatter not in HEADING_FORMATTERS:
+        return False
+    return any(one.mask.any() for name, one in _heading(sentences).items() if name in HEADINGS)
 
 
 def _heading(sentences: Sentences) -> Columns:

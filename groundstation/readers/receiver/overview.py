@@ -101,7 +101,7 @@ def overview(source: Source, bare: bool, host: HostText | None = None) -> Overvi
         sentences = by_address(frames)
         for one in sentences.values():
             found.counts[one.address] += len(one)
-            attitudes[one.address] += len(one) * has_heading(one)
+            attitudes[one.address] += len(one) if attitudes[one.address] or has_heading(one) else 0
         if host_clock is not None:
             host_clock.take(frames, nmea.epochs_of(sentences))
         found.blocks.append((frames, sentences))

@@ -20,13 +20,14 @@ from groundstation.readers.receiver import scan
 from groundstation.readers.receiver.sentence_layouts import FAMILIES, FORMATTERS
 from groundstation.readers.receiver.stream import Frames
 
-COMMA, STAR, POINT, MINUS, PLUS = 44, 42, 46, 45, 43
+COMMA, STAR, POINT, MINUS, PLUS, MAKERS = 44, 42, 46, 45, 43, 80  # P begins a maker's own address
 CHECKSUM_BYTES = 3
 MOST_DIGITS = 18  # of a number: more do not fit 64 bits
 MOST_BEHIND = 13  # digits behind the point of an angle
 ADDRESS_BYTES = 30  # of the longest address, PQTMCFGORIENTATIONERROR among them, and of the word behind it
 NAMELESS = "sentence"  # in place of an address that is none: such sentences are kept as text
-_PRIME = (1 << 55) - 55  # keys of addresses are below it, so that the next byte fits 64 bits
+_EXACT_BYTES = 7  # of an address: they are its key; the bytes of a longer one are hashed
+_PRIME, _LONG = (1 << 55) - 55, 1 << 57  # hashes are below the first, so that the next byte fits 64 bits
 
 _UPPER_CASE = 0xDF  # of a letter: the bit of lower case taken out
 _HEMISPHERES = {"lat": "NS", "lon": "EW"}
@@ -112,26 +113,38 @@ def _is_word(byte: int) -> bool:
     return 48 <= byte <= 57 or 65 <= byte <= 90 or 97 <= byte <= 122 or byte == 95
 
 
+@inlined
+def _longer(key: int, byte: int, size: int) -> int:
+    """Key of ``size`` bytes and one more."""
+    return 256 * key + byte if size < _EXACT_BYTES else _LONG + (31 * (key % _PRIME) + byte) % _PRIME
+
+
+@inlined
+def _is_end(byte: int) -> bool:
+    """Whether an address or a field may end at a byte."""
+    return byte in (COMMA, STAR) or byte < 32
+
+
 @in_place
-def _addresses(data: Any, offsets: Any, ends: Any, families: Any, keys: Any, sizes: Any) -> None:
+def _addresses(data: Any, offsets: Any, families: Any, keys: Any, sizes: Any) -> None:
     """A number for each address, with the word behind it in a family, and their bytes; both 0 where there is none."""
     for row in range(len(offsets)):
-        start, end, key = offsets[row] + 1, ends[row], 0
-        k = start
-        while k < end and k - start < ADDRESS_BYTES and _is_word(data[k]):
-            key = (31 * key + data[k]) % _PRIME
+        start, key = offsets[row] + 1, 0
+        k, end = start, min(start + ADDRESS_BYTES, len(data))
+        while k < end and _is_word(data[k]):
+            key = _longer(key, data[k], k - start)
             k += 1
-        if k == start or (k < end and data[k] != COMMA):
+        if k == start or (k < len(data) and not _is_end(data[k])):
             continue
         keys[row], sizes[row] = key, k - start
-        for number in range(len(families)):
+        for number in range(len(families) if data[start] == MAKERS else 0):
             if families[number, 0] == key and k + 1 < end and (families[number, 1] or _is_letter(data[k + 1])):
-                key = (31 * key + COMMA) % _PRIME
+                key = _longer(key, COMMA, k - start)
                 k += 1
-                while k < end and k - start < ADDRESS_BYTES and _is_word(data[k]):
-                    key = (31 * key + data[k]) % _PRIME
+                while k < end and _is_word(data[k]):
+                    key = _longer(key, data[k], k - start)
                     k += 1
-                if data[k - 1] != COMMA and (k == end or data[k] == COMMA):
+                if data[k - 1] != COMMA and (k == len(data) or _is_end(data[k])):
                     keys[row], sizes[row] = key, k - start
                 break
 
@@ -141,10 +154,7 @@ def _families() -> Int64Array:
     """Keys of the addresses of several layouts, and whether digits choose one too."""
     keys = np.zeros((len(FAMILIES), 2), dtype=np.int64)
     for row, (address, is_numbered) in enumerate(FAMILIES.items()):
-        key = 0
-        for byte in address.encode():
-            key = (31 * key + byte) % _PRIME
-        keys[row] = key, is_numbered
+        keys[row] = int.from_bytes(address.encode(), "big"), is_numbered
     return keys
 
 
@@ -198,7 +208,8 @@ class Sentences:
     @property
     def _ends(self) -> Int64Array:
         """Where the last field of each sentence ends."""
-        return _ends_of(self.frames, self.which)
+        checksum = np.where(self.frames.kinds[self.which] == scan.NMEA, CHECKSUM_BYTES, 0)
+        return self.frames.offsets[self.which] + self.frames.lengths[self.which] - checksum
 
     @cached_property
     def columns(self) -> dict[str, Column]:
@@ -318,19 +329,13 @@ def formatter_of(address: str) -> str:
     return address if address.startswith("P") else address[2:]
 
 
-def _ends_of(frames: Frames, which: Int64Array) -> Int64Array:
-    """Where the last field of sentences ends."""
-    checksum = np.where(frames.kinds[which] == scan.NMEA, CHECKSUM_BYTES, 0)
-    return frames.offsets[which] + frames.lengths[which] - checksum
-
-
 def sentences_of(frames: Frames) -> Iterator[Sentences]:
     """Sentences of a block by address."""
     which = frames.of(scan.NMEA, scan.BARE_NMEA)
     if not len(which):
         return
     keys, sizes = np.zeros(len(which), dtype=np.int64), np.zeros(len(which), dtype=np.int64)
-    _addresses(frames.data, frames.offsets[which], _ends_of(frames, which), _families(), keys, sizes)
+    _addresses(frames.data, frames.offsets[which], _families(), keys, sizes)
     order = np.argsort(keys, kind="stable")
     _distinct, starts = np.unique(keys[order], return_index=True)
     for rows in np.split(order, starts[1:]):
