@@ -148,6 +148,13 @@ def test_short_names_alone(tmp_path: Path) -> None:
     assert one(found, "gnss", "track_deg") == pytest.approx(90.0) and "true north" in found.remarks["north"].text
 
 
+def test_long_names_below_the_short_ones(tmp_path: Path) -> None:
+    top, long, short, rows = log(WEST, G3X).split("\n", 3)
+    found = read(tmp_path, "\n".join((top, short, long, rows)))
+    assert found.header.reader == "csv-profile garmin-g3x" and not found.damages
+    assert motion(found) == pytest.approx((0.0, MPS), abs=CELL) and len(found.rows("gnss")) == 60
+
+
 def test_columns_without_a_short_name_are_kept(tmp_path: Path) -> None:
     names = G3X | {"up": ("AHRS 1 Dev (%)", "")}
     found = read(tmp_path, log(WEST, names))
@@ -193,6 +200,24 @@ def test_a_g1000_by_its_row_of_units(tmp_path: Path, unit: str, factor: float) -
     assert one(found, "gnss", "ground_speed_mps") == pytest.approx(KT * factor, rel=1e-5)
     assert one(found, "gnss", "track_deg") == pytest.approx(90.0, abs=0.1)
     assert one(found, "ins", "true_heading_deg") == pytest.approx(93.0, abs=0.1)
+
+
+@pytest.mark.parametrize("mark", ["#", ""])
+@pytest.mark.parametrize("is_below", [False, True])
+def test_a_row_of_units_on_either_side_of_the_names(tmp_path: Path, mark: str, is_below: bool) -> None:
+    flight = Flight(declination_deg=-13.0, track_is_true=False)
+    top, units, names, rows = log(flight, G1000, top=G1000_TOP).replace(",kt,", ",km/h,", 1).split("\n", 3)
+    units = mark + units.lstrip("#")
+    found = read(tmp_path, "\n".join((top, names, units, rows) if is_below else (top, units, names, rows)))
+    assert not found.damages and len(found.rows("gnss")) == 60
+    assert one(found, "gnss", "ground_speed_mps") == pytest.approx(KT / 3.6, rel=1e-5)
+    assert one(found, "gnss", "track_deg") == pytest.approx(90.0, abs=0.1)
+
+
+def test_a_row_with_a_broken_time_is_no_row_of_units(tmp_path: Path) -> None:
+    text = log(Flight(), G1000, top=G1000_TOP).replace(",03:00:00,", ",--:--:--,", 1)
+    found = read(tmp_path, text)
+    assert len(found.rows("gnss")) == 60 and found.damage("unreadable_cells").count == 1
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,7 @@ def sniff(source: Source) -> Claim | None:
     """Claim a file whose first line and header row are those of a shipped profile.
 
     Where the first line is damaged a header row with enough of the profile's columns will do. Of the profiles of a
-    family the one has the file whose header row stands first: long names stand above short ones.
+    family the one has the file whose header row stands first, or has the long names of that row below it.
     """
     found = _best(source)
     return None if found is None else Claim(NAME, found[1].profile.name, found[0])
@@ -57,7 +57,11 @@ def _best(source: Source) -> tuple[float, Fit] | None:
         if fit is not None and (is_its_own or count >= DISTINCTIVE_COLUMNS):
             found.append((1.0 if is_its_own else 0.9, fit))
             lines = lines[: fit.header.number + DAMAGED_HEAD_LINES]  # a relative has its header near by
-    return max(found, key=lambda one: (one[0], -one[1].header.number), default=None)
+    best = max(found, key=lambda one: (one[0], -one[1].header.number), default=None)
+    for one in found:
+        if best is not None and one[1].header in best[1].behind and one[1].told_count > best[1].told_count:
+            return one
+    return best
 
 
 def claim_by(source: Source, profile: Path) -> Claim:

@@ -31,6 +31,7 @@ from groundstation.readers.layout import Derivation, Layout, Rule, TimeRule, rul
 from groundstation.readers.misnamed import misnamed
 from groundstation.readers.sections import (
     MOST,
+    Place,
     Section,
     ended,
     header_places,
@@ -185,21 +186,22 @@ def _sections(
     last, last_utc_ns, stands_again = top, utc_of_zero_ns, False
     for place in header_places(source, top.header, top.encoding, _MARK, _is_header):
         stands_again = True
-        metadata = dict(_entries(place.above))
+        above, first_byte = _belonging(place)
+        metadata = dict(_entries(above))
         delimiter = detect_delimiter(place.line.text)
         names = tuple(split_cells(place.line.text, delimiter))
         is_same = (names, delimiter) == (last.names, last.delimiter)
         if is_same and utc_of_zero(metadata)[0] in (None, last_utc_ns):
             continue
         if len(sections) == MOST:
-            sections[-1] = ended(sections[-1], place.first_byte)
+            sections[-1] = ended(sections[-1], first_byte)
             return sections, [*remarks, left_out(source, place.line.number, place.first_byte)]
         below = tuple(line.text for line in lines_below(source, place.line, top.encoding))
         found = _Top(top.encoding, metadata, place.line, names, delimiter, below, 0)
         found_layout, more = _layout(found)
         utc_ns, clock_remarks = _utc_of_zero(source, found.dialect, found_layout, metadata, names)
         shift_ns = _shift_ns(utc_of_zero_ns, utc_ns, found, last, sections[-1].shift_ns)
-        sections[-1] = ended(sections[-1], place.first_byte)
+        sections[-1] = ended(sections[-1], first_byte)
         sections.append(Section(found.dialect, found_layout, shift_ns))
         remarks += [told(place, is_same, shift_ns), *more, *_mistakes(found), *clock_remarks]
         last, last_utc_ns = found, last_utc_ns if utc_ns is None else utc_ns
@@ -223,11 +225,18 @@ def _are_flat(names: Sequence[str]) -> bool:
     return any(name in TIME_COLUMNS for name in names) and any("." in name.strip(".") for name in names)
 
 
-def _entries(above: Sequence[Line]) -> Iterator[tuple[str, str]]:
-    """Metadata in the lines right above a header."""
-    for line in reversed(above):
+def _belonging(place: Place) -> tuple[tuple[Line, ...], int]:
+    """Lines of metadata right above a header, and the byte where they begin."""
+    count = 0
+    for line in reversed(place.above):
         if line.text.strip() and not line.text.startswith("#"):
-            return
+            break
+        count += 1
+    return place.above[len(place.above) - count :], place.above_from[-count] if count else place.first_byte
+
+
+def _entries(lines: Sequence[Line]) -> Iterator[tuple[str, str]]:
+    for line in lines:
         key, colon, value = line.text.lstrip("#").partition(":")
         if colon and key.strip():
             yield key.strip(), value.strip()

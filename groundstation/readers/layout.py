@@ -211,13 +211,11 @@ def rule_for(
 
 
 def apply(derivation: Derivation, known: Mapping[Key, Column]) -> dict[Key, Column]:
-    """Columns that a derivation gives: a value where all inputs have one and the file has none of its own.
+    """Columns that a derivation gives and the file has not: present where all its inputs are.
 
-    Nothing where the file's own columns are complete.
+    A column of the file is not filled from others where it is empty: a Garmin G5 without a fix writes no velocity
+    beside a speed of 150 kt.
     """
-    outputs = [(derivation.topic, name) for name in derivation.outputs]
-    if all(key in known and known[key].present is None for key in outputs):
-        return {}
     inputs = [known[key] for key in derivation.inputs]
     masks = [column.mask for column in inputs]
     masks += [known[key].values != 0.0 for key in derivation.not_zero]
@@ -226,9 +224,8 @@ def apply(derivation: Derivation, known: Mapping[Key, Column]) -> dict[Key, Colu
     with np.errstate(over="ignore", invalid="ignore"):  # of absurd numbers: becomes infinite or NaN
         values = [np.where(present, one.values * factor, np.nan) for one, factor in zip(inputs, factors, strict=True)]
         results = METHODS[derivation.method].function(*values)
-    found = {key: Column(np.asarray(result), present) for key, result in zip(outputs, results, strict=True)}
-    return {key: _filled(known[key], column) if key in known else column for key, column in found.items()}
-
-
-def _filled(own: Column, derived: Column) -> Column:
-    return Column(np.where(own.mask, own.values, derived.values), own.mask | derived.mask)
+    found = {
+        (derivation.topic, name): Column(np.asarray(result), present)
+        for name, result in zip(derivation.outputs, results, strict=True)
+    }
+    return {key: column for key, column in found.items() if key not in known}

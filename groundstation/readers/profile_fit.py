@@ -18,6 +18,7 @@ _TIMES: Mapping[str, re.Pattern[str]] = {
     "seconds": re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?"),
     "nanoseconds": re.compile(r"[+-]?\d+"),
 }
+_FORMAT = re.compile(r"(?=.*(yy|hh))[ymdhs:./ -]+", re.IGNORECASE)  # the unit of a date or a time of day
 
 
 @dataclass(frozen=True)
@@ -85,11 +86,17 @@ class Fit:
         """Cells of the rows of names, and of those of units, around the header and with it."""
         if not self.profile.header_tells:
             return [], []
-        lines = [line.text for line in (*self.above, *self.behind)]
-        names = [cells for text in lines if not text.startswith("#") and (cells := self._cells(text))]
-        return [list(self.names), *names], [
-            cells for text in lines if text.startswith("#") and (cells := self._cells(text))
-        ]
+        names, units = [list(self.names)], list[list[str]]()
+        for line in (*self.above, *self.behind):
+            cells = self._cells(line.text)
+            is_of_units = line.text.startswith("#") or any(map(_FORMAT.fullmatch, cells))
+            (units if is_of_units else names).extend([cells] if cells else [])
+        return names, units
+
+    @property
+    def told_count(self) -> int:
+        """Number of columns whose name tells more in parentheses."""
+        return sum(bare(name) != name for name in self.names)
 
     def told(self, at: int) -> Told:
         """Read the names of a column, and its cells in the rows around the header."""
@@ -128,9 +135,10 @@ class Fit:
         return any(_TIMES["seconds"].fullmatch(cell) for cell in others)
 
     def is_of_names(self, line: str) -> bool:
-        """Tell whether a line has a name for each column of time."""
-        times, _others = self._times(line)
-        return bool(times) and all(times) and not _TIMES[self.profile.time.kind].fullmatch(times[-1])
+        """Tell a row of names or units: a word for each column of time, and no number."""
+        times, others = self._times(line.lstrip("#"))
+        is_time = bool(times) and bool(_TIMES[self.profile.time.kind].fullmatch(times[-1]))
+        return bool(times) and all(times) and not is_time and not any(map(_TIMES["seconds"].fullmatch, others))
 
     def _times(self, line: str) -> tuple[list[str], list[str]]:
         """Cells of a line that tell the time, and the others; none if there are too few or many."""

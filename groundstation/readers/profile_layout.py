@@ -129,14 +129,17 @@ def _raw_key(fit: Fit, name: str) -> Key:
 
 
 def _derivations(fit: Fit, fed: _Fed) -> Iterator[Derivation]:
-    """Derivations of the profile whose inputs the file has."""
+    """Derivations of the profile with inputs in the file and outputs that it does not tell."""
     known = fed.rules.keys() | {(one.topic, name) for one in fed.derivations for name in one.outputs}
     for rule in fit.profile.derived:
-        if not all(given.column in fit.position if given.column else given.key in known for given in rule.inputs):
+        outputs = {(rule.topic, name) for name in rule.outputs}
+        if outputs <= known or not all(
+            given.column in fit.position if given.column else given.key in known for given in rule.inputs
+        ):
             continue
         keys = tuple(_raw_key(fit, given.column) if given.column else given.key for given in rule.inputs)
         yield Derivation(rule.method, rule.topic, rule.outputs, keys, _factors(fit, rule))
-        known |= {(rule.topic, name) for name in rule.outputs}
+        known |= outputs
 
 
 def _factors(fit: Fit, rule: DerivedRule) -> tuple[float, ...]:

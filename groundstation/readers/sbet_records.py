@@ -108,12 +108,16 @@ def are_sound(records: NDArray[Any]) -> NDArray[np.bool_]:
         sound &= (np.abs(records["roll"]) <= np.pi) & (np.abs(records["pitch"]) <= np.pi / 2)
         sound &= np.abs(records["platform_heading"]) <= 4 * np.pi
         sound &= np.hypot(records["x_velocity"], records["y_velocity"]) < _FASTEST_MPS
-        sound &= (np.abs(latitude) > _NO_PLACE) | (latitude == 0.0)
-        rest = (records["altitude"], records["x_velocity"], records["platform_heading"])
-        sound &= (
-            (latitude != 0.0) | (longitude != 0.0) | ((time > 0.0) & np.logical_or.reduce([one != 0.0 for one in rest]))
-        )
+        near = np.flatnonzero(np.abs(latitude) <= _NO_PLACE)
+    sound[near] &= _are_zeros_of_a_record(records[near])
     return np.asarray(sound)
+
+
+def _are_zeros_of_a_record(records: NDArray[Any]) -> NDArray[np.bool_]:
+    """Tell which records with next to no latitude are some: it is 0, and beside a place of 0, 0 stands something."""
+    is_one = np.logical_or.reduce([records[name] != 0.0 for name in ("altitude", "x_velocity", "platform_heading")])
+    is_one &= records["time"] > 0.0
+    return np.asarray((records["latitude"] == 0.0) & ((records["longitude"] != 0.0) | is_one))
 
 
 def _follow(records: NDArray[Any]) -> NDArray[np.bool_]:

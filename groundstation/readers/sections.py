@@ -15,7 +15,7 @@ from groundstation.readers.layout import Layout
 from groundstation.readers.source import Source
 
 MOST = 500  # more headers that change something are no log: what follows is left out
-_PIECE_BYTES, _LONGEST_LINE = 1 << 20, 8 << 20
+_PIECE_BYTES, _LONGEST_LINE = 1 << 17, 8 << 20
 _ABOVE_BYTES, _BELOW_BYTES = 1 << 16, 1 << 14  # how far from a header line its preamble and its rows are looked at
 _MARK_OF_UTF8 = "\ufeff"  # a file that was appended to another brings its own
 _SHORT = 2  # characters: such a name stands in many a row

@@ -29,7 +29,7 @@ from groundstation.readers import cells
 from groundstation.readers.cells import Cells
 from groundstation.readers.dates import local_ns
 from groundstation.readers.dialect import Dialect
-from groundstation.readers.layout import METHODS, Derivation, Key, Layout, Rule, apply
+from groundstation.readers.layout import METHODS, Key, Layout, Rule, apply
 from groundstation.readers.losses import Losses
 from groundstation.readers.places import PLACED, without_place, zeroed
 from groundstation.readers.rows import Block, RowScanner, restore_delimiters
@@ -60,7 +60,6 @@ class TableReader:
         self._wrapped: dict[str, int] = {}
         self.zoneless = 0
         self._placeless: set[str] = set()  # topics that had a row without a place
-        self._derived: set[Derivation] = set()  # those that gave a value
         self._dialect, self._layout = sections[0].dialect, sections[0].layout
         self._sections = self._settled(sections)
 
@@ -161,10 +160,7 @@ class TableReader:
         for topic, by_field in self._places():
             columns |= self._placed(topic, by_field, columns, lines)
         for derivation in self._layout.derivations:
-            found = apply(derivation, columns)
-            if any(key not in columns or (one.mask & ~columns[key].mask).any() for key, one in found.items()):
-                self._derived.add(derivation)
-            columns |= found
+            columns |= apply(derivation, columns)
         return columns
 
     def _places(self) -> Iterator[tuple[str, dict[str, Rule]]]:
@@ -264,8 +260,7 @@ class TableReader:
 
     def _remarks(self, scanner: RowScanner) -> Iterator[Remark]:
         layouts = [section.layout for section in self._sections]
-        derivations = dict.fromkeys(derivation for layout in layouts for derivation in layout.derivations)
-        for derivation in filter(self._derived.__contains__, derivations):
+        for derivation in dict.fromkeys(derivation for layout in layouts for derivation in layout.derivations):
             outputs = ", ".join(derivation.outputs)
             text = f"{derivation.topic}: {outputs} derived from {METHODS[derivation.method].text}"
             yield Remark("derived", text, derivation.topic, derivation.outputs)
