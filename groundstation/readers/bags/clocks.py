@@ -138,7 +138,8 @@ def offsets_of(stamped: Mapping[int, Stamped]) -> Offsets:
     """
     tracks = {number: one.readings.all() for number, one in stamped.items()}
     tracks = {number: track for number, track in tracks.items() if track.readings >= FEWEST_READINGS}
-    offsets = offsets_by(tracks, [jump for one in stamped.values() for jump in one.jumps])
+    stretches = {number: stretches_of(track) for number, track in tracks.items()}
+    offsets = offsets_by(stretches, [jump for one in stamped.values() for jump in one.jumps])
     right = [_added_where_right(track, offsets) for track in tracks.values()]
     known = [one for one in right if one is not None]
     if known:
