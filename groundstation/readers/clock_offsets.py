@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.records import Int64Array
-from groundstation.readers.two_clocks import STEP_S, Track, stretches_of
+from groundstation.readers.two_clocks import Stretch, Track
 
 
 class Jump(NamedTuple):
@@ -37,6 +37,8 @@ class Offsets:
 
     def at(self, record_index: Int64Array) -> Int64Array:
         """What is added to the times of records."""
+        if len(self.starts) == 1:
+            return np.full(len(record_index), self.added_ns[0])
         place = np.searchsorted(self.starts, record_index, side="right") - 1
         return np.asarray(self.added_ns[np.maximum(place, 0)])
 
@@ -72,33 +74,32 @@ class _Step(NamedTuple):
     by: int
 
 
-def offsets_by(tracks: Mapping[int, Track], jumps: Sequence[Jump] = (), *, receipt_step_s: float = STEP_S) -> Offsets:
+def offsets_by(clocks: Mapping[int, Sequence[Stretch]], jumps: Sequence[Jump] = ()) -> Offsets:
     """Offsets by which times of receipt go on smoothly with the readings of some clocks; none before the first step.
 
     Parameters
     ----------
-    tracks : mapping of number to Track
+    clocks : mapping of number to sequence of Stretch
+        Readings of each clock, parted where one of the two was set.
     jumps : sequence of Jump
         Of records without a reading as well: where between two readings the clock was set.
-    receipt_step_s : float
-        Least step ahead that is taken for one.
     """
     starts, added, by = [0], [0], list[int]()
-    for step in _united(_steps(tracks, receipt_step_s), jumps):
+    for step in _united(_steps(clocks), jumps):
         starts.append(step.first)
         added.append(added[-1] - step.size_ns)
         by.append(step.by)
     return Offsets(np.array(starts, dtype=np.int64), np.array(added, dtype=np.int64), tuple(dict.fromkeys(by)))
 
 
-def _steps(tracks: Mapping[int, Track], receipt_step_s: float) -> list[_Step]:
+def _steps(clocks: Mapping[int, Sequence[Stretch]]) -> list[_Step]:
     found = []
-    for number, track in tracks.items():
-        for before, stretch in pairwise(stretches_of(track, receipt_step_s=receipt_step_s)):
+    for number, stretches in clocks.items():
+        readings = sum(one.track.readings for one in stretches)
+        for before, stretch in pairwise(stretches):
             if stretch.stepped == "receipt":
                 first = int(stretch.track.record_index[0])
-                size_ns = stretch.level_ns - before.level_ns
-                found.append(_Step(stretch.after, first, size_ns, track.readings, number))
+                found.append(_Step(stretch.after, first, stretch.level_ns - before.level_ns, readings, number))
     return found
 
 

@@ -104,21 +104,25 @@ def one_row_each(batch: RecordBatch) -> RecordBatch:
     stamps = batch.validity_time_ns
     if stamps is None:
         return batch
-    instants, place = np.unique(stamps, return_inverse=True)
-    masks = {name: column.mask for name, column in batch.columns.items()}
+    instants, first, place = np.unique(stamps, return_index=True, return_inverse=True)
+    if len(first) == len(batch):
+        return batch
+    masks = {id(column.present): column.mask for column in batch.columns.values()}
     is_twice = np.zeros(len(instants), dtype=bool)
     for mask in masks.values():
         is_twice |= np.bincount(place[mask], minlength=len(instants)) > 1
-    own = np.flatnonzero(is_twice[place])
-    place[own] = len(instants) + np.arange(len(own))
-    _places, first, place = np.unique(place, return_index=True, return_inverse=True)
-    if len(first) == len(batch):
-        return batch
+    if is_twice.any():
+        own = np.flatnonzero(is_twice[place])
+        place[own] = len(instants) + np.arange(len(own))
+        _places, first, place = np.unique(place, return_index=True, return_inverse=True)
+        if len(first) == len(batch):
+            return batch
     columns = {}
     for name, column in batch.columns.items():
         values, present = np.zeros(len(first), dtype=column.values.dtype), np.zeros(len(first), dtype=bool)
-        at = place[masks[name]]
-        values[at], present[at] = column.values[masks[name]], True
+        mask = masks[id(column.present)]
+        at = place[mask]
+        values[at], present[at] = column.values[mask], True
         columns[name] = Column(values, None if present.all() else present)
     index, time = batch.record_index[first], batch.device_time_ns.take(first)
     return RecordBatch(batch.topic, index, time, columns, validity_time_ns=stamps[first]).take(np.argsort(index))

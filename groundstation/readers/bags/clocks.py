@@ -6,6 +6,7 @@ Stamps are believed where they go with the log time, or where they go on smoothl
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -114,6 +115,16 @@ class Stamped:
             self.jumps.append(Jump(number, before[0], behind[0], before[1], behind[1]))
         self._last = new[:, -1:]
 
+    @cached_property
+    def track(self) -> Track:
+        """Readings of the stamps, once all were taken."""
+        return self.readings.all()
+
+    @cached_property
+    def stretches(self) -> list[Stretch]:
+        """The same, parted where one of the clocks was set."""
+        return stretches_of(self.track)
+
     def line(self, connection: Connection) -> Line:
         """When the connection was written."""
         return Line(connection, np.sort(self.log.all()[0]), self.log.stride)
@@ -136,13 +147,13 @@ def offsets_of(stamped: Mapping[int, Stamped]) -> Offsets:
     ----------
     stamped : mapping of connection number to Stamped
     """
-    tracks = {number: one.readings.all() for number, one in stamped.items()}
-    tracks = {number: track for number, track in tracks.items() if track.readings >= FEWEST_READINGS}
-    offsets = offsets_by(tracks, [jump for one in stamped.values() for jump in one.jumps])
+    known = {number: one for number, one in stamped.items() if one.track.readings >= FEWEST_READINGS}
+    tracks = {number: one.track for number, one in known.items()}
+    stretches = {number: one.stretches for number, one in known.items()}
+    offsets = offsets_by(stretches, [jump for one in stamped.values() for jump in one.jumps])
     right = [_added_where_right(track, offsets) for track in tracks.values()]
-    known = [one for one in right if one is not None]
-    if known:
-        _start, added_ns = max(known)  # where the log time was last right, nothing is added
+    if sure := [one for one in right if one is not None]:
+        _start, added_ns = max(sure)  # where the log time was last right, nothing is added
         return offsets.plus(-added_ns)
     unset_ns = _least_unset(tracks.values(), offsets)
     return offsets.plus(-int(offsets.added_ns[-1]) if unset_ns is None else -unset_ns)
@@ -211,14 +222,17 @@ class Lags:
     def _of(cls, several: Sequence[Stamped], offsets: Offsets) -> "Lags":
         near, far, readings, total = [], [], 0, 0
         for one in several:
-            track = one.readings.all()
-            stretches = [found for found in stretches_of(offsets.moved(track)) if _is_near(found)]
+            track = one.track
+            parted = stretches_of(offsets.moved(track)) if offsets.stated else one.stretches
+            stretches = [found for found in parted if _is_near(found)]
             record, log_ns, stamp_ns = one.stamps.all()
             late_ns = log_ns + offsets.at(record) - stamp_ns
             is_within = np.zeros(len(record), dtype=bool)
             for found in stretches:
                 is_within |= (record >= found.track.record_index[0]) & (record <= found.track.record_index[-1])
-            is_within &= ~np.isin(record, _astray(track, stretches))
+            astray = _astray(track, stretches)
+            if len(astray):
+                is_within &= ~np.isin(record, astray)
             near.append(np.stack((late_ns, log_ns, stamp_ns))[:, is_within])
             far.append(late_ns)
             readings += sum(found.track.readings for found in stretches)
@@ -281,7 +295,8 @@ def _is_near(stretch: Stretch) -> bool:
 def _astray(track: Track, stretches: Sequence[Stretch]) -> Int64Array:
     """Records of readings that are not of the stretches, and of a few in a row that did not merely wait."""
     sound = [track.record_index[:0], *(one.track.record_index for one in stretches)]
-    found = [np.setdiff1d(track.record_index, np.concatenate(sound))]
+    kept = np.concatenate(sound)
+    found = [np.setdiff1d(track.record_index, kept) if len(kept) < len(track) else kept[:0]]
     for one in stretches:
         is_far = (one.track.late_ns < -_LARGEST_LAG_NS) | (one.track.late_ns > MOST_QUEUED_S * NS_PER_S)
         edges = np.flatnonzero(np.diff(np.concatenate(([False], is_far, [False]))))

@@ -82,9 +82,14 @@ class Decoder:
             self.reason = f"encoding {connection.encoding!r}"
 
     @property
-    def is_shaped(self) -> bool:
-        """Whether values of some messages were found at places that others share."""
-        return bool(self._shapes)
+    def has_places(self) -> bool:
+        """Whether the values of messages stand at places that many share."""
+        return self._definition is not None and not self.reason
+
+    def stands_at_one_place(self, name: str) -> bool:
+        """Whether a value stands at one place in all messages."""
+        shape = next(iter(self._shapes.values()), None)
+        return shape is not None and shape.at_one_place(name) is not None
 
     def values_at_one_place(self, block: Block, name: str) -> tuple[Int64Array, Column] | None:
         """Rows of messages that are long enough, and a value of them that stands at one place in all; None else."""

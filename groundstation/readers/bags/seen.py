@@ -13,6 +13,7 @@ from groundstation.readers.bags.messages import Block, Connection
 from groundstation.readers.bags.profile import MessageRule
 
 SAMPLE = 4_000  # messages of a connection that are looked at
+LOOKED_AT = 500  # of those whose values stand at places that are found once
 LATER = 4  # of each block behind them, where a stamp does not stand at one place in all messages
 STAMPS = ("header.stamp_ns", "timestamp_ns")
 
@@ -98,8 +99,10 @@ class Seen:
     def _looked_into(self, block: Block, decoder: Decoder) -> Iterable[tuple[Int64Array, dict[str, Column]]]:
         """Some messages of a block, decoded."""
         rows = np.arange(min(len(block), SAMPLE - self._looked_at), dtype=np.int64)
-        if self._looked_at and self.columns and decoder.is_shaped:
-            rows = rows[:0]  # their stamps are read without
+        if decoder.has_places and not self.columns:
+            rows = rows[:LOOKED_AT]
+        elif decoder.stands_at_one_place(self._stamp_name()):  # then it is read without a look at the rest
+            rows = rows[:0]
         elif not len(rows):
             rows = np.unique(np.linspace(0, len(block) - 1, LATER).astype(np.int64))
         self._looked_at = min(self._looked_at + len(block), SAMPLE)

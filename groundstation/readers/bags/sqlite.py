@@ -73,7 +73,7 @@ class Ros2Sqlite:
             rows, failure = database.next_rows(last)
             if rows:
                 yield from self._blocks(rows, connections)
-                numbers = [row[1] for row in rows if isinstance(row[1], int)]
+                numbers = [row[1] for row in rows if type(row[1]) is int]
                 missing += max(numbers[-1] - max(last, 0) - len(numbers), 0) if numbers else 0
                 last, jump, is_cut = max(row[0] for row in rows), 1, False
             if failure:
@@ -110,7 +110,7 @@ class Ros2Sqlite:
 
     def _blocks(self, rows: list[Any], connections: dict[int, Connection]) -> Iterator[Block]:
         """Rows of one stretch by topic."""
-        sound = [row for row in rows if _is_sound(row)]
+        sound = [row for row in rows if type(row[1]) is type(row[2]) is type(row[3]) is int]
         self._odd += len(rows) - len(sound)
         known = [row for row in sound if row[2] in connections]
         self._unknown += len(sound) - len(known)
@@ -228,21 +228,24 @@ class _Database:
         Each is (number of the row, id, topic_id, timestamp, data). A table without row numbers is read in one go.
         """
         rows: list[Any] = []
-        size = 0
+        size, most = 0, min(BLOCK_BYTES, self.bytes)
         try:
             for row in self._rows(last):
                 if self.has_rowid and row[0] <= last and _is_sound(row):  # pages lead in circles
                     return rows, True
                 rows.append(row)
-                last, length = max(last, row[0]), len(row[4]) if isinstance(row[4], bytes | str) else 0
-                size, self.bytes = size + length, self.bytes - length
-                if self.bytes <= 0:
-                    return rows, True
-                if size > BLOCK_BYTES or len(rows) >= ROWS:
+                number, data = row[0], row[4]
+                if number > last:
+                    last = number
+                if type(data) is bytes or type(data) is str:
+                    size += len(data)
+                if size > most or len(rows) >= ROWS:
                     break
         except _FAILURES:
             return rows, True
-        return rows, False
+        finally:
+            self.bytes -= size
+        return rows, self.bytes <= 0
 
     def _rows(self, last: int) -> Iterator[Any]:
         columns = "id, topic_id, timestamp, data"

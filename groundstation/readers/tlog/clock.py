@@ -5,34 +5,37 @@ less clock is never below the offset between the two: its lower envelope places 
 SYSTEM_TIME tells UTC. A message without a time is placed by those that its system sent before and behind it.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from groundstation.base.records import BoolArray, Int64Array
+from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.clock_offsets import Jump, Offsets, offsets_by
 from groundstation.readers.tlog.dialect import Message, messages
 from groundstation.readers.tlog.frames import Block
 from groundstation.readers.two_clocks import FEWEST_READINGS, Line, Readings, Stretch, Track, lower_line, stretches_of
 
+Key: TypeAlias = tuple[int, int, bool]  # sender, number of message, and whether its times count from 1970
 NS_PER_MS, NS_PER_US = 1_000_000, 1_000
 SINCE_1970_US = 10**15  # a time_usec of more counts from 1970, of less from when the sender was switched on
 _LAST_US = 4_102_444_800 * 10**6  # 2100
 RECEIPT_STEP_S = 10.0  # of the ground station's clock ahead: a link may go on being late by less
-PACES = (0.5, 2.0)  # of a message's time against that of its sender's clock
-MOST_LATE_S = 600.0
+LEAST_PACE = 0.1  # of a clock against the time of receipt
+SHARE_STEPS = 512
+MOST_SHARE = 0.5  # of the frames of a message whose times go with its sender's clock
 OFF_S = 5.0  # between the times of a message and its sender's clock
 ROLLOVER_S, DAY_S = 1_024 * 604_800, 86_400
 MOST_JUMPS = 1_000
 _WRAP_MS, _EDGE_MS = 1 << 32, 3_600_000  # of time_boot_ms, in 49.7 days
 _UTC_READINGS = 20
-# Messages whose times are read for the clock of their sender, the best first; any other where it sends none.
+# Messages whose times are read for the clock of their sender, the best first; any others where it sends none of them.
 _STEADY = (
-    *("ATTITUDE", "ATTITUDE_QUATERNION", "GLOBAL_POSITION_INT", "LOCAL_POSITION_NED", "RAW_IMU", "HIGHRES_IMU"),
-    *("SCALED_IMU", "SCALED_IMU2", "SCALED_PRESSURE", "RC_CHANNELS", "SYSTEM_TIME"),
+    *("ATTITUDE", "ATTITUDE_QUATERNION", "GLOBAL_POSITION_INT", "RAW_IMU", "HIGHRES_IMU", "SCALED_IMU"),
+    *("SCALED_PRESSURE", "SYSTEM_TIME", "GPS_RAW_INT", "GPS2_RAW"),
 )
 
 
@@ -59,6 +62,11 @@ def time_fields() -> Mapping[int, TimeField]:
     """Fields that tell the time, by number of message."""
     found = {number: TimeField.of(message) for number, message in messages().items()}
     return {number: one for number, one in found.items() if one is not None}
+
+
+@cache
+def _steady() -> frozenset[int]:
+    return frozenset(number for number, message in messages().items() if message.name in _STEADY)
 
 
 @dataclass
@@ -89,7 +97,7 @@ class TimeReader:
     def read(self, block: Block, which: Int64Array) -> tuple[Int64Array, BoolArray]:
         """Times in nanoseconds, -1 where there is none, and which count from 1970; shape (n,) each."""
         one = time_fields()[self.number]
-        numbers = block.numbers(which, messages()[self.number], one.name)
+        numbers = block.rows(which, messages()[self.number])[one.name]
         if one.unit_ns == NS_PER_MS:
             return self.unwrapped.take(numbers.astype(np.int64)) * NS_PER_MS, np.zeros(len(which), dtype=bool)
         good = numbers < np.uint64(_LAST_US)
@@ -130,8 +138,6 @@ class SenderClock:
         Its times are UTC by themselves.
     unix_ns : int or None
         UTC less its times, for messages that count from 1970; None where nothing tells it.
-    most_late_ns : int
-        How late a frame arrived at most.
     """
 
     reference: int
@@ -139,7 +145,6 @@ class SenderClock:
     epochs: tuple[Epoch, ...]
     counts_from_1970: bool
     unix_ns: int | None
-    most_late_ns: int
 
     def epoch_of(self, record_index: Int64Array) -> Int64Array:
         """Place of the epoch of records."""
@@ -148,6 +153,8 @@ class SenderClock:
 
     def utc_of(self, record_index: Int64Array, clock_ns: Int64Array, ground_ns: int) -> Int64Array:
         """UTC of the times in records."""
+        if len(self.epochs) == 1:
+            return self.epochs[0].utc_of(clock_ns, ground_ns)
         found = np.zeros(len(clock_ns), dtype=np.int64)
         of = self.epoch_of(record_index)
         for place in np.unique(of).tolist():
@@ -158,20 +165,25 @@ class SenderClock:
     def late_ns(self, record_index: Int64Array, received_ns: Int64Array, clock_ns: Int64Array) -> Int64Array:
         """How late records arrived, by the ground station's clock."""
         found = received_ns - clock_ns
+        if len(self.epochs) == 1:
+            return np.asarray(found - self.epochs[0].line.at(clock_ns))
         of = self.epoch_of(record_index)
         for place in np.unique(of).tolist():
             rows = of == place
             found[rows] -= self.epochs[place].line.at(clock_ns[rows])
         return np.asarray(found)
 
-    def most_late(self, track: Track, since_1970: bool) -> int:
-        """How late the readings of a message arrived at most."""
+    def lateness(self, track: Track, since_1970: bool) -> "Lateness":
+        """How late the readings of a message arrived; those whose relation to the clock is known."""
         own_ns = self.by_its_clock(track.clock_ns, np.full(len(track), since_1970))
-        late_ns = self.late_ns(track.record_index, track.receipt_ns, own_ns)
-        return int(late_ns[late_ns < MOST_LATE_S * NS_PER_S].max(initial=0))
+        known = track.take(own_ns >= 0)
+        late_ns = self.late_ns(known.record_index, known.receipt_ns, own_ns[own_ns >= 0])
+        return Lateness(known.record_index, known.number, late_ns)
 
     def by_its_clock(self, time_ns: Int64Array, since_1970: BoolArray) -> Int64Array:
         """Times of messages by this clock, -1 where it is not known how they relate."""
+        if not since_1970.any() and not self.counts_from_1970:
+            return time_ns
         if self.counts_from_1970:
             return np.where(since_1970, time_ns, -1)
         if self.unix_ns is None:
@@ -196,8 +208,8 @@ class Clocks:
     offsets: Offsets
     ground_ns: int
 
-    def texts(self, vehicle: int) -> Iterator[str]:
-        """What a user must know."""
+    def texts(self, vehicle: int, most_late_ns: int) -> Iterator[str]:
+        """What a user must know; ``most_late_ns`` is how late a frame arrived at most."""
         for record, size_ns in self.offsets.steps():
             yield f"the ground station's clock was set by {size_ns / NS_PER_S:+.3f} s before frame {record}"
         if self.ground_ns:
@@ -207,7 +219,7 @@ class Clocks:
         if clock is None:
             yield "times are those of receipt on the ground, by the ground station's clock; the link's delay is in them"
             return
-        name, late_s = messages()[clock.reference].name, clock.most_late_ns / NS_PER_S
+        name, late_s = messages()[clock.reference].name, most_late_ns / NS_PER_S
         yield (
             f"device times are those of receipt on the ground; values are valid by the vehicle's clock ({name}), set "
             f"by the frames that arrived soonest: others arrived up to {late_s:.2f} s later"
@@ -222,40 +234,47 @@ class ClockSurvey:
 
     def __init__(self) -> None:
         self._readers: dict[tuple[int, int], TimeReader] = {}
-        self._readings: dict[tuple[int, int, bool], Readings] = {}
+        self._readings: dict[Key, Readings] = {}
         self._utc: dict[int, Readings] = {}
         self._jumps: list[Jump] = []
         self._last: tuple[int, int] | None = None
 
     def take(self, block: Block) -> None:
         """Take those of a block."""
-        received, index = block.received, block.record_index
-        self._note_jumps(index, received.values, received.mask)
-        for sender, rows in block.of_senders():
-            for number, which in block.by_number(rows):
-                one = time_fields().get(number)
-                which = which[received.mask[which]]
-                if one is None or (one.is_short and one.unit_ns == NS_PER_US) or not len(which):
-                    continue
-                reader = self._readers.setdefault((sender, number), TimeReader(number))
-                time_ns, since_1970 = reader.read(block, which)
-                for of_1970 in (False, True):
-                    good = (since_1970 == of_1970) & (time_ns >= 0)
-                    if good.any():
-                        readings = self._readings.setdefault((sender, number, of_1970), Readings())
-                        readings.take(index[which[good]], received.values[which[good]], time_ns[good])
-                if messages()[number].name == "SYSTEM_TIME":
-                    self._take_utc(block, sender, number, which, time_ns)
+        received = block.received
+        self._note_jumps(block.record_index, received)
+        for sender, groups in block.by_sender():
+            timed = [(number, which) for number, which in groups if number in time_fields()]
+            steady = [(number, which) for number, which in timed if number in _steady()]
+            for number, which in steady or timed:
+                self._take(block, sender, number, which if received.present is None else which[received.mask[which]])
+
+    def _take(self, block: Block, sender: int, number: int, which: Int64Array) -> None:
+        one = time_fields()[number]
+        if (one.is_short and one.unit_ns == NS_PER_US) or not len(which):
+            return
+        reader = self._readers.setdefault((sender, number), TimeReader(number))
+        time_ns, since_1970 = reader.read(block, which)
+        for of_1970 in (False, True):
+            good = (since_1970 == of_1970) & (time_ns >= 0)
+            if good.any():
+                own = which if good.all() else which[good]
+                readings = self._readings.setdefault((sender, number, of_1970), Readings())
+                readings.take(block.record_index[own], block.received.values[own], time_ns[good])
+        if messages()[number].name == "SYSTEM_TIME":
+            self._take_utc(block, sender, number, which, time_ns)
 
     def _take_utc(self, block: Block, sender: int, number: int, which: Int64Array, boot_ns: Int64Array) -> None:
-        unix_us = block.numbers(which, messages()[number], "time_unix_usec")
+        unix_us = block.rows(which, messages()[number])["time_unix_usec"]
         good = (unix_us >= np.uint64(SINCE_1970_US)) & (unix_us < np.uint64(_LAST_US)) & (boot_ns > 0)
         unix_ns = np.where(good, unix_us, 0).astype(np.int64) * NS_PER_US
         utc = self._utc.setdefault(sender, Readings())
         utc.take(block.record_index[which[good]], unix_ns[good], boot_ns[good])
 
-    def _note_jumps(self, index: Int64Array, time_ns: Int64Array, mask: BoolArray) -> None:
-        index, time_ns = index[mask], time_ns[mask]
+    def _note_jumps(self, index: Int64Array, received: Column) -> None:
+        time_ns = received.values
+        if received.present is not None:
+            index, time_ns = index[received.present], time_ns[received.present]
         if not len(index):
             return
         if self._last is not None:
@@ -270,80 +289,85 @@ class ClockSurvey:
     def clocks(self, vehicle: int) -> Clocks:
         """The clocks that were found."""
         tracks = {key: readings.all() for key, readings in self._readings.items()}
-        references = {sender: self._reference(sender, tracks) for sender in {key[0] for key in tracks}}
-        found = {sender: key for sender, key in references.items() if key is not None}
-        by = {sender: tracks[key] for sender, key in found.items()}
-        offsets = offsets_by(by, self._jumps, receipt_step_s=RECEIPT_STEP_S)
+        parted: dict[int, list[Stretch]] = {}
+        found: dict[int, Key] = {}
+        for sender in sorted({key[0] for key in tracks}):
+            for key in self._ranked(sender, tracks):
+                stretches = stretches_of(tracks[key], receipt_step_s=RECEIPT_STEP_S)
+                if _pace(stretches) > LEAST_PACE:
+                    found[sender], parted[sender] = key, stretches
+                    break
+        offsets = offsets_by(parted, self._jumps)
         offsets = offsets.plus(-int(offsets.added_ns[-1]))  # the clock is right that stood last
-        senders = {sender: self._clock_of(sender, key, tracks, offsets) for sender, key in sorted(found.items())}
-        ground_ns = _ground_ns(senders, by, vehicle, offsets)
+        if offsets.stated:
+            moved = {sender: offsets.moved(tracks[key]) for sender, key in found.items()}
+            parted = {sender: stretches_of(track, receipt_step_s=RECEIPT_STEP_S) for sender, track in moved.items()}
+        senders = {sender: self._clock_of(key, parted[sender], tracks, offsets) for sender, key in found.items()}
+        by = {sender: tracks[key] for sender, key in found.items()}
+        ground_ns = _ground_ns(senders, by, vehicle)
         return Clocks(senders, offsets.plus(ground_ns), ground_ns)
 
-    def _reference(self, sender: int, tracks: Mapping[tuple[int, int, bool], Track]) -> tuple[int, int, bool] | None:
-        """The message that is read for the clock of a sender."""
+    def _ranked(self, sender: int, tracks: Mapping[Key, Track]) -> list[Key]:
+        """The messages that may be read for the clock of a sender, the best first."""
         known = messages()
-        own = [key for key in tracks if key[0] == sender and _pace(stretches_of(tracks[key])) > 0.1]
         places = {name: place for place, name in enumerate(_STEADY)}
 
-        def rank(key: tuple[int, int, bool]) -> tuple[bool, int, int, int]:
+        def rank(key: Key) -> tuple[bool, bool, int, int, int]:
             few = tracks[key].readings < FEWEST_READINGS
-            return few, places.get(known[key[1]].name, len(places)) + 100 * key[2], -tracks[key].readings, key[1]
+            return few, key[2], places.get(known[key[1]].name, len(places)), -tracks[key].readings, key[1]
 
-        return min(own, key=rank, default=None)
+        return sorted((key for key in tracks if key[0] == sender), key=rank)
 
     def _clock_of(
-        self, sender: int, key: tuple[int, int, bool], tracks: Mapping[tuple[int, int, bool], Track], offsets: Offsets
+        self, key: Key, stretches: Sequence[Stretch], tracks: Mapping[Key, Track], offsets: Offsets
     ) -> SenderClock:
-        stretches = stretches_of(offsets.moved(tracks[key]), receipt_step_s=RECEIPT_STEP_S)
+        sender, number, of_1970 = key
         lines = [lower_line(one.track) for one in stretches]
-        utc = self._utc[sender].all() if sender in self._utc and not key[2] else None
+        utc = self._utc[sender].all() if sender in self._utc and not of_1970 else None
         ends = [int(one.track.record_index[0]) for one in stretches[1:]]
         epochs = tuple(
-            Epoch(first, line, 0 if key[2] else _utc_within(utc, first, end, line))
+            Epoch(first, line, 0 if of_1970 else _utc_within(utc, first, end, line))
             for first, end, line in zip([0, *ends], [*ends, 1 << 62], lines, strict=True)
         )
-        levels = {
-            other[1]: _levels(stretches_of(offsets.moved(track), receipt_step_s=RECEIPT_STEP_S))
-            for other, track in tracks.items()
-            if other[0] == sender and other[2] and not key[2]
-        }
+        own = {other: offsets.moved(track) for other, track in tracks.items() if other[0] == sender}
         unix_ns = next((epoch.utc_ns for epoch in reversed(epochs) if epoch.utc_ns is not None), None)
-        if unix_ns is None and levels:
-            unix_ns = lines[-1].offset_ns - min(level[-1] for level in levels.values())
-            epochs = tuple(Epoch(one.first, one.line, unix_ns if one is epochs[-1] else None) for one in epochs)
-        clock = SenderClock(key[1], frozenset(), epochs, key[2], unix_ns, 0)
-        moved = {other: offsets.moved(track) for other, track in tracks.items() if other[0] == sender}
-        trusted = [other for other, track in moved.items() if _goes_with(clock, stretches, track, other[2])]
-        most_late_ns = max((clock.most_late(moved[other], other[2]) for other in trusted), default=0)
-        short = {number for number, one in time_fields().items() if one.is_short and one.unit_ns == NS_PER_US}
-        return replace(clock, trusted=frozenset({other[1] for other in trusted} | short), most_late_ns=most_late_ns)
+        if unix_ns is None and not of_1970 and (levels := [_level(track) for other, track in own.items() if other[2]]):
+            unix_ns = lines[-1].offset_ns - min(levels)
+            epochs = (*epochs[:-1], replace(epochs[-1], utc_ns=unix_ns))
+        clock = SenderClock(number, frozenset(), epochs, of_1970, unix_ns)
+        late = {other: clock.lateness(track, other[2]) for other, track in own.items()}
+        trusted = [other for other in late if _go_together(late[key], late[other])]
+        unread = time_fields().keys() - {other[1] for other in own}  # of these each frame is judged by itself
+        return replace(clock, trusted=frozenset({other[1] for other in trusted} | unread))
 
 
-def _pace(stretches: list[Stretch]) -> float:
+class Lateness(NamedTuple):
+    """How late some records arrived, and their places among all of their message; shape (n,) each."""
+
+    record_index: Int64Array
+    number: Int64Array
+    late_ns: Int64Array
+
+
+def _pace(stretches: Sequence[Stretch]) -> float:
     """Time of a clock over time of receipt."""
     clock = sum(int(np.ptp(one.track.clock_ns)) for one in stretches)
     receipt = sum(int(np.ptp(one.track.receipt_ns)) for one in stretches)
     return clock / receipt if receipt else float(clock > 0)
 
 
-def _levels(stretches: list[Stretch]) -> list[int]:
-    return [one.level_ns for one in stretches]
+def _level(track: Track) -> int:
+    """Least difference of receipt and clock in the last stretch of readings."""
+    return stretches_of(track, receipt_step_s=RECEIPT_STEP_S)[-1].level_ns
 
 
-def _goes_with(clock: SenderClock, reference: list[Stretch], track: Track, since_1970: bool) -> bool:
-    """Whether the times of a message are by the clock of its sender: of its pace, and near it."""
-    own_ns = clock.by_its_clock(track.clock_ns, np.full(len(track), since_1970))
-    if (own_ns < 0).any() or track.readings < FEWEST_READINGS:
+def _go_together(reference: Lateness, other: Lateness) -> bool:
+    """Whether the times of a message are by the clock of its sender: mostly as late as those that are read for it."""
+    if len(other.late_ns) == 0:
         return False
-    moved = Track(track.record_index, track.receipt_ns, own_ns, track.number)
-    pace = _pace(stretches_of(moved, receipt_step_s=RECEIPT_STEP_S)) / max(_pace(reference), 1e-9)
-    of = clock.epoch_of(track.record_index)
-    off = [
-        moved.late_ns[of == place] - epoch.line.at(own_ns[of == place])
-        for place, epoch in enumerate(clock.epochs)
-        if (of == place).any()
-    ]
-    return PACES[0] <= pace <= PACES[1] and all(abs(int(one.min())) <= OFF_S * NS_PER_S for one in off)
+    off_ns = other.late_ns - np.interp(other.record_index, reference.record_index, reference.late_ns)
+    evenly = np.linspace(other.number[0], other.number[-1], SHARE_STEPS)  # those that are kept are not
+    return bool(np.mean(np.abs(np.interp(evenly, other.number, off_ns)) <= OFF_S * NS_PER_S) >= MOST_SHARE)
 
 
 def _utc_within(utc: Track | None, first: int, end: int, line: Line) -> int | None:
@@ -359,7 +383,7 @@ def _utc_within(utc: Track | None, first: int, end: int, line: Line) -> int | No
     return None if weeks and abs(away_s - weeks * ROLLOVER_S) < DAY_S else utc_ns  # its receiver counts other weeks
 
 
-def _ground_ns(senders: Mapping[int, SenderClock], by: Mapping[int, Track], vehicle: int, offsets: Offsets) -> int:
+def _ground_ns(senders: Mapping[int, SenderClock], by: Mapping[int, Track], vehicle: int) -> int:
     """What is added to the ground station's clock to have UTC, by the vehicle, or by another sender that tells it."""
     for sender in sorted(senders, key=lambda sender: (sender != vehicle, sender)):
         for epoch in reversed(senders[sender].epochs):

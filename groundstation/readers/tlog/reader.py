@@ -17,24 +17,42 @@ from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 from groundstation.readers.tlog.canonical import ARMED, INSTANCES, ROLES
 from groundstation.readers.tlog.clock import Clocks, ClockSurvey
-from groundstation.readers.tlog.dialect import MOST_IDS, Message, crc_extras, messages
+from groundstation.readers.tlog.dialect import Message, crc_extras, messages
 from groundstation.readers.tlog.frames import Block
 from groundstation.readers.tlog.timer import Timer
 
 BLOCK_BYTES = 4 << 20
+KEPT_BYTES = 32 << 20  # of a log whose frames are kept for the second pass
 AUTOPILOT = 1  # component
 
 
 @dataclass
 class _Frames:
-    """Iterates over the frames of a log in blocks."""
+    """Iterates over the frames of a log in blocks; again from memory where they are few."""
 
     source: Source
     skipped: SkippedBytes = field(default_factory=lambda: SkippedBytes("frame"))
     unknown: int = 0
     cut: tuple[int, int] | None = None
+    _kept: list[Block] | None = None
 
     def __iter__(self) -> Iterator[Block]:
+        if self._kept is not None:
+            yield from self._kept
+            return
+        self.skipped, self.unknown, self.cut = SkippedBytes("frame"), 0, None
+        kept: list[Block] | None = []
+        size = 0
+        for block in self._scanned():
+            size += len(block.data)
+            if kept is not None:
+                kept.append(block)
+            if size > KEPT_BYTES:
+                kept = None  # it is read again: memory does not grow with the log
+            yield block
+        self._kept = kept
+
+    def _scanned(self) -> Iterator[Block]:
         from groundstation.readers.tlog import scan
 
         data, base, count = np.zeros(0, dtype=np.uint8), 0, 0
@@ -87,31 +105,30 @@ def _begins_frame(data: NDArray[np.uint8]) -> bool:
 
 def items(source: Source, reader_name: str) -> Iterator[Item]:
     """Items of a telemetry log."""
-    known = messages()
-    vehicle, met, clocks = _survey(source)
+    known, frames = messages(), _Frames(source)
+    vehicle, met, clocks = _survey(frames)
     metadata = {"vehicle": f"system {vehicle >> 8}, component {vehicle & 255}"}
     yield LogHeader(
         reader_name, metadata, utc_of_zero_ns=0, has_counting_clock=True, clock_offsets=clocks.offsets.stated
     )
     served = _served(met)
-    frames, armed, timer = _Frames(source), _Arming(), Timer(clocks)
+    armed, timer = _Arming(), Timer(clocks)
     nowhere: Counter[str] = Counter()
     for block, following in _with_next(frames):
         canonical: dict[str, list[Part]] = {}
         validity_ns = timer.validity_ns(block, following)
-        for system, of_system in block.of_senders():
-            for number, which in block.by_number(of_system):
-                message = known[number]
-                part = _part(block, which, message, validity_ns)
-                suffix = "" if system == vehicle else f".{system >> 8}_{system & 255}"
-                yield from bounded(merged(f"{RAW_PREFIX}{message.name}{suffix}", [part]))
-                if system == vehicle:
-                    _take(canonical, part, served.get(message.name, ()), nowhere)
-                    armed.take(canonical, part, message.name)
+        for system, number, which in block.groups:
+            message = known[number]
+            part = _part(block, which, message, validity_ns)
+            suffix = "" if system == vehicle else f".{system >> 8}_{system & 255}"
+            yield from bounded(merged(f"{RAW_PREFIX}{message.name}{suffix}", [part]))
+            if system == vehicle:
+                _take(canonical, part, served.get(message.name, ()), nowhere)
+                armed.take(canonical, part, message.name)
         for topic, parts in sorted(canonical.items()):
             batch = merged(topic, parts)
             yield from bounded(one_row_each(batch) if len(parts) > 1 else batch)
-    yield from _remarks(served, clocks.texts(vehicle))
+    yield from _remarks(served, clocks.texts(vehicle, timer.most_late_ns))
     for topic, count in sorted(nowhere.items()):
         if count:
             yield Remark("no_position", f"{topic}: {count} {NO_POSITION}", topic, ("latitude_deg", "longitude_deg"))
@@ -129,7 +146,7 @@ def _with_next(blocks: Iterable[Block]) -> Iterator[tuple[Block, Block | None]]:
         yield before, None
 
 
-def _survey(source: Source) -> tuple[int, dict[str, frozenset[str]], Clocks]:
+def _survey(frames: Iterable[Block]) -> tuple[int, dict[str, frozenset[str]], Clocks]:
     """The vehicle, the columns of its messages, and the clocks of all senders.
 
     The vehicle (system x 256 + component) is the one that tells its attitude most often.
@@ -137,10 +154,9 @@ def _survey(source: Source) -> tuple[int, dict[str, frozenset[str]], Clocks]:
     known = messages()
     counts: dict[tuple[int, int], int] = {}
     clocks = ClockSurvey()
-    for block in _Frames(source):
-        pairs, times = np.unique(block.frames[:, 2] * MOST_IDS + block.frames[:, 1], return_counts=True)
-        for pair, count in zip(pairs.tolist(), times.tolist(), strict=True):
-            counts[divmod(pair, MOST_IDS)] = counts.get(divmod(pair, MOST_IDS), 0) + count
+    for block in frames:
+        for system, number, which in block.groups:
+            counts[system, number] = counts.get((system, number), 0) + len(which)
         clocks.take(block)
     own: dict[int, int] = {}
     for (system, number), count in counts.items():

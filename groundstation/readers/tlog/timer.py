@@ -1,22 +1,30 @@
 """When the values in the frames of a telemetry log were true, block by block, by the clocks of their senders."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.tlog.clock import MOST_LATE_S, NS_PER_US, Clocks, TimeReader, time_fields
+from groundstation.readers.tlog.clock import NS_PER_US, Clocks, TimeReader, time_fields
 from groundstation.readers.tlog.frames import Block
 
+MOST_LATE_S = 600.0
 ASTRAY_S = 2.0  # of the time of a message from those of its sender's clock around it
 
 
 class Timer:
-    """Tells when the values of frames were true, block by block."""
+    """Tells when the values of frames were true, block by block.
+
+    Attributes
+    ----------
+    most_late_ns : int
+        How late a frame arrived at most, so far.
+    """
 
     def __init__(self, clocks: Clocks) -> None:
+        self.most_late_ns = 0
         self._clocks = clocks
         self._readers: dict[tuple[int, int], TimeReader] = {}
         self._before: dict[int, NDArray[np.int64]] = {}  # the last reference of each sender: record, receipt, its clock
@@ -33,25 +41,27 @@ class Timer:
         index, received_ns = block.record_index, self._received_ns(block)
         utc_ns, is_known = received_ns.copy(), np.zeros(len(block), dtype=bool)
         has_own = np.zeros(len(block), dtype=bool)
-        for sender, rows in block.of_senders():
+        senders = list(block.by_sender())
+        for sender, groups in senders:
             if sender in self._clocks.senders:
                 around = self._around(sender, own, self._references)
-                self._place(block, sender, rows, around, utc_ns, is_known)
+                self._place(block, sender, groups, around, utc_ns, is_known)
         known = np.stack((index, received_ns, utc_ns))
-        systems: dict[int, list[Int64Array]] = {}
-        for sender, rows in block.of_senders():
-            systems.setdefault(sender >> 8, []).append(rows)
-        for system, several in systems.items():
-            everything = self._known(system, np.sort(np.concatenate(several)), known, is_known)
-            for rows in several:
-                sender = int(block.frames[rows[0], 2])
-                of_sender = self._of_sender(sender, rows, known, is_known)
-                wanted = rows[~is_known[rows]]
-                anchors = of_sender if of_sender.shape[1] else everything
-                if len(wanted) and anchors.shape[1]:
-                    utc_ns[wanted] = _between(index[wanted], received_ns[wanted], anchors)
-                    has_own[wanted] = True
-        self._remember(block, own, known, is_known)
+        rows_of = {sender: np.flatnonzero(block.frames[:, 2] == sender) for sender, _groups in senders}
+        for sender, rows in rows_of.items():
+            wanted = rows[~is_known[rows]]
+            if not len(wanted):
+                continue
+            anchors = self._of_sender(sender, rows, known, is_known)
+            if not anchors.shape[1]:
+                system = [other for one, other in rows_of.items() if one >> 8 == sender >> 8]
+                anchors = self._known(sender >> 8, np.sort(np.concatenate(system)), known, is_known)
+            if anchors.shape[1]:
+                utc_ns[wanted] = _between(index[wanted], received_ns[wanted], anchors)
+                has_own[wanted] = True
+        self._remember(rows_of, own, known, is_known)
+        late_ns = (received_ns - utc_ns)[is_known]
+        self.most_late_ns = max(self.most_late_ns, int(late_ns.max(initial=0)))
         validity_ns, device_ns = utc_ns - self._clocks.offsets.at(index), block.received.values
         # Frames received at one time may get others; a time of validity that is the device's would go with it.
         validity_ns += (validity_ns == device_ns) & self._is_repeated(device_ns, following)
@@ -77,9 +87,9 @@ class Timer:
         """The frames of each sender that are read for its clock: record, receipt, clock; those that can be true."""
         found = {}
         received_ns = self._received_ns(block)
-        for sender, clock in self._clocks.senders.items():
-            which = np.flatnonzero((block.frames[:, 2] == sender) & (block.frames[:, 1] == clock.reference))
-            if not len(which):
+        for sender, number, which in block.groups:
+            clock = self._clocks.senders.get(sender)
+            if clock is None or number != clock.reference:
                 continue
             clock_ns = self._read(block, sender, clock.reference, which)
             index = block.record_index[which]
@@ -100,7 +110,7 @@ class Timer:
         self,
         block: Block,
         sender: int,
-        rows: Int64Array,
+        groups: Sequence[tuple[int, Int64Array]],
         around: NDArray[np.int64],
         utc_ns: Int64Array,
         is_known: BoolArray,
@@ -109,25 +119,24 @@ class Timer:
         clock = self._clocks.senders[sender]
         if not around.shape[1]:
             return
-        for number, which in block.by_number(rows):
-            if number not in clock.trusted:
+        astray_ns = round(ASTRAY_S * NS_PER_S)
+        behind = np.concatenate((around[2], around[2, -1:]))
+        before = np.concatenate((around[2, :1], around[2]))
+        low, high = np.minimum(before, behind) - astray_ns, np.maximum(before, behind) + astray_ns
+        clock_ns = np.full(len(block), -1, dtype=np.int64)
+        for number, which in groups:
+            if number == clock.reference or number not in clock.trusted:
                 continue
-            index = block.record_index[which]
-            at = np.searchsorted(around[0], index)
-            before = around[2, np.maximum(at - 1, 0)]
-            behind = around[2, np.minimum(at, around.shape[1] - 1)]
-            if number == clock.reference:
-                place = np.minimum(at, around.shape[1] - 1)
-                good, clock_ns = around[0, place] == index, around[2, place]
-            else:
-                clock_ns = self._read(block, sender, number, which)
-                if time_fields()[number].is_short and time_fields()[number].unit_ns == NS_PER_US:
-                    clock_ns = _near(clock_ns, before)
-                low, high = np.minimum(before, behind), np.maximum(before, behind)
-                astray_ns = round(ASTRAY_S * NS_PER_S)
-                good = (clock_ns >= 0) & (clock_ns >= low - astray_ns) & (clock_ns <= high + astray_ns)
-            utc_ns[which[good]] = clock.utc_of(index[good], clock_ns[good], self._clocks.ground_ns)
-            is_known[which[good]] = True
+            own_ns = self._read(block, sender, number, which)
+            at = np.searchsorted(around[0], block.record_index[which])
+            if time_fields()[number].is_short and time_fields()[number].unit_ns == NS_PER_US:
+                own_ns = _near(own_ns, before[at])
+            clock_ns[which] = np.where((own_ns >= low[at]) & (own_ns <= high[at]), own_ns, -1)
+        of_block = around[:, (around[0] >= block.first_index) & (around[0] < block.first_index + len(block))]
+        clock_ns[of_block[0] - block.first_index] = of_block[2]
+        good = np.flatnonzero(clock_ns >= 0)
+        utc_ns[good] = clock.utc_of(block.record_index[good], clock_ns[good], self._clocks.ground_ns)
+        is_known[good] = True
 
     def _of_sender(
         self, sender: int, rows: Int64Array, known: NDArray[np.int64], is_known: BoolArray
@@ -147,12 +156,16 @@ class Timer:
         return np.concatenate((before, known[:, rows[is_known[rows]]]), axis=1)
 
     def _remember(
-        self, block: Block, own: Mapping[int, NDArray[np.int64]], known: NDArray[np.int64], is_known: BoolArray
+        self,
+        rows_of: Mapping[int, Int64Array],
+        own: Mapping[int, NDArray[np.int64]],
+        known: NDArray[np.int64],
+        is_known: BoolArray,
     ) -> None:
         for sender, references in own.items():
             if references.shape[1]:
                 self._before[sender] = references[:, -1:]
-        for sender, rows in block.of_senders():
+        for sender, rows in rows_of.items():
             placed = rows[is_known[rows]]
             if len(placed):
                 self._last[sender] = known[:, placed[-1:]]
@@ -168,12 +181,18 @@ def _between(index: Int64Array, received_ns: Int64Array, known: NDArray[np.int64
     """UTC of frames between others, by the time of receipt, or by their order where that is one."""
     at = np.searchsorted(known[0], index)
     low, high = np.maximum(at - 1, 0), np.minimum(at, known.shape[1] - 1)
-    span_ns = known[1, high] - known[1, low]
-    by_receipt = np.clip(received_ns - known[1, low], 0, np.maximum(span_ns, 0)) / np.maximum(span_ns, 1)
-    by_order = (index - known[0, low]) / np.maximum(known[0, high] - known[0, low], 1)
-    share = np.where(span_ns > 0, by_receipt, by_order)
-    between = np.rint((known[2, high] - known[2, low]) * share).astype(np.int64)
-    beyond = received_ns - known[1, low]  # before the first, or behind the last
-    beyond = np.where(at == 0, np.minimum(beyond, 0), np.maximum(beyond, 0))
-    is_inside = (at > 0) & (at < known.shape[1])
-    return np.asarray(known[2, low] + np.where(is_inside, between, beyond))
+    records, times, utc = known
+    before_ns, first_ns = times[low], utc[low]
+    span_ns, since_ns = times[high] - before_ns, received_ns - before_ns
+    share = np.clip(since_ns, 0, span_ns) / np.maximum(span_ns, 1)
+    is_one = np.flatnonzero(span_ns <= 0)
+    if len(is_one):
+        before, behind = records[low[is_one]], records[high[is_one]]
+        share[is_one] = (index[is_one] - before) / np.maximum(behind - before, 1)
+    utc_ns = first_ns + np.rint((utc[high] - first_ns) * share).astype(np.int64)
+    is_first, is_last = at == 0, at == known.shape[1]
+    if is_first.any():
+        utc_ns[is_first] = first_ns[is_first] + np.minimum(since_ns[is_first], 0)
+    if is_last.any():
+        utc_ns[is_last] = first_ns[is_last] + np.maximum(since_ns[is_last], 0)
+    return np.asarray(utc_ns)
