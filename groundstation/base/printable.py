@@ -6,12 +6,14 @@ them; a cell that begins like a formula is one to a spreadsheet. Data stay as th
 
 import re
 import unicodedata
+from functools import cache
 
 JOINERS = "\u200c\u200d"  # some scripts need them; they hide nothing
 FORMULA_STARTS = ("=", "+", "-", "@", "＝", "＋", "－", "＠")
-_CANDIDATES = re.compile("[^\n\x20-\x7e]")  # everything else shows in any program
+_OTHERS = re.compile("[^\x20-\x7e]")  # than what shows in any program
 
 
+@cache
 def is_hidden(mark: str) -> bool:
     """Whether a character does something in place of being seen: controls, marks of direction, ends of lines, halves.
 
@@ -33,10 +35,12 @@ def printable(text: str, instead: str = "?") -> str:
     """
     if text.isprintable():
         return text
-    return "".join(_shown(mark, instead) if is_hidden(mark) else mark for mark in text)
+    return _OTHERS.sub(lambda match: _shown(match[0], instead), text)
 
 
 def _shown(mark: str, instead: str) -> str:
+    if not is_hidden(mark):
+        return mark
     return " " if mark in "\t\n\v\f\r\x85\u2028\u2029" else instead
 
 
@@ -51,6 +55,18 @@ def in_a_line(text: str) -> str:
     return " ".join(printable(text).split())
 
 
+def spreadsheet_text(text: str) -> str:
+    """Text of a cell that shows in a spreadsheet and is not run: an apostrophe before what would be a formula.
+
+    Examples
+    --------
+    >>> spreadsheet_text("@SUM(A1)"), spreadsheet_text("a+b")
+    ("'@SUM(A1)", 'a+b')
+    """
+    shown = printable(text)
+    return "'" + shown if shown.lstrip().startswith(FORMULA_STARTS) else shown
+
+
 def csv_cell(text: str) -> str:
     """Write text as a CSV cell that no spreadsheet runs: quoted where needed, an apostrophe before a formula.
 
@@ -59,8 +75,7 @@ def csv_cell(text: str) -> str:
     >>> csv_cell("=1+1"), csv_cell("a,b"), csv_cell("ab"), csv_cell("\\x1b[2J\\n=1")
     ("'=1+1", '"a,b"', 'ab', '?[2J =1')
     """
-    shown = printable(text)
-    safe = "'" + shown if shown.lstrip().startswith(FORMULA_STARTS) else shown
+    safe = spreadsheet_text(text)
     return '"' + safe.replace('"', '""') + '"' if any(mark in safe for mark in ',;"') else safe
 
 
@@ -72,12 +87,12 @@ def printable_json(text: str) -> str:
     >>> print(printable_json('["a\\u202eb", "\\x7f", "ж"]'))
     ["a\\u202eb", "\\u007f", "ж"]
     """
-    return _CANDIDATES.sub(_escaped, text)
+    return _OTHERS.sub(_escaped, text)
 
 
 def _escaped(match: re.Match[str]) -> str:
     mark = match[0]
-    if not is_hidden(mark):
+    if mark == "\n" or not is_hidden(mark):  # between the parts of a document; within a text it is an escape
         return mark
     units = mark.encode("utf-16-be", "surrogatepass")
     return "".join(f"\\u{units[at]:02x}{units[at + 1]:02x}" for at in range(0, len(units), 2))

@@ -13,7 +13,9 @@ import typer.core
 
 from groundstation.base.errors import GroundstationError, UsageError, lack_of_memory
 from groundstation.base.failures import Failure, reason_of
-from groundstation.cli.text import as_json, printable, printable_lines
+from groundstation.cli.text import as_json, printable
+from groundstation.cli.text import say as say
+from groundstation.cli.text import tell as tell
 
 DONE, FAILED, USAGE, DATA_LOST, LIMIT_REACHED = 0, 1, 2, 3, 4
 INTERRUPTED = 130
@@ -200,11 +202,6 @@ def time_limit_s(given: float | None) -> float:
     return math.inf if given is None else given
 
 
-def say(text: str) -> None:
-    """Print a line on stderr."""
-    typer.echo(printable(text), err=True)
-
-
 def tell_failures(found: Iterable[Failure], *, with_traces: bool = False) -> int:
     """Print on stderr the parts that failed; the exit code for that."""
     code = DONE
@@ -212,7 +209,7 @@ def tell_failures(found: Iterable[Failure], *, with_traces: bool = False) -> int
         code = FAILED
         say(f"error: {failure.text}")
         if with_traces:
-            typer.echo(printable_lines(failure.trace), err=True)
+            say(failure.trace.rstrip())
     return code
 
 
@@ -220,9 +217,9 @@ def tell_written(paths: Iterable[object], *, as_json_text: bool, quiet: bool) ->
     """Print the files that were written."""
     written = [str(path) for path in paths]
     if as_json_text:
-        typer.echo(as_json({"written": written}))
+        tell(as_json({"written": written}))
     elif not quiet:
-        typer.echo("\n".join(map(printable, written)))
+        tell("\n".join(map(printable, written)))
 
 
 def answers_with_exit_code(verb: Callable[Parameters, int | None]) -> Callable[Parameters, None]:
@@ -249,9 +246,9 @@ def answers_with_exit_code(verb: Callable[Parameters, int | None]) -> Callable[P
             if lacking := lack_of_memory(error):
                 say(f"error: {lacking}")
             elif isinstance(error, OSError):
-                say(f"error: {error.filename or 'file system'}: {error.strerror or error}")
+                say(printable(f"error: {error.filename or 'file system'}: {error.strerror or error}"))
             elif options.get("verbose"):  # a defect of ours: one line for the user, the rest on request
-                typer.echo(printable_lines("".join(traceback.format_exception(error))), err=True)
+                say("".join(traceback.format_exception(error)).rstrip())
             else:
                 say(f"error: {reason_of(error)}; -v shows where")
         if options.get("verbose"):

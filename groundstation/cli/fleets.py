@@ -16,6 +16,7 @@ from groundstation.cli.application import (
     app,
     examples,
     say,
+    tell,
     tell_failures,
 )
 
@@ -32,7 +33,7 @@ def serve(
     """Offer all recordings of a folder through Rerun's catalog server, until Ctrl-C."""
     from groundstation.pipeline.verbs.serve import serve as offer
 
-    offer(out, host=host, port=port, web=web, tell=typer.echo, say=say)
+    offer(out, host=host, port=port, web=web, tell=tell, say=say)
     return DONE
 
 
@@ -52,11 +53,11 @@ def acceptance(
         found, paths, problem = accept_to(out, standard, output, with_pdf=with_pdf)
         lacking = failures()
     if json:
-        typer.echo(as_json(found.to_dict() | {"written": [str(path) for path in paths]}))
+        tell(as_json(found.to_dict() | {"written": [str(path) for path in paths]}))
     elif not quiet:
         top = front(found)
         told = (line.replace(NARROW_SPACE, " ") for line in (top.line, *top.sentences))
-        typer.echo("\n".join(map(printable, (*told, *map(str, paths)))))
+        tell("\n".join(map(printable, (*told, *map(str, paths)))))
     if problem:
         say(f"warning: {problem}")
     unread = [flight for flight in found.flights if not flight.is_read]

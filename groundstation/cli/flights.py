@@ -18,6 +18,7 @@ from groundstation.cli.application import (
     answers_with_exit_code,
     app,
     examples,
+    tell,
     tell_failures,
 )
 from groundstation.cli.text import printable
@@ -181,9 +182,9 @@ def compare(
         found = held_against(a, b, align)[0] if output is None else compare_to(a, b, output, align, force=force)
         lacking = failures()
     if json:
-        typer.echo(printing.as_json(to_json(found.to_dict())))
+        tell(printing.as_json(to_json(found.to_dict())))
     elif not quiet:
-        typer.echo(comparison_text(found, everything=verbose))
+        tell(comparison_text(found, everything=verbose))
     return tell_failures(lacking, with_traces=verbose)
 
 

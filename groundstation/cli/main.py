@@ -46,6 +46,7 @@ from groundstation.cli.application import (
     app,
     examples,
     say,
+    tell,
     tell_written,
     time_limit_s,
 )
@@ -59,7 +60,7 @@ PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have
 
 def _version(is_asked: bool) -> None:
     if is_asked:
-        typer.echo(f"groundstation {__version__}")
+        tell(f"groundstation {__version__}")
         raise typer.Exit
 
 
@@ -90,11 +91,11 @@ def info(
     from groundstation.pipeline.verbs import describe
 
     if suggest_icd:
-        typer.echo(describe.suggest_icd(log))
+        tell(describe.suggest_icd(log))
         return DONE
     description = describe.describe(log, profile, tuple(icd or ()))
     shown = printing.as_json(description.to_dict()) if json else printing.description(description, everything=verbose)
-    typer.echo(shown)
+    tell(shown)
     if not description.has_records:
         say(f"error: {log.name}: {why_nothing_is_placed(description.findings)}")
         return FAILED
@@ -369,7 +370,7 @@ def list_(
     from groundstation.pipeline.verbs.catalogue import catalogue
 
     entries = catalogue(log, profile)
-    typer.echo(printing.as_json(entries) if json else printing.catalogue(entries, log is not None))
+    tell(printing.as_json(entries) if json else printing.catalogue(entries, log is not None))
     return DONE
 
 

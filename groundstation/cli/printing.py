@@ -6,10 +6,8 @@ from itertools import groupby
 from pathlib import Path, PurePath
 from typing import Any
 
-import typer
-
 from groundstation.base.text_columns import columns
-from groundstation.cli.text import as_json, printable, printable_lines
+from groundstation.cli.text import as_json, printable, say, tell
 from groundstation.pipeline.one_flight.log import log_name
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
 from groundstation.pipeline.verbs.describe import BusWord, Description
@@ -81,37 +79,37 @@ def outcomes(
     On stderr what was skipped, by reason, then failures, then totals. Of a plan there is no state and no total.
     """
     if as_json_text:
-        typer.echo(as_json([_plain(outcome) for outcome in done]))
+        tell(as_json([_plain(outcome) for outcome in done]))
         return
     names = _names(done)
     for name, outcome in zip(names, done, strict=True):
         if outcome.state not in ("failed", "skipped") and not quiet:
             state = "finished before" if outcome.was_finished else _LINE_WORDS[outcome.state]
             state = "" if is_plan else state
-            typer.echo("  ".join(printable(part) for part in (name, state, outcome.flight_id, outcome.text) if part))
+            tell("  ".join(printable(part) for part in (name, state, outcome.flight_id, outcome.text) if part))
         if with_times and outcome.times_s:
             spent = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in outcome.times_s.items())
-            typer.echo(f"  {spent}", err=True)
+            say(f"  {spent}")
     if not quiet:
         for line in skipped_lines(done, most=len(done) if with_times else MOST_SKIPPED):
-            typer.echo(line, err=True)
+            say(line)
     for outcome in done:
         tell_errors(outcome, with_traces=with_times)
     if sum(not one.is_beside for one in done) > 1 and not quiet and not is_plan:
-        typer.echo(totals(done), err=True)
+        say(totals(done))
 
 
 def tell_errors(outcome: Outcome, *, with_traces: bool = False) -> None:
     """Print on stderr why a log failed, and which parts of a flight did."""
     traces = [outcome.trace] if outcome.state == "failed" else []
     if outcome.state == "failed":
-        typer.echo(f"error: {printable(outcome.text)}", err=True)
+        say(printable(f"error: {outcome.text}"))
     name = outcome.source if outcome.is_session else log_name(Path(outcome.source))
     for failure in outcome.failures:
-        typer.echo(f"error: {printable(f'{name}: {failure.text}')}", err=True)
+        say(printable(f"error: {name}: {failure.text}"))
         traces.append(failure.trace)
     for trace in filter(None, traces if with_traces else ()):
-        typer.echo(printable_lines(trace), err=True)
+        say(trace.rstrip())
 
 
 def _names(done: Sequence[Outcome]) -> list[str]:

@@ -1,10 +1,22 @@
-"""Text for a terminal and for other programs: printable lines, JSON."""
+"""What all verbs print with: text that shows and drives no terminal, JSON for programs."""
 
 import json
 from typing import Any
 
+import typer
+
 from groundstation.base.printable import printable as printable
 from groundstation.base.printable import printable_json
+
+
+def tell(text: str) -> None:
+    """Print a result on stdout."""
+    typer.echo(printable_lines(text))
+
+
+def say(text: str) -> None:
+    """Print everything else on stderr."""
+    typer.echo(printable_lines(text), err=True)
 
 
 def printable_lines(text: str) -> str:
@@ -15,7 +27,7 @@ def printable_lines(text: str) -> str:
     >>> printable_lines("a\\x1b[2J\\nb")
     'a?[2J\\nb'
     """
-    return "\n".join(map(printable, text.rstrip("\n").split("\n")))
+    return "\n".join(map(printable, text.split("\n")))
 
 
 def as_json(document: Any) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+from groundstation.base.printable import printable
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.exports.text import coordinates, number
 from groundstation.exports.tracks import MSL, Track
@@ -61,5 +62,5 @@ def _known(parent: ET.Element, tag: str, text: str) -> None:
 
 def _sub(parent: ET.Element, tag: str, text: str | None = None) -> ET.Element:
     element = ET.SubElement(parent, f"{{{GPX}}}{tag}")
-    element.text = text
+    element.text = None if text is None else printable(text)  # XML knows no other characters
     return element

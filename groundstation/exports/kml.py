@@ -8,6 +8,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import continuous_longitude_deg
+from groundstation.base.printable import printable
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.exports.text import coordinates, number
 from groundstation.exports.tracks import ELLIPSOID, MSL, PRESSURE, Track
@@ -129,5 +130,5 @@ def _altitudes(track: Track) -> FloatArray:
 
 def _sub(parent: ET.Element, tag: str, text: str | None = None, **attributes: str) -> ET.Element:
     element = ET.SubElement(parent, tag if tag.startswith("{") else f"{{{KML}}}{tag}", attributes)
-    element.text = text
+    element.text = None if text is None else printable(text)  # XML knows no other characters
     return element
