@@ -5,13 +5,17 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, Literal, ParamSpec
+from typing import TYPE_CHECKING, Annotated, Any, Literal, ParamSpec
 
 import typer
 import typer.core
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.cli.text import as_json, printable
+
+if TYPE_CHECKING:
+    from groundstation.pipeline.many_flights.confined import Bounds
+    from groundstation.pipeline.one_flight.isolation import Isolation
 
 DONE, FAILED, USAGE, DATA_LOST, LIMIT_REACHED = 0, 1, 2, 3, 4
 INTERRUPTED = 130
@@ -138,6 +142,13 @@ Timeout = Annotated[
         min=1.0,
     ),
 ]
+Isolate = Annotated[
+    bool,
+    typer.Option(
+        "--isolate",
+        help="Read each log in a process of its own, with limits of memory, time and file size ([isolation]).",
+    ),
+]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
 Profile = Annotated[
     Path | None,
@@ -196,6 +207,22 @@ def time_limit_s(given: float | None) -> float:
     if given is not None and math.isnan(given):
         raise UsageError("--timeout nan", "no number", "seconds")
     return math.inf if given is None else given
+
+
+def time_bound(timeout: float | None, isolation: "Isolation | None" = None) -> "Bounds | None":
+    """What one log may take; None where there is neither a limit of time nor ``--isolate``.
+
+    Raises
+    ------
+    UsageError
+        When the limit is no number, or this system cannot read a log apart.
+    """
+    timeout_s = time_limit_s(timeout)
+    if timeout is None and isolation is None:
+        return None
+    from groundstation.pipeline.many_flights.apart import bounds_of
+
+    return bounds_of(isolation, timeout_s)
 
 
 def say(text: str) -> None:

@@ -21,7 +21,7 @@ from groundstation.base.errors import GroundstationError
 from groundstation.base.findings import Severity, worst
 from groundstation.base.version import __version__
 from groundstation.pipeline.one_flight.apply_deviation import APPLIED, corrected_name
-from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.configuration import ISOLATION, Configuration
 from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.log import as_log, digest_of
 from groundstation.pipeline.one_flight.sealing import spoiled_files
@@ -140,6 +140,7 @@ def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool) -> 
     """
     tables = dict(configuration.tables)
     thresholds = tables.pop("thresholds", {})
+    tables.pop(ISOLATION, None)
     conversion = _digest(
         asdict(source), _layouts_of(configuration), thresholds, dict(versions()), platform.python_version()
     )
