@@ -25,7 +25,8 @@ from groundstation.base.records import Column
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.cli.main import app
 from groundstation.estimators.magnetic.corrected import CorrectedHeading, correct_heading
-from groundstation.pipeline.many_flights.batch import plan_many, run_many
+from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.dry_run import plan_many
 from groundstation.pipeline.many_flights.inputs import file_in
 from groundstation.pipeline.many_flights.publishing import report_again
 from groundstation.pipeline.many_flights.remote import RemoteFolder

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from groundstation.base import to_disk
-from groundstation.pipeline.many_flights.batch import plan_many, run_many
+from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.dry_run import plan_many
 from groundstation.pipeline.many_flights.flight_keys import KEYS
 from groundstation.pipeline.one_flight import flight
 from groundstation.pipeline.one_flight.configuration import Configuration

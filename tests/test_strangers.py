@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from groundstation.pipeline.many_flights import batch, strangers
-from groundstation.pipeline.many_flights.batch import plan_many, run_many
+from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.dry_run import plan_many
 from groundstation.pipeline.many_flights.publishing import MOST_SKIPPED
 from groundstation.pipeline.many_flights.strangers import MEMORY, Strangers
 from groundstation.pipeline.one_flight.configuration import Configuration
@@ -51,7 +52,7 @@ def test_files_that_are_no_logs_are_told_as_before_and_no_job_is_made_of_them(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr(batch, "_skipped", lambda *_: {})
+        patch.setattr(batch, "skipped_files", lambda *_: {})
         before = run(folder, tmp_path / "one")
     assert {one.state for one in before} == {"skipped"} and len(before) == len(CONTENTS)
     monkeypatch.setattr("groundstation.pipeline.many_flights.batch.run_flight", None)

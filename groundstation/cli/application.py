@@ -6,7 +6,7 @@ import traceback
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, Literal, ParamSpec
+from typing import TYPE_CHECKING, Annotated, Any, Literal, ParamSpec
 
 import typer
 import typer.core
@@ -16,6 +16,10 @@ from groundstation.base.failures import Failure, reason_of
 from groundstation.cli.text import as_json, printable
 from groundstation.cli.text import say as say
 from groundstation.cli.text import tell as tell
+
+if TYPE_CHECKING:
+    from groundstation.pipeline.many_flights.confined import Bounds
+    from groundstation.pipeline.one_flight.isolation import Isolation
 
 DONE, FAILED, USAGE, DATA_LOST, LIMIT_REACHED = 0, 1, 2, 3, 4
 INTERRUPTED = 130
@@ -142,6 +146,13 @@ Timeout = Annotated[
         min=1.0,
     ),
 ]
+Isolate = Annotated[
+    bool,
+    typer.Option(
+        "--isolate",
+        help="Read each log in a process of its own, with limits of memory, time and file size ([isolation]).",
+    ),
+]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
 Profile = Annotated[
     Path | None,
@@ -211,6 +222,22 @@ def tell_failures(found: Iterable[Failure], *, with_traces: bool = False) -> int
         if with_traces:
             say(failure.trace.rstrip())
     return code
+
+
+def time_bound(timeout: float | None, isolation: "Isolation | None" = None) -> "Bounds | None":
+    """What one log may take; None where there is neither a limit of time nor ``--isolate``.
+
+    Raises
+    ------
+    UsageError
+        When the limit is no number, or this system cannot read a log apart.
+    """
+    timeout_s = time_limit_s(timeout)
+    if timeout is None and isolation is None:
+        return None
+    from groundstation.pipeline.many_flights.apart import bounds_of
+
+    return bounds_of(isolation, timeout_s)
 
 
 def tell_written(paths: Iterable[object], *, as_json_text: bool, quiet: bool) -> None:

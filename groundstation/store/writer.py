@@ -1,5 +1,6 @@
 """Write a store file: chunks go to a spool as they fill, and into the file in order of time when all are known."""
 
+import glob
 import hashlib
 import os
 import re
@@ -46,6 +47,7 @@ LIBRARY = f"groundstation {__version__}"
 ZSTD_LEVEL = -1
 MEMORY_BYTES = 32 << 20  # of finished chunks that are kept in memory; when there are more, all go to the spool
 MOST_ON_THEIR_WAY = 4  # chunks that wait for the thread which compresses and writes them
+PART = ".part"  # end of the name of a file that is being written
 MAX_CHANNELS = 65_535  # MCAP's channel ids have 16 bits
 
 
@@ -140,7 +142,7 @@ class StoreWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         assert self._spool is not None
-        part = self.path.with_name(f".{self.path.name}.{os.getpid()}.part")
+        part = self.path.with_name(f".{self.path.name}.{os.getpid()}{PART}")
         try:
             if kind is None:
                 with self._failing_in_one_line():
@@ -331,6 +333,26 @@ class StoreWriter:
         except OSError as error:
             reason = error.strerror or type(error).__name__
             raise GroundstationError(str(self.path), f"cannot be written ({reason})") from error
+
+
+def clear_parts(path: Path) -> None:
+    """Remove what processes that died while they wrote a file have left beside it."""
+    for part in path.parent.glob(f".{glob.escape(path.name)}.*{PART}"):
+        number = part.name.removesuffix(PART).rpartition(".")[2]
+        if number.isdecimal() and not _is_alive(int(number)):
+            part.unlink(missing_ok=True)
+
+
+def _is_alive(process: int) -> bool:
+    if os.name != "posix":  # there the signal 0 is another one
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:

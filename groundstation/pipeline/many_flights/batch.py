@@ -3,48 +3,37 @@
 import math
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePath
 from types import MappingProxyType
 
-from groundstation.base.errors import UnclaimedLogError, UsageError
+from groundstation.base.errors import UsageError
 from groundstation.base.to_disk import sync_folder
+from groundstation.pipeline.many_flights.apart import bounds_of, outcomes_apart
+from groundstation.pipeline.many_flights.confined import Bounds
 from groundstation.pipeline.many_flights.delta_sink import delta_place, put_flights
-from groundstation.pipeline.many_flights.fleet_store import Scan, refresh, scan
-from groundstation.pipeline.many_flights.found_sessions import (
-    STATIONS_TOML,
-    Asked,
-    FoundSessions,
-    find_sessions,
-    run_sessions,
-)
-from groundstation.pipeline.many_flights.inputs import collect, is_ours, session_folders
+from groundstation.pipeline.many_flights.fleet_store import Scan, refresh
+from groundstation.pipeline.many_flights.found_sessions import Asked, find_sessions, run_sessions
+from groundstation.pipeline.many_flights.inputs import session_folders
 from groundstation.pipeline.many_flights.known_flights import KnownFlights
+from groundstation.pipeline.many_flights.listed_logs import inputs_of, run_known, skipped_files, with_steps
 from groundstation.pipeline.many_flights.out_folder import alone_in, clear_unfinished, prepare, refuse_foreign
 from groundstation.pipeline.many_flights.output import LocalOutput, RemoteOutput
 from groundstation.pipeline.many_flights.placement import Placement
 from groundstation.pipeline.many_flights.publishing import FLEET_FILES, write_beside, write_index_of
-from groundstation.pipeline.many_flights.remote import FarLog, far_logs, is_remote
+from groundstation.pipeline.many_flights.remote import is_remote
 from groundstation.pipeline.many_flights.remote_runs import RemoteJob, digest_remote, run_remote
-from groundstation.pipeline.many_flights.session import load_stations, planned_session
+from groundstation.pipeline.many_flights.session import load_stations
 from groundstation.pipeline.many_flights.strangers import Strangers
 from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJob, Crew, in_turn, side_by_side
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.cores import cores, painters_of
 from groundstation.pipeline.one_flight.flight import Job, run_flight
-from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
-
-PLANS: Mapping[str, str] = {
-    "everything": "to run",
-    "analysis": "to analyse again: a setting changed, a file is missing or a part failed; the MCAP stays",
-    "reports": "to report again",
-    "nothing": "finished, nothing to do",
-}
 
 
 def run_many(
@@ -61,6 +50,7 @@ def run_many(
     stations: Path | None = None,
     only_results: bool = False,
     timeout_s: float = math.inf,
+    is_isolated: bool = False,
     store: str = "",
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
@@ -83,6 +73,8 @@ def run_many(
         Neither recordings nor reports, of flights or of all; a later run without it makes them.
     timeout_s : float
         A log, or a session, that takes longer has failed, and the process that ran it is ended.
+    is_isolated : bool
+        Each log, and each session, in a process of its own that may take what ``[isolation]`` of the settings allows.
     store : str
         ``delta:`` and a path or URL: a Delta table that takes the rows of these flights, too.
 
@@ -100,13 +92,14 @@ def run_many(
     ground = None if stations is None else load_stations(stations)
     if store:
         delta_place(store)
-    inputs = _inputs(paths, out, configuration)
+    inputs = inputs_of(paths, out, configuration)
     is_near = not any(is_remote(str(place)) for place in (out, *paths))
     listen(Event("begin", total=len(inputs)))
     strangers = Strangers(Path(out) if is_near else None)
-    skipped = _skipped(inputs, strangers, listen) if is_near and configuration.profile is None else {}
+    skipped = skipped_files(inputs, strangers, listen) if is_near and configuration.profile is None else {}
     logs = len(inputs) - len(skipped)
-    crew = _crew(scheduler, jobs or cores(), logs, listen, timeout_s)
+    bounds = bounds_of(configuration.isolation, timeout_s) if is_isolated else None
+    crew = _crew(scheduler, jobs or cores(), logs, listen, timeout_s, bounds)
     painters = 1 if scheduler else painters_of(jobs or cores(), logs)
     make = partial(
         Job,
@@ -134,7 +127,7 @@ def run_many(
         return _run_remote(remote, asked, crew, force, listen)
     near = [make(Path(one.url), Path(out), is_named=one.is_named) for one in inputs]
     refresher = _crew(scheduler, jobs or cores(), TASKS_PER_PROCESS + 1, listen)
-    outcomes = _run_here(near, asked, crew, force, listen, refresher, skipped)
+    outcomes = _run_here(near, asked, crew, force, listen, refresher, skipped, is_isolated=is_isolated)
     strangers.keep(outcomes)
     return outcomes
 
@@ -190,16 +183,6 @@ def run_together(
         return _run_here([job], asked, partial(in_turn, listen=listen), force, listen)
 
 
-def _skipped(inputs: Sequence[FarLog], strangers: Strangers, listen: Listener) -> dict[int, Outcome]:
-    """Outcomes, by their numbers, of files in folders that no reader claims."""
-    found: dict[int, Outcome] = {}
-    for number, one in enumerate(inputs):
-        if not one.is_named and (reason := strangers.reason(Path(one.url))) is not None:
-            found[number] = Outcome(one.url, "skipped", reason)
-            listen(Event("end", PurePath(one.url).name, reason))
-    return found
-
-
 def _run_here(
     work: Sequence[Job],
     asked: Asked,
@@ -208,18 +191,21 @@ def _run_here(
     listen: Listener,
     refresher: Crew | None = None,
     skipped: Mapping[int, Outcome] = MappingProxyType({}),
+    *,
+    is_isolated: bool = False,
 ) -> tuple[Outcome, ...]:
     out = asked.out
     refuse_foreign(out, force)
     with alone_in(out):
         prepare(out)
-        known = KnownFlights(None if asked.redo else out)
+        known = KnownFlights(None if asked.redo or is_isolated else out)  # isolated, no log is read in this process
+        run = partial(run_known, redo=asked.redo) if is_isolated else run_flight
         placement = Placement(LocalOutput(out), [job.log for job in work])
         for number, outcome in skipped.items():
             placement.put(number, outcome)
 
         def left() -> Iterator[tuple[int, Job]]:
-            for number, job, twin in _with_steps(work, known, skipped):
+            for number, job, twin in with_steps(work, known, skipped):
                 if twin is None:
                     yield number, job
                 else:
@@ -229,7 +215,7 @@ def _run_here(
         def suffixed(number: int) -> Job:
             return replace(work[number], add_suffix=True)
 
-        _run_into(placement, out, left(), run_flight, suffixed, crew, listen)
+        _run_into(placement, out, left(), run, suffixed, crew, listen)
         clear_unfinished(out)  # of processes that died or took too long
         found, unwritten = _swept(placement, out, refresher)
         sessions = _run_sessions(placement, asked, found, crew, listen)
@@ -367,8 +353,17 @@ def _run_into(
         raise
 
 
-def _crew(scheduler: str, workers: int, logs: int, listen: Listener, timeout_s: float = math.inf) -> Crew:
+def _crew(
+    scheduler: str,
+    workers: int,
+    logs: int,
+    listen: Listener,
+    timeout_s: float = math.inf,
+    bounds: Bounds | None = None,
+) -> Crew:
     """Who does the work: a cluster, processes, or this process alone, where there is little and no limit of time."""
+    if bounds is not None:
+        return partial(outcomes_apart, workers=workers, listen=listen, bounds=bounds)
     if scheduler:
         from groundstation.pipeline.many_flights.cluster import on_cluster
 
@@ -376,101 +371,3 @@ def _crew(scheduler: str, workers: int, logs: int, listen: Listener, timeout_s: 
     if min(workers, logs) <= 1 and logs <= TASKS_PER_PROCESS and math.isinf(timeout_s):
         return partial(in_turn, listen=listen)
     return partial(side_by_side, workers=min(workers, logs), listen=listen, timeout_s=timeout_s)
-
-
-def plan_many(
-    paths: Sequence[Path | str],
-    out: Path | str,
-    configuration: Configuration,
-    *,
-    with_pdf: bool = True,
-    redo: bool = False,
-    stations: Path | None = None,
-    only_results: bool = False,
-) -> tuple[Outcome, ...]:
-    """Say what :func:`run_many` would do of each log, and of the sessions among finished flights; nothing is written.
-
-    Raises
-    ------
-    UsageError
-        As :func:`run_many`, and for logs or results elsewhere, which would have to be fetched first.
-    """
-    if any(is_remote(str(place)) for place in (out, *paths)):
-        raise UsageError("--dry-run", "logs or results elsewhere", "local ones")
-    inputs, out = _inputs(paths, out, configuration), Path(out)
-    refuse_foreign(out, force=True)
-    before = scan(out)
-    known = KnownFlights(None if redo else out)
-    make = partial(Job, out=out, configuration=configuration, with_pdf=with_pdf, only_results=only_results)
-    work = [make(Path(one.url), is_named=one.is_named) for one in inputs]
-    found = {} if configuration.profile is not None else _skipped(inputs, Strangers(out), silent)
-    for number, job, twin in _with_steps(work, known, found):
-        if twin is not None:
-            found[number] = Outcome(job.log, "done", f"same content as {work[twin].log}, listed once")
-        else:
-            found[number] = _planned(job)
-    outcomes = [outcome for _, outcome in sorted(found.items())]
-    ground = None if stations is None else load_stations(stations)
-    asked = Asked(out, configuration, ground, "none", with_pdf, redo, only_results=only_results)
-    return (*outcomes, *_planned_sessions(asked, before, outcomes))
-
-
-def _planned(job: Job) -> Outcome:
-    """What would become of a log."""
-    if job.finished is not None:
-        is_there = job.step == "nothing"
-        return Outcome(job.log, "done", PLANS[job.step], flight_id=job.finished.flight_id, was_finished=is_there)
-    try:
-        open_log(job.path, job.configuration.profile_path)
-    except UnclaimedLogError as error:
-        return Outcome(job.log, "failed" if job.is_named else "skipped", str(error))
-    except Exception as error:
-        return Outcome(job.log, "failed", reason_of(job.name, error)[0])
-    return Outcome(job.log, "done", PLANS[job.step])
-
-
-def _planned_sessions(asked: Asked, among: Scan, planned: Sequence[Outcome]) -> list[Outcome]:
-    """Sessions among the finished flights; that those of unread logs are looked for, where stations are given."""
-    flight_ids = {one.flight_id for one in planned if one.flight_id}
-    found = find_sessions(asked, among, flight_ids) if flight_ids else FoundSessions()
-    sessions = [*map(planned_session, found.jobs), *(one for one in found.told if one.state == "failed")]
-    logs = [one for one in planned if one.state == "done"]
-    unread = [one.source for one in logs if one.text == PLANS["everything"]]
-    has_stations = asked.stations is not None or any(Path(log).with_name(STATIONS_TOML).is_file() for log in unread)
-    if unread and len(logs) > 1 and has_stations:
-        text = "looked for among the flights once the logs are read"
-        sessions.append(Outcome("sessions", "done", text, is_session=True))
-    return sessions
-
-
-def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configuration) -> tuple[FarLog, ...]:
-    """Logs by path or URL, in a stable order."""
-    near = [Path(path) for path in paths if not is_remote(str(path))]
-    found = {log.url: log for path in paths if is_remote(str(path)) for log in far_logs(str(path))}
-    judges = {path.resolve() for path in configuration.references.paths}  # in a folder they are no logs to run
-    for one in collect(near, None if is_remote(str(out)) else Path(out)):
-        if one.is_named or not judges or one.path.resolve() not in judges:
-            found[str(one.path)] = FarLog(str(one.path), one.is_named, one.path.stat().st_size)
-    if not found:
-        hint = "output of groundstation is no input" if any(path.is_dir() and is_ours(path) for path in near) else ""
-        raise UsageError(", ".join(map(str, paths)), "no log in it", "", hint)
-    return tuple(log for _, log in sorted(found.items()))
-
-
-def _with_steps(
-    jobs: Sequence[Job], known: KnownFlights, without: Collection[int] = ()
-) -> Iterator[tuple[int, Job, int | None]]:
-    """Jobs by number, with what is to be done of each, and the number of an earlier one with the same finished log."""
-    first: dict[str, int] = {}
-    for number, job in enumerate(jobs):
-        if number in without:
-            continue
-        planned = _with_step(job, known) if len(known) else job
-        kept = first.setdefault(planned.finished.sha256, number) if planned.finished else number
-        yield number, planned, kept if kept != number else None
-
-
-def _with_step(job: Job, known: KnownFlights) -> Job:
-    asked = job.asked()
-    found = None if asked is None else known.of(asked[0])
-    return job if asked is None or found is None else job.going_on(found, asked[1])

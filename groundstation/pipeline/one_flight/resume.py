@@ -22,7 +22,7 @@ from groundstation.base.failures import is_incomplete
 from groundstation.base.findings import Finding
 from groundstation.base.version import __version__
 from groundstation.pipeline.one_flight.apply_deviation import APPLIED, corrected_name
-from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.configuration import ISOLATION, Configuration
 from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.log import as_log, digest_of
 from groundstation.pipeline.one_flight.sealing import spoiled_files
@@ -142,6 +142,7 @@ def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool) -> 
     """
     tables = dict(configuration.tables)
     thresholds = tables.pop("thresholds", {})
+    tables.pop(ISOLATION, None)
     conversion = _digest(
         asdict(source), _layouts_of(configuration), thresholds, dict(versions()), platform.python_version()
     )
