@@ -33,6 +33,8 @@ from groundstation.readers.start import unusable_references, utc_of_zero
 NAME = "csv-profile"
 DISTINCTIVE_COLUMNS = 4
 DAMAGED_HEAD_LINES = 20  # in which a header row is looked for when the first line is not the profile's
+MOST_LINES = 10_000  # in which it is looked for elsewhere
+FEWEST_ROWS = 3  # above the header row that are those of another log
 
 
 @dataclass(frozen=True)
@@ -64,9 +66,14 @@ def sniff(source: Source) -> Claim | None:
         if first.startswith(profile.first_line):
             if _fit(source, profile) is not None:
                 return Claim(NAME, profile.name, 1.0)
-        elif (fit := _fit(source, profile, limit=DAMAGED_HEAD_LINES)) is not None and _is_distinctive(fit):
+        elif (fit := _fit(source, profile, _limit(source, profile))) is not None and _is_distinctive(fit):
             return Claim(NAME, profile.name, 0.9)
     return None
+
+
+def _limit(source: Source, profile: Profile) -> int:
+    """In how many lines a header row is looked for: below the rows of another log it has its first line above it."""
+    return MOST_LINES if b"\n" + profile.first_line.encode() in source.head else DAMAGED_HEAD_LINES
 
 
 def _is_distinctive(fit: _Fit) -> bool:
@@ -109,16 +116,34 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
         yield header
         yield truncated_header(last.number)
         return
-    header_lines = frozenset(normal_form(line.text, fit.delimiter) for line in fit.above) - {""}
+    header_lines = frozenset(normal_form(line.text, fit.delimiter) for line in _of_the_header(fit)) - {""}
     cells = len(fit.names) + trailing_cells(fit.first_rows, fit.delimiter, len(fit.names))
-    dialect = Dialect(fit.encoding, fit.delimiter, cells, last.next_byte, last.number + 1, header_lines)
+    start = (0, 1) if _has_rows_above(fit, cells) else (last.next_byte, last.number + 1)
+    dialect = Dialect(fit.encoding, fit.delimiter, cells, *start, header_lines)
     items = TableReader(source, dialect, layout).items(header)
     yield next(items)
     yield from remarks + layout_remarks + unusable_references(metadata)
     yield from misnamed(items, _slips(fit), last.number - fit.profile.rows_after_header)
 
 
-def _fit(source: Source, profile: Profile, limit: int = 1000) -> _Fit | None:
+def _of_the_header(fit: _Fit) -> tuple[Line, ...]:
+    """The header row, what belongs to it, and the lines of comments above it."""
+    rows = 1 + fit.profile.rows_after_header
+    first = fit.profile.first_line
+    is_below = first and any(line.text.lstrip().startswith(first) for line in fit.above[1:])
+    return (
+        *(line for line in fit.above[:-rows] if not is_below or line.text.lstrip().startswith("#")),
+        *fit.above[-rows:],
+    )
+
+
+def _has_rows_above(fit: _Fit, cells: int) -> bool:
+    """Whether rows of another log stand above the header; they have its columns."""
+    above = set(fit.above) - set(_of_the_header(fit))
+    return sum(len(split_cells(line.text, fit.delimiter)) == cells for line in above) >= FEWEST_ROWS
+
+
+def _fit(source: Source, profile: Profile, limit: int = MOST_LINES) -> _Fit | None:
     """Find the header row: the first one that has every column the profile asks for."""
     encoding = detect_encoding(source.head, source.name)
     lines = head_lines(source, encoding, limit)
@@ -147,7 +172,7 @@ def _fitted(source: Source, profile: Profile) -> _Fit:
 
 
 def _metadata(fit: _Fit) -> dict[str, str]:
-    text = "\n".join(line.text for line in fit.above)
+    text = "\n".join(line.text for line in _of_the_header(fit))
     found = dict(fit.profile.constants)
     for key, pattern in fit.profile.find.items():
         match = pattern.search(text)

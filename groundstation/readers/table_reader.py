@@ -26,6 +26,7 @@ from groundstation.readers import cells
 from groundstation.readers.cells import Cells
 from groundstation.readers.dates import local_ns
 from groundstation.readers.dialect import Dialect
+from groundstation.readers.inside import new_logs, with_own_zeros
 from groundstation.readers.layout import METHODS, Key, Layout, Rule, apply
 from groundstation.readers.losses import Losses
 from groundstation.readers.rows import Block, RowScanner, restore_delimiters
@@ -58,7 +59,9 @@ class TableReader:
         scanner = RowScanner(self._source, self._dialect, self._losses)
         for block in scanner:
             time, columns = self._typed(block)
+            time = with_own_zeros(time, block.line_numbers, scanner.skipped, header.utc_of_zero_ns)
             yield from self._batches(block.line_numbers, time, columns)
+        yield from new_logs(scanner.skipped)
         yield from self._remarks(scanner)
         yield from self._losses.damages()
 

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from groundstation.base.records import Int64Array, Remark
+from groundstation.base.records import BoolArray, Int64Array, Remark, UtcReadings
 from groundstation.base.signals import RAW_PREFIX
 from groundstation.base.source_units import PREFIX
 from groundstation.base.timescales import gps_week_to_utc_ns, utc_ns_to_iso
@@ -43,6 +43,21 @@ def metadata(found: Overview) -> dict[str, str]:
     return facts
 
 
+def utc_readings(times: GpsTimes) -> UtcReadings | None:
+    """UTC of the autopilot's time zero by each fix, where that zero changes: the autopilot was started again."""
+    good, device_ns = _plausible(times), times.device_ns
+    if not (np.diff(device_ns[good]) < _RESTART_NS).any():
+        return None
+    zeros = gps_week_to_utc_ns(times.week[good], times.week_ms[good]) - device_ns[good]
+    return UtcReadings(times.record_index[good], zeros)
+
+
+def _plausible(times: GpsTimes) -> BoolArray:
+    """Fixes whose week and time may be those of a log, shape (n,)."""
+    is_week = (times.week >= _FIRST_WEEK) & (times.week < _LAST_WEEK)
+    return np.asarray(is_week & (times.week_ms >= 0) & (times.week_ms < _MS_PER_WEEK))
+
+
 def utc_of_power_up(times: GpsTimes) -> tuple[int | None, list[Remark]]:
     """UTC nanoseconds of the autopilot's time zero, None when no receiver told the time, and what was assumed.
 
@@ -56,9 +71,7 @@ def utc_of_power_up(times: GpsTimes) -> tuple[int | None, list[Remark]]:
     >>> utc_ns_to_iso(utc)
     '2018-05-05T23:59:35.000Z'
     """
-    good = (
-        (times.week >= _FIRST_WEEK) & (times.week < _LAST_WEEK) & (times.week_ms >= 0) & (times.week_ms < _MS_PER_WEEK)
-    )
+    good = _plausible(times)
     if not good.any():
         return None, []
     device_ns = times.device_ns[good]
