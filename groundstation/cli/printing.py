@@ -106,7 +106,8 @@ def outcomes(
 def _names(done: Sequence[Outcome]) -> list[str]:
     """Logs by the names of their files; by their paths where two files have one name."""
     files = [outcome.source if outcome.is_session else log_name(Path(outcome.source)) for outcome in done]
-    return [file if files.count(file) == 1 else outcome.source for file, outcome in zip(files, done, strict=True)]
+    paths = {file: {one.source for name, one in zip(files, done, strict=True) if name == file} for file in set(files)}
+    return [file if len(paths[file]) == 1 else outcome.source for file, outcome in zip(files, done, strict=True)]
 
 
 def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:
@@ -179,6 +180,7 @@ def _plain(outcome: Outcome) -> dict[str, Any]:
         "flight_id": outcome.flight_id,
         "folder": outcome.folder,
         "was_finished": outcome.was_finished,
+        **({"power_up": outcome.power_up} if outcome.power_up else {}),
         "text": outcome.text,
     }
 

@@ -26,6 +26,14 @@ class LogOfSession(SourceOfRun):
 
 
 @dataclass(frozen=True)
+class PowerUpOfRun:
+    """Which of several power-ups in the log, from 1, and of how many."""
+
+    number: int
+    count: int
+
+
+@dataclass(frozen=True)
 class Host:
     """The machine of the run."""
 
@@ -72,6 +80,8 @@ class Manifest:
         Whether a run found the session among its flights, and may replace it; not what ``cooperative`` made.
     resume : Resume, optional
         Absent where no run made the folder.
+    power_up : PowerUpOfRun, optional
+        Absent where the log holds one.
     """
 
     groundstation: str = ""
@@ -85,3 +95,4 @@ class Manifest:
     logs: tuple[LogOfSession, ...] = field(default=(), metadata=LEFT_OUT_WHEN_DEFAULT)
     is_found: bool = field(default=False, metadata=LEFT_OUT_WHEN_DEFAULT)
     resume: Resume | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)
+    power_up: PowerUpOfRun | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)

@@ -200,9 +200,9 @@ def _run_here(
                     listen(Event("end", job.name, "same content as another log"))
 
         def suffixed(number: int) -> Job:
-            return replace(work[number], add_suffix=True)
+            return replace(work[number % len(work)], add_suffix=True, power_up=placement.power_up(number))
 
-        _run_into(placement, out, left(), run_flight, suffixed, crew, listen)
+        _run_into(placement, out, left(), run_flight, suffixed, crew, listen, len(work))
         clear_unfinished(out)  # of processes that died or took too long
         found, unwritten = _swept(placement, out, refresher)
         sessions = _run_sessions(placement, asked, found, crew, listen)
@@ -248,7 +248,9 @@ def _run_remote(
     work: Sequence[RemoteJob], asked: Asked, crew: Crew, force: bool, listen: Listener
 ) -> tuple[Outcome, ...]:
     def suffixed(number: int) -> RemoteJob:
-        return replace(work[number], job=replace(work[number].job, add_suffix=True), redo=True)
+        one = work[number % len(work)]
+        job = replace(one.job, add_suffix=True, power_up=placement.power_up(number))
+        return replace(one, job=job, redo=True)
 
     with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
         copy = Path(folder)
@@ -259,7 +261,8 @@ def _run_remote(
             placement = Placement(output, [one.log for one in work])
             is_whole = False
             try:
-                _run_into(placement, copy, _once(work, placement, crew, listen), run_remote, suffixed, crew, listen)
+                tasks = _once(work, placement, crew, listen)
+                _run_into(placement, copy, tasks, run_remote, suffixed, crew, listen, len(work))
                 found, unwritten = _swept(placement, copy)
                 sessions = _run_remote_sessions(placement, output, asked, found, listen)
                 outcomes = (*placement.outcomes(), *sessions)
@@ -322,13 +325,19 @@ def _run_into(
     suffixed: Callable[[int], AnyJob],
     crew: Crew,
     listen: Listener,
+    logs: int,
 ) -> None:
-    """Carry out jobs and put their flights into place; interrupted, the index at least is written."""
+    """Carry out jobs and put their flights into place; interrupted, the index at least is written.
+
+    ``logs`` is how many logs there are: the flights of a log have its number, and that and multiples of their count.
+    """
     try:
         with closing(crew(tasks, run)) as ended:  # closed at once when something is wrong here: its processes end
             for number, outcome in ended:
                 listen(Event("end", PurePath(outcome.source).name, outcome.text))
-                placement.put(number, outcome)
+                placement.put(number, replace(outcome, more=()))
+                for place, other in enumerate(outcome.more, start=1):
+                    placement.put(number + place * logs, other)
         clashing = placement.clashing()
         if clashing:
             with closing(crew(((number, suffixed(number)) for number in clashing), run)) as ended:
@@ -429,15 +438,23 @@ def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configu
 
 
 def _with_steps(jobs: Sequence[Job], known: KnownFlights) -> Iterator[tuple[int, Job, int | None]]:
-    """Jobs by number, with what is to be done of each, and the number of an earlier one with the same finished log."""
+    """Jobs by number, with what is to be done of each, and the number of an earlier one with the same finished log.
+
+    A log whose flights of several power-ups are finished has a job for each of them.
+    """
     first: dict[str, int] = {}
     for number, job in enumerate(jobs):
-        planned = _with_step(job, known) if len(known) else job
-        kept = first.setdefault(planned.finished.sha256, number) if planned.finished else number
-        yield number, planned, kept if kept != number else None
+        for place, planned in enumerate(_with_step(job, known) if len(known) else (job,)):
+            kept = first.setdefault(planned.finished.sha256, number) if planned.finished else number
+            yield number + place * len(jobs), planned, kept if kept != number else None
 
 
-def _with_step(job: Job, known: KnownFlights) -> Job:
+def _with_step(job: Job, known: KnownFlights) -> tuple[Job, ...]:
     asked = job.asked()
-    found = None if asked is None else known.of(asked[0])
-    return job if asked is None or found is None else job.going_on(found, asked[1])
+    found = () if asked is None else known.of(asked[0])
+    if asked is None or not found:
+        return (job,)
+    planned = tuple(job.going_on(one, asked[1]) for one in found)
+    if len(planned) > 1 and any(one.step == "everything" for one in planned):
+        return (job,)  # the log is read anew: it tells what it holds
+    return planned

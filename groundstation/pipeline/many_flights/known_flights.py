@@ -38,13 +38,17 @@ class KnownFlights:
     def __len__(self) -> int:
         return len(self._one_of)
 
-    def of(self, sha256: str) -> Finished | None:
-        """The flight that a log gave, by the digest of the log; None when there is none that is whole."""
+    def of(self, sha256: str) -> tuple[Finished, ...]:
+        """The flights that a log gave, by its digest: one of each power-up in it; none unless all of them are whole."""
         if self._out is None or sha256 not in self._one_of:
-            return None
+            return ()
         several = self._several.get(sha256) or [self._one_of[sha256]]
-        found = (finished(self._out / name) for name in several)
-        return next((one for one in found if one is not None and one.sha256 == sha256), None)
+        whole = [one for name in several if (one := finished(self._out / name)) is not None and one.sha256 == sha256]
+        by_number = {one.power_up.number if one.power_up else 0: one for one in reversed(whole)}
+        if not whole or whole[0].power_up is None:
+            return tuple(whole[:1])
+        wanted = range(1, whole[0].power_up.count + 1)
+        return tuple(by_number[number] for number in wanted) if by_number.keys() >= set(wanted) else ()
 
     @cached_property
     def _several(self) -> dict[str, list[str]]:

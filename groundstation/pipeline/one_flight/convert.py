@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.findings import Finding, Severity
@@ -19,9 +20,13 @@ from groundstation.integrity.ledger_findings import damage_finding as log_damage
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.integrity.survey import Census
 from groundstation.pipeline.one_flight.configuration import NO_REFERENCES, References
-from groundstation.pipeline.one_flight.log import Log
+from groundstation.pipeline.one_flight.log import Log, Replay
 from groundstation.pipeline.one_flight.reference import FACTS, TRUTH, Laid, laid_beside
+from groundstation.pipeline.one_flight.segments import Segment, document_of, segments_in, segments_of
 from groundstation.store.info import StoreInfo
+
+if TYPE_CHECKING:
+    from groundstation.integrity.survey import Survey
 
 OWN_TRUTH = ("a truth of its own", "a log without one", "leave --reference out")
 COUNTED_CAUSES = ("dropout", "stuck", "out_of_range", "sequence")  # of spans: counted again with the topics
@@ -42,7 +47,7 @@ class Converted:
 def convert_log(
     log: Log, target: Path, thresholds: Thresholds | None = None, references: References = NO_REFERENCES
 ) -> Converted:
-    """Write a log's MCAP, under a temporary name until it is whole.
+    """Write a log's MCAP, under a temporary name until it is whole; several power-ups in a log stay together.
 
     Parameters
     ----------
@@ -63,45 +68,95 @@ def convert_log(
     limits = thresholds or shipped()
     if log.is_store:
         return _copy_store(log, target, limits, references)
-    return _convert_recorded(log, target, limits, references)
-
-
-def _convert_recorded(log: Log, target: Path, limits: Thresholds, references: References) -> Converted:
-    from importlib import metadata as installed
-
-    from groundstation.integrity.ledger_findings import ledger_findings
-    from groundstation.integrity.ordering import corrected
-    from groundstation.integrity.survey import survey
-    from groundstation.store.writer import StoreWriter
-
     items = log.replay()
+    return _convert_recorded(log, items, survey_of(log, items, limits), target, references)
+
+
+def convert_flight(
+    log: Log, target: Path, thresholds: Thresholds | None = None, references: References = NO_REFERENCES
+) -> Converted | tuple[Log, ...]:
+    """Write the MCAP of a log of one flight; of one that holds several power-ups nothing, but the log of each.
+
+    Parameters and errors are those of :func:`convert_log`.
+    """
+    limits = thresholds or shipped()
+    if log.is_store:
+        parts = () if log.segment is not None else segments_in(log.info())
+        return tuple(map(log.only, parts)) or _copy_store(log, target, limits, references)
+    items = log.replay()
+    found = survey_of(log, items, limits)
+    several = _segments(log, found)
+    if several:
+        return tuple(log.only(one, items) for one in several)
+    return _convert_recorded(log, items, found, target, references)
+
+
+def survey_of(log: Log, items: Iterable[Item], limits: Thresholds) -> "Survey":
+    """Survey a log that is to be converted.
+
+    Raises
+    ------
+    UnreadableLogError
+        When it holds no record.
+    """
+    from groundstation.integrity.survey import survey
+
     found = survey(items, thresholds=limits)
     if not found.ledger.topics:
         raise UnreadableLogError(log.path.name, "no readable record", "", "`info` shows what the file is")
+    return found
+
+
+def _segments(log: Log, found: "Survey") -> tuple[Segment, ...]:
+    """The power-ups of a log; none of one that is read for one of them alone."""
+    return () if log.segment is not None else segments_of(found.power_ups)
+
+
+def _convert_recorded(log: Log, items: Replay, found: "Survey", target: Path, references: References) -> Converted:
+    from groundstation.integrity.ordering import corrected
+    from groundstation.store.writer import StoreWriter
+
+    limits = found.ledger.thresholds
     topics = found.ledger.topics
     if references.paths and any(kind_of(one.topic) == TRUTH for one in topics):
         raise GroundstationError(log.path.name, *OWN_TRUTH)
     span_ns = min(one.first_ns for one in topics), max(one.last_ns for one in topics)
     laid = laid_beside(log.path.name, span_ns, found.clock.is_absolute, references.besides(log.path))
-    findings = (*ledger_findings(found.ledger), *laid.findings)
-    info = StoreInfo(
+    info = _facts_of(log, found, laid)
+    if several := _segments(log, found):
+        documents = []
+        for one in several:
+            alone = log.only(one, items)
+            facts = _facts_of(alone, survey_of(alone, alone.items(), limits), laid.within(one.start_ns, one.end_ns))
+            documents.append(document_of(one, facts, found.clock))
+        info = replace(info, segments=documents)
+    with StoreWriter(target, info) as writer:
+        for batch in chain(corrected(items, found.clock), laid.batches):
+            writer.write(batch)
+    return Converted(info, info.findings, any(damage.loses_data for damage in found.damages))
+
+
+def _facts_of(log: Log, found: "Survey", laid: Laid) -> StoreInfo:
+    """Facts of the MCAP of a log, with those of the reference that is laid beside it."""
+    from importlib import metadata as installed
+
+    from groundstation.integrity.ledger_findings import ledger_findings
+
+    of_segment = () if log.segment is None else (log.segment.finding,)
+    return StoreInfo(
         source_name=log.source.name,
         source_sha256=log.source.sha256,
         reader=found.header.reader,
         versions={"groundstation": __version__, "mcap": installed.version("mcap")},
         metadata={**found.header.metadata, **told_of_fields(found.remarks), **laid.facts},
         has_utc=found.clock.is_absolute,
-        start_ns=span_ns[0],
+        start_ns=found.ledger.start_ns,
         clock=found.clock.document(),
-        ledger=_with_truth(found.ledger.document(), laid, limits),
-        findings=findings,
+        ledger=_with_truth(found.ledger.document(), laid, found.ledger.thresholds),
+        findings=(*of_segment, *ledger_findings(found.ledger), *laid.findings),
         remarks=[asdict(remark) for remark in found.remarks],
         damages=[asdict(damage) for damage in found.damages],
     )
-    with StoreWriter(target, info) as writer:
-        for batch in chain(corrected(items, found.clock), laid.batches):
-            writer.write(batch)
-    return Converted(info, findings, any(damage.loses_data for damage in found.damages))
 
 
 def _with_truth(ledger: Ledger, laid: Laid, limits: Thresholds) -> Ledger:
@@ -131,10 +186,9 @@ def told_of_fields(remarks: tuple[Remark, ...]) -> dict[str, str]:
 
 def _copy_store(log: Log, target: Path, limits: Thresholds, references: References) -> Converted:
     """Write the intact content of a groundstation MCAP again; an undamaged one comes out equal in content."""
-    from groundstation.store.reader import read_info
     from groundstation.store.writer import StoreWriter
 
-    info = read_info(log.path)
+    info = log.info()
     laid = _laid_beside_store(log, info, references)
     if laid.batches:
         info = _with_another_truth(info, laid, limits)

@@ -17,7 +17,7 @@ from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES
 from groundstation.pipeline.one_flight.analyse import Given, analyse
 from groundstation.pipeline.one_flight.apply_deviation import apply_deviation, corrected_name, write_corrected
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.convert import Converted, convert_log
+from groundstation.pipeline.one_flight.convert import Converted, convert_flight
 from groundstation.pipeline.one_flight.identity import flight_id
 from groundstation.pipeline.one_flight.log import Log, digest_of, open_log
 from groundstation.pipeline.one_flight.manifest import manifest_of
@@ -29,7 +29,7 @@ from groundstation.reports.steer_card import write_exports
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
-from groundstation.results.manifest import Resume
+from groundstation.results.manifest import PowerUpOfRun, Resume
 from groundstation.tables.table import Flight
 
 PARTIAL_PREFIX = ".partial-"
@@ -70,6 +70,7 @@ class Job:
     ``add_suffix``: two flights of one id get ``_<sha8>`` of their logs; ``step`` is what has to be done, with what the
     flight that is ``finished`` has for the rest; ``url`` is where the log is, if ``path`` is but a copy of it. With
     ``only_results`` there is neither a recording nor a report. ``painters`` is how many processes paint its figures.
+    Of several power-ups in the log, ``power_up`` is the only one to run; 0: all of them.
     """
 
     path: Path
@@ -84,6 +85,7 @@ class Job:
     url: str = ""
     only_results: bool = False
     painters: int = 1
+    power_up: int = 0
 
     @property
     def log(self) -> str:
@@ -106,35 +108,60 @@ class Job:
     def going_on(self, finished: Finished, keys: Keys) -> "Job":
         """The job with what is left to do of it, its flight being finished."""
         step = finished.step(keys, with_pdf=self.with_pdf, only_results=self.only_results)
-        return replace(self, step=step, finished=finished, add_suffix=step == "analysis" and finished.has_suffix)
+        add_suffix = step == "analysis" and finished.has_suffix
+        power_up = finished.power_up.number if finished.power_up else 0
+        return replace(self, step=step, finished=finished, add_suffix=add_suffix, power_up=power_up)
 
 
 def run_flight(job: Job, listen: Listener = silent) -> Outcome:
     """Run one log into a partial folder in ``out``; the caller moves it into place (see :func:`place`).
 
     A log that cannot be read or computed gives an outcome with the reason, never an exception: one bad log never
-    stops the others.
+    stops the others. Of a log with several power-ups each has its own folder, those behind the first in ``more``.
     """
     watch = Stopwatch(listen, job.path.name)
-    sha256 = ""
-    partial: Path | None = None
     try:
         if job.finished is not None and job.step in ("nothing", "reports"):
             return _run_reports(job, job.finished, watch)
         version = _version(job.path)
         log = open_log(job.path, job.configuration.profile_path, job.configuration.icds)
-        sha256 = log.source.sha256
         job.out.mkdir(parents=True, exist_ok=True)
-        partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=job.out))
-        partial.chmod(0o755)  # mkdtemp's folders are private
-        return _run(log, version, job, partial, watch)
     except UnclaimedLogError as error:
         return Outcome(job.log, "failed" if job.is_named else "skipped", str(error))
     except Exception as error:
-        reason, trace = reason_of(job.name, error)
-    if partial is not None:
-        shutil.rmtree(partial, ignore_errors=True)
-    return Outcome(job.log, "failed", reason, sha256=sha256, times_s=watch.times_s, trace=trace)
+        return _failed(job, error, watch)
+    return _run_log(log, version, job, watch)
+
+
+def _run_log(log: Log, version: tuple[int, int], job: Job, watch: Stopwatch) -> Outcome:
+    """Run a log, or one power-up of it, into a partial folder; of a log with several each into its own."""
+    partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=job.out))
+    try:
+        partial.chmod(0o755)  # mkdtemp's folders are private
+        found = _run(log, version, job, partial, watch)
+        if isinstance(found, Outcome):
+            return found
+        wanted = [one for one in found if job.power_up in (0, _power_up_of(one))]
+        if not wanted:
+            raise UnreadableLogError(
+                log.path.name, f"{len(found)} power-ups", f"{job.power_up} of them", "run it again"
+            )
+        first, *others = [_run_log(one, version, job, Stopwatch(watch.listen, watch.name)) for one in wanted]
+        outcome = replace(first, more=tuple(others))
+    except Exception as error:
+        outcome = _failed(job, error, watch, log)
+    shutil.rmtree(partial, ignore_errors=True)
+    return outcome
+
+
+def _power_up_of(log: Log) -> int:
+    return 0 if log.segment is None else log.segment.number
+
+
+def _failed(job: Job, error: Exception, watch: Stopwatch, log: Log | None = None) -> Outcome:
+    reason, trace = reason_of(job.name, error)
+    sha256, power_up = ("", 0) if log is None else (log.source.sha256, _power_up_of(log))
+    return Outcome(job.log, "failed", reason, sha256=sha256, times_s=watch.times_s, trace=trace, power_up=power_up)
 
 
 def _version(path: Path) -> tuple[int, int]:
@@ -149,22 +176,26 @@ def _require_unchanged(log: Log, version: tuple[int, int]) -> None:
         raise UnreadableLogError(log.path.name, "changed while it was read", "", "run it again once it is complete")
 
 
-def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Stopwatch) -> Outcome:
+def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Stopwatch) -> Outcome | tuple[Log, ...]:
+    """Run one flight into a folder; of a log with several power-ups nothing is run, they are told."""
     from groundstation.results.files import save
 
     mcap = partial / "flight.mcap"
+    converted: Converted | tuple[Log, ...]
     if job.step == "analysis" and job.finished is not None:
         converted = _taken_over(job.finished.mcap, mcap)
     else:
         with watch.stage("converting"):
-            converted = convert_log(log, mcap, job.configuration.thresholds, job.configuration.references)
+            converted = convert_flight(log, mcap, job.configuration.thresholds, job.configuration.references)
         _require_unchanged(log, version)
+    if isinstance(converted, tuple):
+        return converted
     with watch.stage("reading the MCAP"):
         flight = read_flight(mcap, converted)
     start_utc_ns = flight.start_ns if flight.has_utc else None
-    identity = flight_id(start_utc_ns, flight.metadata, log.source.sha256)
-    if job.add_suffix and start_utc_ns is not None:  # NOTIME ids hold the digest already
-        identity += f"_{log.source.sha256[:8]}"
+    power_up = _power_up(log, job)
+    number = power_up.number if power_up else 0
+    identity = flight_id(start_utc_ns, flight.metadata, log.source.sha256, number, add_suffix=job.add_suffix)
     with watch.stage("estimating"):
         results = analyse(flight, given_of(log, converted, identity), job.configuration)
         applied = apply_deviation(flight, results, job.configuration.apply, job.configuration.settings)
@@ -177,7 +208,8 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf)
         resume = Resume(keys, text, converted.has_lost_data)
         path = job.url or str(log.path.absolute())
-        save(partial, results, manifest_of(results, job.configuration.to_dict(), path=path, resume=resume))
+        settings = job.configuration.to_dict()
+        save(partial, results, manifest_of(results, settings, path=path, resume=resume, power_up=power_up))
     problem = _show(partial, flight, results, job, watch)
     return Outcome(
         job.log,
@@ -187,7 +219,15 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         folder=str(partial),
         sha256=log.source.sha256,
         times_s=watch.times_s,
+        power_up=number,
     )
+
+
+def _power_up(log: Log, job: Job) -> PowerUpOfRun | None:
+    """Which of several power-ups in its log a flight is."""
+    if log.segment is not None:
+        return PowerUpOfRun(log.segment.number, log.segment.count)
+    return job.finished.power_up if job.step == "analysis" and job.finished is not None else None
 
 
 def _show(partial: Path, flight: Flight, results: FlightResults, job: Job, watch: Stopwatch) -> str:
@@ -230,6 +270,7 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
         sha256=finished.sha256,
         times_s=watch.times_s,
         was_finished=job.step == "nothing",
+        power_up=job.power_up,
     )
 
 

@@ -1,7 +1,7 @@
 """One way to open whatever a user names: a recorded log, or an MCAP that groundstation wrote."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,11 +10,13 @@ from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.records import Item, RecordBatch
 from groundstation.base.signals import BUS_PREFIX
 from groundstation.pipeline.one_flight.identity import sha256_of
+from groundstation.pipeline.one_flight.segments import Segment
 from groundstation.results.flight import Source
 
 if TYPE_CHECKING:
     from groundstation.readers.icd import Icd
     from groundstation.readers.source import Source as LogFile
+    from groundstation.store.info import StoreInfo
 
 REPLAY_LIMIT_BYTES = 96 << 20  # an hour of CSV at 100 Hz is kept; the peak of a conversion has this part in it
 
@@ -25,6 +27,8 @@ class Log:
 
     ``is_store``: an MCAP that groundstation wrote; its records carry corrected time already. ``icds`` are files or
     names of shipped ones; with ``has_new_names`` it is an MCAP whose bus words they name, and read as its log again.
+    ``segment`` is the only one of the power-ups in it that is read; ``whole`` then gives the items of all, if they are
+    kept.
     """
 
     path: Path
@@ -33,9 +37,21 @@ class Log:
     profile: Path | None = None
     icds: tuple[str, ...] = ()
     has_new_names: bool = False
+    segment: Segment | None = None
+    whole: "Replay | None" = None
 
     def items(self) -> Iterator[Item]:
         """Read the log from its beginning, in bounded batches."""
+        items = self._whole_items() if self.whole is None else iter(self.whole)
+        if self.segment is None:
+            return items
+        return self.segment.of_store(items) if self.is_store else self.segment.of_log(items)
+
+    def only(self, segment: Segment, whole: "Replay | None" = None) -> "Log":
+        """The log as if there were but one of its power-ups."""
+        return replace(self, segment=segment, whole=whole)
+
+    def _whole_items(self) -> Iterator[Item]:
         if self.is_store:
             from groundstation.store.reader import read
 
@@ -48,9 +64,18 @@ class Log:
 
         return read_log(self._file, self.profile, self.loaded_icds)
 
+    def info(self) -> "StoreInfo":
+        """Facts of an MCAP, or of the one power-up in it that is read."""
+        from groundstation.store.reader import read_info
+
+        if self.segment is not None and self.segment.info is not None:
+            return self.segment.info
+        return read_info(self.path)
+
     def replay(self) -> "Replay":
         """The items for two passes; of a file that is larger than what may be kept, nothing is."""
-        return Replay(self.items, REPLAY_LIMIT_BYTES if self.source.size_bytes <= REPLAY_LIMIT_BYTES else 0)
+        is_small = self.source.size_bytes <= REPLAY_LIMIT_BYTES and self.whole is None
+        return Replay(self.items, REPLAY_LIMIT_BYTES if is_small else 0)
 
     @cached_property
     def loaded_icds(self) -> "tuple[Icd, ...]":

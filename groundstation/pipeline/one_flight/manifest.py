@@ -10,11 +10,16 @@ from groundstation.base.version import __version__
 from groundstation.pipeline.one_flight.resume import versions
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult
-from groundstation.results.manifest import Host, Manifest, Resume, SourceOfRun
+from groundstation.results.manifest import Host, Manifest, PowerUpOfRun, Resume, SourceOfRun
 
 
 def manifest_of(
-    results: FlightResults, configuration: Mapping[str, Any], *, path: str = "", resume: Resume | None = None
+    results: FlightResults,
+    configuration: Mapping[str, Any],
+    *,
+    path: str = "",
+    resume: Resume | None = None,
+    power_up: PowerUpOfRun | None = None,
 ) -> Manifest:
     """Describe a run of a flight, a session or a plan: source, settings, versions, host and time.
 
@@ -27,6 +32,8 @@ def manifest_of(
         Where the source is, or its URL.
     resume : Resume, optional
         What a later run need not do again.
+    power_up : PowerUpOfRun, optional
+        Which of several in the log.
     """
     source, heading = results.source, results.answer(HeadingResult)
     return Manifest(
@@ -39,4 +46,5 @@ def manifest_of(
         host=Host(platform.platform(), platform.machine(), sys.version.split()[0]),
         versions=versions(),
         resume=resume,
+        power_up=power_up,
     )

@@ -34,6 +34,10 @@ class Outcome:
         Whether it is of a session: ``source`` are then the names of its logs, and ``flight_id`` is that of the session.
     was_finished : bool
         Whether an earlier run had finished it, so that nothing was computed.
+    power_up : int
+        Which of several power-ups in the log, from 1; 0 where the log holds one.
+    more : tuple of Outcome
+        What became of the others.
     """
 
     source: str
@@ -46,6 +50,8 @@ class Outcome:
     trace: str = ""
     is_session: bool = False
     was_finished: bool = False
+    power_up: int = 0
+    more: "tuple[Outcome, ...]" = ()
 
     @property
     def code(self) -> int:

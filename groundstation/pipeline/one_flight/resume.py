@@ -29,7 +29,7 @@ from groundstation.results.document import SummaryDocument
 from groundstation.results.files import load_document, load_manifest, save_manifest
 from groundstation.results.flight import Source
 from groundstation.results.manifest import Keys as Keys
-from groundstation.results.manifest import Manifest
+from groundstation.results.manifest import Manifest, PowerUpOfRun
 
 Step = Literal["everything", "analysis", "reports", "nothing"]  # what has to be done for a log
 PACKAGES = (
@@ -57,6 +57,8 @@ class Finished:
         Severity of its gravest finding.
     has_deviation, has_applied : bool
         Whether a magnetic deviation was found, and whether one was added to the log: there are files of both.
+    power_up : PowerUpOfRun, optional
+        Which of several in its log.
     """
 
     folder: Path
@@ -69,6 +71,7 @@ class Finished:
     gravest: Severity | None
     has_deviation: bool = False
     has_applied: bool = False
+    power_up: PowerUpOfRun | None = None
 
     @property
     def mcap(self) -> Path:
@@ -194,4 +197,5 @@ def _finished(folder: Path, files: frozenset[str], manifest: Manifest, summary: 
         worst(summary.findings),
         bool(summary.results.get("magnetic")),
         any(finding.code == APPLIED for finding in summary.findings),
+        manifest.power_up,
     )
