@@ -121,6 +121,39 @@ class Placement:
             self._output.discard(former.folder)
         self._outcomes[number] = self._put_in_place(outcome) if outcome.flight_id else outcome
 
+    def put_part(self, number: int, kept: int, flight_id: str, sha256: str, *, was_finished: bool = False) -> None:
+        """Take over a log that is part of a flight, which that with the number ``kept`` gives."""
+        name, folder = self._names[number % len(self._names)], str(self._output.root / flight_id)
+        text = f"part of {flight_id}, with {Path(self._names[kept % len(self._names)]).name}"
+        self._outcomes[number] = Outcome(
+            name, "done", text, flight_id=flight_id, folder=folder, sha256=sha256, was_finished=was_finished
+        )
+
+    def put_joined(self, numbers: Sequence[int], outcome: Outcome) -> Outcome | None:
+        """Put the flight of several logs into place, in that of the flights that they gave one by one.
+
+        Parameters
+        ----------
+        numbers : sequence of int
+            Of those of the logs that are of this run.
+
+        Returns
+        -------
+        Outcome or None
+            Why they are not joined: then what each of them gave stays.
+        """
+        placed = self._put_in_place(outcome) if outcome.flight_id else outcome
+        if not placed.flight_id:
+            return Outcome(outcome.source, "skipped", f"not joined with the files behind it: {placed.text}")
+        self._outcomes[numbers[0]] = placed
+        for number in numbers[1:]:
+            self.put_part(number, numbers[0], placed.flight_id, self._outcomes[number].sha256)
+        return None
+
+    def flights(self) -> dict[int, Outcome]:
+        """What became of the logs put so far, by their numbers."""
+        return dict(self._outcomes)
+
     def sweep(self, found: Scan) -> bool:
         """Remove flights of these logs that stand under another id, and those of older versions of the logs.
 
@@ -129,7 +162,8 @@ class Placement:
         flights = [outcome for outcome in self._outcomes.values() if outcome.flight_id]
         now: dict[str, set[str]] = {}
         for outcome in flights:
-            now.setdefault(outcome.sha256, set()).add(outcome.flight_id)
+            for sha256 in (outcome.sha256, *(part.sha256 for part in outcome.parts)):
+                now.setdefault(sha256, set()).add(outcome.flight_id)
         versions = {(utf8_text(_place_of(one)), plain_id(one.flight_id, one.sha256)) for one in flights}
         old = []
         for name in sorted({*_came_from(found.fresh, now, {path for path, _ in versions}), *found.stale}):

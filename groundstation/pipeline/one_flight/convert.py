@@ -1,8 +1,9 @@
 """A log becomes an MCAP: its clock is repaired, its ledger is kept beside the data."""
 
+import json
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
-from itertools import chain
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from groundstation.base.ledger import Ledger, TopicEntry
 from groundstation.base.records import HEADING_IS_TRACK, Damage, Item, RecordBatch, Remark
 from groundstation.base.signals import kind_of
 from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.base.units import NS_PER_S
 from groundstation.base.version import __version__
 from groundstation.integrity.breaks_off import BREAKS_OFF, broken_off
 from groundstation.integrity.ledger import damage_entry
@@ -21,6 +23,7 @@ from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.integrity.survey import Census
 from groundstation.pipeline.one_flight.configuration import NO_REFERENCES, References
 from groundstation.pipeline.one_flight.log import Log, Replay
+from groundstation.pipeline.one_flight.parts import LATE_S
 from groundstation.pipeline.one_flight.reference import FACTS, TRUTH, Laid, laid_beside
 from groundstation.pipeline.one_flight.segments import Segment, document_of, segments_in, segments_of
 from groundstation.store.info import StoreInfo
@@ -29,6 +32,8 @@ if TYPE_CHECKING:
     from groundstation.integrity.survey import Survey
 
 OWN_TRUTH = ("a truth of its own", "a log without one", "leave --reference out")
+OF_JOINTS = ("log.power_ups", "data.repeated_header", "data.comment_line")  # findings on files that stand behind others
+PARTS_TOLD = 5
 COUNTED_CAUSES = ("dropout", "stuck", "out_of_range", "sequence")  # of spans: counted again with the topics
 
 
@@ -108,8 +113,19 @@ def survey_of(log: Log, items: Iterable[Item], limits: Thresholds) -> "Survey":
 
 
 def _segments(log: Log, found: "Survey") -> tuple[Segment, ...]:
-    """The power-ups of a log; none of one that is read for one of them alone."""
-    return () if log.segment is not None else segments_of(found.power_ups)
+    """The power-ups of a log; none of one that is read for one of them alone, or of consecutive files.
+
+    Raises
+    ------
+    GroundstationError
+        When the counter starts again in a later file, and nothing tells how the clock goes on.
+    """
+    if log.parts:
+        for one, other in pairwise(found.power_ups):
+            has_utc = one.is_absolute and other.is_absolute
+            if not has_utc or other.start_ns - one.end_ns < -LATE_S * NS_PER_S:
+                raise GroundstationError(log.source.name, "parts whose clock does not go on", "one recording")
+    return () if log.segment is not None or log.parts else segments_of(found.power_ups)
 
 
 def _convert_recorded(log: Log, items: Replay, found: "Survey", target: Path, references: References) -> Converted:
@@ -143,20 +159,38 @@ def _facts_of(log: Log, found: "Survey", laid: Laid) -> StoreInfo:
     from groundstation.integrity.ledger_findings import ledger_findings
 
     of_segment = () if log.segment is None else (log.segment.finding,)
+    of_parts = _told_joined(log) if log.parts else ()
+    findings = [one for one in ledger_findings(found.ledger) if not (log.parts and one.code in OF_JOINTS)]
     return StoreInfo(
         source_name=log.source.name,
         source_sha256=log.source.sha256,
         reader=found.header.reader,
         versions={"groundstation": __version__, "mcap": installed.version("mcap")},
-        metadata={**found.header.metadata, **told_of_fields(found.remarks), **laid.facts},
+        metadata={**found.header.metadata, **told_of_fields(found.remarks), **laid.facts, **_facts_of_parts(log)},
         has_utc=found.clock.is_absolute,
         start_ns=found.ledger.start_ns,
         clock=found.clock.document(),
         ledger=_with_truth(found.ledger.document(), laid, found.ledger.thresholds),
-        findings=(*of_segment, *ledger_findings(found.ledger), *laid.findings),
+        findings=(*of_segment, *of_parts, *findings, *laid.findings),
         remarks=[asdict(remark) for remark in found.remarks],
         damages=[asdict(damage) for damage in found.damages],
     )
+
+
+def _told_joined(log: Log) -> tuple[Finding, ...]:
+    """That a flight was put together from consecutive files."""
+    names = [path.name for path in log.parts]
+    more = f" and {len(names) - PARTS_TOLD} more" if len(names) > PARTS_TOLD else ""
+    text = f"{len(names)} consecutive files joined as one flight: {', '.join(names[:PARTS_TOLD])}{more}"
+    return (Finding("info", "log.parts", text, count=len(names)),)
+
+
+def _facts_of_parts(log: Log) -> dict[str, str]:
+    """Names and digests of the consecutive files of a flight, as metadata."""
+    if not log.parts:
+        return {}
+    parts = [{"name": path.name, "sha256": sha256} for path, sha256 in zip(log.parts, log.digests, strict=True)]
+    return {"parts": json.dumps(parts)}
 
 
 def _with_truth(ledger: Ledger, laid: Laid, limits: Thresholds) -> Ledger:

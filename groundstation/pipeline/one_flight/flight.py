@@ -4,13 +4,13 @@ import os
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import TypeVar
 
-from groundstation.base.errors import UnclaimedLogError, UnreadableLogError
+from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
 from groundstation.base.findings import SEVERITIES, Severity, worst
 from groundstation.base.records import RecordBatch
 from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES
@@ -19,9 +19,10 @@ from groundstation.pipeline.one_flight.apply_deviation import apply_deviation, c
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_flight
 from groundstation.pipeline.one_flight.identity import flight_id
-from groundstation.pipeline.one_flight.log import Log, digest_of, open_log
+from groundstation.pipeline.one_flight.log import Log, as_log, digest_of, open_log, open_parts
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
+from groundstation.pipeline.one_flight.parts import part_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, Keys, Step, keys_of, remember_reports
 from groundstation.reports.flight_report import PDF, REPORT, flight_report_begun, write_flight_report
@@ -29,11 +30,13 @@ from groundstation.reports.steer_card import write_exports
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
-from groundstation.results.manifest import PowerUpOfRun, Resume
+from groundstation.results.manifest import PartOfRun, PowerUpOfRun, Resume
 from groundstation.tables.table import Flight
 
 PARTIAL_PREFIX = ".partial-"
+MOST_APART = 50  # records that a part read alone may have more than as part of a flight, at each joint
 Inside = TypeVar("Inside")
+Version = tuple[tuple[int, int], ...]  # of each file of a log: time and size
 
 
 @dataclass
@@ -70,7 +73,8 @@ class Job:
     ``add_suffix``: two flights of one id get ``_<sha8>`` of their logs; ``step`` is what has to be done, with what the
     flight that is ``finished`` has for the rest; ``url`` is where the log is, if ``path`` is but a copy of it. With
     ``only_results`` there is neither a recording nor a report. ``painters`` is how many processes paint its figures.
-    Of several power-ups in the log, ``power_up`` is the only one to run; 0: all of them.
+    Of several power-ups in the log, ``power_up`` is the only one to run; 0: all of them. ``parts`` are the consecutive
+    logs that are run as one flight, the first of them its log.
     """
 
     path: Path
@@ -86,6 +90,7 @@ class Job:
     only_results: bool = False
     painters: int = 1
     power_up: int = 0
+    parts: tuple[PartOfRun, ...] = ()
 
     @property
     def log(self) -> str:
@@ -105,6 +110,33 @@ class Job:
         except Exception:
             return None
 
+    def digest(self) -> str:
+        """Digest of its log, whether it can be read or not; empty where there is none."""
+        try:
+            return digest_of(as_log(self.path))
+        except OSError:
+            return ""
+
+    def keys_of(self, finished: Finished) -> Keys:
+        """Keys of what is asked for of a flight of several logs, which are as they were."""
+        digests = [part.sha256 for part in finished.parts]
+        return keys_of(finished.source, self.configuration, with_pdf=self.with_pdf, digests=digests)
+
+    def of_parts(self, parts: Sequence[PartOfRun], *, add_suffix: bool = False) -> "Job":
+        """The job of running consecutive logs as one flight."""
+        first = Path(parts[0].path)
+        path = self.path if self.path.absolute() == first else first
+        return replace(
+            self,
+            path=path,
+            parts=tuple(parts),
+            step="everything",
+            finished=None,
+            power_up=0,
+            url="",
+            add_suffix=add_suffix,
+        )
+
     def going_on(self, finished: Finished, keys: Keys) -> "Job":
         """The job with what is left to do of it, its flight being finished."""
         step = finished.step(keys, with_pdf=self.with_pdf, only_results=self.only_results)
@@ -123,8 +155,9 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
     try:
         if job.finished is not None and job.step in ("nothing", "reports"):
             return _run_reports(job, job.finished, watch)
-        version = _version(job.path)
-        log = open_log(job.path, job.configuration.profile_path, job.configuration.icds)
+        paths = [Path(part.path) for part in job.parts] or [job.path]
+        version = tuple(map(_version, paths))
+        log = open_parts(paths, job.configuration.profile_path, job.configuration.icds)
         job.out.mkdir(parents=True, exist_ok=True)
     except UnclaimedLogError as error:
         return Outcome(job.log, "failed" if job.is_named else "skipped", str(error))
@@ -133,7 +166,7 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
     return _run_log(log, version, job, watch)
 
 
-def _run_log(log: Log, version: tuple[int, int], job: Job, watch: Stopwatch) -> Outcome:
+def _run_log(log: Log, version: Version, job: Job, watch: Stopwatch) -> Outcome:
     """Run a log, or one power-up of it, into a partial folder; of a log with several each into its own."""
     partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=job.out))
     try:
@@ -170,13 +203,15 @@ def _version(path: Path) -> tuple[int, int]:
     return found.st_mtime_ns, found.st_size
 
 
-def _require_unchanged(log: Log, version: tuple[int, int]) -> None:
+def _require_unchanged(log: Log, version: Version) -> None:
     """Refuse a log that was written to while it was read: the digest is not of what was converted."""
-    if _version(log.path) != version and (log.is_store or digest_of(log.path) != log.source.sha256):
-        raise UnreadableLogError(log.path.name, "changed while it was read", "", "run it again once it is complete")
+    digests = log.digests or (log.source.sha256,)
+    for path, before, sha256 in zip(log.parts or (log.path,), version, digests, strict=True):
+        if _version(path) != before and (log.is_store or digest_of(path) != sha256):
+            raise UnreadableLogError(path.name, "changed while it was read", "", "run it again once it is complete")
 
 
-def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Stopwatch) -> Outcome | tuple[Log, ...]:
+def _run(log: Log, version: Version, job: Job, partial: Path, watch: Stopwatch) -> Outcome | tuple[Log, ...]:
     """Run one flight into a folder; of a log with several power-ups nothing is run, they are told."""
     from groundstation.results.files import save
 
@@ -193,7 +228,8 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
     with watch.stage("reading the MCAP"):
         flight = read_flight(mcap, converted)
     start_utc_ns = flight.start_ns if flight.has_utc else None
-    power_up = _power_up(log, job)
+    path = job.url or str(log.path.absolute())
+    power_up, parts = _power_up(log, job), _parts(log, job, path, converted, flight)
     number = power_up.number if power_up else 0
     identity = flight_id(start_utc_ns, flight.metadata, log.source.sha256, number, add_suffix=job.add_suffix)
     with watch.stage("estimating"):
@@ -205,11 +241,11 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         write_corrected(corrected, converted.info, flight, applied, job.configuration.thresholds)
         mcap.rename(partial / f"{identity}.mcap")
         text = sentence(results)
-        keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf)
+        keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf, digests=log.digests)
         resume = Resume(keys, text, converted.has_lost_data)
-        path = job.url or str(log.path.absolute())
         settings = job.configuration.to_dict()
-        save(partial, results, manifest_of(results, settings, path=path, resume=resume, power_up=power_up))
+        manifest = manifest_of(results, settings, path=path, resume=resume, power_up=power_up, parts=parts)
+        save(partial, results, manifest)
     problem = _show(partial, flight, results, job, watch)
     return Outcome(
         job.log,
@@ -220,7 +256,29 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         sha256=log.source.sha256,
         times_s=watch.times_s,
         power_up=number,
+        parts=parts,
     )
+
+
+def _parts(log: Log, job: Job, path: str, converted: Converted, flight: Flight) -> tuple[PartOfRun, ...]:
+    """The consecutive logs of a flight, with what tells whether another one goes on from it.
+
+    Raises
+    ------
+    GroundstationError
+        When the records of parts are not those of the flight: they are not of one recording.
+    """
+    if _power_up(log, job) is not None:
+        return ()
+    if job.step == "analysis" and job.finished is not None:
+        return job.finished.parts
+    whole = part_of(log, path, converted.info.reader, flight)
+    if not log.parts:
+        return (whole,)
+    missing = sum(part.rows for part in job.parts) - whole.rows
+    if missing > MOST_APART * (len(job.parts) - 1):
+        raise GroundstationError(log.source.name, f"{missing} records of its parts are missing", "files of one layout")
+    return tuple(replace(one, sha256=sha256) for one, sha256 in zip(job.parts, log.digests, strict=True))
 
 
 def _power_up(log: Log, job: Job) -> PowerUpOfRun | None:
@@ -271,6 +329,7 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
         times_s=watch.times_s,
         was_finished=job.step == "nothing",
         power_up=job.power_up,
+        parts=finished.parts,
     )
 
 

@@ -2,7 +2,7 @@
 
 import platform
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
@@ -10,7 +10,7 @@ from groundstation.base.version import __version__
 from groundstation.pipeline.one_flight.resume import versions
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult
-from groundstation.results.manifest import Host, Manifest, PowerUpOfRun, Resume, SourceOfRun
+from groundstation.results.manifest import Host, Manifest, PartOfRun, PowerUpOfRun, Resume, SourceOfRun
 
 
 def manifest_of(
@@ -20,6 +20,7 @@ def manifest_of(
     path: str = "",
     resume: Resume | None = None,
     power_up: PowerUpOfRun | None = None,
+    parts: Sequence[PartOfRun] = (),
 ) -> Manifest:
     """Describe a run of a flight, a session or a plan: source, settings, versions, host and time.
 
@@ -34,6 +35,8 @@ def manifest_of(
         What a later run need not do again.
     power_up : PowerUpOfRun, optional
         Which of several in the log.
+    parts : sequence of PartOfRun
+        The consecutive logs of the flight.
     """
     source, heading = results.source, results.answer(HeadingResult)
     return Manifest(
@@ -47,4 +50,5 @@ def manifest_of(
         versions=versions(),
         resume=resume,
         power_up=power_up,
+        parts=tuple(parts),
     )

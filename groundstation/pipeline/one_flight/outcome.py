@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from groundstation.base.errors import GroundstationError
+from groundstation.results.manifest import PartOfRun
 
 State = Literal["done", "data_lost", "limit_reached", "failed", "skipped"]
 EXIT_CODE: Mapping[State, int] = {"done": 0, "skipped": 0, "data_lost": 3, "limit_reached": 4, "failed": 1}
@@ -38,6 +39,8 @@ class Outcome:
         Which of several power-ups in the log, from 1; 0 where the log holds one.
     more : tuple of Outcome
         What became of the others.
+    parts : tuple of PartOfRun
+        The consecutive logs of the flight: where a log begins and ends tells whether another one goes on from it.
     """
 
     source: str
@@ -52,6 +55,7 @@ class Outcome:
     was_finished: bool = False
     power_up: int = 0
     more: "tuple[Outcome, ...]" = ()
+    parts: tuple[PartOfRun, ...] = ()
 
     @property
     def code(self) -> int:

@@ -8,8 +8,8 @@ reports whether there is a PDF.
 import hashlib
 import json
 import platform
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from importlib import metadata as installed
 from pathlib import Path
@@ -29,7 +29,7 @@ from groundstation.results.document import SummaryDocument
 from groundstation.results.files import load_document, load_manifest, save_manifest
 from groundstation.results.flight import Source
 from groundstation.results.manifest import Keys as Keys
-from groundstation.results.manifest import Manifest, PowerUpOfRun
+from groundstation.results.manifest import Manifest, PartOfRun, PowerUpOfRun
 
 Step = Literal["everything", "analysis", "reports", "nothing"]  # what has to be done for a log
 PACKAGES = (
@@ -59,6 +59,10 @@ class Finished:
         Whether a magnetic deviation was found, and whether one was added to the log: there are files of both.
     power_up : PowerUpOfRun, optional
         Which of several in its log.
+    parts : tuple of PartOfRun
+        The consecutive logs that it came from.
+    source : Source
+        Of its log, or of all its parts.
     """
 
     folder: Path
@@ -72,11 +76,17 @@ class Finished:
     has_deviation: bool = False
     has_applied: bool = False
     power_up: PowerUpOfRun | None = None
+    parts: tuple[PartOfRun, ...] = ()
+    source: Source = field(default_factory=lambda: Source("", "", 0, ""))
 
     @property
     def mcap(self) -> Path:
         """Its store file."""
         return self.folder / f"{self.flight_id}.mcap"
+
+    def has(self, sha256: str) -> bool:
+        """Whether a log with a digest is the flight's, or one of its parts."""
+        return sha256 == self.sha256 or any(part.sha256 == sha256 for part in self.parts)
 
     @property
     def has_suffix(self) -> bool:
@@ -117,8 +127,10 @@ def _version(package: str) -> str:
         return ""
 
 
-def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool) -> Keys:
+def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool, digests: Sequence[str] = ()) -> Keys:
     """Keys of the run of a log: its name counts too, as it stands in the results.
+
+    ``digests`` are those of the consecutive files of one recording.
 
     Raises
     ------
@@ -128,7 +140,8 @@ def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool) -> 
     tables = dict(configuration.tables)
     thresholds = tables.pop("thresholds", {})
     conversion = _digest(
-        asdict(source), _layouts_of(configuration), thresholds, dict(versions()), platform.python_version()
+        *(asdict(source), _layouts_of(configuration), thresholds, dict(versions()), platform.python_version()),
+        *([list(digests)] if len(digests) > 1 else []),
     )
     intervals = [[asdict(part) for part in listed] for listed in (configuration.exclude, configuration.force)]
     apply = None if configuration.apply is None else asdict(configuration.apply)
@@ -198,4 +211,6 @@ def _finished(folder: Path, files: frozenset[str], manifest: Manifest, summary: 
         bool(summary.results.get("magnetic")),
         any(finding.code == APPLIED for finding in summary.findings),
         manifest.power_up,
+        manifest.parts,
+        Source(manifest.source.name, manifest.source.sha256, manifest.source.size_bytes, manifest.source.reader),
     )

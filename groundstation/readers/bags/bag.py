@@ -14,6 +14,7 @@ from groundstation.readers.bags.ros1 import MAGIC as ROS1_MAGIC
 from groundstation.readers.bags.ros1 import Ros1Bag, has_chunk
 from groundstation.readers.bags.sqlite import MAGIC as SQLITE_MAGIC
 from groundstation.readers.bags.sqlite import Ros2Sqlite
+from groundstation.readers.joined import JoinedSource
 from groundstation.readers.source import Source
 
 METADATA = "metadata.yaml"
@@ -94,6 +95,8 @@ class Bag:
 
     def files(self) -> tuple[Source, ...]:
         """The files that hold messages."""
+        if isinstance(self.source, JoinedSource):
+            return self.source.files
         if not self.source.head.lstrip().startswith(METADATA_MARK):
             return (self.source,)
         return tuple(Source(path) for path in files_of(self.source.path))
