@@ -6,12 +6,13 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path, PurePath
 from types import MappingProxyType
 
 from groundstation.base.errors import UnclaimedLogError, UsageError
 from groundstation.base.to_disk import sync_folder
+from groundstation.pipeline.many_flights.consecutive import flights_of_parts
 from groundstation.pipeline.many_flights.delta_sink import delta_place, put_flights
 from groundstation.pipeline.many_flights.fleet_store import Scan, refresh, scan
 from groundstation.pipeline.many_flights.found_sessions import (
@@ -35,9 +36,12 @@ from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJo
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.cores import cores, painters_of
 from groundstation.pipeline.one_flight.flight import Job, run_flight
+from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.pipeline.one_flight.resume import Finished, Keys
+from groundstation.results.manifest import PartOfRun
 
 PLANS: Mapping[str, str] = {
     "everything": "to run",
@@ -220,16 +224,21 @@ def _run_here(
 
         def left() -> Iterator[tuple[int, Job]]:
             for number, job, twin in _with_steps(work, known, skipped):
+                flight = job.finished
                 if twin is None:
                     yield number, job
+                elif flight is not None and len(flight.parts) > 1:
+                    placement.put_part(number, twin, flight.flight_id, "", was_finished=job.step == "nothing")
+                    listen(Event("end", job.name, "part of a flight"))
                 else:
                     placement.put_twin(number, Outcome(job.log, "skipped", ""), twin)
                     listen(Event("end", job.name, "same content as another log"))
 
         def suffixed(number: int) -> Job:
-            return replace(work[number], add_suffix=True)
+            return replace(work[number % len(work)], add_suffix=True, power_up=placement.power_up(number))
 
-        _run_into(placement, out, left(), run_flight, suffixed, crew, listen)
+        _run_into(placement, out, left(), run_flight, suffixed, crew, listen, len(work))
+        apart = _run_joined(placement, work, known, crew, listen)
         clear_unfinished(out)  # of processes that died or took too long
         found, unwritten = _swept(placement, out, refresher)
         sessions = _run_sessions(placement, asked, found, crew, listen)
@@ -238,7 +247,29 @@ def _run_here(
         problems = _write_beside(out, outcomes, asked, found)
         sync_folder(out)
         stored = put_flights(asked.store, found, outcomes) if asked.store else ()
-        return (*outcomes, *unwritten, *problems, *stored)
+        return (*outcomes, *apart, *unwritten, *problems, *stored)
+
+
+def _run_joined(
+    placement: Placement, work: Sequence[Job], known: KnownFlights, crew: Crew, listen: Listener
+) -> tuple[Outcome, ...]:
+    """Run as one flight the consecutive logs among those in place; returns what could not be joined, and why."""
+    found = flights_of_parts(placement.flights(), known, work[0].configuration)
+    if not found:
+        return ()
+    tasks: list[tuple[int, Job]] = []
+    for number, stretch in enumerate(found):
+        first = placement.flights()[stretch.numbers[0]]
+        add_suffix = bool(first.flight_id) and plain_id(first.flight_id, first.sha256) != first.flight_id
+        tasks.append((number, work[stretch.numbers[0] % len(work)].of_parts(stretch.parts, add_suffix=add_suffix)))
+    apart = []
+    with closing(crew(tasks, run_flight)) as ended:
+        for number, outcome in ended:
+            stretch = found[number]
+            listen(Event("end", tasks[number][1].name, outcome.text))
+            problem = placement.put_joined(stretch.numbers, outcome)
+            apart += [problem] if problem else []
+    return tuple(apart)
 
 
 def _write_beside(out: Path, outcomes: Sequence[Outcome], asked: Asked, found: Scan) -> tuple[Outcome, ...]:
@@ -276,7 +307,9 @@ def _run_remote(
     work: Sequence[RemoteJob], asked: Asked, crew: Crew, force: bool, listen: Listener
 ) -> tuple[Outcome, ...]:
     def suffixed(number: int) -> RemoteJob:
-        return replace(work[number], job=replace(work[number].job, add_suffix=True), redo=True)
+        one = work[number % len(work)]
+        job = replace(one.job, add_suffix=True, power_up=placement.power_up(number))
+        return replace(one, job=job, redo=True)
 
     with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
         copy = Path(folder)
@@ -287,7 +320,8 @@ def _run_remote(
             placement = Placement(output, [one.log for one in work])
             is_whole = False
             try:
-                _run_into(placement, copy, _once(work, placement, crew, listen), run_remote, suffixed, crew, listen)
+                tasks = _once(work, placement, crew, listen)
+                _run_into(placement, copy, tasks, run_remote, suffixed, crew, listen, len(work))
                 found, unwritten = _swept(placement, copy)
                 sessions = _run_remote_sessions(placement, output, asked, found, listen)
                 outcomes = (*placement.outcomes(), *sessions)
@@ -350,13 +384,19 @@ def _run_into(
     suffixed: Callable[[int], AnyJob],
     crew: Crew,
     listen: Listener,
+    logs: int,
 ) -> None:
-    """Carry out jobs and put their flights into place; interrupted, the index at least is written."""
+    """Carry out jobs and put their flights into place; interrupted, the index at least is written.
+
+    ``logs`` is how many logs there are: the flights of a log have its number, and that and multiples of their count.
+    """
     try:
         with closing(crew(tasks, run)) as ended:  # closed at once when something is wrong here: its processes end
             for number, outcome in ended:
                 listen(Event("end", PurePath(outcome.source).name, outcome.text))
-                placement.put(number, outcome)
+                placement.put(number, replace(outcome, more=()))
+                for place, other in enumerate(outcome.more, start=1):
+                    placement.put(number + place * logs, other)
         clashing = placement.clashing()
         if clashing:
             with closing(crew(((number, suffixed(number)) for number in clashing), run)) as ended:
@@ -405,7 +445,10 @@ def plan_many(
     work = [make(Path(one.url), is_named=one.is_named) for one in inputs]
     found = {} if configuration.profile is not None else _skipped(inputs, Strangers(out), silent)
     for number, job, twin in _with_steps(work, known, found):
-        if twin is not None:
+        if twin is not None and job.finished is not None and len(job.finished.parts) > 1:
+            text = f"part of {job.finished.flight_id}, with {work[twin].name}"
+            found[number] = Outcome(work[number % len(work)].log, "done", text, was_finished=job.step == "nothing")
+        elif twin is not None:
             found[number] = Outcome(job.log, "done", f"same content as {work[twin].log}, listed once")
         else:
             found[number] = _planned(job)
@@ -460,17 +503,55 @@ def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configu
 def _with_steps(
     jobs: Sequence[Job], known: KnownFlights, without: Collection[int] = ()
 ) -> Iterator[tuple[int, Job, int | None]]:
-    """Jobs by number, with what is to be done of each, and the number of an earlier one with the same finished log."""
+    """Jobs by number, with what is to be done of each, and the number of an earlier one that gives its flight.
+
+    That is one with the same log, or with another part of the flight. A log whose flights of several power-ups are
+    finished has a job for each of them. Those ``without`` are passed over.
+    """
     first: dict[str, int] = {}
+    numbers = {str(job.path.absolute()): number for number, job in enumerate(jobs)}
+    asked = cache(lambda number: jobs[number].asked())
+
+    @cache
+    def digest(number: int) -> str:
+        found = asked(number)
+        return found[0] if found else jobs[number].digest()
+
+    def is_as_it_was(part: PartOfRun) -> bool:
+        return part.path not in numbers or digest(numbers[part.path]) == part.sha256
+
     for number, job in enumerate(jobs):
         if number in without:
             continue
-        planned = _with_step(job, known) if len(known) else job
-        kept = first.setdefault(planned.finished.sha256, number) if planned.finished else number
-        yield number, planned, kept if kept != number else None
+        found = known.of(digest(number)) if len(known) else ()
+        for place, planned in enumerate(_with_step(job, asked(number) if found else None, found, is_as_it_was)):
+            flight = planned.finished
+            kept = number if flight is None else first.setdefault(flight.sha256, number)
+            yield number + place * len(jobs), planned, kept if kept != number else None
 
 
-def _with_step(job: Job, known: KnownFlights) -> Job:
-    asked = job.asked()
-    found = None if asked is None else known.of(asked[0])
-    return job if asked is None or found is None else job.going_on(found, asked[1])
+def _with_step(
+    job: Job,
+    asked: tuple[str, Keys] | None,
+    found: Sequence[Finished],
+    is_as_it_was: Callable[[PartOfRun], bool],
+) -> tuple[Job, ...]:
+    """A job with what is left to do of it, one for each power-up of its log; ``found`` are its finished flights."""
+    if found and len(found[0].parts) > 1:
+        return (_of_parts(job, found[0], is_as_it_was),)
+    if asked is None or not found:
+        return (job,)
+    planned = tuple(job.going_on(one, asked[1]) for one in found)
+    if len(planned) > 1 and any(one.step == "everything" for one in planned):
+        return (job,)  # the log is read anew: it tells what it holds
+    return planned
+
+
+def _of_parts(job: Job, flight: Finished, is_as_it_was: Callable[[PartOfRun], bool]) -> Job:
+    """The job of a flight of several logs; where one of them has changed, that of its own log alone."""
+    if not all(map(is_as_it_was, flight.parts)):
+        return job
+    joined = job.of_parts(flight.parts)
+    planned = replace(joined.going_on(flight, joined.keys_of(flight)), power_up=0)
+    is_read = planned.step in ("everything", "analysis")
+    return job if is_read and not all(Path(part.path).is_file() for part in flight.parts) else planned
