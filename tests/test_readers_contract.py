@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.base.records import MAX_BATCH_ROWS, Damage, Item, LogHeader, RecordBatch, Remark
+from groundstation.base.records import MAX_BATCH_ROWS, Damage, Item, LogHeader, NewLog, RecordBatch, Remark
 from groundstation.base.signals import field_of, is_canonical
 from groundstation.readers import registry, rows
 from tests.real_logs import real_log
@@ -30,7 +30,7 @@ KINDS = {"double": "f", "bool": "b", "text": "U"}
 
 def check(items: list[Item]) -> None:
     assert isinstance(items[0], LogHeader) and items[0].reader
-    assert all(isinstance(item, RecordBatch | Damage | Remark) for item in items[1:])
+    assert all(isinstance(item, NewLog | RecordBatch | Damage | Remark) for item in items[1:])
     last: dict[str, int] = {}
     kinds: dict[tuple[str, str], str] = {}
     for batch in items:

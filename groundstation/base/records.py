@@ -1,8 +1,9 @@
 """Records: what readers and the store yield, and what tables are made from.
 
 A reader is an iterator of items. Most are :class:`RecordBatch` (a bounded batch of one topic's columns); beside them
-come :class:`LogHeader` (facts about the log), :class:`Damage` (what could not be read, where and how much) and
-:class:`Remark` (what the reader derived or assumed). Missing stays missing: absent values are marked, never filled.
+come :class:`LogHeader` (facts about the log), :class:`NewLog` (where another one begins in the source),
+:class:`Damage` (what could not be read, where and how much) and :class:`Remark` (what the reader derived or
+assumed). Missing stays missing: absent values are marked, never filled.
 """
 
 from collections.abc import Iterator, Mapping
@@ -110,6 +111,23 @@ class RecordBatch:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class UtcReadings:
+    """UTC of device time zero by each reading of another clock, in the order of the source.
+
+    Parameters
+    ----------
+    record_index, zero_ns : ndarray of int64, shape (n,)
+    """
+
+    record_index: Int64Array
+    zero_ns: Int64Array
+
+    def between(self, first: int, end: int) -> Int64Array:
+        """What is read from record ``first`` on and before record ``end``, in rising order."""
+        return np.sort(self.zero_ns[(self.record_index >= first) & (self.record_index < end)])
+
+
 @dataclass(frozen=True)
 class LogHeader:
     """Facts about a log, yielded before its first batch.
@@ -129,6 +147,8 @@ class LogHeader:
     clock_offsets : tuple of (int, int)
         What another clock of the log says of the device's: from the record of this index on, so many nanoseconds are to
         be added to device times (and to times of validity). The records before the first are moved by its offset too.
+    utc_readings : UtcReadings, optional
+        What ``utc_of_zero_ns`` is from, where the device's clock starts again: each stretch has a zero of its own.
     """
 
     reader: str
@@ -136,6 +156,26 @@ class LogHeader:
     utc_of_zero_ns: int | None = None
     has_counting_clock: bool = False
     clock_offsets: tuple[tuple[int, int], ...] = ()
+    utc_readings: UtcReadings | None = None
+
+
+@dataclass(frozen=True)
+class NewLog:
+    """A place where a further log begins in the source, by what stands there: a header, definitions, a magic.
+
+    Parameters
+    ----------
+    record_index : int
+        Its first record has this place or a later one.
+    metadata : mapping of str to str
+        What it says of itself.
+    utc_of_zero_ns : int, optional
+        UTC of its device time zero, where it says so.
+    """
+
+    record_index: int
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    utc_of_zero_ns: int | None = None
 
 
 @dataclass(frozen=True)
@@ -186,5 +226,5 @@ class Remark:
     fields: tuple[str, ...] = ()
 
 
-Item: TypeAlias = LogHeader | RecordBatch | Damage | Remark
+Item: TypeAlias = LogHeader | NewLog | RecordBatch | Damage | Remark
 Items: TypeAlias = Iterator[Item]

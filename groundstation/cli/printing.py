@@ -1,6 +1,5 @@
 """How results look on stdout: lines for people, JSON for programs."""
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path, PurePath
@@ -115,8 +114,8 @@ def tell_errors(outcome: Outcome, *, with_traces: bool = False) -> None:
 def _names(done: Sequence[Outcome]) -> list[str]:
     """Logs by the names of their files; by their paths where two files have one name."""
     files = [outcome.source if outcome.is_session else log_name(Path(outcome.source)) for outcome in done]
-    count = Counter(files)
-    return [file if count[file] == 1 else outcome.source for file, outcome in zip(files, done, strict=True)]
+    paths = {file: {one.source for name, one in zip(files, done, strict=True) if name == file} for file in set(files)}
+    return [file if len(paths[file]) == 1 else outcome.source for file, outcome in zip(files, done, strict=True)]
 
 
 def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:
@@ -199,6 +198,7 @@ def _plain(outcome: Outcome) -> dict[str, Any]:
         "flight_id": outcome.flight_id,
         "folder": outcome.folder,
         "was_finished": outcome.was_finished,
+        **({"power_up": outcome.power_up} if outcome.power_up else {}),
         "text": outcome.text,
         **({"left_out": [failure.text for failure in outcome.failures]} if outcome.failures else {}),
     }

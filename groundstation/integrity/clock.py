@@ -19,6 +19,7 @@ from groundstation.base.timescales import duration_text, iso_to_utc_ns, utc_ns_t
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock_relation import ClockRelation, mistake_of_step
 from groundstation.integrity.clock_steps import ClockSettings, ClockStep, Steps
+from groundstation.integrity.power_ups import Wrap
 
 LARGEST_NS = 2**62  # of a time and of what is added to it: sums fit 64 bits
 FIRST_NS = iso_to_utc_ns("1980-01-08T00:00:00Z")[0]  # a clock before it was not set: 1970, or the zero of GPS
@@ -61,6 +62,10 @@ class ClockModel:
         Device time of the first record that has one; UTC of a clock that tells UTC.
     relations : tuple of ClockRelation
         How corrected time runs by other clocks of the log; it is never changed by that.
+    longest_step_ns : int
+        The longest step ahead between two records.
+    wraps : tuple of Wrap
+        Where the counter wrapped and went on.
     """
 
     is_absolute: bool = False
@@ -83,6 +88,8 @@ class ClockModel:
     start: Start = "own_zero"
     first_device_ns: int = 0
     relations: tuple[ClockRelation, ...] = ()
+    longest_step_ns: int = 0
+    wraps: tuple[Wrap, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("starts", "offsets_ns", "placed_index", "placed_ns", "stray_index"):
@@ -274,6 +281,7 @@ def estimate_clock(
         stray_index=index[found.stray & believed],
         start=start_of(int(time[0]), utc_of_zero_ns),
         first_device_ns=int(time[0]) + (utc_of_zero_ns or 0),
+        longest_step_ns=found.longest_step_ns,
     )
 
 

@@ -1,6 +1,8 @@
 """What a user must know of the clock of a log, one line each, with figures and places."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+
+import numpy as np
 
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.normal import NORMAL_95
@@ -10,7 +12,10 @@ from groundstation.integrity.clock import FIRST_NS, ClockModel
 from groundstation.integrity.clock_relation import ClockRelation, Mistake
 from groundstation.integrity.clock_steps import ClockStep
 from groundstation.integrity.ledger import LedgerCounts
+from groundstation.integrity.power_ups import LAST_RECORD
+from groundstation.integrity.source_clock import PowerUpClock
 
+POWER_UPS_TOLD = 5
 _UNIX_SECONDS = (1_000_000_000, 4_000_000_000)  # 2001 to 2096: as a time since power-up, more than 31 years
 
 
@@ -20,7 +25,8 @@ def clock_findings(ledger: LedgerCounts) -> Iterator[Finding]:
     Codes: ``clock.backward_step``, ``clock.forward_step``, ``clock.unset``, ``clock.missing_times``,
     ``clock.implausible_times``, ``clock.stale_times``, ``clock.shifted``, ``clock.no_utc``, ``clock.no_times``,
     ``clock.relation_step``, ``clock.relation_rate``, ``clock.drift``, ``clock.offset``, ``clock.week_number``,
-    ``clock.leap_seconds``, ``clock.time_zone``, ``time.unordered``, ``time.stray_rows``, ``data.none``.
+    ``clock.leap_seconds``, ``clock.time_zone``, ``time.unordered``, ``time.stray_rows``, ``data.none``,
+    ``clock.wrapped``, ``log.power_ups``.
     """
     clock = ledger.clock
     if not clock.has_times:
@@ -30,8 +36,13 @@ def clock_findings(ledger: LedgerCounts) -> Iterator[Finding]:
         else:
             yield Finding("fail", "data.none", "the log holds no records")
         return
+    if ledger.power_ups:
+        yield _power_ups(ledger.power_ups, clock)
+    for wrap in clock.wraps:
+        text = f"the {wrap.what} wrapped at record {wrap.record_index} and goes on"
+        yield Finding("info", "clock.wrapped", text, place=f"record {wrap.record_index}")
     for step in clock.steps:
-        yield _step(step, clock)
+        yield _step(step, clock, _zero_at(step, ledger))
     yield from _times(ledger)
     yield from _order(clock)
     yield from _absolute(clock)
@@ -50,8 +61,28 @@ def counted(count: int, noun: str, nouns: str = "") -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {nouns or noun + 's'}"
 
 
-def _step(step: ClockStep, clock: ClockModel) -> Finding:
-    zero_ns = int(clock.offsets_ns[-1])
+def _power_ups(several: Sequence[PowerUpClock], clock: ClockModel) -> Finding:
+    """That the source is of several flights, and when each was."""
+    _first, second = several[:2]
+    spans = [
+        f"{clock.text(one.start_ns)} to {clock.text(one.end_ns)}" if one.is_absolute else "one without UTC"
+        for one in several[:POWER_UPS_TOLD]
+    ]
+    more = f" and {len(several) - POWER_UPS_TOLD} more" if len(several) > POWER_UPS_TOLD else ""
+    text = f"{len(several)} power-ups in one file: {'; '.join(spans)}{more}: `run` makes a flight of each"
+    place = f"record {second.records.first}"
+    return Finding("warn", "log.power_ups", text, place=place, count=len(several))
+
+
+def _zero_at(step: ClockStep, ledger: LedgerCounts) -> int:
+    """What is added to device times at the end of the power-up of a step: what comes last is believed."""
+    clock = ledger.clock
+    ends = (one.records.end for one in ledger.power_ups if step.record_index < one.records.end)
+    last = int(np.searchsorted(clock.starts, next(ends, LAST_RECORD))) - 1
+    return int(clock.offsets_ns[last])
+
+
+def _step(step: ClockStep, clock: ClockModel, zero_ns: int) -> Finding:
     before, after = clock.text(step.device_before_ns + zero_ns), clock.text(step.device_after_ns + zero_ns)
     direction = "back" if step.kind == "backward" else "ahead"
     text = (

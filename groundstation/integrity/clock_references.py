@@ -32,6 +32,7 @@ from groundstation.integrity.stretches import Sampler
 
 MOST_SAMPLES = 4_096
 MOST_REFERENCES = 8
+_FEWEST_ZEROS = 3  # readings that tell when a counter began
 _DAY_NS = 86_400 * NS_PER_S
 STAMPS = "header stamp"  # a clock that is read when a message is made, and written when it reaches the recorder
 _AROUND, _PROMPT_NS, _WAITED_NS = 64, NS_PER_S // 100, NS_PER_S // 2
@@ -163,6 +164,21 @@ class ClockReferences:
         for readings in found:
             if readings.reference.serves(batch):
                 readings.add(batch)
+
+    def zeros_ns(self, first: int, end: int) -> Int64Array:
+        """UTC of device time zero by the readings from record ``first`` on and before ``end``, in rising order.
+
+        Of the first clock, in the order of the topics, that tells UTC with its date there; none without any.
+        """
+        for readings in (one for topic in sorted(self._readings) for one in self._readings[topic]):
+            index, columns = readings.sampler.all()
+            if readings.reference.scale not in ("utc", "gps") or not len(index):
+                continue
+            told_ns, good = _told(readings.reference, columns)
+            good &= (index >= first) & (index < end) & (told_ns >= FIRST_NS)
+            if np.count_nonzero(good) >= _FEWEST_ZEROS:
+                return np.sort(told_ns[good] - columns["device"][good])
+        return np.zeros(0, dtype=np.int64)
 
     def relations(self, clock: ClockModel) -> tuple[ClockRelation, ...]:
         """How the recorder's corrected clock runs by each of them, in the order of their topics."""

@@ -100,6 +100,7 @@ class Steps:
         self.steps: list[tuple[int, int]] = []  # first record after, last sound record before
         changes = np.diff(time)
         ahead = changes[changes > 0]
+        self.longest_step_ns = int(ahead.max(initial=0))
         self.period_ns = int(middle_of(ahead))
         self._spacing = middle_of(np.diff(index)) if len(index) > 1 else 1.0
         self._forward_ns = round(settings.forward_step_s * NS_PER_S)

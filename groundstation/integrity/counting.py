@@ -120,6 +120,7 @@ def estimate_counting_clock(
         is_counting=True,
         start=start_of(int(time[0]), utc_of_zero_ns),
         first_device_ns=int(time[0]) + (utc_of_zero_ns or 0),
+        longest_step_ns=int(steps.max(initial=0)),
     )
 
 

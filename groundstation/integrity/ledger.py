@@ -27,6 +27,7 @@ from groundstation.integrity.contradictions import Contradiction
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.integrity.rhythm import rhythm_of
 from groundstation.integrity.sequence import Sequence
+from groundstation.integrity.source_clock import PowerUpClock
 from groundstation.integrity.spans import Dropout, Span, Timeline, skipped_bytes, spans_of, truncation
 from groundstation.integrity.stuck import Stuck
 
@@ -155,7 +156,10 @@ class TopicCounts:
 
 @dataclass(frozen=True)
 class LedgerCounts:
-    """The ledger of a log: its topics in alphabetical order, its clock, and what the reader lost and remarked."""
+    """The ledger of a log: its topics in alphabetical order, its clock, and what the reader lost and remarked.
+
+    ``power_ups`` are those of the source, where it holds several.
+    """
 
     topics: tuple[TopicCounts, ...] = ()
     clock: ClockModel = field(default_factory=ClockModel)
@@ -165,6 +169,7 @@ class LedgerCounts:
     dropouts: tuple[Dropout, ...] = ()
     timeline: Timeline | None = None
     contradictions: tuple[Contradiction, ...] = ()
+    power_ups: tuple[PowerUpClock, ...] = ()
 
     def __getitem__(self, topic: str) -> TopicCounts:
         """The ledger of one topic; KeyError when the log has none of that name."""

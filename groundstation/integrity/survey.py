@@ -13,19 +13,16 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.gaps import Gaps
-from groundstation.base.records import BoolArray, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
-from groundstation.base.units import NS_PER_S
+from groundstation.base.records import Damage, Int64Array, Item, LogHeader, NewLog, RecordBatch, Remark
 from groundstation.integrity.breaks_off import broken_off
-from groundstation.integrity.clock import ClockModel, ClockOffsets, estimate_clock
+from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.clock_dates import doubtful_dates
 from groundstation.integrity.clock_references import ClockReferences
 from groundstation.integrity.contents import Contents
-from groundstation.integrity.counting import CountingSettings, estimate_counting_clock
 from groundstation.integrity.ledger import LedgerCounts, TopicCounts, topic_ledger
 from groundstation.integrity.limits import Thresholds, shipped
-from groundstation.integrity.ordering import joined_columns
 from groundstation.integrity.places import Kept, Places
-from groundstation.integrity.thinning import Thinner
+from groundstation.integrity.source_clock import Found, PowerUpClock, clock_of
 
 
 @dataclass(frozen=True)
@@ -43,6 +40,11 @@ class Survey:
     header: LogHeader
     clock: ClockModel
     ledger: LedgerCounts
+
+    @property
+    def power_ups(self) -> tuple[PowerUpClock, ...]:
+        """Power-ups of the source, where it holds several."""
+        return self.ledger.power_ups
 
     @property
     def damages(self) -> tuple[Damage, ...]:
@@ -115,6 +117,7 @@ def survey(items: Iterable[Item], *, thresholds: Thresholds | None = None) -> Su
 
 def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Survey:
     header = LogHeader("")
+    new_logs: list[NewLog] = []
     damages: list[Damage] = []
     remarks: list[Remark] = []
     pieces: dict[str, list[Kept]] = {}
@@ -129,9 +132,11 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
             damages.append(item)
         elif isinstance(item, Remark):
             remarks.append(item)
+        elif isinstance(item, NewLog):
+            new_logs.append(item)
         else:
             header = item
-    clock = _clock_of(header, places, [pieces[topic] for topic in sorted(pieces)], limits)
+    clock, parts = clock_of(Found(header, tuple(new_logs), places, pieces, references), limits)
     clock = replace(clock, relations=references.relations(clock))
     results = _ledgers(places, pieces, contents, clock, limits) if clock.has_times else []
     topics = tuple(ledger for ledger, _lateness in results)
@@ -139,7 +144,7 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
     clock = replace(clock, lateness_ns={ledger.topic: lateness for ledger, lateness in results})
     dropouts, timeline = (contents.dropouts(clock), contents.timeline(clock)) if clock.has_times else ((), None)
     against = contents.contradictions(clock, header.metadata) if clock.has_times else ()
-    ledger = LedgerCounts(topics, clock, tuple(damages), tuple(remarks), limits, dropouts, timeline, against)
+    ledger = LedgerCounts(topics, clock, tuple(damages), tuple(remarks), limits, dropouts, timeline, against, parts)
     return Survey(header, clock, replace(ledger, damages=(*damages, *broken_off(ledger))))
 
 
@@ -165,48 +170,6 @@ def _ledgers(
             )
             results.append((ledger, order.lateness_ns))
     return sorted(results, key=lambda result: result[0].topic)
-
-
-def _clock_of(header: LogHeader, places: Places, topics: Sequence[Sequence[Kept]], limits: Thresholds) -> ClockModel:
-    """The model of the log's clock, of the kind that its reader names."""
-    offsets = ClockOffsets.of(header.clock_offsets)
-    if header.has_counting_clock:
-        clock = _counting_clock(header, places, topics, limits.counting_clock, offsets)
-    else:
-        index, time = places.in_one(topics)
-        moved = time if offsets is None else offsets.moved(index, time)
-        clock = estimate_clock(index, moved, header.utc_of_zero_ns, settings=limits.clock)
-    if offsets is None or not clock.has_times:
-        return clock
-    return clock.on(offsets, clock.first_device_ns - int(offsets.offsets_ns[0]))
-
-
-def _counting_clock(
-    header: LogHeader,
-    places: Places,
-    topics: Sequence[Sequence[Kept]],
-    settings: CountingSettings,
-    offsets: ClockOffsets | None,
-) -> ClockModel:
-    """The model of a counting clock; of a long log only the records that have a say are laid together."""
-    thinner = Thinner(round(settings.tolerance_s * NS_PER_S), settings.run_records)
-    windows: list[tuple[Int64Array, Column, BoolArray]] = []
-    for index, own, frozen in places.in_order(topics):
-        time = own if offsets is None else offsets.moved(index, own)
-        if not places.is_long:
-            return estimate_counting_clock(index, time, frozen, header.utc_of_zero_ns, settings=settings)
-        kept = thinner.kept(time.values, time.mask & ~frozen)
-        windows.append((index[kept], time.take(kept), frozen[kept]))
-    if not windows:
-        return ClockModel()
-    clock = estimate_counting_clock(
-        np.concatenate([index for index, _time, _frozen in windows]),
-        joined_columns([time for _index, time, _frozen in windows]),
-        np.concatenate([frozen for _index, _time, frozen in windows]),
-        header.utc_of_zero_ns,
-        settings=settings,
-    )
-    return replace(clock, period_ns=thinner.period_ns) if clock.has_times else clock
 
 
 class Census:

@@ -5,6 +5,7 @@ profile's raw topic.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Item, LogHeader, Remark
 from groundstation.base.slips import slips
 from groundstation.base.source_units import PREFIX, units_entry
-from groundstation.readers.dialect import Line, detect_encoding, head_lines
+from groundstation.readers.dialect import Dialect, Line, detect_encoding, head_lines
 from groundstation.readers.misnamed import misnamed
 from groundstation.readers.profile import Profile, load, shipped
 from groundstation.readers.profile_fit import Fit, delimiter_of, fit_at, fit_below
@@ -25,6 +26,8 @@ NAME = "csv-profile"
 DISTINCTIVE_COLUMNS = 4
 _HEAD_LINES = 1000
 DAMAGED_HEAD_LINES = 20  # in which a header row is looked for when the first line is not the profile's
+MOST_LINES = 10_000  # in which it is looked for elsewhere
+FEWEST_ROWS = 3  # above the header row that are those of another log
 
 
 @cache
@@ -48,11 +51,14 @@ def _best(source: Source) -> tuple[float, Fit] | None:
     profiles = [profile for profile in _shipped() if profile.first_lines]
     is_one = any(first.startswith(profile.first_lines) for profile in profiles)
     encoding = detect_encoding(source.head, source.name)
-    lines = head_lines(source, encoding, _HEAD_LINES if is_one else DAMAGED_HEAD_LINES)
+    below = {profile.name for profile in profiles if _stands_below(source, profile)}
+    most = MOST_LINES if below else _HEAD_LINES if is_one else DAMAGED_HEAD_LINES
+    lines = head_lines(source, encoding, most)
     found: list[tuple[float, Fit]] = []
     for profile in profiles:
         is_its_own = first.startswith(profile.first_lines)
-        fit = _fit(profile, encoding, lines if is_its_own else lines[:DAMAGED_HEAD_LINES])
+        is_near = not is_its_own and profile.name not in below
+        fit = _fit(profile, encoding, lines[:DAMAGED_HEAD_LINES] if is_near else lines)
         count = 0 if fit is None else sum(rule.name in fit.position for rule in profile.columns)
         if fit is not None and (is_its_own or count >= DISTINCTIVE_COLUMNS):
             found.append((1.0 if is_its_own else 0.9, fit))
@@ -62,6 +68,11 @@ def _best(source: Source) -> tuple[float, Fit] | None:
         if best is not None and one[1].header in best[1].behind and one[1].told_count > best[1].told_count:
             return one
     return best
+
+
+def _stands_below(source: Source, profile: Profile) -> bool:
+    """Whether the profile's first line stands below the rows of another log, of which the beginning is lost."""
+    return any(b"\n" + line.encode() in source.head for line in profile.first_lines)
 
 
 def claim_by(source: Source, profile: Path) -> Claim:
@@ -98,11 +109,20 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
         yield truncated_header(fit.last.number)
         return
     sections, section_remarks = _sections(source, fit, utc_of_zero_ns)
-    items = TableReader(source, sections).items(header)
+    above = _rows_of_another(fit)
+    items = TableReader(source, [*([Section(above, sections[0].layout)] if above else []), *sections]).items(header)
     yield next(items)
     yield from dict.fromkeys([*remarks, *section_remarks, *unusable_references(metadata)])
-    yield from _above(fit)
+    yield from () if above else _above(fit)
     yield from misnamed(items, _slips(fit), fit.header.number)
+
+
+def _rows_of_another(fit: Fit) -> Dialect | None:
+    """Form of the rows above the header, where they are those of another log with the same columns."""
+    is_begun = any(line.text.lstrip().startswith(fit.profile.first_lines) for line in fit.above)
+    if not fit.profile.first_lines or not is_begun or len(fit.rows_above) < FEWEST_ROWS:
+        return None
+    return replace(fit.dialect_to(None), first_byte=0, first_line=1, end_byte=fit.rows_above[-1].next_byte)
 
 
 def _fit(profile: Profile, encoding: str, lines: Sequence[Line]) -> Fit | None:
@@ -116,7 +136,7 @@ def _fit(profile: Profile, encoding: str, lines: Sequence[Line]) -> Fit | None:
 
 def _fitted(source: Source, profile: Profile) -> Fit:
     encoding = detect_encoding(source.head, source.name)
-    fit = _fit(profile, encoding, head_lines(source, encoding, _HEAD_LINES))
+    fit = _fit(profile, encoding, head_lines(source, encoding, MOST_LINES))
     if fit is None:
         wanted = ", ".join(dict.fromkeys((*profile.required, *profile.time.columns[:2])))
         raise UnreadableLogError(

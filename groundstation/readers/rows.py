@@ -20,6 +20,7 @@ from groundstation.readers.source import Source
 
 BLOCK_BYTES = 4 << 20
 MAX_LINE_BYTES = 8 << 20
+MOST_SKIPPED = 10_000  # lines inside a file that are kept: more are no headers
 _LF, _QUOTE = 10, 34
 _PADDED_QUOTE = re.compile(r'" +(?=[,;\t]|$)')
 _NOTHING = b" \t\x1a"  # a line of nothing else is blank: padding, or the end mark of DOS
@@ -49,6 +50,7 @@ class RowScanner:
         self._left = None if dialect.end_byte is None else dialect.end_byte - dialect.first_byte
         self._newline = b"\n" if b"\n" in source.head or b"\r" not in source.head else b"\r"
         self.ends_without_newline = False
+        self.skipped: dict[int, str] = {}  # header and comment lines inside the file, by their numbers
 
     def __iter__(self) -> Iterator[Block]:
         with self._source.open() as stream:
@@ -143,6 +145,8 @@ class RowScanner:
                 repeats[at] = normal_form(line, delimiter) in headers
                 position = text.find(mark, int(ends[at]))
         comments = (array[starts] == ord("#")) & (cells != self._dialect.cells) & ~repeats
+        for at in np.flatnonzero(repeats | comments)[: MOST_SKIPPED - len(self.skipped)].tolist():
+            self.skipped[int(numbers[at])] = text[starts[at] : ends[at]].decode("utf-8")
         self._losses.add("repeated_header", "header lines inside the file, skipped", numbers[repeats], loses_data=False)
         self._losses.add("comment_line", "comment lines inside the file, skipped", numbers[comments], loses_data=False)
         skipped: BoolArray = repeats | comments

@@ -29,6 +29,7 @@ from groundstation.readers import cells
 from groundstation.readers.cells import Cells
 from groundstation.readers.dates import local_ns
 from groundstation.readers.dialect import Dialect
+from groundstation.readers.inside import new_logs, with_own_zeros
 from groundstation.readers.layout import METHODS, Key, Layout, Rule, apply
 from groundstation.readers.losses import Losses
 from groundstation.readers.places import PLACED, without_place, zeroed
@@ -66,12 +67,17 @@ class TableReader:
     def items(self, header: LogHeader) -> Iterator[Item]:
         """The header, batches in the order of the file, then remarks and damages."""
         yield header
-        for section in self._sections:
+        lines: dict[int, str] = {}
+        for number, section in enumerate(self._sections):
             self._dialect, self._layout = section.dialect, section.layout
             scanner = RowScanner(self._source, section.dialect, self._losses)
+            zero_ns = _zero_of(header, section)
             for block in scanner:
                 time, columns = self._typed(block)
+                time = with_own_zeros(time, block.line_numbers, scanner.skipped, zero_ns)
                 yield from self._batches(block.line_numbers, _shifted(time, section.shift_ns), columns)
+            lines |= ({section.dialect.first_line - 1: ""} if number else {}) | scanner.skipped
+        yield from new_logs(lines)
         yield from self._remarks(scanner)
         yield from self._losses.damages()
 
@@ -277,6 +283,13 @@ class TableReader:
 
 def _with_point(text: Any) -> Any:
     return pc.replace_substring(text, ",", ".", max_replacements=1)
+
+
+def _zero_of(header: LogHeader, section: Section) -> int | None:
+    """UTC of time zero of the rows of a section."""
+    if header.utc_of_zero_ns is None or section.shift_ns is None:
+        return None
+    return header.utc_of_zero_ns + section.shift_ns
 
 
 def _shifted(time: Column, shift_ns: int | None) -> Column:

@@ -26,6 +26,40 @@ class LogOfSession(SourceOfRun):
 
 
 @dataclass(frozen=True)
+class PartOfRun(SourceOfRun):
+    """One of the consecutive logs of a flight, and where it begins and ends; most flights have one.
+
+    Parameters
+    ----------
+    aircraft, flight : str
+        As the log names them; empty where it does not.
+    rows : int
+        Records of all topics; 0 where the log cannot be read alone.
+    utc_ns : (int, int) or None
+        UTC of its first and last record.
+    device_ns : (int, int)
+        The same on the clock of the device.
+    places_deg : tuple of (float, float)
+        Latitude and longitude where it begins and ends; empty where it does not tell them.
+    """
+
+    aircraft: str = ""
+    flight: str = ""
+    rows: int = 0
+    utc_ns: tuple[int, int] | None = None
+    device_ns: tuple[int, int] = (0, 0)
+    places_deg: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class PowerUpOfRun:
+    """Which of several power-ups in the log, from 1, and of how many."""
+
+    number: int
+    count: int
+
+
+@dataclass(frozen=True)
 class Host:
     """The machine of the run."""
 
@@ -83,6 +117,10 @@ class Manifest:
         Absent where no run made the folder.
     files : mapping of str to FileOfRun
         All others of the folder by their path in it; absent in manifests of earlier versions.
+    power_up : PowerUpOfRun, optional
+        Absent where the log holds one.
+    parts : tuple of PartOfRun
+        The consecutive logs of the flight; that of a power-up has none.
     """
 
     groundstation: str = ""
@@ -97,3 +135,5 @@ class Manifest:
     is_found: bool = field(default=False, metadata=LEFT_OUT_WHEN_DEFAULT)
     resume: Resume | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)
     files: Mapping[str, FileOfRun] = field(default_factory=dict, metadata=LEFT_OUT_WHEN_DEFAULT)
+    power_up: PowerUpOfRun | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)
+    parts: tuple[PartOfRun, ...] = field(default=(), metadata=LEFT_OUT_WHEN_DEFAULT)

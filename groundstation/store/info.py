@@ -76,6 +76,8 @@ class StoreInfo:
         What the log gave when it was converted; kept with the ledger.
     remarks, damages : sequence, json-able
         What the reader derived or assumed, and what of the log was lost.
+    segments : sequence, json-able
+        Power-ups of the recorder, where the log holds several.
 
     Examples
     --------
@@ -96,6 +98,7 @@ class StoreInfo:
     findings: tuple[Finding, ...] = ()
     remarks: Sequence[Any] = ()
     damages: Sequence[Any] = ()
+    segments: Sequence[Any] = ()
 
     def __post_init__(self) -> None:
         for entry in fields(self):
@@ -122,7 +125,7 @@ class StoreInfo:
             "ledger": {**to_json_exactly(self.ledger), "findings": to_json_exactly(self.findings)},
         }
         for entry in fields(self):
-            if entry.name == "findings":
+            if entry.name == "findings" or (entry.name == "segments" and not self.segments):
                 continue
             value = kept.get(entry.name, getattr(self, entry.name))
             out[entry.name] = value if isinstance(value, str) else _json(value)

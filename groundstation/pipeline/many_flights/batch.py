@@ -14,6 +14,7 @@ from groundstation.base.errors import UsageError
 from groundstation.base.to_disk import sync_folder
 from groundstation.pipeline.many_flights.apart import bounds_of, outcomes_apart
 from groundstation.pipeline.many_flights.confined import Bounds
+from groundstation.pipeline.many_flights.consecutive import flights_of_parts
 from groundstation.pipeline.many_flights.delta_sink import delta_place, put_flights
 from groundstation.pipeline.many_flights.fleet_store import Scan, refresh
 from groundstation.pipeline.many_flights.found_sessions import Asked, find_sessions, run_sessions
@@ -32,6 +33,7 @@ from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJo
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.cores import cores, painters_of
 from groundstation.pipeline.one_flight.flight import Job, run_flight
+from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
@@ -96,7 +98,7 @@ def run_many(
     is_near = not any(is_remote(str(place)) for place in (out, *paths))
     listen(Event("begin", total=len(inputs)))
     strangers = Strangers(Path(out) if is_near else None)
-    skipped = skipped_files(inputs, strangers, listen) if is_near and configuration.profile is None else {}
+    skipped = skipped_files(inputs, strangers) if is_near and configuration.profile is None else {}
     logs = len(inputs) - len(skipped)
     bounds = bounds_of(configuration.isolation, timeout_s) if is_isolated else None
     crew = _crew(scheduler, jobs or cores(), logs, listen, timeout_s, bounds)
@@ -205,17 +207,24 @@ def _run_here(
             placement.put(number, outcome)
 
         def left() -> Iterator[tuple[int, Job]]:
+            for outcome in skipped.values():
+                listen(Event("end", PurePath(outcome.source).name, outcome.text))
             for number, job, twin in with_steps(work, known, skipped):
+                flight = job.finished
                 if twin is None:
                     yield number, job
+                elif flight is not None and len(flight.parts) > 1:
+                    placement.put_part(number, twin, flight.flight_id, "", was_finished=job.step == "nothing")
+                    listen(Event("end", job.name, "part of a flight"))
                 else:
                     placement.put_twin(number, Outcome(job.log, "skipped", ""), twin)
                     listen(Event("end", job.name, "same content as another log"))
 
         def suffixed(number: int) -> Job:
-            return replace(work[number], add_suffix=True)
+            return replace(work[number % len(work)], add_suffix=True, power_up=placement.power_up(number))
 
-        _run_into(placement, out, left(), run, suffixed, crew, listen)
+        _run_into(placement, out, left(), run, suffixed, crew, listen, len(work))
+        apart = _run_joined(placement, work, known, crew, listen)
         clear_unfinished(out)  # of processes that died or took too long
         found, unwritten = _swept(placement, out, refresher)
         sessions = _run_sessions(placement, asked, found, crew, listen)
@@ -224,7 +233,29 @@ def _run_here(
         problems = _write_beside(out, outcomes, asked, found)
         sync_folder(out)
         stored = put_flights(asked.store, found, outcomes) if asked.store else ()
-        return (*outcomes, *unwritten, *problems, *stored)
+        return (*outcomes, *apart, *unwritten, *problems, *stored)
+
+
+def _run_joined(
+    placement: Placement, work: Sequence[Job], known: KnownFlights, crew: Crew, listen: Listener
+) -> tuple[Outcome, ...]:
+    """Run as one flight the consecutive logs among those in place; returns what could not be joined, and why."""
+    found = flights_of_parts(placement.flights(), known, work[0].configuration)
+    if not found:
+        return ()
+    tasks: list[tuple[int, Job]] = []
+    for number, stretch in enumerate(found):
+        first = placement.flights()[stretch.numbers[0]]
+        add_suffix = bool(first.flight_id) and plain_id(first.flight_id, first.sha256) != first.flight_id
+        tasks.append((number, work[stretch.numbers[0] % len(work)].of_parts(stretch.parts, add_suffix=add_suffix)))
+    apart = []
+    with closing(crew(tasks, run_flight)) as ended:
+        for number, outcome in ended:
+            stretch = found[number]
+            listen(Event("end", tasks[number][1].name, outcome.text))
+            problem = placement.put_joined(stretch.numbers, outcome)
+            apart += [problem] if problem else []
+    return tuple(apart)
 
 
 def _write_beside(out: Path, outcomes: Sequence[Outcome], asked: Asked, found: Scan) -> tuple[Outcome, ...]:
@@ -262,7 +293,9 @@ def _run_remote(
     work: Sequence[RemoteJob], asked: Asked, crew: Crew, force: bool, listen: Listener
 ) -> tuple[Outcome, ...]:
     def suffixed(number: int) -> RemoteJob:
-        return replace(work[number], job=replace(work[number].job, add_suffix=True), redo=True)
+        one = work[number % len(work)]
+        job = replace(one.job, add_suffix=True, power_up=placement.power_up(number))
+        return replace(one, job=job, redo=True)
 
     with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
         copy = Path(folder)
@@ -273,7 +306,8 @@ def _run_remote(
             placement = Placement(output, [one.log for one in work])
             is_whole = False
             try:
-                _run_into(placement, copy, _once(work, placement, crew, listen), run_remote, suffixed, crew, listen)
+                tasks = _once(work, placement, crew, listen)
+                _run_into(placement, copy, tasks, run_remote, suffixed, crew, listen, len(work))
                 found, unwritten = _swept(placement, copy)
                 sessions = _run_remote_sessions(placement, output, asked, found, listen)
                 outcomes = (*placement.outcomes(), *sessions)
@@ -336,13 +370,19 @@ def _run_into(
     suffixed: Callable[[int], AnyJob],
     crew: Crew,
     listen: Listener,
+    logs: int,
 ) -> None:
-    """Carry out jobs and put their flights into place; interrupted, the index at least is written."""
+    """Carry out jobs and put their flights into place; interrupted, the index at least is written.
+
+    ``logs`` is how many logs there are: the flights of a log have its number, and that and multiples of their count.
+    """
     try:
         with closing(crew(tasks, run)) as ended:  # closed at once when something is wrong here: its processes end
             for number, outcome in ended:
                 listen(Event("end", PurePath(outcome.source).name, outcome.text))
-                placement.put(number, outcome)
+                placement.put(number, replace(outcome, more=()))
+                for place, other in enumerate(outcome.more, start=1):
+                    placement.put(number + place * logs, other)
         clashing = placement.clashing()
         if clashing:
             with closing(crew(((number, suffixed(number)) for number in clashing), run)) as ended:

@@ -17,7 +17,6 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
-from groundstation.pipeline.one_flight.progress import silent
 
 PLANS: Mapping[str, str] = {
     "everything": "to run",
@@ -52,9 +51,12 @@ def plan_many(
     known = KnownFlights(None if redo else out)
     make = partial(Job, out=out, configuration=configuration, with_pdf=with_pdf, only_results=only_results)
     work = [make(Path(one.url), is_named=one.is_named) for one in inputs]
-    found = {} if configuration.profile is not None else skipped_files(inputs, Strangers(out), silent)
+    found = {} if configuration.profile is not None else skipped_files(inputs, Strangers(out))
     for number, job, twin in with_steps(work, known, found):
-        if twin is not None:
+        if twin is not None and job.finished is not None and len(job.finished.parts) > 1:
+            text = f"part of {job.finished.flight_id}, with {work[twin].name}"
+            found[number] = Outcome(work[number % len(work)].log, "done", text, was_finished=job.step == "nothing")
+        elif twin is not None:
             found[number] = Outcome(job.log, "done", f"same content as {work[twin].log}, listed once")
         else:
             found[number] = _planned(job)

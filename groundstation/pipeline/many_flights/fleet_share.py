@@ -74,6 +74,8 @@ class FlightShare:
         Name of its aircraft on the data link, and of those whom it heard.
     samples : str
         File of its heading samples in the dataset of samples; empty without any.
+    parts : tuple of str
+        Digests of its consecutive logs but the first.
     """
 
     row: Mapping[str, Any]
@@ -86,6 +88,7 @@ class FlightShare:
     link_name: str
     hears: tuple[str, ...]
     samples: str
+    parts: tuple[str, ...] = ()
 
 
 def share_of(folder: Path, store: SampleStore | None = None) -> FlightShare:
@@ -112,6 +115,7 @@ def share_of(folder: Path, store: SampleStore | None = None) -> FlightShare:
         aircraft_named(results.metadata, results.source.name),
         tuple(topic.partition(".")[2] for topic in topics_of_kind("link", tuple(results.ledger.topics))),
         store.put(row, samples) if samples is not None and store is not None else "",
+        tuple(part.sha256 for part in saved.manifest.parts[1:]),
     )
 
 

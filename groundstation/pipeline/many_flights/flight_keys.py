@@ -20,7 +20,10 @@ NUMBERS = ("stamp", "start_ns", "end_ns")
 
 
 class Key(NamedTuple):
-    """What is known of a flight folder without reading it; ``stamp`` is of its files when it was read."""
+    """What is known of a flight folder without reading it; ``stamp`` is of its files when it was read.
+
+    ``parts`` are the digests of the consecutive logs of the flight but the first, one a line.
+    """
 
     flight_id: str
     stamp: int
@@ -31,6 +34,7 @@ class Key(NamedTuple):
     start_ns: int | None
     end_ns: int | None
     samples: str
+    parts: str = ""
 
 
 class Keys(Mapping[str, Key]):
@@ -195,4 +199,5 @@ def key_of(share: FlightShare, stamp: int) -> Key:
     end_ns = start_ns + round(duration_s * NS_PER_S) if is_timed else None
     path, name, hears = map(utf8_text, (share.path, share.link_name, "\n".join(share.hears)))
     sha256 = str(share.index.sha256)
-    return Key(row["flight_id"], stamp, path, sha256, name, hears, start_ns, end_ns, share.samples)
+    parts = "\n".join(share.parts)
+    return Key(row["flight_id"], stamp, path, sha256, name, hears, start_ns, end_ns, share.samples, parts)

@@ -1,14 +1,21 @@
 """Flights that an OUT has already, by the log they came from; a folder is read when its log is asked for."""
 
 from collections import Counter
+from collections.abc import Iterator
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from groundstation.base.errors import GroundstationError
+from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.fleet_store import names_in, remembered
+from groundstation.pipeline.one_flight.parts import LONGEST_GAP_S, family
 from groundstation.pipeline.one_flight.resume import Finished, finished
 from groundstation.results.files import load_manifest
+from groundstation.results.manifest import Manifest, PartOfRun
 
 
 class KnownFlights:
@@ -26,30 +33,82 @@ class KnownFlights:
         self._out = out
         self._names: list[str] = []
         self._digests: list[str] = []
+        self._manifests: dict[str, Manifest] = {}  # of those that are not remembered
+        later: list[list[str]] = []  # digests of the parts behind the first
         if out is not None:
-            keys = remembered(out)
+            self._keys = keys = remembered(out)
             self._names, self._digests = list(keys), keys.column("sha256")
+            later = [text.split("\n") if text else [] for text in keys.column("parts")]
             for name in set(names_in(out)).difference(keys.names):
                 with suppress(GroundstationError):  # it is not whole
-                    self._digests.append(load_manifest(out / name).source.sha256)
+                    self._manifests[name] = manifest = load_manifest(out / name)
+                    self._digests.append(manifest.source.sha256)
                     self._names.append(name)
-        self._one_of = dict(zip(self._digests, self._names, strict=True))
+                    later.append([part.sha256 for part in manifest.parts[1:]])
+        self._one_of = {sha256: name for name, parts in zip(self._names, later, strict=True) for sha256 in parts}
+        self._one_of |= dict(zip(self._digests, self._names, strict=True))
 
     def __len__(self) -> int:
         return len(self._one_of)
 
-    def of(self, sha256: str) -> Finished | None:
-        """The flight that a log gave, by the digest of the log; None when there is none that is whole."""
+    def of(self, sha256: str) -> tuple[Finished, ...]:
+        """The flights that a log gave, by its digest: one of each power-up in it; none unless all of them are whole.
+
+        Of a log that is part of a flight, the flight.
+        """
         if self._out is None or sha256 not in self._one_of:
-            return None
+            return ()
         several = self._several.get(sha256) or [self._one_of[sha256]]
-        found = (finished(self._out / name) for name in several)
-        return next((one for one in found if one is not None and one.sha256 == sha256), None)
+        whole = [one for name in several if (one := finished(self._out / name)) is not None and one.has(sha256)]
+        by_number = {one.power_up.number if one.power_up else 0: one for one in reversed(whole)}
+        if not whole or whole[0].power_up is None:
+            return tuple(whole[:1])
+        wanted = range(1, whole[0].power_up.count + 1)
+        return tuple(by_number[number] for number in wanted) if by_number.keys() >= set(wanted) else ()
+
+    def about(self, part: PartOfRun) -> Iterator[tuple[str, Manifest]]:
+        """Flights that another one may go on from, or that may go on from it: by their times, or names of files."""
+        if self._out is None:
+            return
+        names = {*self._near(part), *self._beside(part)}
+        for name in sorted(names):
+            with suppress(GroundstationError):  # it is gone, or not whole
+                yield name, self._manifests.get(name) or load_manifest(self._out / name)
+
+    def _near(self, part: PartOfRun) -> list[str]:
+        """Flights that overlap with a log, or nearly."""
+        if part.utc_ns is None:
+            return []
+        gap_ns = round(LONGEST_GAP_S * NS_PER_S)
+        start_ns, end_ns = self._spans
+        rows = np.flatnonzero((start_ns <= part.utc_ns[1] + gap_ns) & (end_ns >= part.utc_ns[0] - gap_ns))
+        return [self._names[row] for row in rows.tolist()]
+
+    def _beside(self, part: PartOfRun) -> list[str]:
+        """Flights of files in the folder of a log whose names differ from its in a number alone."""
+        if part.utc_ns is not None and part.aircraft:
+            return []
+        folder, like = Path(part.path).parent, family(part.name)
+        paths = (*self._keys.column("path"), *(one.source.path for one in self._manifests.values()))
+        pairs = zip(self._names, map(Path, paths), strict=True)
+        return [name for name, path in pairs if path.parent == folder and family(path.name) == like]
+
+    @cached_property
+    def _spans(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """First and last time of the flights; of one without UTC, none that anything is near to."""
+        never = np.iinfo(np.int64)
+        spans = list(zip(*(self._keys.column(name) for name in ("start_ns", "end_ns")), strict=True))
+        for manifest in self._manifests.values():
+            known = [part.utc_ns for part in manifest.parts if part.utc_ns is not None]
+            spans.append((known[0][0], known[-1][1]) if known else (None, None))
+        starts = [never.max if start is None else start for start, _end in spans]
+        ends = [never.min if end is None else end for _start, end in spans]
+        return np.array(starts, dtype=np.int64), np.array(ends, dtype=np.int64)
 
     @cached_property
     def _several(self) -> dict[str, list[str]]:
         """Folders by the digest of their log where it gave more than one, the last name first."""
-        if len(self._one_of) == len(self._names):
+        if len(set(self._digests)) == len(self._names):
             return {}
         counts = Counter(self._digests)
         found: dict[str, list[str]] = {}

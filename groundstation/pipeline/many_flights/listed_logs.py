@@ -1,7 +1,9 @@
 """The logs of a run: which there are, which are none, and what an earlier run has left to do of each."""
 
-from collections.abc import Collection, Iterator, Sequence
-from pathlib import Path, PurePath
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
 
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.many_flights.inputs import collect, is_ours
@@ -11,7 +13,9 @@ from groundstation.pipeline.many_flights.strangers import Strangers
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.one_flight.outcome import Outcome
-from groundstation.pipeline.one_flight.progress import Event, Listener
+from groundstation.pipeline.one_flight.progress import Listener
+from groundstation.pipeline.one_flight.resume import Finished, Keys
+from groundstation.results.manifest import PartOfRun
 
 
 def inputs_of(paths: Sequence[Path | str], out: Path | str, configuration: Configuration) -> tuple[FarLog, ...]:
@@ -31,29 +35,66 @@ def inputs_of(paths: Sequence[Path | str], out: Path | str, configuration: Confi
 def with_steps(
     jobs: Sequence[Job], known: KnownFlights, without: Collection[int] = ()
 ) -> Iterator[tuple[int, Job, int | None]]:
-    """Jobs by number, with what is to be done of each, and the number of an earlier one with the same finished log."""
+    """Jobs by number, with what is to be done of each, and the number of an earlier one that gives its flight.
+
+    That is one with the same log, or with another part of the flight. A log whose flights of several power-ups are
+    finished has a job for each of them. Those ``without`` are passed over.
+    """
     first: dict[str, int] = {}
+    numbers = {str(job.path.absolute()): number for number, job in enumerate(jobs)}
+    asked = cache(lambda number: jobs[number].asked())
+
+    @cache
+    def digest(number: int) -> str:
+        found = asked(number)
+        return found[0] if found else jobs[number].digest()
+
+    def is_as_it_was(part: PartOfRun) -> bool:
+        return part.path not in numbers or digest(numbers[part.path]) == part.sha256
+
     for number, job in enumerate(jobs):
         if number in without:
             continue
-        planned = _with_step(job, known) if len(known) else job
-        kept = first.setdefault(planned.finished.sha256, number) if planned.finished else number
-        yield number, planned, kept if kept != number else None
+        found = known.of(digest(number)) if len(known) else ()
+        for place, planned in enumerate(_with_step(job, asked(number) if found else None, found, is_as_it_was)):
+            flight = planned.finished
+            kept = number if flight is None else first.setdefault(flight.sha256, number)
+            yield number + place * len(jobs), planned, kept if kept != number else None
 
 
-def _with_step(job: Job, known: KnownFlights) -> Job:
-    asked = job.asked()
-    found = None if asked is None else known.of(asked[0])
-    return job if asked is None or found is None else job.going_on(found, asked[1])
+def _with_step(
+    job: Job,
+    asked: tuple[str, Keys] | None,
+    found: Sequence[Finished],
+    is_as_it_was: Callable[[PartOfRun], bool],
+) -> tuple[Job, ...]:
+    """A job with what is left to do of it, one for each power-up of its log; ``found`` are its finished flights."""
+    if found and len(found[0].parts) > 1:
+        return (_of_parts(job, found[0], is_as_it_was),)
+    if asked is None or not found:
+        return (job,)
+    planned = tuple(job.going_on(one, asked[1]) for one in found)
+    if len(planned) > 1 and any(one.step == "everything" for one in planned):
+        return (job,)  # the log is read anew: it tells what it holds
+    return planned
 
 
-def skipped_files(inputs: Sequence[FarLog], strangers: Strangers, listen: Listener) -> dict[int, Outcome]:
+def _of_parts(job: Job, flight: Finished, is_as_it_was: Callable[[PartOfRun], bool]) -> Job:
+    """The job of a flight of several logs; where one of them has changed, that of its own log alone."""
+    if not all(map(is_as_it_was, flight.parts)):
+        return job
+    joined = job.of_parts(flight.parts)
+    planned = replace(joined.going_on(flight, joined.keys_of(flight)), power_up=0)
+    is_read = planned.step in ("everything", "analysis")
+    return job if is_read and not all(Path(part.path).is_file() for part in flight.parts) else planned
+
+
+def skipped_files(inputs: Sequence[FarLog], strangers: Strangers) -> dict[int, Outcome]:
     """Outcomes, by their numbers, of files in folders that no reader claims."""
     found: dict[int, Outcome] = {}
     for number, one in enumerate(inputs):
         if not one.is_named and (reason := strangers.reason(Path(one.url))) is not None:
             found[number] = Outcome(one.url, "skipped", reason)
-            listen(Event("end", PurePath(one.url).name, reason))
     return found
 
 
@@ -63,4 +104,8 @@ def run_known(job: Job, listen: Listener, *, redo: bool) -> Outcome:
     With ``add_suffix`` it is one of several of the same id, and run anew.
     """
     known = KnownFlights(None if redo or job.add_suffix else job.out)
-    return run_flight(_with_step(job, known) if len(known) else job, listen)
+    asked = job.asked() if len(known) else None
+    found = known.of(asked[0]) if asked else ()
+    if asked and len(found) == 1 and len(found[0].parts) < 2:
+        job = job.going_on(found[0], asked[1])
+    return run_flight(job, listen)

@@ -12,7 +12,7 @@ from groundstation.base.errors import UsageError
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, SESSION_ARRAYS
 from groundstation.pipeline.many_flights.lease import LOCKS, Lease, alone_elsewhere
 from groundstation.pipeline.many_flights.remote import RemoteFolder
-from groundstation.pipeline.many_flights.remote_runs import BY_LOG, STAGING, array_files
+from groundstation.pipeline.many_flights.remote_runs import BY_LOG, STAGING, array_files, remember_flight
 from groundstation.pipeline.one_flight.flight import is_made, place, remove
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports.flight_report import PDF, REPORT
@@ -138,7 +138,7 @@ class RemoteOutput:
         """Move a finished flight to its place, which is told."""
         self._require_alone()
         self._out.replace(outcome.folder, outcome.flight_id, partial(is_made, identity=outcome.flight_id))
-        self._out.write(f"{BY_LOG}/{outcome.sha256}", outcome.flight_id.encode())
+        remember_flight(self._out, outcome)
         self._copy(outcome.flight_id)
         return outcome.flight_id
 

@@ -19,10 +19,22 @@ from groundstation.results.files import utf8_text
 
 
 class _Origin(NamedTuple):
-    """Which log a flight folder came from: where it was, and the digest of its content."""
+    """Which log a flight folder came from: where it was, the digest of its content, which power-up in it."""
 
     path: str
     sha256: str
+    power_up: int = 0
+
+
+class _Content(NamedTuple):
+    """What a flight is of: the digest of its log, and which power-up in it."""
+
+    sha256: str
+    power_up: int
+
+    @classmethod
+    def of(cls, one: "Outcome | _Origin") -> "_Content":
+        return cls(one.sha256, one.power_up)
 
 
 class Placement:
@@ -37,14 +49,15 @@ class Placement:
     ----------
     output : Output
     names : sequence of str
-        The logs as the user would type them.
+        The logs as the user would type them. A log has its place among them for its number; what else is in it has
+        numbers that are higher by multiples of how many logs there are.
     """
 
     def __init__(self, output: Output, names: Sequence[str]) -> None:
         self._output, self._names = output, names
         self._outcomes: dict[int, Outcome] = {}
-        self._kept: dict[str, int] = {}  # content -> number of the log that is kept
-        self._owner: dict[str, str] = {}  # flight id -> content
+        self._kept: dict[_Content, int] = {}  # content -> number of the log that is kept
+        self._owner: dict[str, _Content] = {}  # flight id -> content
         self._clashes: set[str] = set()
 
     def put(self, number: int, outcome: Outcome) -> None:
@@ -52,11 +65,12 @@ class Placement:
         if not outcome.flight_id:
             self._outcomes[number] = outcome
             return
-        twin = self._kept.get(outcome.sha256)
+        content = _Content.of(outcome)
+        twin = self._kept.get(content)
         if twin is not None and twin < number:
             self.put_twin(number, outcome, twin)
             return
-        self._kept[outcome.sha256] = number
+        self._kept[content] = number
         self._outcomes[number] = self._placed(outcome)
         if twin is not None:
             self.put_twin(twin, self._outcomes[twin], number)
@@ -65,19 +79,25 @@ class Placement:
         """Take over a log whose content is that of the log with the number ``kept``."""
         if outcome.folder and not self._output.has_in_place(outcome):
             self._output.discard(outcome.folder)
-        text = f"{Path(outcome.source).name}: same content as {self._names[kept]}, listed once"
+        text = f"{Path(outcome.source).name}: same content as {self._names[kept % len(self._names)]}, listed once"
         self._outcomes[number] = Outcome(outcome.source, "skipped", text, sha256=outcome.sha256)
 
     def _placed(self, outcome: Outcome) -> Outcome:
         identity, plain = outcome.flight_id, plain_id(outcome.flight_id, outcome.sha256)
-        owner = self._owner.setdefault(plain, outcome.sha256)
-        is_taken = owner != outcome.sha256 or self._is_of_another_log(identity, outcome)
+        content = _Content.of(outcome)
+        owner = self._owner.setdefault(plain, content)
+        is_taken = owner != content or self._is_of_another_log(identity, outcome)
         was_taken = plain != identity  # in an earlier run
-        if is_taken or (not was_taken and (self._output.root / f"{plain}_{outcome.sha256[:8]}").exists()):
+        if is_taken or (not was_taken and self._with_digest(plain, outcome).exists()):
             self._clashes.add(plain)
             if not was_taken:
                 return outcome
         return outcome if self._output.has_in_place(outcome) else self._put_in_place(outcome)
+
+    def _with_digest(self, plain: str, outcome: Outcome) -> Path:
+        """The folder of a flight that had to take the digest of its log into its name."""
+        number = f"_{outcome.power_up}" if outcome.power_up else ""
+        return self._output.root / f"{plain}_{outcome.sha256[:8]}{number}"
 
     def _put_in_place(self, outcome: Outcome) -> Outcome:
         try:
@@ -101,18 +121,54 @@ class Placement:
             self._output.discard(former.folder)
         self._outcomes[number] = self._put_in_place(outcome) if outcome.flight_id else outcome
 
+    def put_part(self, number: int, kept: int, flight_id: str, sha256: str, *, was_finished: bool = False) -> None:
+        """Take over a log that is part of a flight, which that with the number ``kept`` gives."""
+        name, folder = self._names[number % len(self._names)], str(self._output.root / flight_id)
+        text = f"part of {flight_id}, with {Path(self._names[kept % len(self._names)]).name}"
+        self._outcomes[number] = Outcome(
+            name, "done", text, flight_id=flight_id, folder=folder, sha256=sha256, was_finished=was_finished
+        )
+
+    def put_joined(self, numbers: Sequence[int], outcome: Outcome) -> Outcome | None:
+        """Put the flight of several logs into place, in that of the flights that they gave one by one.
+
+        Parameters
+        ----------
+        numbers : sequence of int
+            Of those of the logs that are of this run.
+
+        Returns
+        -------
+        Outcome or None
+            Why they are not joined: then what each of them gave stays.
+        """
+        placed = self._put_in_place(outcome) if outcome.flight_id else outcome
+        if not placed.flight_id:
+            return Outcome(outcome.source, "skipped", f"not joined with the files behind it: {placed.text}")
+        self._outcomes[numbers[0]] = placed
+        for number in numbers[1:]:
+            self.put_part(number, numbers[0], placed.flight_id, self._outcomes[number].sha256)
+        return None
+
+    def flights(self) -> dict[int, Outcome]:
+        """What became of the logs put so far, by their numbers."""
+        return dict(self._outcomes)
+
     def sweep(self, found: Scan) -> bool:
         """Remove flights of these logs that stand under another id, and those of older versions of the logs.
 
         Returns whether there were any. ``found`` are the flights of the folder, with what is known of them.
         """
         flights = [outcome for outcome in self._outcomes.values() if outcome.flight_id]
-        now = {outcome.sha256: outcome.flight_id for outcome in flights}
+        now: dict[str, set[str]] = {}
+        for outcome in flights:
+            for sha256 in (outcome.sha256, *(part.sha256 for part in outcome.parts)):
+                now.setdefault(sha256, set()).add(outcome.flight_id)
         versions = {(utf8_text(_place_of(one)), plain_id(one.flight_id, one.sha256)) for one in flights}
         old = []
         for name in sorted({*_came_from(found.fresh, now, {path for path, _ in versions}), *found.stale}):
             origin = _origin_of(found.out / name)  # nothing is removed for what is remembered alone
-            if origin is None or now.get(origin.sha256) == name:
+            if origin is None or name in now.get(origin.sha256, ()):
                 continue
             if origin.sha256 in now or (utf8_text(origin.path), plain_id(name, origin.sha256)) in versions:
                 old.append(name)
@@ -123,12 +179,19 @@ class Placement:
 
     def outcomes(self) -> tuple[Outcome, ...]:
         """What became of the logs put so far, in the order of the inputs."""
-        return tuple(outcome for _, outcome in sorted(self._outcomes.items()))
+        count = max(1, len(self._names))
+        return tuple(
+            self._outcomes[number] for number in sorted(self._outcomes, key=lambda one: divmod(one, count)[::-1])
+        )
+
+    def power_up(self, number: int) -> int:
+        """Which of several power-ups in its log the flight of a number is; 0 where the log holds one."""
+        return self._outcomes[number].power_up
 
     def _is_of_another_log(self, flight_id: str, outcome: Outcome) -> bool:
         """Whether a flight folder came from another log than an earlier version of this one."""
         origin = _origin_of(self._output.root / flight_id)
-        if origin is None or origin.sha256 == outcome.sha256:
+        if origin is None or _Content.of(origin) == _Content.of(outcome):
             return False
         return origin.path != _place_of(outcome)
 
@@ -148,7 +211,8 @@ def _place_of(outcome: Outcome) -> str:
 def _origin_of(folder: Path) -> _Origin | None:
     """None for a folder that is not whole."""
     try:
-        source = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["source"]
-        return _Origin(str(source["path"]), str(source["sha256"]))
+        manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        source, power_up = manifest["source"], manifest.get("power_up") or {}
+        return _Origin(str(source["path"]), str(source["sha256"]), int(power_up.get("number", 0)))
     except (OSError, ValueError, KeyError, TypeError):
         return None

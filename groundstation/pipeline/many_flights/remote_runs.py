@@ -85,9 +85,16 @@ def _run_in(scratch: Path, remote: RemoteJob, listen: Listener) -> Outcome:
     job = replace(
         remote.job, path=_here(scratch, remote), out=scratch / "out", url=remote.log if is_remote(remote.log) else ""
     )
-    if not remote.redo:
-        job = _planned(job, out, scratch / "finished")
-    outcome = run_flight(job, listen)
+    jobs = (job,) if remote.redo else _planned(job, out, scratch / "finished")
+    outcomes: list[Outcome] = []
+    for one in jobs:
+        first = run_flight(one, listen)
+        outcomes += [_sent(one, outcome, out) for outcome in (replace(first, more=()), *first.more)]
+    return replace(outcomes[0], more=tuple(outcomes[1:]))
+
+
+def _sent(job: Job, outcome: Outcome, out: RemoteFolder) -> Outcome:
+    """The outcome of a flight, its folder sent to staging, or what was made again of it to its place."""
     if not outcome.flight_id:
         return outcome
     if job.step == "nothing":
@@ -103,23 +110,43 @@ def _run_in(scratch: Path, remote: RemoteJob, listen: Listener) -> Outcome:
     return replace(outcome, folder=staged)
 
 
-def _planned(job: Job, out: RemoteFolder, scratch: Path) -> Job:
-    """The job with what has to be done of it; what it needs of a finished flight is fetched."""
+def _planned(job: Job, out: RemoteFolder, scratch: Path) -> tuple[Job, ...]:
+    """The job with what has to be done of it, one for each power-up; what it needs of finished flights is fetched."""
     asked = job.asked()
     if asked is None:
-        return job
+        return (job,)
     sha256, keys = asked
-    flight_id = (out.read(f"{BY_LOG}/{sha256}") or b"").decode()
-    found = _fetched(out, flight_id, scratch) if flight_id else None
-    if found is None or found.sha256 != sha256:
-        return job
-    planned = job.going_on(found, keys)
-    if planned.step == "analysis":
-        out.fetch(f"{flight_id}/{found.mcap.name}", found.mcap)
-    elif planned.step == "reports":
-        for name in array_files(out, flight_id):
-            out.fetch(f"{flight_id}/{name}", found.folder / name)
-    return planned
+    planned: list[Job] = []
+    for flight_id in flights_of(out, sha256).values():
+        found = _fetched(out, flight_id, scratch)
+        if found is None or found.sha256 != sha256:
+            return (job,)
+        one = job.going_on(found, keys)
+        if one.step == "analysis":
+            out.fetch(f"{flight_id}/{found.mcap.name}", found.mcap)
+        elif one.step == "reports":
+            for name in array_files(out, flight_id):
+                out.fetch(f"{flight_id}/{name}", found.folder / name)
+        planned.append(one)
+    counts = {one.finished.power_up.count for one in planned if one.finished and one.finished.power_up}
+    if not planned or counts - {len(planned)} or (counts and any(one.step == "everything" for one in planned)):
+        return (job,)  # the log tells what it holds
+    return tuple(planned)
+
+
+def flights_of(out: RemoteFolder, sha256: str) -> dict[int, str]:
+    """Ids of the flights that a log gave, by the number of the power-up in it, 0 where it holds one."""
+    lines = (out.read(f"{BY_LOG}/{sha256}") or b"").decode().split("\n")
+    pairs = (line.rpartition(" ")[::2] for line in lines if line)
+    return dict(sorted((int(number or 0), flight_id) for number, flight_id in pairs))
+
+
+def remember_flight(out: RemoteFolder, outcome: Outcome) -> None:
+    """Take down which flight a log, or a power-up in it, gave."""
+    known = flights_of(out, outcome.sha256) if outcome.power_up else {}
+    known = {number: one for number, one in known.items() if number} | {outcome.power_up: outcome.flight_id}
+    lines = (f"{number} {one}" if number else one for number, one in sorted(known.items()))
+    out.write(f"{BY_LOG}/{outcome.sha256}", "\n".join(lines).encode())
 
 
 def array_files(out: RemoteFolder, flight_id: str) -> list[str]:

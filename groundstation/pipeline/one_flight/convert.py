@@ -1,9 +1,11 @@
 """A log becomes an MCAP: its clock is repaired, its ledger is kept beside the data."""
 
+import json
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
-from itertools import chain
+from itertools import chain, pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.findings import Finding, Severity
@@ -11,6 +13,7 @@ from groundstation.base.ledger import Ledger, TopicEntry
 from groundstation.base.records import HEADING_IS_TRACK, Damage, Item, RecordBatch, Remark
 from groundstation.base.signals import kind_of
 from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.base.units import NS_PER_S
 from groundstation.base.version import __version__
 from groundstation.integrity.breaks_off import BREAKS_OFF, broken_off
 from groundstation.integrity.ledger import damage_entry
@@ -19,11 +22,18 @@ from groundstation.integrity.ledger_findings import damage_finding as log_damage
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.integrity.survey import Census
 from groundstation.pipeline.one_flight.configuration import NO_REFERENCES, References
-from groundstation.pipeline.one_flight.log import Log
+from groundstation.pipeline.one_flight.log import Log, Replay
+from groundstation.pipeline.one_flight.parts import LATE_S
 from groundstation.pipeline.one_flight.reference import FACTS, TRUTH, Laid, laid_beside
+from groundstation.pipeline.one_flight.segments import Segment, document_of, segments_in, segments_of
 from groundstation.store.info import StoreInfo
 
+if TYPE_CHECKING:
+    from groundstation.integrity.survey import Survey
+
 OWN_TRUTH = ("a truth of its own", "a log without one", "leave --reference out")
+OF_JOINTS = ("log.power_ups", "data.repeated_header", "data.comment_line")  # findings on files that stand behind others
+PARTS_TOLD = 5
 COUNTED_CAUSES = ("dropout", "stuck", "out_of_range", "sequence")  # of spans: counted again with the topics
 
 
@@ -43,7 +53,7 @@ class Converted:
 def convert_log(
     log: Log, target: Path, thresholds: Thresholds | None = None, references: References = NO_REFERENCES
 ) -> Converted:
-    """Write a log's MCAP, under a temporary name until it is whole.
+    """Write a log's MCAP, under a temporary name until it is whole; several power-ups in a log stay together.
 
     Parameters
     ----------
@@ -64,52 +74,133 @@ def convert_log(
     limits = thresholds or shipped()
     if log.is_store:
         return _copy_store(log, target, limits, references)
-    return _convert_recorded(log, target, limits, references)
-
-
-def _convert_recorded(log: Log, target: Path, limits: Thresholds, references: References) -> Converted:
-    from importlib import metadata as installed
-
-    from groundstation.integrity.ledger_findings import ledger_findings
-    from groundstation.integrity.ordering import corrected
-    from groundstation.integrity.survey import survey
-    from groundstation.store.writer import StoreWriter
-
     items = log.replay()
+    return _convert_recorded(log, items, survey_of(log, items, limits), target, references)
+
+
+def convert_flight(
+    log: Log, target: Path, thresholds: Thresholds | None = None, references: References = NO_REFERENCES
+) -> Converted | tuple[Log, ...]:
+    """Write the MCAP of a log of one flight; of one that holds several power-ups nothing, but the log of each.
+
+    Parameters and errors are those of :func:`convert_log`.
+    """
+    limits = thresholds or shipped()
+    if log.is_store:
+        parts = () if log.segment is not None else segments_in(log.info())
+        return tuple(map(log.only, parts)) or _copy_store(log, target, limits, references)
+    items = log.replay()
+    found = survey_of(log, items, limits)
+    several = _segments(log, found)
+    if several:
+        return tuple(log.only(one, items) for one in several)
+    return _convert_recorded(log, items, found, target, references)
+
+
+def survey_of(log: Log, items: Iterable[Item], limits: Thresholds) -> "Survey":
+    """Survey a log that is to be converted.
+
+    Raises
+    ------
+    UnreadableLogError
+        When it holds no record.
+    """
+    from groundstation.integrity.survey import survey
+
     found = survey(items, thresholds=limits)
     if not found.ledger.topics:
+        from groundstation.integrity.ledger_findings import ledger_findings
+
         why = why_nothing_is_placed(ledger_findings(found.ledger))
         raise UnreadableLogError(log.path.name, why, "", "`info` shows what the file is")
-    topics = found.ledger.topics
-    if references.paths and any(kind_of(one.topic) == TRUTH for one in topics):
-        raise GroundstationError(log.path.name, *OWN_TRUTH)
-    span_ns = min(one.first_ns for one in topics), max(one.last_ns for one in topics)
-    laid = laid_beside(log.path.name, span_ns, found.clock.is_absolute, references.besides(log.path))
-    findings = (*ledger_findings(found.ledger), *laid.findings)
-    info = StoreInfo(
-        source_name=log.source.name,
-        source_sha256=log.source.sha256,
-        reader=found.header.reader,
-        versions={"groundstation": __version__, "mcap": installed.version("mcap")},
-        metadata={**found.header.metadata, **told_of_fields(found.remarks), **laid.facts},
-        has_utc=found.clock.is_absolute,
-        start_ns=span_ns[0],
-        clock=found.clock.document(),
-        ledger=_with_truth(found.ledger.document(), laid, limits),
-        findings=findings,
-        remarks=[asdict(remark) for remark in found.remarks],
-        damages=[asdict(damage) for damage in found.damages],
-    )
-    with StoreWriter(target, info) as writer:
-        for batch in chain(corrected(items, found.clock), laid.batches):
-            writer.write(batch)
-    return Converted(info, findings, any(damage.loses_data for damage in found.damages), writer.sha256)
+    return found
 
 
 def why_nothing_is_placed(findings: Iterable[Finding]) -> str:
     """Reason why a log has no topic: its records have no time, or it has no record that can be read."""
     timeless = next((one.count for one in findings if one.code == "clock.no_times"), 0)
     return f"no readable record has a time, of {timeless}" if timeless else "no readable record"
+
+
+def _segments(log: Log, found: "Survey") -> tuple[Segment, ...]:
+    """The power-ups of a log; none of one that is read for one of them alone, or of consecutive files.
+
+    Raises
+    ------
+    GroundstationError
+        When the counter starts again in a later file, and nothing tells how the clock goes on.
+    """
+    if log.parts:
+        for one, other in pairwise(found.power_ups):
+            has_utc = one.is_absolute and other.is_absolute
+            if not has_utc or other.start_ns - one.end_ns < -LATE_S * NS_PER_S:
+                raise GroundstationError(log.source.name, "parts whose clock does not go on", "one recording")
+    return () if log.segment is not None or log.parts else segments_of(found.power_ups)
+
+
+def _convert_recorded(log: Log, items: Replay, found: "Survey", target: Path, references: References) -> Converted:
+    from groundstation.integrity.ordering import corrected
+    from groundstation.store.writer import StoreWriter
+
+    limits = found.ledger.thresholds
+    topics = found.ledger.topics
+    if references.paths and any(kind_of(one.topic) == TRUTH for one in topics):
+        raise GroundstationError(log.path.name, *OWN_TRUTH)
+    span_ns = min(one.first_ns for one in topics), max(one.last_ns for one in topics)
+    laid = laid_beside(log.path.name, span_ns, found.clock.is_absolute, references.besides(log.path))
+    info = _facts_of(log, found, laid)
+    if several := _segments(log, found):
+        documents = []
+        for one in several:
+            alone = log.only(one, items)
+            facts = _facts_of(alone, survey_of(alone, alone.items(), limits), laid.within(one.start_ns, one.end_ns))
+            documents.append(document_of(one, facts, found.clock))
+        info = replace(info, segments=documents)
+    with StoreWriter(target, info) as writer:
+        for batch in chain(corrected(items, found.clock), laid.batches):
+            writer.write(batch)
+    return Converted(info, info.findings, any(damage.loses_data for damage in found.damages), writer.sha256)
+
+
+def _facts_of(log: Log, found: "Survey", laid: Laid) -> StoreInfo:
+    """Facts of the MCAP of a log, with those of the reference that is laid beside it."""
+    from importlib import metadata as installed
+
+    from groundstation.integrity.ledger_findings import ledger_findings
+
+    of_segment = () if log.segment is None else (log.segment.finding,)
+    of_parts = _told_joined(log) if log.parts else ()
+    findings = [one for one in ledger_findings(found.ledger) if not (log.parts and one.code in OF_JOINTS)]
+    return StoreInfo(
+        source_name=log.source.name,
+        source_sha256=log.source.sha256,
+        reader=found.header.reader,
+        versions={"groundstation": __version__, "mcap": installed.version("mcap")},
+        metadata={**found.header.metadata, **told_of_fields(found.remarks), **laid.facts, **_facts_of_parts(log)},
+        has_utc=found.clock.is_absolute,
+        start_ns=found.ledger.start_ns,
+        clock=found.clock.document(),
+        ledger=_with_truth(found.ledger.document(), laid, found.ledger.thresholds),
+        findings=(*of_segment, *of_parts, *findings, *laid.findings),
+        remarks=[asdict(remark) for remark in found.remarks],
+        damages=[asdict(damage) for damage in found.damages],
+    )
+
+
+def _told_joined(log: Log) -> tuple[Finding, ...]:
+    """That a flight was put together from consecutive files."""
+    names = [path.name for path in log.parts]
+    more = f" and {len(names) - PARTS_TOLD} more" if len(names) > PARTS_TOLD else ""
+    text = f"{len(names)} consecutive files joined as one flight: {', '.join(names[:PARTS_TOLD])}{more}"
+    return (Finding("info", "log.parts", text, count=len(names)),)
+
+
+def _facts_of_parts(log: Log) -> dict[str, str]:
+    """Names and digests of the consecutive files of a flight, as metadata."""
+    if not log.parts:
+        return {}
+    parts = [{"name": path.name, "sha256": sha256} for path, sha256 in zip(log.parts, log.digests, strict=True)]
+    return {"parts": json.dumps(parts)}
 
 
 def _with_truth(ledger: Ledger, laid: Laid, limits: Thresholds) -> Ledger:
@@ -139,10 +230,9 @@ def told_of_fields(remarks: tuple[Remark, ...]) -> dict[str, str]:
 
 def _copy_store(log: Log, target: Path, limits: Thresholds, references: References) -> Converted:
     """Write the intact content of a groundstation MCAP again; an undamaged one comes out equal in content."""
-    from groundstation.store.reader import read_info
     from groundstation.store.writer import StoreWriter
 
-    info = read_info(log.path)
+    info = log.info()
     laid = _laid_beside_store(log, info, references)
     if laid.batches:
         info = _with_another_truth(info, laid, limits)

@@ -4,7 +4,7 @@ import os
 import secrets
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial as bound
@@ -20,11 +20,12 @@ from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES
 from groundstation.pipeline.one_flight.analyse import Given, analyse
 from groundstation.pipeline.one_flight.apply_deviation import apply_deviation, corrected_name, write_corrected
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.convert import Converted, convert_log
+from groundstation.pipeline.one_flight.convert import Converted, convert_flight
 from groundstation.pipeline.one_flight.identity import flight_id, sha256_of
-from groundstation.pipeline.one_flight.log import Log, digest_of, open_log
+from groundstation.pipeline.one_flight.log import Log, as_log, digest_of, open_log, open_parts
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
+from groundstation.pipeline.one_flight.parts import part_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, Keys, Step, keys_of, remember_reports
 from groundstation.pipeline.one_flight.sealing import note, seal
@@ -33,13 +34,15 @@ from groundstation.reports.steer_card import write_exports
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
-from groundstation.results.manifest import Resume
+from groundstation.results.manifest import PartOfRun, PowerUpOfRun, Resume
 from groundstation.tables.table import Flight
 
 PARTIAL_PREFIX = ".partial-"
 OF_THE_WORLD = OSError, GroundstationError  # a full disk, a setting: no defect of the part that meets it
 REPORT_FILES = (REPORT, PDF, DEVIATION_CSV, STEER_CARD)
+MOST_APART = 50  # records that a part read alone may have more than as part of a flight, at each joint
 Inside = TypeVar("Inside")
+Version = tuple[tuple[int, int], ...]  # of each file of a log: time and size
 
 
 @dataclass
@@ -76,6 +79,8 @@ class Job:
     ``add_suffix``: two flights of one id get ``_<sha8>`` of their logs; ``step`` is what has to be done, with what the
     flight that is ``finished`` has for the rest; ``url`` is where the log is, if ``path`` is but a copy of it. With
     ``only_results`` there is neither a recording nor a report. ``painters`` is how many processes paint its figures.
+    Of several power-ups in the log, ``power_up`` is the only one to run; 0: all of them. ``parts`` are the consecutive
+    logs that are run as one flight, the first of them its log.
     """
 
     path: Path
@@ -90,6 +95,8 @@ class Job:
     url: str = ""
     only_results: bool = False
     painters: int = 1
+    power_up: int = 0
+    parts: tuple[PartOfRun, ...] = ()
 
     @property
     def log(self) -> str:
@@ -109,10 +116,39 @@ class Job:
         except Exception:
             return None
 
+    def digest(self) -> str:
+        """Digest of its log, whether it can be read or not; empty where there is none."""
+        try:
+            return digest_of(as_log(self.path))
+        except OSError:
+            return ""
+
+    def keys_of(self, finished: Finished) -> Keys:
+        """Keys of what is asked for of a flight of several logs, which are as they were."""
+        digests = [part.sha256 for part in finished.parts]
+        return keys_of(finished.source, self.configuration, with_pdf=self.with_pdf, digests=digests)
+
+    def of_parts(self, parts: Sequence[PartOfRun], *, add_suffix: bool = False) -> "Job":
+        """The job of running consecutive logs as one flight."""
+        first = Path(parts[0].path)
+        path = self.path if self.path.absolute() == first else first
+        return replace(
+            self,
+            path=path,
+            parts=tuple(parts),
+            step="everything",
+            finished=None,
+            power_up=0,
+            url="",
+            add_suffix=add_suffix,
+        )
+
     def going_on(self, finished: Finished, keys: Keys) -> "Job":
         """The job with what is left to do of it, its flight being finished."""
         step = finished.step(keys, with_pdf=self.with_pdf, only_results=self.only_results)
-        return replace(self, step=step, finished=finished, add_suffix=step == "analysis" and finished.has_suffix)
+        add_suffix = step == "analysis" and finished.has_suffix
+        power_up = finished.power_up.number if finished.power_up else 0
+        return replace(self, step=step, finished=finished, add_suffix=add_suffix, power_up=power_up)
 
 
 def run_flight(job: Job, listen: Listener = silent) -> Outcome:
@@ -120,31 +156,54 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
 
     A log that cannot be read or computed gives an outcome with the reason, never an exception: one bad log never
     stops the others. Nor does one part of a flight that fails by a defect (an analysis, a figure, a tab) stop the rest
-    of it: the flight is then incomplete, and a finding says what it lacks.
+    of it: the flight is then incomplete, and a finding says what it lacks. Of a log with several power-ups each has its
+    own folder, those behind the first in ``more``.
     """
-    with gathered_failures():
-        return _run_gathering(job, Stopwatch(listen, job.path.name))
-
-
-def _run_gathering(job: Job, watch: Stopwatch) -> Outcome:
-    sha256 = ""
-    partial: Path | None = None
+    watch = Stopwatch(listen, job.path.name)
     try:
         if job.finished is not None and job.step in ("nothing", "reports"):
-            return _run_reports(job, job.finished, watch)
-        version = _version(job.path)
-        log = open_log(job.path, job.configuration.profile_path, job.configuration.icds)
-        sha256 = log.source.sha256
+            with gathered_failures():
+                return _run_reports(job, job.finished, watch)
+        paths = [Path(part.path) for part in job.parts] or [job.path]
+        version = tuple(map(_version, paths))
+        log = open_parts(paths, job.configuration.profile_path, job.configuration.icds)
         job.out.mkdir(parents=True, exist_ok=True)
-        partial = partial_folder(job.out)
-        return _run(log, version, job, partial, watch)
     except UnclaimedLogError as error:
         return Outcome(job.log, "failed" if job.is_named else "skipped", str(error))
     except Exception as error:
-        reason, trace = reason_of(job.name, error)
-    if partial is not None:
-        shutil.rmtree(partial, ignore_errors=True)
-    return Outcome(job.log, "failed", reason, sha256=sha256, times_s=watch.times_s, trace=trace)
+        return _failed(job, error, watch)
+    return _run_log(log, version, job, watch)
+
+
+def _run_log(log: Log, version: Version, job: Job, watch: Stopwatch) -> Outcome:
+    """Run a log, or one power-up of it, into a partial folder; of a log with several each into its own."""
+    partial = partial_folder(job.out)
+    try:
+        with gathered_failures():
+            found = _run(log, version, job, partial, watch)
+        if isinstance(found, Outcome):
+            return found
+        wanted = [one for one in found if job.power_up in (0, _power_up_of(one))]
+        if not wanted:
+            raise UnreadableLogError(
+                log.path.name, f"{len(found)} power-ups", f"{job.power_up} of them", "run it again"
+            )
+        first, *others = [_run_log(one, version, job, Stopwatch(watch.listen, watch.name)) for one in wanted]
+        outcome = replace(first, more=tuple(others))
+    except Exception as error:
+        outcome = _failed(job, error, watch, log)
+    shutil.rmtree(partial, ignore_errors=True)
+    return outcome
+
+
+def _power_up_of(log: Log) -> int:
+    return 0 if log.segment is None else log.segment.number
+
+
+def _failed(job: Job, error: Exception, watch: Stopwatch, log: Log | None = None) -> Outcome:
+    reason, trace = reason_of(job.name, error)
+    sha256, power_up = ("", 0) if log is None else (log.source.sha256, _power_up_of(log))
+    return Outcome(job.log, "failed", reason, sha256=sha256, times_s=watch.times_s, trace=trace, power_up=power_up)
 
 
 def partial_folder(out: Path) -> Path:
@@ -160,28 +219,35 @@ def _version(path: Path) -> tuple[int, int]:
     return found.st_mtime_ns, found.st_size
 
 
-def _require_unchanged(log: Log, version: tuple[int, int]) -> None:
+def _require_unchanged(log: Log, version: Version) -> None:
     """Refuse a log that was written to while it was read: the digest is not of what was converted."""
-    if _version(log.path) != version and (log.is_store or digest_of(log.path) != log.source.sha256):
-        raise UnreadableLogError(log.path.name, "changed while it was read", "", "run it again once it is complete")
+    digests = log.digests or (log.source.sha256,)
+    for path, before, sha256 in zip(log.parts or (log.path,), version, digests, strict=True):
+        if _version(path) != before and (log.is_store or digest_of(path) != sha256):
+            raise UnreadableLogError(path.name, "changed while it was read", "", "run it again once it is complete")
 
 
-def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Stopwatch) -> Outcome:
+def _run(log: Log, version: Version, job: Job, partial: Path, watch: Stopwatch) -> Outcome | tuple[Log, ...]:
+    """Run one flight into a folder; of a log with several power-ups nothing is run, they are told."""
     from groundstation.results.files import put_failures, save
 
     mcap = partial / "flight.mcap"
+    converted: Converted | tuple[Log, ...]
     if job.step == "analysis" and job.finished is not None:
         converted = _taken_over(job.finished, mcap)
     else:
         with watch.stage("converting"):
-            converted = convert_log(log, mcap, job.configuration.thresholds, job.configuration.references)
+            converted = convert_flight(log, mcap, job.configuration.thresholds, job.configuration.references)
         _require_unchanged(log, version)
+    if isinstance(converted, tuple):
+        return converted
     with watch.stage("reading the MCAP"):
         flight = read_flight(mcap, converted)
     start_utc_ns = flight.start_ns if flight.has_utc else None
-    identity = flight_id(start_utc_ns, flight.metadata, log.source.sha256)
-    if job.add_suffix and start_utc_ns is not None:  # NOTIME ids hold the digest already
-        identity += f"_{log.source.sha256[:8]}"
+    path = job.url or str(log.path.absolute())
+    power_up, parts = _power_up(log, job), _parts(log, job, path, converted, flight)
+    number = power_up.number if power_up else 0
+    identity = flight_id(start_utc_ns, flight.metadata, log.source.sha256, number, add_suffix=job.add_suffix)
     with watch.stage("estimating"):
         results = analyse(flight, given_of(log, converted, identity), job.configuration)
         asked = job.configuration.apply, job.configuration.settings
@@ -196,10 +262,10 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         results = replace(results, findings=with_failures(results.findings, failures()))
         mcap.rename(partial / f"{identity}.mcap")
         text = sentence(results)
-        keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf)
+        keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf, digests=log.digests)
         resume = Resume(keys, text, converted.has_lost_data)
-        path = job.url or str(log.path.absolute())
-        manifest = manifest_of(results, job.configuration.to_dict(), path=path, resume=resume)
+        settings = job.configuration.to_dict()
+        manifest = manifest_of(results, settings, path=path, resume=resume, power_up=power_up, parts=parts)
         save(partial, results, manifest)
     problem = _show(partial, flight, results, job, watch)
     put_failures(partial, failures())
@@ -215,7 +281,37 @@ def _run(log: Log, version: tuple[int, int], job: Job, partial: Path, watch: Sto
         sha256=log.source.sha256,
         times_s=watch.times_s,
         failures=failures(),
+        power_up=number,
+        parts=parts,
     )
+
+
+def _parts(log: Log, job: Job, path: str, converted: Converted, flight: Flight) -> tuple[PartOfRun, ...]:
+    """The consecutive logs of a flight, with what tells whether another one goes on from it.
+
+    Raises
+    ------
+    GroundstationError
+        When the records of parts are not those of the flight: they are not of one recording.
+    """
+    if _power_up(log, job) is not None:
+        return ()
+    if job.step == "analysis" and job.finished is not None:
+        return job.finished.parts
+    whole = part_of(log, path, converted.info.reader, flight)
+    if not log.parts:
+        return (whole,)
+    missing = sum(part.rows for part in job.parts) - whole.rows
+    if missing > MOST_APART * (len(job.parts) - 1):
+        raise GroundstationError(log.source.name, f"{missing} records of its parts are missing", "files of one layout")
+    return tuple(replace(one, sha256=sha256) for one, sha256 in zip(job.parts, log.digests, strict=True))
+
+
+def _power_up(log: Log, job: Job) -> PowerUpOfRun | None:
+    """Which of several power-ups in its log a flight is."""
+    if log.segment is not None:
+        return PowerUpOfRun(log.segment.number, log.segment.count)
+    return job.finished.power_up if job.step == "analysis" and job.finished is not None else None
 
 
 def _show(partial: Path, flight: Flight, results: FlightResults, job: Job, watch: Stopwatch) -> str:
@@ -268,6 +364,8 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
         times_s=watch.times_s,
         was_finished=job.step == "nothing",
         failures=failures(),
+        power_up=job.power_up,
+        parts=finished.parts,
     )
 
 

@@ -34,20 +34,30 @@ def safe_part(text: str) -> str:
     return joined.strip("-")[:MAX_PART_CHARACTERS].strip("-")
 
 
-def flight_id(start_utc_ns: int | None, metadata: Mapping[str, str], sha256: str) -> str:
+def flight_id(
+    start_utc_ns: int | None, metadata: Mapping[str, str], sha256: str, power_up: int = 0, *, add_suffix: bool = False
+) -> str:
     """Name of a flight: ``20260504T060000Z_<aircraft>_<flight>``, or ``NOTIME_<sha8>`` without absolute time.
+
+    Parameters
+    ----------
+    power_up : int
+        Which of several in its log, from 1; 0 where the log holds one. It stands behind the digest.
+    add_suffix : bool
+        Another flight has the same name: add the digest.
 
     Examples
     --------
     >>> flight_id(1777874400000000000, {"aircraft": "L-39 07", "flight": ""}, "ab" * 32)
     '20260504T060000Z_L-39-07'
-    >>> flight_id(None, {"aircraft": "x"}, "ab" * 32)
-    'NOTIME_abababab'
+    >>> flight_id(None, {"aircraft": "x"}, "ab" * 32), flight_id(None, {}, "ab" * 32, 2)
+    ('NOTIME_abababab', 'NOTIME_abababab_2')
     """
+    digest = f"{sha256[:8]}_{power_up}" if power_up else sha256[:8]
     if start_utc_ns is None:
-        return f"{NOTIME}_{sha256[:8]}"
+        return f"{NOTIME}_{digest}"
     parts = [utc_ns_to_stamp(start_utc_ns), *(safe_part(metadata.get(key, "")) for key in ("aircraft", "flight"))]
-    return "_".join(part for part in parts if part)
+    return "_".join(part for part in (*parts, digest if add_suffix else "") if part)
 
 
 def plain_id(identity: str, sha256: str) -> str:
@@ -55,8 +65,8 @@ def plain_id(identity: str, sha256: str) -> str:
 
     Examples
     --------
-    >>> plain_id("20260504T060000Z_A12_abababab", "ab" * 32), plain_id("NOTIME_abababab", "ab" * 32)
-    ('20260504T060000Z_A12', 'NOTIME_abababab')
+    >>> plain_id("20260504T060000Z_A12_abababab", "ab" * 32), plain_id("NOTIME_abababab_2", "ab" * 32)
+    ('20260504T060000Z_A12', 'NOTIME_abababab_2')
     """
-    plain = identity.removesuffix(f"_{sha256[:8]}")
+    plain = re.sub(rf"_{sha256[:8]}(_\d+)?$", "", identity)
     return identity if plain == NOTIME else plain

@@ -1,7 +1,7 @@
 """One way to open whatever a user names: a recorded log, or an MCAP that groundstation wrote."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,12 +10,15 @@ from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.records import Item, RecordBatch
 from groundstation.base.signals import BUS_PREFIX
 from groundstation.pipeline.one_flight.identity import sha256_of
+from groundstation.pipeline.one_flight.segments import Segment
 from groundstation.results.flight import Source
 
 if TYPE_CHECKING:
     from groundstation.readers.icd import Icd
     from groundstation.readers.source import Source as LogFile
+    from groundstation.store.info import StoreInfo
 
+NAMES_TOLD = 3  # of files that are one recording
 REPLAY_LIMIT_BYTES = 96 << 20  # an hour of CSV at 100 Hz is kept; the peak of a conversion has this part in it
 
 
@@ -25,6 +28,9 @@ class Log:
 
     ``is_store``: an MCAP that groundstation wrote; its records carry corrected time already. ``icds`` are files or
     names of shipped ones; with ``has_new_names`` it is an MCAP whose bus words they name, and read as its log again.
+    ``segment`` is the only one of the power-ups in it that is read; ``whole`` then gives the items of all, if they are
+    kept. ``parts`` are the consecutive files that are read as one; its source has the digest of the first, and
+    ``digests`` are those of all.
     """
 
     path: Path
@@ -33,9 +39,23 @@ class Log:
     profile: Path | None = None
     icds: tuple[str, ...] = ()
     has_new_names: bool = False
+    segment: Segment | None = None
+    whole: "Replay | None" = None
+    parts: tuple[Path, ...] = ()
+    digests: tuple[str, ...] = ()
 
     def items(self) -> Iterator[Item]:
         """Read the log from its beginning, in bounded batches."""
+        items = self._whole_items() if self.whole is None else iter(self.whole)
+        if self.segment is None:
+            return items
+        return self.segment.of_store(items) if self.is_store else self.segment.of_log(items)
+
+    def only(self, segment: Segment, whole: "Replay | None" = None) -> "Log":
+        """The log as if there were but one of its power-ups."""
+        return replace(self, segment=segment, whole=whole)
+
+    def _whole_items(self) -> Iterator[Item]:
         if self.is_store:
             from groundstation.store.reader import read
 
@@ -48,9 +68,18 @@ class Log:
 
         return read_log(self._file, self.profile, self.loaded_icds)
 
+    def info(self) -> "StoreInfo":
+        """Facts of an MCAP, or of the one power-up in it that is read."""
+        from groundstation.store.reader import read_info
+
+        if self.segment is not None and self.segment.info is not None:
+            return self.segment.info
+        return read_info(self.path)
+
     def replay(self) -> "Replay":
         """The items for two passes; of a file that is larger than what may be kept, nothing is."""
-        return Replay(self.items, REPLAY_LIMIT_BYTES if self.source.size_bytes <= REPLAY_LIMIT_BYTES else 0)
+        is_small = self.source.size_bytes <= REPLAY_LIMIT_BYTES and self.whole is None
+        return Replay(self.items, REPLAY_LIMIT_BYTES if is_small else 0)
 
     @cached_property
     def loaded_icds(self) -> "tuple[Icd, ...]":
@@ -66,7 +95,11 @@ class Log:
         """The file as readers see it: a compressed one is decompressed once, however often it is read."""
         from groundstation.readers.source import Source as LogFile
 
-        return LogFile(self.path)
+        if not self.parts:
+            return LogFile(self.path)
+        from groundstation.readers.joined import JoinedSource
+
+        return JoinedSource(self.path, tuple(map(LogFile, self.parts)))
 
 
 def as_log(path: Path) -> Path:
@@ -126,6 +159,39 @@ def open_log(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()
     claim = identify(path, profile)
     size = sum(file.stat().st_size for file in _files_of(path))
     return Log(path, Source(log_name(path), digest_of(path), size, claim.title), False, profile, icds)
+
+
+def open_parts(paths: Sequence[Path], profile: Path | None = None, icds: tuple[str, ...] = ()) -> Log:
+    """Find out who can read consecutive files of one recording as one; the first tells it.
+
+    Raises
+    ------
+    UnreadableLogError
+        When no reader claims the first, or one of them is missing.
+    """
+    first = open_log(paths[0], profile, icds)
+    if len(paths) == 1:
+        return first
+    if first.is_store or first.has_new_names or _is_metadata(first.path):
+        raise UnreadableLogError(first.path.name, "no file that a recorder continues in another one", "a recorded log")
+    try:
+        digests = (first.source.sha256, *map(digest_of, paths[1:]))
+        size = first.source.size_bytes + sum(path.stat().st_size for path in paths[1:])
+    except OSError as error:
+        raise UnreadableLogError(str(error.filename), error.strerror or "cannot be read", "a part of a log") from error
+    source = replace(first.source, name=parts_name([path.name for path in paths]), size_bytes=size)
+    return replace(first, source=source, parts=tuple(paths), digests=digests)
+
+
+def parts_name(names: Sequence[str]) -> str:
+    """Name of what several files are together.
+
+    Examples
+    --------
+    >>> parts_name(["a.bin", "b.bin"]), parts_name(["1.csv", "2.csv", "3.csv", "4.csv"])
+    ('a.bin + b.bin', '1.csv and 3 more')
+    """
+    return " + ".join(names) if len(names) <= NAMES_TOLD else f"{names[0]} and {len(names) - 1} more"
 
 
 def _is_store(path: Path, profile: Path | None) -> bool:

@@ -2,7 +2,7 @@
 
 import platform
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
@@ -10,11 +10,17 @@ from groundstation.base.version import __version__
 from groundstation.pipeline.one_flight.resume import versions
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult
-from groundstation.results.manifest import Host, Manifest, Resume, SourceOfRun
+from groundstation.results.manifest import Host, Manifest, PartOfRun, PowerUpOfRun, Resume, SourceOfRun
 
 
 def manifest_of(
-    results: FlightResults, configuration: Mapping[str, Any], *, path: str = "", resume: Resume | None = None
+    results: FlightResults,
+    configuration: Mapping[str, Any],
+    *,
+    path: str = "",
+    resume: Resume | None = None,
+    power_up: PowerUpOfRun | None = None,
+    parts: Sequence[PartOfRun] = (),
 ) -> Manifest:
     """Describe a run of a flight, a session or a plan: source, settings, versions, host and time.
 
@@ -27,6 +33,10 @@ def manifest_of(
         Where the source is, or its URL.
     resume : Resume, optional
         What a later run need not do again.
+    power_up : PowerUpOfRun, optional
+        Which of several in the log.
+    parts : sequence of PartOfRun
+        The consecutive logs of the flight.
     """
     source, heading = results.source, results.answer(HeadingResult)
     return Manifest(
@@ -39,4 +49,6 @@ def manifest_of(
         host=Host(platform.platform(), platform.machine(), sys.version.split()[0]),
         versions=versions(),
         resume=resume,
+        power_up=power_up,
+        parts=tuple(parts),
     )

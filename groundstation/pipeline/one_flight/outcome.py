@@ -9,6 +9,7 @@ from typing import Literal
 from groundstation.base.errors import GroundstationError, lack_of_memory
 from groundstation.base.failures import Failure
 from groundstation.base.failures import reason_of as why
+from groundstation.results.manifest import PartOfRun
 
 State = Literal["done", "data_lost", "limit_reached", "incomplete", "failed", "skipped"]
 EXIT_CODE: Mapping[State, int] = {
@@ -48,6 +49,12 @@ class Outcome:
         The parts that failed.
     is_beside : bool
         Whether it is of what stands beside the flights, and of no log: the index, the page of all, another store.
+    power_up : int
+        Which of several power-ups in the log, from 1; 0 where the log holds one.
+    more : tuple of Outcome
+        What became of the others.
+    parts : tuple of PartOfRun
+        The consecutive logs of the flight: where a log begins and ends tells whether another one goes on from it.
     """
 
     source: str
@@ -62,6 +69,9 @@ class Outcome:
     was_finished: bool = False
     failures: tuple[Failure, ...] = ()
     is_beside: bool = False
+    power_up: int = 0
+    more: "tuple[Outcome, ...]" = ()
+    parts: tuple[PartOfRun, ...] = ()
 
     @property
     def code(self) -> int:

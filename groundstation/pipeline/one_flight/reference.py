@@ -59,6 +59,15 @@ class Laid:
     facts: Mapping[str, str] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
 
+    def within(self, start_ns: int, end_ns: int) -> "Laid":
+        """What it has between two times, both included."""
+        parts = []
+        for batch in self.batches:
+            assert batch.time_ns is not None, "a reference is on the flight's clock"
+            first, end = np.searchsorted(batch.time_ns, (start_ns, end_ns + 1))
+            parts += [batch.take(slice(int(first), int(end)))] if first < end else []
+        return Laid(tuple(parts), self.facts if parts else {}, self.findings)
+
 
 def laid_beside(log_name: str, span_ns: tuple[int, int], has_utc: bool, references: References) -> Laid:
     """Find the reference of a flight and put it on its clock; nothing where no file is given.

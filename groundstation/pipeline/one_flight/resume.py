@@ -9,8 +9,8 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from importlib import metadata as installed
 from pathlib import Path
@@ -33,7 +33,7 @@ from groundstation.results.file_names import ARRAYS, SUMMARY, TABLES
 from groundstation.results.files import load_document, load_manifest, save_manifest
 from groundstation.results.flight import Source
 from groundstation.results.manifest import Keys as Keys
-from groundstation.results.manifest import Manifest
+from groundstation.results.manifest import Manifest, PartOfRun, PowerUpOfRun
 
 Step = Literal["everything", "analysis", "reports", "nothing"]  # what has to be done for a log
 _OF_RESULTS = (SUMMARY, f"{ARRAYS}/", f"{TABLES}/")
@@ -65,6 +65,12 @@ class Finished:
         Paths in the folder of files that are missing or not as the run left them; ``files`` has none of them.
     mcap_sha256 : str
         Empty where an earlier version made the flight.
+    power_up : PowerUpOfRun, optional
+        Which of several in its log.
+    parts : tuple of PartOfRun
+        The consecutive logs that it came from.
+    source : Source
+        Of its log, or of all its parts.
     """
 
     folder: Path
@@ -79,11 +85,18 @@ class Finished:
     has_applied: bool = False
     spoiled: frozenset[str] = frozenset()
     mcap_sha256: str = ""
+    power_up: PowerUpOfRun | None = None
+    parts: tuple[PartOfRun, ...] = ()
+    source: Source = field(default_factory=lambda: Source("", "", 0, ""))
 
     @property
     def mcap(self) -> Path:
         """Its store file."""
         return self.folder / f"{self.flight_id}.mcap"
+
+    def has(self, sha256: str) -> bool:
+        """Whether a log with a digest is the flight's, or one of its parts."""
+        return sha256 == self.sha256 or any(part.sha256 == sha256 for part in self.parts)
 
     @property
     def has_suffix(self) -> bool:
@@ -132,8 +145,10 @@ def _version(package: str) -> str:
         return ""
 
 
-def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool) -> Keys:
+def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool, digests: Sequence[str] = ()) -> Keys:
     """Keys of the run of a log: its name counts too, as it stands in the results.
+
+    ``digests`` are those of the consecutive files of one recording.
 
     Raises
     ------
@@ -144,7 +159,8 @@ def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool) -> 
     thresholds = tables.pop("thresholds", {})
     tables.pop(ISOLATION, None)
     conversion = _digest(
-        asdict(source), _layouts_of(configuration), thresholds, dict(versions()), platform.python_version()
+        *(asdict(source), _layouts_of(configuration), thresholds, dict(versions()), platform.python_version()),
+        *([list(digests)] if len(digests) > 1 else []),
     )
     intervals = [[asdict(part) for part in listed] for listed in (configuration.exclude, configuration.force)]
     apply = None if configuration.apply is None else asdict(configuration.apply)
@@ -227,4 +243,7 @@ def _finished(
         any(finding.code == APPLIED for finding in summary.findings),
         spoiled,
         "" if mcap is None else mcap.sha256,
+        manifest.power_up,
+        manifest.parts,
+        Source(manifest.source.name, manifest.source.sha256, manifest.source.size_bytes, manifest.source.reader),
     )

@@ -19,6 +19,7 @@ from groundstation.readers.bags.rosbag2_metadata import BagMetadata
 from groundstation.readers.bags.sources import Key, key_of
 from groundstation.readers.bags.sqlite import MAGIC as SQLITE_MAGIC
 from groundstation.readers.bags.sqlite import Ros2Sqlite
+from groundstation.readers.joined import JoinedSource
 from groundstation.readers.source import Source
 
 METADATA = "metadata.yaml"
@@ -105,6 +106,8 @@ class Bag:
 
     def files(self) -> tuple[Source, ...]:
         """The files that hold messages."""
+        if isinstance(self.source, JoinedSource):
+            return self.source.files
         if not self._is_folder:
             return (self.source,)
         return tuple(Source(path) for path in files_of(self.source.path))

@@ -1,7 +1,7 @@
 """The first pass over a recording: TMATS and the time packets, and dates on the buses where they lack the year."""
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date
 
 import numpy as np
@@ -43,7 +43,7 @@ def overview(source: Source, *, with_buses: bool) -> Overview:
                 block.specific_word(packet),
                 block.body(packet),
             )
-            found.readings += [told] if told else []
+            found.readings += [replace(told, place=block.base + int(packet[scan.AT]))] if told else []
         if found.dates.total() < _ENOUGH_DATES and not (found.readings and found.readings[0].year):
             found.dates += _dates(block)
         for kind, channel, packets in block.by_channel() if with_buses else ():

@@ -35,7 +35,8 @@ def items(source: Source, icds: Sequence[Icd] = ()) -> Iterator[Item]:
 
 def _recorded(source: Source, found: Overview) -> Iterator[Item]:
     start = start_of(found.readings, found.dates, found.tmats)
-    yield LogHeader(READER, metadata(found.tmats), start.utc_of_zero_ns, has_counting_clock=True)
+    facts = metadata(found.tmats)
+    yield LogHeader(READER, facts, start.utc_of_zero_ns, has_counting_clock=True, utc_readings=start.readings)
     walk, lost = Walk(source), dict[str, int]()
     for block in walk:
         for batch in _batches(block, found.tmats, lost):

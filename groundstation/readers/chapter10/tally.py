@@ -11,6 +11,9 @@ from groundstation.readers.chapter10 import kinds, scan
 from groundstation.readers.chapter10.tmats import Tmats
 from groundstation.readers.skipped import bytes_place
 
+RESTART_TICKS = 10 * 10_000_000  # of the relative time counter, which runs at 10 MHz: a step back of no recording
+WRAP_TICKS = 1 << 47  # a longer one is a wrap: numbers go on
+
 
 class _Wrong(NamedTuple):
     """A packet that is not whole: verdict, type, place and length."""
@@ -23,9 +26,10 @@ class _Wrong(NamedTuple):
 
 @dataclass
 class _Sequence:
-    """Sequence number of a channel's last packet, and how many packets are missing by it."""
+    """Sequence number and counter of a channel's last packet, and how many packets are missing by the number."""
 
     last: int
+    last_rtc: int
     missing: int = 0
     first_place: int = 0
 
@@ -65,10 +69,13 @@ class Tally:
             self._add_sequence(channel, packets[channels == channel], base)
 
     def _add_sequence(self, channel: int, packets: Int64Array, base: int) -> None:
-        numbers = packets[:, scan.SEQUENCE]
-        sequence = self.sequences.setdefault(channel, _Sequence(int(numbers[0]) - 1))
+        numbers, counter = packets[:, scan.SEQUENCE], packets[:, scan.RTC]
+        sequence = self.sequences.setdefault(channel, _Sequence(int(numbers[0]) - 1, int(counter[0])))
         missing = (np.diff(numbers, prepend=sequence.last) - 1) % 256
-        sequence.last = int(numbers[-1])
+        steps = np.diff(counter, prepend=sequence.last_rtc)
+        is_begun = (steps < -RESTART_TICKS) & (steps > -WRAP_TICKS) | (packets[:, scan.TYPE] == kinds.TMATS)
+        missing[is_begun] = 0  # another recording begins, and its numbers
+        sequence.last, sequence.last_rtc = int(numbers[-1]), int(counter[-1])
         if missing.any():
             if not sequence.missing:
                 sequence.first_place = base + int(packets[np.flatnonzero(missing)[0], scan.AT])

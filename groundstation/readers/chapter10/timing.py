@@ -8,7 +8,7 @@ from datetime import UTC, date, datetime, timedelta
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.records import Int64Array, Remark
+from groundstation.base.records import Int64Array, Remark, UtcReadings
 from groundstation.base.timescales import leap_seconds_at, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.chapter10.tmats import YEARS, Tmats
@@ -39,6 +39,8 @@ class Reading:
     time_of_day_ns : int
     is_gps : bool
         GPS time, not UTC.
+    place : int
+        Byte of the file at which the packet begins.
     """
 
     channel: int
@@ -47,6 +49,7 @@ class Reading:
     day: int
     time_of_day_ns: int
     is_gps: bool = False
+    place: int = 0
 
 
 def reading(channel: int, device_ns: int, specific_word: int, body: bytes) -> Reading | None:
@@ -104,10 +107,15 @@ def dates_in(words: NDArray[np.uint32]) -> Counter[date]:
 
 @dataclass(frozen=True)
 class Start:
-    """UTC of the counter's zero, None when nothing tells it, and what was assumed."""
+    """UTC of the counter's zero, None when nothing tells it, and what was assumed.
+
+    ``readings`` are there where the counter starts again (recordings joined end to end) or wraps: its zero is another
+    one behind that place.
+    """
 
     utc_of_zero_ns: int | None
     remarks: tuple[Remark, ...]
+    readings: UtcReadings | None = None
 
 
 def start_of(readings: Sequence[Reading], dates: Counter[date], tmats: Tmats) -> Start:
@@ -130,21 +138,25 @@ def start_of(readings: Sequence[Reading], dates: Counter[date], tmats: Tmats) ->
     year, remarks = _year_of(used[0], dates, tmats)
     if year is None:
         return Start(None, remarks)
-    zeros = _zeros(used, year)
-    told = zero_of_readings(zeros)
-    moment_ns = told.ns + used[-1].device_ns
+    every = _every_zero(used, year)
+    zeros = every[_last_start(used) :]
+    zero = zero_of_readings(zeros)
+    moment_ns = zero.ns + used[-1].device_ns
     behind = rollovers(moment_ns, others=_of_tmats(tmats) if used[0].year is not None else ())
-    utc_ns = told.ns + behind.shift_ns(moment_ns, is_gps_time=used[-1].is_gps)
+    shift_ns = behind.shift_ns(moment_ns, is_gps_time=used[-1].is_gps)
+    utc_ns = zero.ns + shift_ns
     text = f"UTC from {len(used)} time packets of channel {chosen}: the counter's zero is {utc_ns_to_iso(utc_ns, 6)}"
     name = f"time channel {chosen}"
-    parted = [*told.remarks(name)] if told.passed_over else [*_spread(zeros, chosen)]
+    parted = [*zero.remarks(name)] if zero.passed_over else [*_spread(zeros, chosen)]
     others = [
-        _other(channel, [one for one in readings if one.channel == channel], year, told.ns)
+        _other(channel, [one for one in readings if one.channel == channel], year, zero.ns)
         for channel in sorted(channels)
         if channel != chosen
     ]
     remarks = (Remark("utc_from_time_packets", text), *remarks, *parted, *behind.remarks, *others)
-    return Start(utc_ns, remarks)
+    places = np.array([one.place for one in used], dtype=np.int64)
+    is_one = len(zeros) == len(every)
+    return Start(utc_ns, remarks, None if is_one else UtcReadings(places, every + shift_ns))
 
 
 def _of_tmats(tmats: Tmats) -> tuple[OtherDate, ...]:
@@ -176,13 +188,18 @@ def _year_of(first: Reading, dates: Counter[date], tmats: Tmats) -> tuple[int | 
     return None, (Remark("year_unknown", text),)
 
 
-def _zeros(used: Iterable[Reading], year: int) -> Int64Array:
-    """UTC less the counter, of each reading behind the counter's last restart; a day that falls begins a new year."""
+def _last_start(used: Sequence[Reading]) -> int:
+    """The first reading behind the counter's last restart."""
+    steps = np.diff(np.array([one.device_ns for one in used], dtype=np.int64))
+    restarts = np.flatnonzero(steps < _RESTART_NS)
+    return int(restarts[-1]) + 1 if len(restarts) else 0
+
+
+def _every_zero(used: Iterable[Reading], year: int) -> Int64Array:
+    """UTC less the counter, of each reading; a day that falls begins a new year."""
     zeros: list[int] = []
     before: Reading | None = None
     for one in used:
-        if before is not None and one.device_ns - before.device_ns < _RESTART_NS:
-            zeros = []
         if before is not None and before.day - one.day > 180:
             year += 1
         day = datetime(one.year or year, 1, 1, tzinfo=UTC) + timedelta(one.day - 1)
@@ -206,7 +223,7 @@ def _spread(zeros: Int64Array, channel: int) -> Iterable[Remark]:
 
 
 def _other(channel: int, readings: Sequence[Reading], year: int, utc_ns: int) -> Remark:
-    zeros = _zeros(readings, year)
+    zeros = _every_zero(readings, year)[_last_start(readings) :]
     apart_s = (int(np.sort(zeros)[len(zeros) // 2]) - utc_ns) / NS_PER_S
     code = "clock_disagrees" if abs(apart_s) > _SPREAD_NS / NS_PER_S else "other_time_channel"
     return Remark(code, f"time channel {channel} ({len(readings)} packets) differs by {apart_s:+.3f} s: it is not used")

@@ -130,7 +130,8 @@ class Scanner:
         self.spans = Spans(SkippedBytes("record"))
         self.refused: list[tuple[int, Definition]] = []
         self.refused_more = 0
-        self._met = self._logs = 0
+        self._met = 0
+        self.log_starts: list[int] = []  # places of the records with which further logs begin
         self.definitions = {FMT_ID: fmt_definition()}
         self._lengths = np.zeros(256, dtype=np.int64)
         self._time_kind = np.zeros(256, dtype=np.int64)
@@ -219,10 +220,10 @@ class Scanner:
                 count = int(state[scan.COUNT])
                 at = int(offsets[count - 1])
                 payload = data[at + HEADER_BYTES : at + FMT_BYTES].tobytes()
-                if payload.startswith(_LOG_BEGINS) and (self._count or count > 1) and self._logs < MOST_LOGS:
+                if payload.startswith(_LOG_BEGINS) and (self._count or count > 1) and len(self.log_starts) < MOST_LOGS:
+                    self.log_starts.append(self._count + count - 1)
                     yield from self._block(data, offsets, types)
                     self._seen[:] = False
-                    self._logs += 1
                 new = self._accepted(payload, types, self._base + at)
                 if new is not None:
                     self._define(new)

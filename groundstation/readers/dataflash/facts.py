@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from groundstation.base.records import BoolArray, Int64Array, Remark
+from groundstation.base.records import BoolArray, Int64Array, Remark, UtcReadings
 from groundstation.base.signals import RAW_PREFIX
 from groundstation.base.source_units import PREFIX
 from groundstation.base.timescales import gps_week_to_utc_ns, utc_ns_to_iso
@@ -57,6 +57,17 @@ def metadata(found: Overview) -> dict[str, str]:
         if units and name not in ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"):
             facts[f"{PREFIX}{RAW_PREFIX}{name}"] = units
     return facts
+
+
+def utc_readings(times: GpsTimes, firmware: str = "") -> UtcReadings | None:
+    """UTC of the autopilot's time zero by each fix, where that zero changes: the autopilot was started again."""
+    good, device_ns = _dated(times), times.device_ns
+    if not (np.diff(device_ns[good]) < _RESTART_NS).any():
+        return None
+    utc_ns = gps_week_to_utc_ns(times.week[good], times.week_ms[good])
+    behind = rollovers(int(utc_ns[-1]), earliest=_earliest(firmware))
+    utc_ns = utc_ns + behind.shift_ns(int(utc_ns[-1]), is_gps_time=True)
+    return UtcReadings(times.record_index[good], utc_ns - device_ns[good])
 
 
 def utc_of_power_up(times: GpsTimes, firmware: str = "") -> tuple[int | None, list[Remark]]:

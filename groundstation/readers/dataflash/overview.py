@@ -44,11 +44,12 @@ class States:
 
 @dataclass(frozen=True, eq=False)
 class GpsTimes:
-    """Fixes of all receivers that tell a time: GPS week, milliseconds of the week, and the autopilot's clock."""
+    """Fixes of all receivers that tell a time: GPS week, milliseconds of the week, the autopilot's clock, the place."""
 
     week: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     week_ms: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     device_ns: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    record_index: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +112,7 @@ class _Survey:
         self._instances: dict[tuple[int, str], set[int]] = {}
         self._parameters: dict[str, float] = {}
         self._messages: list[str] = []
-        self._gps: list[tuple[Any, Any, Any]] = []
+        self._gps: list[tuple[Any, ...]] = []
         self._has_fix = False
         self._sigma: dict[Unit, list[tuple[Any, Any]]] = {}
         self._unknown = UnknownUnits()
@@ -166,7 +167,7 @@ class _Survey:
             split=split,
             parameters=self._parameters,
             messages=tuple(self._messages),
-            gps_times=GpsTimes(*(_joined([part[n] for part in self._gps]) for n in range(3))),
+            gps_times=GpsTimes(*(_joined([part[n] for part in self._gps]) for n in range(4))),
             has_fix=self._has_fix,
             speed_sigma={unit: _sorted_pairs(parts) for unit, parts in self._sigma.items()},
             primary_core={name: _states(parts) for name, parts in self._cores.items()},
@@ -231,7 +232,7 @@ class _Survey:
         if names is not None:
             timed = fixed & rows.time_ns.mask
             week, week_ms = (rows.values(name).astype(np.int64)[timed] for name in names)
-            self._gps.append((week, week_ms, rows.time_ns.values[timed]))
+            self._gps.append((week, week_ms, rows.time_ns.values[timed], rows.record_index[timed]))
 
     def _accuracy(self, rows: Rows) -> None:
         if not rows.definition.has_numbers("SAcc"):

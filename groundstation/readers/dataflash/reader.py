@@ -4,13 +4,13 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 
-from groundstation.base.records import MAX_BATCH_ROWS, Damage, Item, LogHeader, RecordBatch
+from groundstation.base.records import MAX_BATCH_ROWS, Damage, Item, LogHeader, NewLog, RecordBatch
 from groundstation.readers.dataflash.blocks import Block, Scanner
 from groundstation.readers.dataflash.canonical import Mapper
 from groundstation.readers.dataflash.choices import choose
 from groundstation.readers.dataflash.definitions import Definition
 from groundstation.readers.dataflash.doubts import doubts, odd_instances
-from groundstation.readers.dataflash.facts import metadata, utc_of_power_up
+from groundstation.readers.dataflash.facts import metadata, utc_of_power_up, utc_readings
 from groundstation.readers.dataflash.overview import Overview, overview
 from groundstation.readers.dataflash.values import Rows, by_instance, rows_of
 from groundstation.readers.source import Source
@@ -23,8 +23,11 @@ def items(source: Source) -> Iterator[Item]:
     scanner = Scanner(source)
     found = overview(scanner)
     facts = metadata(found)
-    utc_ns, remarks = utc_of_power_up(found.gps_times, facts.get("firmware", ""))
-    yield LogHeader(READER, facts, utc_ns, has_counting_clock=True)
+    firmware = facts.get("firmware", "")
+    utc_ns, remarks = utc_of_power_up(found.gps_times, firmware)
+    readings = utc_readings(found.gps_times, firmware)
+    yield LogHeader(READER, facts, utc_ns, has_counting_clock=True, utc_readings=readings)
+    yield from map(NewLog, scanner.log_starts)
     choices = choose(found, facts.get("vehicle", ""))
     mapper, topics = Mapper(found, choices), _Topics()
     unreadable: dict[str, int] = {}

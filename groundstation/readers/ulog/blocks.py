@@ -13,7 +13,7 @@ from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 from groundstation.readers.ulog import scan
 from groundstation.readers.ulog.formats import Flattener, Format, Layout, parse_format
-from groundstation.readers.ulog.messages import FILE_HEADER_BYTES, FlagBits, flag_bits, text_of
+from groundstation.readers.ulog.messages import FILE_HEADER_BYTES, FLAGS_BYTES, MAGIC, FlagBits, flag_bits, text_of
 
 BLOCK_BYTES = 8 << 20
 KEPT_BYTES = 32 << 20  # of a log whose blocks may all be kept, for a second pass
@@ -169,6 +169,7 @@ class Walk:
         self.definitions = Definitions()
         self._skipped = SkippedBytes("message")
         self._ends: list[Damage] = []
+        self.log_starts: list[int] = []  # places of the first messages of further logs
         self._index = 0
         self._capacity = max(1024, BLOCK_BYTES // 16)
 
@@ -235,7 +236,7 @@ class Walk:
                     data[: len(data) - SLACK], 0 if is_end else scan.LOOKAHEAD, *tables, at, topic, spans, state
                 )
                 for start, end, before in spans[: state[scan.SPANS]].tolist():
-                    self._skipped.add(base + start, base + end, self._index + before)
+                    self._note_skipped(data[start:end], base + start, self._index + before)
                 if reason == scan.DEFINITION:
                     last = int(state[scan.COUNT]) - 1
                     place = int(at[last])
@@ -246,6 +247,21 @@ class Walk:
             if count:
                 yield Block(data, at[:count], topic[:count], self._index, definitions.topics)
                 self._index += count
+
+    def _note_skipped(self, data: NDArray[np.uint8], start: int, behind: int) -> None:
+        """Count bytes of no message; the header of a further log is none of them."""
+        bytes_, end = data.tobytes(), start + len(data)
+        at = bytes_.find(MAGIC)
+        if at < 0:
+            self._skipped.add(start, end, behind)
+            return
+        self.log_starts.append(behind)
+        header_end = at + FILE_HEADER_BYTES
+        flags = flag_bits(bytes_[at : header_end + FLAGS_BYTES])
+        rest = start + at + flags.end if flags else start + header_end
+        for first, last in ((start, start + at), (rest, end)):
+            if first < last:
+                self._skipped.add(first, last, behind)
 
     def _read(self, stream: BinaryIO, place: int, into: NDArray[np.uint8]) -> int:
         """Fill ``into`` with bytes of the file from ``place`` on; returns how many there were."""

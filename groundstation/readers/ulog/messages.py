@@ -9,6 +9,7 @@ from groundstation.readers.ulog.formats import DTYPES
 MAGIC = b"ULog\x01\x12\x35"
 FILE_HEADER_BYTES = 16
 FLAG_BITS_BYTES = 40
+FLAGS_BYTES = 3 + FLAG_BITS_BYTES  # with the head of the message
 APPENDED_BIT = 1
 SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
 _CODES = dict(zip(DTYPES, "bBhHiIqQfdBb", strict=True))

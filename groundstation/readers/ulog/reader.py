@@ -16,6 +16,7 @@ from groundstation.base.records import (
     Int64Array,
     Item,
     LogHeader,
+    NewLog,
     RecordBatch,
     Remark,
 )
@@ -95,6 +96,7 @@ def items(source: Source, reader_name: str, start_us: int) -> Iterator[Item]:
         newest = _newest_before(np.append(controls, len(messages_us)), messages_us, newest_us)
         yield from texts.batches(block, newest[:-1])
         newest_us = int(newest[-1])
+    yield from map(NewLog, walk.log_starts)
     yield from found.remarks
     yield from canonical.remarks()
     yield from walk.damages()

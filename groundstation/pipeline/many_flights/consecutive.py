@@ -1,0 +1,188 @@
+"""Consecutive logs among those of a run and the flights of its OUT: found by where each begins and ends."""
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from groundstation.base.errors import GroundstationError
+from groundstation.base.units import NS_PER_S
+from groundstation.pipeline.many_flights.known_flights import KnownFlights
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.log import Log, open_log
+from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.one_flight.parts import LATE_S, LONGEST_GAP_S, behind_it, family, goes_on, order_of
+from groundstation.results.manifest import PartOfRun
+
+_NOT_JOINED = "groundstation-mcap"  # how readers of MCAPs that we wrote begin: a recorder's files are joined
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Consecutive logs as far as they are known to be of one flight.
+
+    Parameters
+    ----------
+    parts : tuple of PartOfRun
+    numbers : tuple of int
+        Of the logs of this run among them.
+    """
+
+    parts: tuple[PartOfRun, ...]
+    numbers: tuple[int, ...] = ()
+
+    @property
+    def first(self) -> PartOfRun:
+        """The log with which it begins."""
+        return self.parts[0]
+
+    @property
+    def last(self) -> PartOfRun:
+        """The log with which it ends."""
+        return self.parts[-1]
+
+    def with_next(self, other: "Stretch") -> "Stretch":
+        """Both, one behind the other."""
+        return Stretch((*self.parts, *other.parts), (*self.numbers, *other.numbers))
+
+
+def flights_of_parts(
+    outcomes: Mapping[int, Outcome], known: KnownFlights, configuration: Configuration
+) -> list[Stretch]:
+    """Flights that consist of several logs, of which this run has at least one, and which are not so in OUT yet.
+
+    Parameters
+    ----------
+    outcomes : mapping of int to Outcome
+        By the numbers of the logs; those without a flight may be parts that cannot be read alone.
+    known : KnownFlights
+        What OUT had before the run.
+    configuration : Configuration
+        How logs are read.
+    """
+    own = [Stretch(one.parts, (number,)) for number, one in outcomes.items() if one.flight_id and _may_join(one.parts)]
+    stretches = [*own, *_others(own, known)]
+    strangers = {Path(one.source).absolute(): number for number, one in outcomes.items() if not one.flight_id}
+    folders = _Folders()
+    grown = [_with_strangers(one, strangers, folders, configuration) for one in stretches]
+    known_ones = {_digests(one) for one in stretches}
+    return [one for one in _chained(grown, folders) if one.numbers and _digests(one) not in known_ones]
+
+
+def _digests(stretch: Stretch) -> tuple[str, ...]:
+    return tuple(part.sha256 for part in stretch.parts)
+
+
+class _Folders:
+    """Files of folders by the families of their names, each folder looked at once."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[Path, str], list[str]] = {}
+
+    def next_file(self, path: Path) -> Path | None:
+        """The file behind one of those in its folder whose names differ in a number alone."""
+        key = path.parent, family(path.name)
+        if key not in self._known:
+            try:
+                names = [one.name for one in path.parent.iterdir() if family(one.name) == key[1]]
+            except OSError:
+                names = []
+            self._known[key] = sorted(names, key=order_of)
+        names = self._known[key]
+        at = names.index(path.name) + 1 if path.name in names else len(names)
+        return path.parent / names[at] if at < len(names) else None
+
+
+def _may_join(parts: Sequence[PartOfRun]) -> bool:
+    return bool(parts) and not parts[0].reader.startswith(_NOT_JOINED)
+
+
+def _others(own: Sequence[Stretch], known: KnownFlights) -> Iterator[Stretch]:
+    """Flights of OUT that are near those of the run; what the run has anew of their parts is left out of them."""
+    mine = {part.sha256 for one in own for part in one.parts}
+    paths = {part.path for one in own for part in one.parts}
+    seen: set[str] = set()
+    for name, manifest in (found for one in own for part in one.parts for found in known.about(part)):
+        if name in seen or not _may_join(manifest.parts):
+            continue
+        seen.add(name)
+        left = [part for part in manifest.parts if part.sha256 not in mine and part.path not in paths]
+        if len(left) == len(manifest.parts):
+            yield Stretch(manifest.parts)
+        else:
+            yield from (Stretch((part,)) for part in left)
+
+
+def _with_strangers(
+    stretch: Stretch, strangers: Mapping[Path, int], folders: _Folders, configuration: Configuration
+) -> Stretch:
+    """A stretch with the files behind it that cannot be read alone: by name they follow, by content they go on."""
+    first: Log | None = None
+    while strangers and (path := folders.next_file(Path(stretch.last.path))) in strangers:
+        assert path is not None
+        try:
+            first = first or open_log(Path(stretch.first.path), configuration.profile_path, configuration.icds)
+        except (GroundstationError, OSError):
+            break
+        part = behind_it(first, stretch.last, path)
+        if part is None or not goes_on(stretch.last, part, is_beside=True):
+            break
+        stretch = Stretch((*stretch.parts, part), (*stretch.numbers, strangers[path]))
+    return stretch
+
+
+def _chained(stretches: Sequence[Stretch], folders: _Folders) -> list[Stretch]:
+    """Stretches put behind one another where exactly one goes on from another."""
+    behind: dict[int, list[int]] = {}
+    before: dict[int, list[int]] = {}
+    for one, other in _pairs(stretches, folders):
+        behind.setdefault(one, []).append(other)
+        before.setdefault(other, []).append(one)
+    links: dict[int, int] = {}
+    for one, others in behind.items():
+        chosen = _only(stretches, one, others)
+        if chosen is not None and _only(stretches, chosen, before[chosen]) == one:
+            links[one] = chosen
+    starts = [number for number in range(len(stretches)) if number not in links.values()]
+    chains = []
+    for number in starts:
+        chain = stretches[number]
+        while (number := links.get(number, -1)) >= 0:
+            chain = chain.with_next(stretches[number])
+        chains.append(chain)
+    return chains
+
+
+def _only(stretches: Sequence[Stretch], one: int, others: Sequence[int]) -> int | None:
+    """The one of several that goes with a stretch: where there are more, that of the same family of names."""
+    if len(others) == 1:
+        return others[0]
+    like = family(stretches[one].last.name)
+    akin = [other for other in others if family(stretches[other].first.name) == like]
+    return akin[0] if len(akin) == 1 else None
+
+
+def _pairs(stretches: Sequence[Stretch], folders: _Folders) -> Iterator[tuple[int, int]]:
+    """Numbers of stretches of which the second goes on from the first."""
+    by_start = sorted((start, number) for number, one in enumerate(stretches) for start in _starts(one.first))
+    for number, one in enumerate(stretches):
+        found: set[int] = set()
+        for kind, end_ns in _ends(one.last):
+            low = bisect_left(by_start, ((kind, end_ns - round(LATE_S * NS_PER_S)), -1))
+            high = bisect_right(by_start, ((kind, end_ns + round(LONGEST_GAP_S * NS_PER_S)), len(stretches)))
+            found.update(other for _start, other in by_start[low:high] if other != number)
+        for other in sorted(found):
+            first = stretches[other].first
+            is_beside = folders.next_file(Path(one.last.path)) == Path(first.path)
+            if goes_on(one.last, first, is_beside=is_beside):
+                yield number, other
+
+
+def _starts(part: PartOfRun) -> Iterable[tuple[str, int]]:
+    """When a log begins, by each clock that tells it."""
+    return [("device", part.device_ns[0]), *([("utc", part.utc_ns[0])] if part.utc_ns else [])]
+
+
+def _ends(part: PartOfRun) -> Iterable[tuple[str, int]]:
+    """The same of its end."""
+    return [("device", part.device_ns[1]), *([("utc", part.utc_ns[1])] if part.utc_ns else [])]

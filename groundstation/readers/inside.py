@@ -1,0 +1,62 @@
+"""Header and comment lines inside a table: what a log that was appended to another says of itself."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from groundstation.base.records import Column, Int64Array, NewLog
+from groundstation.readers.start import utc_of_zero
+
+START = "start_utc"
+
+
+def new_logs(lines: Mapping[int, str]) -> Iterator[NewLog]:
+    """Logs that begin at lines of a header or comments; lines right behind one another are of one log.
+
+    Examples
+    --------
+    >>> [(one.record_index, dict(one.metadata)) for one in new_logs({7: "# aircraft: B", 8: "time_s,ins.roll_deg"})]
+    [(7, {'aircraft': 'B'})]
+    """
+    first, facts = -1, dict[str, str]()
+    for number, text in sorted(lines.items()):
+        if first >= 0 and number - 1 not in lines:
+            yield NewLog(first, facts)
+            first, facts = -1, {}
+        first = number if first < 0 else first
+        facts.update(_entry(text))
+    if first >= 0:
+        yield NewLog(first, facts)
+
+
+def with_own_zeros(time: Column, numbers: Int64Array, lines: Mapping[int, str], zero_ns: int | None) -> Column:
+    """Times of rows by the zero of the file's header, where a line above them states another one.
+
+    Parameters
+    ----------
+    time : Column of int64, shape (n,)
+    numbers : ndarray of int64, shape (n,)
+        Line numbers of the rows.
+    lines : mapping of line number to text
+    zero_ns : int or None
+        UTC of time zero by the header of the file; without it no zero is related to it.
+    """
+    if zero_ns is None or not lines:
+        return time
+    stated = [(0, zero_ns), *((number, ns) for number, text in sorted(lines.items()) if (ns := _zero_ns(text)))]
+    if len(stated) == 1:
+        return time
+    places, zeros = (np.array(column, dtype=np.int64) for column in zip(*stated, strict=True))
+    shift_ns = zeros[np.searchsorted(places, numbers, side="right") - 1] - zero_ns
+    return Column(time.values + shift_ns, time.present)
+
+
+def _zero_ns(text: str) -> int | None:
+    """UTC of time zero that a line states."""
+    return utc_of_zero(_entry(text))[0]
+
+
+def _entry(text: str) -> dict[str, str]:
+    """Metadata in a comment line."""
+    key, colon, value = text.lstrip("#").partition(":")
+    return {key.strip(): value.strip()} if text.startswith("#") and colon and key.strip() else {}

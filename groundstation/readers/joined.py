@@ -1,0 +1,179 @@
+"""Consecutive files of one recording, seen as one file; and a few bytes, seen as one."""
+
+import io
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import accumulate
+from typing import Any, BinaryIO
+
+from groundstation.base.records import Damage
+from groundstation.readers.dialect import DELIMITERS
+from groundstation.readers.source import HEAD_BYTES, Source
+
+_LOOKED_AT = 1 << 16  # bytes at the end of a file and at the beginning of the next in which lines are looked for
+
+
+@dataclass(frozen=True)
+class JoinedSource(Source):
+    """Files that were written one after the other, as one: their bytes stand behind one another.
+
+    Containers of messages are read file by file, from ``files``.
+
+    Parameters
+    ----------
+    path : Path
+        Of the first.
+    files : tuple of Source
+        All of them.
+    """
+
+    files: tuple[Source, ...] = ()
+
+    @cached_property
+    def size(self) -> int:
+        """Bytes of all of them, decompressed."""
+        return self._ends[-1]
+
+    @property
+    def compression(self) -> str:
+        """Nothing: the files are decompressed one by one."""
+        return ""
+
+    @cached_property
+    def head(self) -> bytes:
+        """The first bytes, of as many files as it takes."""
+        head = b""
+        for piece in self._pieces:
+            head += piece if isinstance(piece, bytes) else piece.head
+            if len(head) >= HEAD_BYTES or (not isinstance(piece, bytes) and piece.size > len(piece.head)):
+                break
+        return head[:HEAD_BYTES]
+
+    @cached_property
+    def is_empty(self) -> bool:
+        """Whether none has any bytes."""
+        return all(file.is_empty for file in self.files)
+
+    def open(self) -> BinaryIO:
+        """Open for reading bytes; errors as of a single file."""
+        return io.BufferedReader(_Chain(self._pieces, self._ends))
+
+    def damages(self) -> tuple[Damage, ...]:
+        """Damage of compressed files, once they were opened."""
+        return tuple(replace(one, place=f"{file.name}, {one.place}") for file in self.files for one in file.damages())
+
+    @cached_property
+    def _pieces(self) -> "tuple[Source | bytes, ...]":
+        """The files, and a line feed between two where rows of a table would run into one another."""
+        pieces: list[Source | bytes] = [self.files[0]]
+        for before, file in zip(self.files, self.files[1:], strict=False):
+            pieces += [*([b"\n"] if _runs_together(before, file) else []), file]
+        return tuple(pieces)
+
+    @cached_property
+    def _ends(self) -> list[int]:
+        return list(accumulate(len(piece) if isinstance(piece, bytes) else piece.size for piece in self._pieces))
+
+
+@dataclass(frozen=True)
+class BytesSource(Source):
+    """Bytes at hand, under the name of a file."""
+
+    content: bytes = b""
+
+    @property
+    def size(self) -> int:
+        """How many they are."""
+        return len(self.content)
+
+    @property
+    def compression(self) -> str:
+        """Nothing."""
+        return ""
+
+    @property
+    def head(self) -> bytes:
+        """The first of them."""
+        return self.content[:HEAD_BYTES]
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there are none."""
+        return not self.content
+
+    def open(self) -> BinaryIO:
+        """Open for reading bytes."""
+        return io.BytesIO(self.content)
+
+
+class _Chain(io.RawIOBase):
+    """A read-only view of files behind one another, each opened when it is first read."""
+
+    def __init__(self, pieces: "Sequence[Source | bytes]", ends: Sequence[int]) -> None:
+        self._pieces, self._ends, self._at = pieces, ends, 0
+        self._open: tuple[int, BinaryIO] | None = None
+
+    def readable(self) -> bool:
+        """True."""
+        return True
+
+    def seekable(self) -> bool:
+        """True."""
+        return True
+
+    def tell(self) -> int:
+        """Position from the start."""
+        return self._at
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        """Move to a position; returns it."""
+        base = {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._ends[-1]}[whence]
+        self._at = max(0, base + offset)
+        return self._at
+
+    def readinto(self, buffer: Any) -> int:
+        """Fill ``buffer`` from the position on, at most to the end of the file there; returns how many bytes."""
+        number = bisect_right(self._ends, self._at)
+        if number == len(self._ends):
+            return 0
+        piece, start = self._pieces[number], self._ends[number - 1] if number else 0
+        if self._open is None or self._open[0] != number:
+            self._close()
+            self._open = number, io.BytesIO(piece) if isinstance(piece, bytes) else piece.open()
+        stream = self._open[1]
+        stream.seek(self._at - start)
+        count: int = stream.readinto(memoryview(buffer)[: self._ends[number] - self._at])  # type: ignore[attr-defined]
+        self._at += count
+        return count
+
+    def close(self) -> None:
+        """Close it, and the file that is open."""
+        self._close()
+        super().close()
+
+    def _close(self) -> None:
+        if self._open is not None:
+            self._open[1].close()
+            self._open = None
+
+
+def _runs_together(before: Source, behind: Source) -> bool:
+    """Whether a row ends a file without a line end, and a whole line begins the next."""
+    with before.open() as stream:
+        stream.seek(max(0, before.size - _LOOKED_AT))
+        lines = stream.read().splitlines(keepends=True)
+    if len(lines) < 2 or lines[-1].endswith((b"\n", b"\r")):
+        return False
+    first = behind.head[:_LOOKED_AT].split(b"\n", 1)[0]
+    if b"\0" in lines[-1] or b"\0" in first:
+        return False
+    if first.startswith((b"#", b"$", b"!")):
+        return True
+    return all(first.count(mark) == lines[-1].count(mark) == lines[-2].count(mark) for mark in _marks(lines[-2]))
+
+
+def _marks(line: bytes) -> list[bytes]:
+    """The delimiter that a row has most of."""
+    return [max((mark.encode() for mark in DELIMITERS), key=line.count)]
