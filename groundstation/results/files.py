@@ -100,7 +100,7 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def json_text(document: Any) -> str:
-    """Render JSON as it is written everywhere: two spaces, order kept, NaN refused, hidden characters as escapes."""
+    """Render JSON as it is written everywhere: NaN refused, hidden characters escaped."""
     return printable_json(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
 
 

@@ -145,7 +145,7 @@ def _run_gathering(job: Job, watch: Stopwatch) -> Outcome:
 
 
 def partial_folder(out: Path) -> Path:
-    """A new folder in ``out`` for what is not finished; as every other it is open to whom the user's mask leaves it."""
+    """Make a folder in ``out`` for unfinished work, open to whom the user's mask leaves it."""
     partial = out / f"{PARTIAL_PREFIX}{secrets.token_hex(8)}"
     partial.mkdir()
     return partial
