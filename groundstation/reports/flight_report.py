@@ -101,7 +101,7 @@ def flight_report_begun(
 def write_pages(
     page: Path, render: Callable[[Document], str], shown: Document, on_paper: Document, *, with_pdf: bool
 ) -> Written:
-    """Write a page and, beside it, a document as PDF; what is not made is not there from an earlier run either."""
+    """Write a page and, beside it, a document as PDF; none of an earlier run stays."""
     pdf, problem = page.with_suffix(".pdf"), ""
     html = attempt("report", page.name, render, shown)
     if html is None:
