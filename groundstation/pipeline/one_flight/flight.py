@@ -298,7 +298,7 @@ def _parts(log: Log, job: Job, path: str, converted: Converted, flight: Flight) 
         return ()
     if job.step == "analysis" and job.finished is not None:
         return job.finished.parts
-    whole = part_of(log, path, converted.info.reader, flight)
+    whole = part_of(log, path, log.source.reader, flight)  # an MCAP that we wrote says so: it is no recorder's file
     if not log.parts:
         return (whole,)
     missing = sum(part.rows for part in job.parts) - whole.rows
