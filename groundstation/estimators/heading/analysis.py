@@ -38,6 +38,7 @@ def _run(flight: "Flight", known: Known, settings: HeadingSettings) -> Found[Hea
         request=HeadingRequest(intervals=known.intervals),
         latencies=known.answer(Latencies),
         phases=known.phases,
+        weather=known.weather,
     )
     return Found(found, (_verdict(found), *_steps(found), *_findings_of_what_was_set(flight, found, known)))
 
@@ -89,7 +90,7 @@ def _sentence(answers: Answers) -> str:
     text = f"{heading.verdict}: heading error {heading.error_deg:+.3f} deg, 95 % {low:+.3f} to {high:+.3f}"
     if heading.confidence95_measured_deg is not None:
         low, high = heading.confidence95_measured_deg
-        text += f" ({low:+.3f} to {high:+.3f} without steady sideslip and mounting)"
+        text += f" ({low:+.3f} to {high:+.3f} without steady sideslip)"
     if heading.correction_deg is not None:
         return f"{text}, enter {heading.correction_deg:+g} deg"
     return f"{text} ({heading.verdict_reason})"
