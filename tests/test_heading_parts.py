@@ -568,6 +568,10 @@ def gate(name: str, state: str, required: bool = True) -> Gate:
         ((("quality", "failed"), ("precision", "failed")), "reject"),
         ((("geometry", "not_measured"), ("precision", "passed")), "undecided"),
         ((("geometry", "not_measured"), ("precision", "failed")), "extend"),
+        ((("whole_half_width", "failed"), ("precision", "passed")), "advisory"),
+        ((("whole_half_width", "failed"), ("half_width", "failed")), "extend"),
+        ((("whole_half_width", "failed"), ("steps", "failed")), "reject"),
+        ((("whole_half_width", "failed"), ("geometry", "not_measured")), "undecided"),
         ((("standstill_speed_of_mean", "failed"), ("precision", "passed")), "reject"),
     ],
 )
