@@ -675,6 +675,17 @@ def test_sideslip_on_the_way_back_takes_the_other_sign() -> None:
     assert back.verdict == "accept"
 
 
+def test_weather_that_is_not_of_the_taxi_is_told(flight: Flight) -> None:
+    from groundstation.estimators.heading.analysis import HEADING
+    from groundstation.estimators.known import Known
+
+    known = Known(flight_phases(flight), aircraft=AIRCRAFT, weather=("METAR UUEE 040930Z 09010MPS CAVOK=",))
+    found = HEADING.run(flight, known, HeadingSettings())
+    assert [one.text for one in found.findings if one.code == "heading.weather"] == [
+        "no METAR line of the field within the time allowed of the taxi: the ordinary wind is taken"
+    ]
+
+
 def test_taxi_after_the_flight_alone_is_not_assessable(flight: Flight, result: HeadingResult) -> None:
     first_s = result.segments[0].start_s
     with pytest.raises(NotAssessableError, match="straight taxi before take-off, 5 s needed"):

@@ -53,7 +53,7 @@ class RunOutcome:
 
     @property
     def is_inside_measured(self) -> bool:
-        """Whether the interval without steady sideslip and mounting holds the truth."""
+        """Whether the interval without steady sideslip holds the truth."""
         return self.low_measured_deg <= 0.0 <= self.high_measured_deg
 
     @property

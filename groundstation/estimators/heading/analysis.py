@@ -71,6 +71,11 @@ def _findings_of_what_was_set(flight: "Flight", heading: HeadingResult, known: K
 
     lines = reference_findings(heading, flight.metadata, known.site)
     findings = [Finding("warn", "heading.reference", line) for line in lines]
+    if known.weather and heading.wind is None:
+        text = "no METAR line of the field within the time allowed of the taxi: the ordinary wind is taken"
+        if not flight.has_utc:
+            text = "the log has no UTC: no METAR line can be placed, the ordinary wind is taken"
+        findings.append(Finding("warn", "heading.weather", text))
     for part in intervals_without_epoch(flight.time_s(heading.gnss_topic), known.intervals):
         text = f"interval to {part.use}, {part.start_s:g} to {part.end_s:g} s: no GNSS epoch in it"
         findings.append(Finding("warn", "heading.interval", text))

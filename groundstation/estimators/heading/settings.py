@@ -68,7 +68,7 @@ class HeadingSettings:
     precision_max_deg: float = number(0.05, 0.0)  # paper: e
     quality_max_deg: float = number(0.3, 0.0)  # paper
     half_width_max_deg: float = number(0.2, 0.0)  # of what this taxi shows: 20 arcmin is then more than three sigma
-    whole_half_width_max_deg: float = number(1.0 / 3.0, 0.0)  # steady sideslip and mounting in it: 20 arcmin
+    whole_half_width_max_deg: float = number(1.0 / 3.0, 0.0)  # steady sideslip in it: 20 arcmin
     whole_decides: bool = True  # whether the latter is required: nothing is accepted that steady terms may spoil
     skewness_max: float = number(0.5, 0.0)
     excess_kurtosis_range: tuple[float, float] = (-1.2, 2.0)
