@@ -147,6 +147,7 @@ def known_of(flight: Flight, configuration: Configuration) -> Known:
         aircraft=settings.aircraft,
         site=settings.site,
         settings=settings.analyses,
+        weather=configuration.weather,
     )
     try:
         return replace(known, intervals=_intervals(flight, configuration))
