@@ -73,7 +73,7 @@ def read(source: Source) -> Iterator[Item]:
     time = TimeRule("seconds", (1,), ("tow",)) if form.has_week else _CALENDAR
     rules = [Rule(at, RAW, name, "double") for at, name in enumerate(form.names) if at >= 2]
     rules += [Rule(0, RAW, "week", "double")] if form.has_week else []
-    table = TableReader(_Tabbed(source.path, form.first.next_byte), dialect, Layout(time, tuple(rules)))
+    table = TableReader(_Tabbed(source.path, source, form.first.next_byte), dialect, Layout(time, tuple(rules)))
     items = table.items(LogHeader(NAME, form.metadata, 0))
     yield next(items)
     yield from _remarks(form)
@@ -164,13 +164,14 @@ class _Tabs(io.RawIOBase):
 
 @dataclass(frozen=True)
 class _Tabbed(Source):
-    """A source whose rows are parted by tabs; ``first_byte`` is where they begin in the file."""
+    """Another source whose rows are parted by tabs; ``first_byte`` is where they begin in it."""
 
-    first_byte: int = 0
+    whole: Source
+    first_byte: int
 
     def open(self) -> BinaryIO:
         """The rows, from the first on."""
-        stream = super().open()
+        stream = self.whole.open()
         stream.seek(self.first_byte)
         return io.BufferedReader(_Tabs(stream))
 

@@ -63,6 +63,7 @@ def run_many(
     only_results: bool = False,
     timeout_s: float = math.inf,
     store: str = "",
+    strangers: Sequence[Path] = (),
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
     """Run logs and folders of logs into ``out``, then the sessions among the flights; the index lists all of them.
@@ -86,6 +87,8 @@ def run_many(
         A log, or a session, that takes longer has failed, and the process that ran it is ended.
     store : str
         ``delta:`` and a path or URL: a Delta table that takes the rows of these flights, too.
+    strangers : sequence of Path
+        Files that no reader claims: they are skipped, unless one goes on from a log.
 
     Returns
     -------
@@ -101,7 +104,8 @@ def run_many(
     ground = None if stations is None else load_stations(stations)
     if store:
         delta_place(store)
-    inputs = _inputs(paths, out, configuration)
+    odd = [FarLog(str(path), is_named=False, size=path.stat().st_size) for path in strangers]
+    inputs = tuple(sorted((*_inputs(paths, out, configuration, is_alone=not odd), *odd), key=lambda one: one.url))
     crew = _crew(scheduler, jobs or cores(), len(inputs), listen, timeout_s)
     painters = 1 if scheduler else painters_of(jobs or cores(), len(inputs))
     make = partial(
@@ -457,15 +461,17 @@ def _planned_sessions(asked: Asked, among: Scan, planned: Sequence[Outcome]) -> 
     return sessions
 
 
-def _inputs(paths: Sequence[Path | str], out: Path | str, configuration: Configuration) -> tuple[FarLog, ...]:
-    """Logs by path or URL, in a stable order."""
+def _inputs(
+    paths: Sequence[Path | str], out: Path | str, configuration: Configuration, *, is_alone: bool = True
+) -> tuple[FarLog, ...]:
+    """Logs by path or URL, in a stable order; there may be none where they do not stand alone."""
     near = [Path(path) for path in paths if not is_remote(str(path))]
     found = {log.url: log for path in paths if is_remote(str(path)) for log in far_logs(str(path))}
     judges = {path.resolve() for path in configuration.references.paths}  # in a folder they are no logs to run
     for one in collect(near, None if is_remote(str(out)) else Path(out)):
         if one.is_named or one.path.resolve() not in judges:
             found[str(one.path)] = FarLog(str(one.path), one.is_named, one.path.stat().st_size)
-    if not found:
+    if not found and is_alone:
         hint = "output of groundstation is no input" if any(path.is_dir() and is_ours(path) for path in near) else ""
         raise UsageError(", ".join(map(str, paths)), "no log in it", "", hint)
     return tuple(log for _, log in sorted(found.items()))
